@@ -1,0 +1,1 @@
+"""The blocks that ship with aloft: what computes. One block, one file."""

@@ -1,0 +1,1 @@
+"""The graphs that ship with aloft, as YAML files; this package only makes them findable."""

@@ -1,0 +1,1 @@
+"""What runs a graph: signals, blocks, loading, schedule, executor, clocks, test bench."""

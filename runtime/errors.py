@@ -1,0 +1,51 @@
+"""The errors of the runtime, one class a kind, and the exit codes of the command line."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+
+
+class ExitCode(IntEnum):
+    """What the process returns to the shell."""
+
+    SUCCESS = 0
+    """The graph ran and its own criteria hold."""
+    NOT_SUCCESSFUL = 1
+    """The graph ran to its end, but a criterion of its own failed (a fall, a missed target)."""
+    BAD_INPUT = 2
+    """The graph, an override or the command line is wrong; nothing moved."""
+    RUN_FAILED = 3
+    """A block failed, a signal was not finite or a deadline policy stopped the run."""
+    INTERRUPTED = 130
+    """SIGINT: stopped cleanly, the robot in damping."""
+    TERMINATED = 143
+    """SIGTERM: stopped cleanly, the robot in damping."""
+
+
+class AloftError(Exception):
+    """The base of every error that aloft raises on purpose."""
+
+
+class UnitError(AloftError, ValueError):
+    """A unit's text cannot be read, or two units have different dimensions."""
+
+
+class DeclarationError(AloftError, TypeError):
+    """A block or a signal is declared wrongly in Python."""
+
+
+class UnknownBlockError(AloftError, LookupError):
+    """No block has that name; the message names the nearest ones."""
+
+
+class BlockError(AloftError):
+    """A block cannot go on: raised by a block with a message for the user."""
+
+
+class RunError(AloftError):
+    """A run ended early: names the block, the tick and the reason."""
+
+    def __init__(self, message: str, *, block: str = "", tick: int = -1) -> None:
+        super().__init__(message)
+        self.block = block
+        self.tick = tick

@@ -1,0 +1,72 @@
+"""Parameters: what a graph may set on a block, checked and converted by pydantic.
+
+A parameter with a unit may be written as a bare number in that unit or as text with any unit of
+the same dimension: ``force: 70 N``, ``duration: 10 ms``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from .errors import UnitError
+from .units import parse_quantity
+
+
+def parameter(
+    default: Any = ...,
+    *,
+    text: str,
+    unit: str = "",
+    ge: float | None = None,
+    gt: float | None = None,
+    le: float | None = None,
+    lt: float | None = None,
+    min_length: int | None = None,
+    max_length: int | None = None,
+) -> Any:
+    """Declare a parameter: its default (none makes it required), unit, bounds and text."""
+    if default is not ... and isinstance(default, list):
+        value = default
+        return Field(
+            default_factory=lambda: list(value), description=text, ge=ge, gt=gt, le=le, lt=lt,
+            min_length=min_length, max_length=max_length, json_schema_extra={"unit": unit},
+        )  # fmt: skip
+    return Field(
+        default, description=text, ge=ge, gt=gt, le=le, lt=lt,
+        min_length=min_length, max_length=max_length, json_schema_extra={"unit": unit},
+        validate_default=default is not ...,
+    )  # fmt: skip
+
+
+def _convert(value: Any, unit: str) -> Any:
+    """``value`` with every text that starts with a number replaced by the number in ``unit``."""
+    if isinstance(value, str):
+        return parse_quantity(value, unit)
+    if isinstance(value, Sequence) and not isinstance(value, bytes):
+        return [_convert(item, unit) for item in value]
+    return value
+
+
+class Parameters(BaseModel):
+    """The base of every block's parameters: unknown keys are errors, values cannot be changed."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _read_quantities(cls, data: Any) -> Any:
+        if not isinstance(data, dict):
+            return data
+        converted = dict(data)
+        for name, info in cls.model_fields.items():
+            extra = info.json_schema_extra
+            unit = extra.get("unit", "") if isinstance(extra, dict) else ""
+            if name in converted and unit:
+                try:
+                    converted[name] = _convert(converted[name], str(unit))
+                except UnitError:
+                    continue  # left as text, so pydantic reports it at its own place
+        return converted

@@ -1,0 +1,152 @@
+"""Signals: fixed-layout records that travel on the wires of a graph.
+
+A signal is declared once as a class whose attributes are fields::
+
+    class ImuReading(Signal):
+        \"\"\"One sample of the inertial measurement unit.\"\"\"
+
+        angular_velocity = Field(3, unit="rad/s", frame="body", text="gyroscope")
+        specific_force = Field(3, unit="m/s^2", frame="body", text="accelerometer")
+
+On an instance that is bound to a graph's memory each field is a NumPy view of that memory, so
+reading and writing a signal copies nothing and allocates nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any, ClassVar, Self, overload
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .errors import DeclarationError
+from .units import Unit, parse_unit
+
+Dimension = int | str
+"""A size, or the name of one that the graph resolves."""
+
+DTYPES: Mapping[str, np.dtype[Any]] = {
+    "float64": np.dtype(np.float64),
+    "int64": np.dtype(np.int64),
+    "bool": np.dtype(np.bool_),
+}
+"""The element types a field may have. Floats are checked for finiteness on every tick."""
+
+
+class Field:
+    """One named array of a signal.
+
+    Args:
+        shape: sizes, or names of dimensions such as ``"n_joints"``; ``()`` is a scalar.
+        unit: the physical unit as text (``"rad/s"``), ``""`` for dimensionless, ``None`` where a
+            field mixes units and is not checked.
+        frame: the coordinate frame the numbers are expressed in (``"world"``, ``"body"``), or
+            ``None`` where that has no meaning.
+        dtype: ``"float64"``, ``"int64"`` or ``"bool"``.
+        text: one line on what the field is.
+
+    Raises:
+        DeclarationError: the dtype or the unit is unknown, or a size is not positive.
+    """
+
+    def __init__(
+        self,
+        shape: Dimension | tuple[Dimension, ...] = (),
+        *,
+        unit: str | None = None,
+        frame: str | None = None,
+        dtype: str = "float64",
+        text: str = "",
+    ) -> None:
+        self.shape: tuple[Dimension, ...] = shape if isinstance(shape, tuple) else (shape,)
+        if dtype not in DTYPES:
+            raise DeclarationError(f"dtype {dtype!r} is not one of {', '.join(DTYPES)}")
+        for size in self.shape:
+            if isinstance(size, int) and size < 1:
+                raise DeclarationError(f"shape {self.shape} has a size below 1")
+        self.dtype_name = dtype
+        self.dtype = DTYPES[dtype]
+        self.unit: Unit | None = None if unit is None else parse_unit(unit)
+        self.frame = frame
+        self.text = text
+        self.name = ""
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self.name = name
+
+    # A field is a non-data descriptor: on a bound signal the view in the instance's own
+    # dictionary wins at full speed, and this method is only what tells a type checker so.
+    @overload
+    def __get__(self, instance: None, owner: type) -> Field: ...
+    @overload
+    def __get__(self, instance: Signal, owner: type) -> NDArray[Any]: ...
+    def __get__(self, instance: Signal | None, owner: type) -> Field | NDArray[Any]:
+        if instance is None:
+            return self
+        raise AttributeError(f"{owner.__name__}.{self.name} is not bound to memory")
+
+    def resolve(self, dimensions: Mapping[str, int]) -> tuple[int, ...]:
+        """The shape in numbers.
+
+        Raises:
+            KeyError: a dimension's name is not in ``dimensions``.
+        """
+        return tuple(size if isinstance(size, int) else dimensions[size] for size in self.shape)
+
+    def describe(self) -> str:
+        """The field's type in one line, e.g. ``float64[n_joints] rad``."""
+        shape = f"[{', '.join(map(str, self.shape))}]" if self.shape else ""
+        unit = f" {self.unit}" if self.unit is not None else ""
+        frame = f" in {self.frame}" if self.frame else ""
+        return f"{self.dtype_name}{shape}{unit}{frame}"
+
+
+class Signal:
+    """The base of all signals; see the module's text. Instances are made by the runtime."""
+
+    fields: ClassVar[Mapping[str, Field]] = {}
+
+    def __init_subclass__(cls, **kwargs: Any) -> None:
+        super().__init_subclass__(**kwargs)
+        own = {name: value for name, value in vars(cls).items() if isinstance(value, Field)}
+        cls.fields = {**cls.fields, **own}
+
+    @classmethod
+    def bind(cls, views: Mapping[str, NDArray[Any]]) -> Self:
+        """An instance whose fields are the given arrays, themselves not copied."""
+        signal = cls.__new__(cls)
+        signal.__dict__.update(views)
+        return signal
+
+    @classmethod
+    def allocate(cls, dimensions: Mapping[str, int] | None = None) -> Self:
+        """A free-standing zeroed instance with memory of its own, for tests and tools."""
+        sizes = dimensions or {}
+        return cls.bind({n: np.zeros(f.resolve(sizes), f.dtype) for n, f in cls.fields.items()})
+
+    def views(self) -> Mapping[str, NDArray[Any]]:
+        """The arrays by field name, in the order of declaration."""
+        return {name: self.__dict__[name] for name in type(self).fields}
+
+    def __iter__(self) -> Iterator[tuple[str, NDArray[Any]]]:
+        return iter(self.views().items())
+
+    def __repr__(self) -> str:
+        inner = ", ".join(f"{n}={v.tolist()}" for n, v in self.views().items())
+        return f"{type(self).__name__}({inner})"
+
+
+@dataclass(frozen=True)
+class Slot:
+    """Where one field lies: in which section of a buffer, from which element on, how shaped."""
+
+    section: str
+    start: int
+    shape: tuple[int, ...]
+
+    @property
+    def size(self) -> int:
+        """The number of elements."""
+        return int(np.prod(self.shape, dtype=np.int64)) if self.shape else 1

@@ -1,0 +1,187 @@
+"""Physical units as SI exponents and a scale, parsed from text such as ``N m`` or ``rad/s``.
+
+A unit is checked when a graph is loaded and never touched while it runs. Angles are dimensionless
+in SI, but a graph that feeds radians where metres are meant is wrong, so ``rad`` keeps an exponent
+of its own.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass
+from functools import lru_cache
+
+from .errors import UnitError
+
+BASE_UNITS = ("m", "kg", "s", "A", "K", "mol", "cd", "rad")
+"""The order of the exponents: the seven SI base units and the plane angle."""
+
+
+@dataclass(frozen=True)
+class Unit:
+    """A physical unit: ``scale`` times the product of the base units to their ``exponents``."""
+
+    exponents: tuple[int, ...]
+    scale: float
+    text: str
+
+    def __mul__(self, other: Unit) -> Unit:
+        exponents = tuple(a + b for a, b in zip(self.exponents, other.exponents, strict=True))
+        return Unit(exponents, self.scale * other.scale, f"{self.text} {other.text}".strip())
+
+    def __pow__(self, power: int) -> Unit:
+        return Unit(
+            tuple(e * power for e in self.exponents), self.scale**power, f"{self.text}^{power}"
+        )
+
+    def same_dimension(self, other: Unit) -> bool:
+        """Whether a value in one unit can be converted to the other."""
+        return self.exponents == other.exponents
+
+    def matches(self, other: Unit) -> bool:
+        """Whether a value means the same in both units, with no conversion."""
+        return self.same_dimension(other) and math.isclose(self.scale, other.scale, rel_tol=1e-12)
+
+    def factor_to(self, other: Unit) -> float:
+        """The factor that converts a value in this unit to ``other``.
+
+        Raises:
+            UnitError: the two have different dimensions.
+        """
+        if not self.same_dimension(other):
+            raise UnitError(f"cannot convert {self.text!r} to {other.text!r}")
+        return self.scale / other.scale
+
+    def __str__(self) -> str:
+        return self.text or "1"
+
+
+def _base(index: int | None, scale: float = 1.0) -> Unit:
+    exponents = tuple(1 if k == index else 0 for k in range(len(BASE_UNITS)))
+    return Unit(exponents, scale, "")
+
+
+def _derived(scale: float = 1.0, **exponents: int) -> Unit:
+    return Unit(tuple(exponents.get(name, 0) for name in BASE_UNITS), scale, "")
+
+
+_SYMBOLS: dict[str, Unit] = {
+    **{name: _base(k) for k, name in enumerate(BASE_UNITS)},
+    "1": _base(None),
+    "g": _derived(1e-3, kg=1),
+    "mm": _derived(1e-3, m=1),
+    "cm": _derived(1e-2, m=1),
+    "km": _derived(1e3, m=1),
+    "ms": _derived(1e-3, s=1),
+    "us": _derived(1e-6, s=1),
+    "ns": _derived(1e-9, s=1),
+    "min": _derived(60.0, s=1),
+    "deg": _derived(math.pi / 180, rad=1),
+    "mrad": _derived(1e-3, rad=1),
+    "rev": _derived(2 * math.pi, rad=1),
+    "rpm": _derived(2 * math.pi / 60, rad=1, s=-1),
+    "dps": _derived(math.pi / 180, rad=1, s=-1),
+    "Hz": _derived(s=-1),
+    "kHz": _derived(1e3, s=-1),
+    "N": _derived(kg=1, m=1, s=-2),
+    "kN": _derived(1e3, kg=1, m=1, s=-2),
+    "J": _derived(kg=1, m=2, s=-2),
+    "W": _derived(kg=1, m=2, s=-3),
+    "Pa": _derived(kg=1, m=-1, s=-2),
+    "V": _derived(kg=1, m=2, s=-3, A=-1),
+    "mA": _derived(1e-3, A=1),
+    "ohm": _derived(kg=1, m=2, s=-3, A=-2),
+    "%": _derived(1e-2),
+}
+
+_TOKEN = re.compile(
+    r"\s*(?:(?P<symbol>[A-Za-z%]+|1)(?:\s*(?:\^|\*\*)\s*(?P<power>[+-]?\d+))?|(?P<op>[*/·()]))"
+)
+_QUANTITY = re.compile(r"^\s*(?P<number>[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(?P<unit>.*)$")
+
+
+@lru_cache(maxsize=512)
+def parse_unit(text: str) -> Unit:
+    """The unit that ``text`` names.
+
+    A space or ``*`` multiplies; ``/`` divides by the one factor or bracket behind it; ``^`` raises
+    to an integer power. The empty text and ``1`` are dimensionless.
+
+    Raises:
+        UnitError: the text is not a product of known symbols.
+    """
+    tokens: list[tuple[str, int] | str] = []
+    position = 0
+    stripped = text.strip()
+    while position < len(stripped):
+        match = _TOKEN.match(stripped, position)
+        if match is None or match.end() == position:
+            raise UnitError(f"cannot read unit {text!r} at {stripped[position:]!r}")
+        position = match.end()
+        if match["op"]:
+            tokens.append("*" if match["op"] == "·" else match["op"])
+        else:
+            tokens.append((match["symbol"], int(match["power"] or 1)))
+    unit, rest = _product(tokens, text)
+    if rest:
+        raise UnitError(f"cannot read unit {text!r}: unexpected ')'")
+    return Unit(unit.exponents, unit.scale, "" if stripped == "1" else stripped)
+
+
+def _product(
+    tokens: list[tuple[str, int] | str], text: str
+) -> tuple[Unit, list[tuple[str, int] | str]]:
+    """Read factors up to the end or the closing bracket; return the product and what is left."""
+    result = _base(None)
+    sign = 1
+    pending = False  # an operator that still waits for its factor
+    while tokens:
+        token, tokens = tokens[0], tokens[1:]
+        if token == ")":
+            if pending:
+                raise UnitError(f"cannot read unit {text!r}: nothing behind an operator")
+            return result, [token, *tokens]
+        if token == "(":
+            factor, tokens = _product(tokens, text)
+            if not tokens:
+                raise UnitError(f"cannot read unit {text!r}: a bracket is not closed")
+            tokens = tokens[1:]
+        elif isinstance(token, str):
+            if pending:
+                raise UnitError(f"cannot read unit {text!r}: two operators in a row")
+            sign, pending = (-1 if token == "/" else 1), True
+            continue
+        else:
+            symbol, power = token
+            if symbol not in _SYMBOLS:
+                raise UnitError(f"cannot read unit {text!r}: unknown symbol {symbol!r}")
+            factor = _SYMBOLS[symbol] ** power
+        result = result * factor**sign
+        sign, pending = 1, False
+    if pending:
+        raise UnitError(f"cannot read unit {text!r}: nothing behind an operator")
+    return result, []
+
+
+def parse_quantity(text: str, unit: str) -> float:
+    """The value of a text such as ``70 N`` or ``10 ms`` in ``unit``; a bare number is taken as is.
+
+    Raises:
+        UnitError: there is no number, or its unit has another dimension.
+    """
+    match = _QUANTITY.match(text)
+    if match is None:
+        raise UnitError(f"cannot read {text!r} as a number with a unit")
+    number = float(match["number"])
+    if not match["unit"].strip():
+        return number
+    found, expected = parse_unit(match["unit"]), parse_unit(unit)
+    if not found.same_dimension(expected):
+        raise UnitError(f"{text!r} is not in {expected}")
+    return number * found.factor_to(expected)
+
+
+def known_symbols() -> list[str]:
+    """Every unit symbol that ``parse_unit`` knows, sorted."""
+    return sorted(_SYMBOLS)
