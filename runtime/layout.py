@@ -1,0 +1,113 @@
+"""Where every field of every signal lies in one buffer: pure arithmetic, no memory.
+
+A buffer has three sections, ``float64``, ``int64`` and ``bool``, each starting at a multiple of 64
+bytes and packed inside. Floats come first so that one call checks them all for finiteness.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from .errors import DeclarationError
+from .signals import DTYPES, Signal, Slot
+
+ALIGNMENT = 64
+"""Bytes: a cache line, and what the widest vector instructions like."""
+
+
+@dataclass(frozen=True)
+class PortLayout:
+    """A port that needs memory: its full name ``block.port``, its signal and its dimensions."""
+
+    name: str
+    signal: type[Signal]
+    dimensions: Mapping[str, int]
+
+
+@dataclass(frozen=True)
+class Layout:
+    """The slots of a buffer by ``block.port.field``, and its sections."""
+
+    slots: Mapping[str, Slot]
+    lengths: Mapping[str, int]
+    """Elements by section."""
+    offsets: Mapping[str, int]
+    """Bytes from the buffer's start by section."""
+    size: int
+    """Bytes of the whole buffer, a multiple of 64."""
+
+    @classmethod
+    def of(cls, ports: Iterable[PortLayout]) -> Layout:
+        """Lay out all fields of ``ports``, in their order, section by section.
+
+        Raises:
+            DeclarationError: a field's dimension has no size, or two ports have one name.
+        """
+        slots: dict[str, Slot] = {}
+        lengths = dict.fromkeys(DTYPES, 0)
+        for port in ports:
+            for name, field in port.signal.fields.items():
+                full_name = f"{port.name}.{name}"
+                if full_name in slots:
+                    raise DeclarationError(f"{full_name} is laid out twice")
+                try:
+                    shape = field.resolve(port.dimensions)
+                except KeyError as missing:
+                    raise DeclarationError(
+                        f"{full_name} ({field.describe()}): dimension {missing} has no size; "
+                        f"known are {', '.join(sorted(port.dimensions)) or 'none'}. Give it under "
+                        "'dimensions', through a robot, or as an integer parameter of the block"
+                    ) from None
+                slot = Slot(field.dtype_name, lengths[field.dtype_name], shape)
+                slots[full_name] = slot
+                lengths[field.dtype_name] += slot.size
+        offsets: dict[str, int] = {}
+        size = 0
+        for section, length in lengths.items():
+            offsets[section] = size
+            size += -(-length * DTYPES[section].itemsize // ALIGNMENT) * ALIGNMENT
+        return cls(slots, lengths, offsets, size)
+
+    def locate(self, section: str, index: int) -> str:
+        """The name of one element of a section, ``block.port.field[index]``.
+
+        Raises:
+            IndexError: the section has no such element.
+        """
+        names = [name for name, slot in self.slots.items() if slot.section == section]
+        if not 0 <= index < self.lengths[section]:
+            raise IndexError(f"section {section} has {self.lengths[section]} elements, not {index}")
+        starts = [self.slots[name].start for name in names]
+        name = names[bisect_right(starts, index) - 1]
+        slot = self.slots[name]
+        place = np.unravel_index(index - slot.start, slot.shape) if slot.shape else ()
+        return name + (f"[{', '.join(str(int(i)) for i in place)}]" if slot.shape else "")
+
+    def byte_range(self, name: str) -> tuple[int, int]:
+        """First byte and one past the last of a slot. Raises ``KeyError``."""
+        slot = self.slots[name]
+        item = DTYPES[slot.section].itemsize
+        start = self.offsets[slot.section] + slot.start * item
+        return start, start + slot.size * item
+
+    def view(self, rows: np.ndarray[Any, Any], name: str) -> np.ndarray[Any, Any]:
+        """One slot of a buffer, or of many recorded ones.
+
+        Args:
+            rows: uint8 of shape (size,) or (n, size).
+            name: ``block.port.field``.
+
+        Returns:
+            The field, shape (...) or (n, ...); not a copy where memory allows it.
+        """
+        slot = self.slots[name]
+        first, last = self.byte_range(name)
+        part = rows[..., first:last]
+        if not part.flags.c_contiguous:
+            part = np.ascontiguousarray(part)
+        return part.view(DTYPES[slot.section]).reshape(*rows.shape[:-1], *slot.shape)

@@ -1,0 +1,156 @@
+"""A bench to test any block by itself: set its inputs, step it, read its outputs and state."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from types import TracebackType
+from typing import Any, Generic, Self, TypeVar
+
+import numpy as np
+
+from ..block import Block, Clock, Context
+from ..description import RobotDescription, find_robot
+from ..memory import Memory, Snapshot
+from ..parameters import Parameters
+from ..signals import Signal
+from ..stages import BlockSpec
+
+B = TypeVar("B", bound=Block)
+
+
+class BlockBench(Generic[B]):
+    """One block with memory of its own, set up and started.
+
+    Args:
+        block_type: the block's class.
+        params: its parameters as a graph file would give them, or a ready object.
+        robot: a robot's name, a description, or nothing.
+        rate: how often the block runs [Hz]; one step is one tick.
+        dimensions: named sizes; they win over the robot's, and the block's own win over them.
+        wired: which inputs the block is told are wired; all by default. The others read their
+            defaults and cannot be set.
+
+    Example::
+
+        bench = BlockBench(Gain, {"gain": 2.0, "n": 3})
+        bench.set("u", value=[1.0, 2.0, 3.0])
+        bench.step()
+        assert bench.get("y").value.tolist() == [2.0, 4.0, 6.0]
+    """
+
+    def __init__(
+        self,
+        block_type: type[B],
+        params: Mapping[str, Any] | Parameters | None = None,
+        *,
+        robot: str | RobotDescription | None = None,
+        rate: float = 500.0,
+        dimensions: Mapping[str, int] | None = None,
+        wired: Iterable[str] | None = None,
+    ) -> None:
+        description = find_robot(robot) if isinstance(robot, str) else robot
+        if not isinstance(params, Parameters):
+            params = block_type.Params.model_validate(dict(params or {}))
+        sizes = {
+            **(description.dimensions if description else {}),
+            **(dimensions or {}),
+            **block_type.local_dimensions(params, description),
+        }
+        names = tuple(block_type.inputs) if wired is None else tuple(wired)
+        for name in names:
+            if name not in block_type.inputs:
+                raise KeyError(f"{block_type.__name__} has no input {name!r}")
+        spec = BlockSpec("block", block_type, params, {}, sizes)
+        self.clock = Clock(1.0 / rate)
+        self.memory = Memory([spec], description)
+        self.block: B = block_type(
+            params,
+            Context("block", self.clock, 1, 0, dimensions=sizes, robot=description, wired=names),
+        )
+        self.memory.bind(self.block, spec)
+        self._is_moore = block_type.is_moore()
+        self._settable: dict[str, Signal] = {
+            name: self.memory.bus.signal(block_type.inputs[name].signal, f"block.{name}")
+            for name in names
+        }
+        self._settable.update({name: getattr(self.block, name) for name in block_type.states})
+        self.block.setup()
+        self.block.start()
+
+    def set(self, port: str, /, **fields: Any) -> None:
+        """Write fields of a wired input or a state; a single number fills a whole field.
+
+        Raises:
+            KeyError: there is no such wired input or state, or no such field.
+            ValueError: a value has another shape than the field.
+        """
+        if port not in self._settable:
+            raise KeyError(
+                f"{port!r} cannot be set; there is {', '.join(self._settable) or 'nothing'}"
+            )
+        views = self._settable[port].views()
+        for name, value in fields.items():
+            if name not in views:
+                raise KeyError(f"{port} has no field {name!r}; it has {', '.join(views)}")
+            if np.shape(value) not in ((), views[name].shape):
+                raise ValueError(
+                    f"{port}.{name} has shape {views[name].shape}, not {np.shape(value)}"
+                )
+            views[name][...] = value
+
+    def get(self, port: str) -> Any:
+        """The signal of an output, an input or a state: views, which the next step changes.
+
+        Raises:
+            KeyError: there is no such port.
+        """
+        kind = type(self.block)
+        if port not in {**kind.inputs, **kind.outputs, **kind.states}:
+            raise KeyError(f"{kind.__name__} has no port {port!r}")
+        return getattr(self.block, port)
+
+    def step(self, ticks: int = 1) -> None:
+        """Run the block once a tick: ``step``, or ``emit`` and then ``update``.
+
+        After a step of a Moore block its outputs are what ``emit`` wrote before ``update``; call
+        ``bench.block.emit()`` to see what the new state says.
+        """
+        block: Any = self.block
+        for _ in range(ticks):
+            if self._is_moore:
+                block.emit()
+                block.update()
+            else:
+                block.step()
+            self.clock.tick += 1
+
+    @property
+    def stop_reason(self) -> str | None:
+        """Why the block asked for the run to end, if it did."""
+        return self.clock.stop_reason
+
+    def snapshot(self) -> Snapshot:
+        """Everything the block remembers, its ports and the tick."""
+        self.block.freeze()
+        return self.memory.snapshot(self.clock.tick)
+
+    def restore(self, snapshot: Snapshot) -> None:
+        """Go back to a snapshot."""
+        self.memory.restore(snapshot)
+        self.clock.tick = snapshot.tick
+        self.block.thaw()
+
+    def close(self) -> None:
+        """Close the block; also at the end of a ``with``."""
+        self.block.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
