@@ -97,6 +97,7 @@ class DynamicsTerms(Signal):
     angular_momentum = Field(3, unit="N m s", frame="world", text="k: about the com")
     centroidal_matrix = Field((6, "n_velocities"), frame="world", text="centroidal momentum matrix")
     centroidal_drift = Field(6, frame="world", text="momentum rate at qdd = 0")
+    base_position = Field(3, unit="m", frame="world", text="base origin")
     base_rotation = Field((3, 3), unit="", text="rotation matrix from body to world")
     foot_position = Field(("n_feet", 3), unit="m", frame="world", text="sole centres")
     foot_rotation = Field(("n_feet", 3, 3), unit="", text="rotations from foot to world")
