@@ -107,7 +107,7 @@ class JumpReference(Signal):
     """A planned jump at the present instant; positions relative to where the robot stood."""
 
     time = Field(unit="s", text="time since the plan began")
-    phase = Field(dtype="int64", text="planned phase, see Phase")
+    phase = Field(dtype="int64", values=Phase, text="planned phase, see Phase")
     lift_off_time = Field(unit="s", text="planned lift-off in plan time")
     touchdown_time = Field(unit="s", text="planned touchdown in plan time")
     com = Field(3, unit="m", frame="world", text="centre of mass")
@@ -128,7 +128,7 @@ class JumpReference(Signal):
 class PhaseState(Signal):
     """The phase the robot is really in, by plan time and measured contact."""
 
-    phase = Field(dtype="int64", text="see Phase")
+    phase = Field(dtype="int64", values=Phase, text="see Phase")
     time_in_phase = Field(unit="s", text="time since the phase began")
     time_to_touchdown = Field(unit="s", text="predicted; zero outside flight")
     time_since_touchdown = Field(unit="s", text="zero before the first touchdown")
@@ -177,7 +177,7 @@ class WholeBodyCommand(Signal):
 class JointCommand(Signal):
     """What the drives execute: mode, feedforward torque, joint targets and gains."""
 
-    mode = Field(dtype="int64", text="see CommandMode")
+    mode = Field(dtype="int64", values=CommandMode, text="see CommandMode")
     torque = Field("n_joints", unit="N m", text="feedforward joint torques")
     position = Field("n_joints", unit="rad", text="joint angle targets")
     velocity = Field("n_joints", unit="rad/s", text="joint velocity targets")

@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from enum import IntEnum
 from typing import Any, ClassVar, Self, overload
 
 import numpy as np
@@ -46,6 +47,7 @@ class Field:
             ``None`` where that has no meaning.
         dtype: ``"float64"``, ``"int64"`` or ``"bool"``.
         text: one line on what the field is.
+        values: what the numbers of an ``"int64"`` field stand for; shown by name in recordings.
 
     Raises:
         DeclarationError: the dtype or the unit is unknown, or a size is not positive.
@@ -59,6 +61,7 @@ class Field:
         frame: str | None = None,
         dtype: str = "float64",
         text: str = "",
+        values: type[IntEnum] | None = None,
     ) -> None:
         self.shape: tuple[Dimension, ...] = shape if isinstance(shape, tuple) else (shape,)
         if dtype not in DTYPES:
@@ -71,6 +74,7 @@ class Field:
         self.unit: Unit | None = None if unit is None else parse_unit(unit)
         self.frame = frame
         self.text = text
+        self.values = values
         self.name = ""
 
     def __set_name__(self, owner: type, name: str) -> None:
