@@ -1,0 +1,52 @@
+# Everything starts here. Needs git, make and Python 3.11 to 3.14; all else goes into .venv.
+#
+#   make jump    set up, let BRUCE jump, write the recording
+#   make test    set up, run all tests
+#
+# PYTHON=/path/to/python chooses the interpreter; by default the first that will do is taken.
+
+VENV := .venv
+BIN := $(VENV)/bin
+READY := $(VENV)/ready
+RECORDING := recordings/jump.rrd
+# One thread for each test process: the workers already take every core.
+SINGLE := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
+
+.PHONY: setup jump test lint format bench clean help
+
+help:  ## list the targets
+	@sed -n 's/^\([a-z]*\):.*##/\1:/p' $(MAKEFILE_LIST)
+
+setup: $(READY)  ## create .venv with everything
+
+$(READY): pyproject.toml scripts/find_python.sh
+	@python="$$(sh scripts/find_python.sh $(PYTHON))" && \
+	echo "setting up $(VENV) with $$python (a few minutes the first time)" && \
+	"$$python" -m venv $(VENV)
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --upgrade 'pip>=25.1'
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable . --group dev
+	@touch $@
+
+jump: $(READY)  ## run graphs/jump.yaml and write recordings/jump.rrd
+	@$(BIN)/aloft run graphs/jump.yaml --record $(RECORDING)
+	@echo "to see it: $(BIN)/rerun $(RECORDING)"
+
+test: $(READY)  ## run all tests
+	@$(SINGLE) $(BIN)/python -m pytest --numprocesses auto
+
+lint: $(READY)  ## check style and types
+	@$(BIN)/ruff check .
+	@$(BIN)/ruff format --check .
+	@$(BIN)/mypy .
+
+format: $(READY)  ## rewrite the files in the project's style
+	@$(BIN)/ruff check --fix .
+	@$(BIN)/ruff format .
+
+bench: $(READY)  ## run all benchmarks
+	@$(SINGLE) $(BIN)/aloft bench
+
+clean:  ## remove all that these targets made
+	rm -rf $(VENV) build dist *.egg-info recordings
+	rm -rf .mypy_cache .pytest_cache .ruff_cache .hypothesis
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +

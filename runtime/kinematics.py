@@ -1,0 +1,99 @@
+"""Where the links of a robot are: forward kinematics from its description, for many instants.
+
+For pictures and tests, not for control: plain NumPy, vectorised over the instants and
+independent of the libraries that the controller and the simulator use.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .description import Joint, RobotDescription
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class LinkPoses:
+    """Link frames in the world at ``n`` instants, links in the order of the description.
+
+    ``position`` [m] is (n, n_links, 3), ``rotation`` from link to world (n, n_links, 3, 3).
+    """
+
+    names: tuple[str, ...]
+    position: Array
+    rotation: Array
+
+    def of(self, link: str) -> tuple[Array, Array]:
+        """The position (n, 3) and rotation (n, 3, 3) of one link. Raises ``ValueError``."""
+        index = self.names.index(link)
+        return self.position[:, index], self.rotation[:, index]
+
+
+def matrices_of_quaternions(quaternions: Array) -> Array:
+    """Rotation matrices (n, 3, 3) of unit quaternions x, y, z, w (n, 4)."""
+    x, y, z, w = np.moveaxis(quaternions, -1, 0)
+    rows = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+    ]
+    return np.moveaxis(np.array(rows), -1, 0)
+
+
+def rotations_about(axis: tuple[float, float, float], angles: Array) -> Array:
+    """Rotation matrices (n, 3, 3) by ``angles`` [rad] (n,) about a unit axis (Rodrigues)."""
+    x, y, z = axis
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    sine, cosine = np.sin(angles)[:, None, None], np.cos(angles)[:, None, None]
+    return np.eye(3) + sine * cross + (1.0 - cosine) * (cross @ cross)
+
+
+def from_base_outwards(robot: RobotDescription) -> list[tuple[int, Joint]]:
+    """The joints with their index, each behind the one that carries its parent link.
+
+    Raises:
+        ValueError: some joints do not hang on the base.
+    """
+    reached = {robot.base}
+    remaining = list(enumerate(robot.joints))
+    ordered: list[tuple[int, Joint]] = []
+    while remaining:
+        ready = [(k, joint) for k, joint in remaining if joint.parent in reached]
+        if not ready:
+            names = ", ".join(joint.name for _, joint in remaining)
+            raise ValueError(f"joints {names} are not connected to the base {robot.base!r}")
+        ordered += ready
+        reached |= {joint.child for _, joint in ready}
+        remaining = [(k, joint) for k, joint in remaining if joint.child not in reached]
+    return ordered
+
+
+def link_poses(
+    robot: RobotDescription, base_position: Array, base_orientation: Array, joint_position: Array
+) -> LinkPoses:
+    """The pose of every link.
+
+    Args:
+        robot: the description; all its frames are parallel to the base's at the zero pose.
+        base_position: base origin in the world [m], (n, 3).
+        base_orientation: unit quaternions x, y, z, w from base to world, (n, 4).
+        joint_position: joint angles [rad], (n, n_joints), in the order of the description.
+    """
+    names = tuple(link.name for link in robot.links)
+    index = {name: k for k, name in enumerate(names)}
+    instants = len(base_position)
+    position = np.zeros((instants, len(names), 3))
+    rotation = np.zeros((instants, len(names), 3, 3))
+    position[:, index[robot.base]] = base_position
+    rotation[:, index[robot.base]] = matrices_of_quaternions(base_orientation)
+    for k, joint in from_base_outwards(robot):
+        parent, child = index[joint.parent], index[joint.child]
+        offset = np.array(joint.origin)
+        position[:, child] = position[:, parent] + rotation[:, parent] @ offset
+        turn = rotations_about(joint.axis, joint_position[:, k])
+        rotation[:, child] = rotation[:, parent] @ turn
+    return LinkPoses(names, position, rotation)
