@@ -1,0 +1,124 @@
+"""The block behind a delayed wire: ``delay: k`` in a graph file becomes one of these."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .block import Block, Input, Output, State
+from .errors import BlockError
+from .parameters import Parameters, parameter
+from .signals import Field, Signal
+
+
+class DelayParameters(Parameters):
+    """The parameters of every delay."""
+
+    initial: Mapping[str, Any] = parameter(
+        {}, text="what the first runs emit, by field: a number or nested lists; otherwise zero"
+    )
+
+
+class RingPosition(Signal):
+    """Where a ring buffer stands."""
+
+    oldest = Field(dtype="int64", text="index of the entry that is emitted next")
+
+
+class Delay(Block):
+    """The input of k runs ago: y[n] = u[n - k], and the initial values for the first k runs.
+
+    Runs count at the block's own rate, which for a delayed wire is that of the source's block. A
+    Moore block, so it breaks a loop. It interpolates nothing. Subclasses made by
+    ``delay_block_type`` fix the signal and k.
+
+    Raises:
+        BlockError: an initial value names no field of the signal, or has another shape.
+    """
+
+    Params = DelayParameters
+    params: DelayParameters
+    ring_position = State(RingPosition, text="place in the ring buffer")
+
+    def setup(self) -> None:
+        """Fill the ring with the initial values and take a view of each entry."""
+        ports: Mapping[str, Any] = self.__dict__
+        source, target, ring = (dict(ports[n].views()) for n in ("u", "y", "past"))
+        shapes = {name: view.shape for name, view in target.items()}
+        for problem in initial_problems(shapes, self.params.initial):
+            raise BlockError(problem)
+        for name, value in self.params.initial.items():
+            ring[name][...] = value
+            target[name][...] = value  # what a reader sees before the first run, with an offset
+        self._length: int = next(iter(ring.values())).shape[0]
+        # entry by entry, so that a tick indexes no array and thus makes none
+        self._entries: list[list[NDArray[Any]]] = [
+            [ring[name][i : i + 1].reshape(target[name].shape) for name in target]
+            for i in range(self._length)
+        ]
+        self._source = list(source.values())
+        self._target = list(target.values())
+
+    def emit(self) -> None:
+        """Write the oldest entry."""
+        oldest = self._entries[self.ring_position.oldest.item()]
+        for target, entry in zip(self._target, oldest, strict=True):
+            np.copyto(target, entry)
+
+    def update(self) -> None:
+        """Put the input in the place of the oldest entry."""
+        position = self.ring_position.oldest.item()
+        for entry, source in zip(self._entries[position], self._source, strict=True):
+            np.copyto(entry, source)
+        self.ring_position.oldest[()] = (position + 1) % self._length
+
+
+def initial_problems(
+    shapes: Mapping[str, tuple[int, ...]], initial: Mapping[str, Any]
+) -> list[str]:
+    """What is wrong with a delay's initial values for fields of those shapes, one text each."""
+    problems = []
+    for name, value in initial.items():
+        if name not in shapes:
+            problems.append(f"initial: no field {name!r}; there is {', '.join(shapes)}")
+            continue
+        try:
+            array = np.asarray(value, np.float64)
+        except (TypeError, ValueError):
+            problems.append(f"initial.{name}: {value!r} is not a number or an array of numbers")
+            continue
+        if array.shape not in ((), shapes[name]):
+            problems.append(
+                f"initial.{name} has shape {array.shape}, expected {shapes[name]} or one number"
+            )
+        elif not np.isfinite(array).all():
+            problems.append(f"initial.{name}: {value!r} is not finite")
+    return problems
+
+
+@lru_cache(maxsize=256)
+def delay_block_type(signal: type[Signal], k: int) -> type[Delay]:
+    """The block type that delays ``signal`` by ``k`` >= 1 runs: input ``u``, output ``y``."""
+    if k < 1:
+        raise ValueError(f"a delay is at least 1 run, not {k}")
+    entries = {
+        name: Field((k, *field.shape), dtype=field.dtype_name, frame=field.frame, text=field.text)
+        for name, field in signal.fields.items()
+    }
+    past = type(
+        f"Past{signal.__name__}{k}", (Signal,), {"__doc__": "Entries of a ring.", **entries}
+    )
+    return type(
+        f"Delay{signal.__name__}{k}",
+        (Delay,),
+        {
+            "__doc__": Delay.__doc__,
+            "u": Input(signal, text="what is delayed"),
+            "y": Output(signal, text=f"the input {k} runs ago"),
+            "past": State(past, text="the last inputs"),
+        },
+    )
