@@ -224,7 +224,7 @@ def inverse(
         )  # fmt: skip
     cos_t, sin_t = math.cos(thigh), math.sin(thigh)
     xx, xy, xz = cos_t * fx + sin_t * ux, cos_t * fy + sin_t * uy, cos_t * fz + sin_t * uz
-    zx, zy, zz = cos_t * ux - sin_t * fx, cos_t * uy - sin_t * fy, cos_t * uz - sin_t * fz
+    zx, zy = cos_t * ux - sin_t * fx, cos_t * uy - sin_t * fy
 
     # The thigh's axes are yaw, then pitch, then roll. Of the two answers for yaw the one with the
     # roll below a right angle; in gimbal lock the present yaw, and roll takes up the rest.

@@ -148,7 +148,7 @@ def test_small_steps_of_the_target_are_small_steps_of_the_joints(side, x, y, z, 
             math.sin(slope),
         ]
     )
-    sole = leg.hip + [x, y, z]
+    sole = leg.hip + np.array([x, y, z])
     first, _ = inverse(leg, sole, line)
     second, _ = inverse(leg, sole + 1e-8, line)
     assert np.abs(second - first).max() < 1e-4
