@@ -1,0 +1,39 @@
+"""What the single numbers of a field are called in legends: joints, contact points, axes."""
+
+from __future__ import annotations
+
+from itertools import product
+
+from ..runtime.description import RobotDescription
+from ..runtime.signals import Field
+
+MOST_NAMES = 24
+"""Legends longer than this help nobody."""
+
+
+def names_along(size: int | str, length: int, robot: RobotDescription | None) -> list[str]:
+    """The names along one axis of a field: the robot's own for its dimensions, x y z for three."""
+    if robot is not None:
+        parts = {
+            "n_joints": robot.joints,
+            "n_contacts": robot.contacts,
+            "n_feet": robot.feet,
+        }.get(str(size), ())
+        if parts:
+            return [part.name for part in parts]
+    if length in (3, 4):
+        return list("xyzw"[:length])
+    return [str(k) for k in range(length)]
+
+
+def element_names(
+    field: Field, shape: tuple[int, ...], robot: RobotDescription | None
+) -> list[str]:
+    """One name for every element in C order, or none at all where there would be too many."""
+    if not shape:
+        return [field.name]
+    axes = [
+        names_along(size, length, robot) for size, length in zip(field.shape, shape, strict=True)
+    ]
+    names = [" ".join(parts) for parts in product(*axes)]
+    return names if len(names) <= MOST_NAMES else []
