@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -100,11 +99,15 @@ def initial_problems(
     return problems
 
 
-@lru_cache(maxsize=256)
+_TYPES: dict[tuple[type[Signal], int], type[Delay]] = {}
+
+
 def delay_block_type(signal: type[Signal], k: int) -> type[Delay]:
     """The block type that delays ``signal`` by ``k`` >= 1 runs: input ``u``, output ``y``."""
     if k < 1:
         raise ValueError(f"a delay is at least 1 run, not {k}")
+    if (signal, k) in _TYPES:
+        return _TYPES[signal, k]
     entries = {
         name: Field((k, *field.shape), dtype=field.dtype_name, frame=field.frame, text=field.text)
         for name, field in signal.fields.items()
@@ -112,7 +115,7 @@ def delay_block_type(signal: type[Signal], k: int) -> type[Delay]:
     past = type(
         f"Past{signal.__name__}{k}", (Signal,), {"__doc__": "Entries of a ring.", **entries}
     )
-    return type(
+    kind = type(
         f"Delay{signal.__name__}{k}",
         (Delay,),
         {
@@ -122,3 +125,5 @@ def delay_block_type(signal: type[Signal], k: int) -> type[Delay]:
             "past": State(past, text="the last inputs"),
         },
     )
+    _TYPES[signal, k] = kind
+    return kind
