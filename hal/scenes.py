@@ -1,0 +1,52 @@
+"""Scenes: the ground the robot stands and lands on, as a floor and boxes.
+
+The world's origin is the ground point midway between the soles where the robot starts, so the
+surface there is at z = 0 in every scene.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Box:
+    """A solid block with faces along the axes: its extent in x and y, its ``top`` and ``bottom``
+    [m, world]."""
+
+    x: tuple[float, float]
+    y: tuple[float, float]
+    top: float
+    bottom: float
+
+
+@dataclass(frozen=True)
+class Scene:
+    """A level floor at height ``floor`` [m, world] and boxes on it."""
+
+    floor: float = 0.0
+    boxes: tuple[Box, ...] = ()
+
+    def ground_height(self, x: float, y: float) -> float:
+        """The height [m, world] of the highest surface at that place."""
+        height = self.floor
+        for box in self.boxes:
+            if box.top > height and box.x[0] <= x <= box.x[1] and box.y[0] <= y <= box.y[1]:
+                height = box.top
+        return height
+
+
+def flat() -> Scene:
+    """A level floor."""
+    return Scene()
+
+
+def step(height: float, distance: float) -> Scene:
+    """A step of ``height`` whose front edge is ``distance`` [m] ahead of the origin."""
+    return Scene(boxes=(Box((distance, distance + 1.5), (-0.75, 0.75), height, 0.0),))
+
+
+def platform(height: float, edge: float) -> Scene:
+    """A platform that the robot starts on, ``height`` above the floor, which ends ``edge`` [m]
+    ahead of the origin."""
+    return Scene(-height, (Box((edge - 0.6, edge), (-0.4, 0.4), 0.0, -height),))
