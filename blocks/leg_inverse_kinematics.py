@@ -1,0 +1,125 @@
+"""From where the feet should be to the joint angles that put them there."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..runtime.block import Block, Input, Output, State
+from ..runtime.errors import BlockError
+from ..runtime.parameters import Parameters, parameter
+from ..runtime.signals import Field, Signal
+from .leg_kinematics import forward, inverse, inverse_velocity, jacobian, read_leg
+from .signals import FootTarget, JointState, JointTarget
+
+Array = NDArray[np.float64]
+
+_FASTEST = 100.0
+"""Foot velocities [m/s] are brought within this, so that no square overflows."""
+_JUMP = 0.1
+"""A line that turns by more than this [rad] in a tick has been given anew."""
+
+
+class FootLines(Signal):
+    """The feet's target lines at the last tick, to difference."""
+
+    direction = Field(("n_feet", 3), unit="", frame="body", text="heel to toe, of unit length")
+    known = Field(dtype="bool", text="whether there was a last tick")
+
+
+class LegInverseKinematics(Block):
+    """Joint positions and velocities for foot targets seen from the base (paper, V).
+
+    Five joints reach a sole position and a direction of the foot's line, that is pitch and yaw;
+    the target's roll about the line is ignored. Positions are in closed form
+    (``leg_kinematics.inverse``), exact where the leg reaches. Elsewhere the foot's pitch is given
+    up first, then the distance, and every angle stays ``margin`` inside the joint limits; the
+    answer moves continuously. Velocities solve the 5 x 5 Jacobian by damped least squares::
+
+        q' = (A'A + damping^2 I)^-1 A'(p', u'),   u' = (u - u_last) / period
+
+    with u the target's line. They are limited to ``speed_limit``, and are zero for a joint held at
+    its limit. A line that turns by more than 0.1 rad in one tick is a new target, not a motion.
+
+    Joints that belong to no leg keep their measured angle. Does not avoid collisions between the
+    legs. Raises ``BlockError`` at load for a leg that is not a hip yaw, pitch and roll with
+    intersecting axes, a knee and an ankle.
+    """
+
+    class Params(Parameters):
+        margin: float = parameter(0.02, unit="rad", ge=0.0, le=0.2, text="kept from joint limits")
+        damping: float = parameter(3e-4, unit="m", gt=0.0, text="of the least squares for velocity")
+        speed_limit: float = parameter(30.0, unit="rad/s", gt=0.0, text="largest joint velocity")
+
+    params: Params
+
+    feet = Input(FootTarget, text="where the feet should be, from the base")
+    joints = Input(JointState, text="measured joints: where to stay where any angle will do")
+    target = Output(JointTarget, text="joint angles and velocities to track")
+    lines = State(FootLines, text="to difference the lines")
+
+    def setup(self) -> None:
+        robot = self.context.robot
+        if robot is None:
+            raise BlockError("LegInverseKinematics needs a robot: name one in the graph")
+        self._legs = [read_leg(robot, foot) for foot in range(len(robot.feet))]
+        margin = self.params.margin
+        for leg in self._legs:
+            leg.limits[:, 0] += margin
+            leg.limits[:, 1] -= margin
+        self._angles = np.zeros(5)
+        self._speeds = np.zeros(5)
+        self._sole = np.zeros(3)
+        self._turn = np.zeros((3, 3))
+        self._velocity = np.zeros(3)
+        self._rate = np.zeros(3)
+        self._jacobian = np.zeros((6, 5))
+        self._rows = np.zeros((5, 6))
+        self._normal = np.zeros((5, 5))
+
+    def step(self) -> None:
+        feet, target, lines = self.feet, self.target, self.lines
+        angles, speeds, turn = self._angles, self._speeds, self._turn
+        target.position[...] = self.joints.position
+        target.velocity[...] = 0.0
+        known = bool(lines.known[()])
+        limit = self.params.speed_limit
+        for foot, leg in enumerate(self._legs):
+            wanted = feet.rotation[foot, :, 0]
+            target.reachable[foot] = inverse(
+                leg.hip, leg.plane, leg.signs, leg.limits, feet.position[foot], wanted,
+                float(self.joints.position[leg.joints[0]]), angles,
+            )  # fmt: skip
+            forward(leg.hip, leg.plane, leg.signs, angles, self._sole, turn)
+            jacobian(leg.plane, leg.signs, angles, self._jacobian)
+            line_rate(wanted, lines.direction[foot], self.period, known, self._rate)
+            np.clip(feet.velocity[foot], -_FASTEST, _FASTEST, out=self._velocity)
+            inverse_velocity(
+                self._jacobian, turn, self._velocity, self._rate, self.params.damping,
+                self._rows, self._normal, speeds,
+            )  # fmt: skip
+            for i, joint in enumerate(leg.joints):
+                angle, speed = float(angles[i]), float(speeds[i])
+                held = angle <= leg.limits[i, 0] or angle >= leg.limits[i, 1]
+                target.position[joint] = angle
+                target.velocity[joint] = 0.0 if held else min(max(speed, -limit), limit)
+        lines.known[()] = True
+
+
+def line_rate(line: Array, last: Array, period: float, known: bool, out: Array) -> None:
+    """How fast the direction of ``line`` turns [1/s]; ``last`` becomes its direction now."""
+    x, y, z = float(line[0]), float(line[1]), float(line[2])
+    largest = max(abs(x), abs(y), abs(z))
+    if largest < 1e-300:
+        x, y, z = 1.0, 0.0, 0.0
+    else:
+        x, y, z = x / largest, y / largest, z / largest
+    size = math.sqrt(x * x + y * y + z * z)
+    x, y, z = x / size, y / size, z / size
+    dx, dy, dz = x - float(last[0]), y - float(last[1]), z - float(last[2])
+    jumped = dx * dx + dy * dy + dz * dz > _JUMP * _JUMP
+    scale = 0.0 if jumped or not known else 1.0 / period
+    out[0], out[1], out[2] = scale * dx, scale * dy, scale * dz
+    last[0], last[1], last[2] = x, y, z

@@ -1,0 +1,122 @@
+"""The block: exact where reachable, within limits and finite always, velocity the derivative."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from aloft.blocks import leg_kinematics
+from aloft.blocks.leg_inverse_kinematics import LegInverseKinematics
+from aloft.runtime.description import find_robot
+from aloft.runtime.errors import BlockError
+from aloft.runtime.testing import BlockBench
+
+ROBOT = find_robot("bruce")
+LEGS = [leg_kinematics.read_leg(ROBOT, foot) for foot in range(2)]
+any_number = st.floats(allow_nan=False, allow_infinity=False)
+
+
+def feet_of(joints):
+    positions, rotations = np.empty((2, 3)), np.empty((2, 3, 3))
+    for leg, position, rotation in zip(LEGS, positions, rotations, strict=True):
+        angles = joints[list(leg.joints)]
+        leg_kinematics.forward(leg.hip, leg.plane, leg.signs, angles, position, rotation)
+    return positions, rotations
+
+
+def swing(time):
+    """A smooth motion of all joints, well inside their limits, and its rate."""
+    middle = ROBOT.standing_position
+    size = np.tile([0.3, 0.3, 0.2, 0.3, 0.3], 2)
+    shift = np.arange(10)
+    return middle + size * np.sin(9.0 * time + shift), size * 9.0 * np.cos(9.0 * time + shift)
+
+
+def test_standing_feet_give_the_standing_joints():
+    bench = BlockBench(LegInverseKinematics, robot="bruce")
+    position, rotation = feet_of(ROBOT.standing_position)
+    bench.set("feet", position=position, rotation=rotation)
+    bench.step()
+    target = bench.get("target")
+    assert np.abs(target.position - ROBOT.standing_position).max() < 1e-12
+    assert np.abs(target.velocity).max() == 0.0
+    assert target.reachable.all()
+
+
+def test_a_moving_foot_gives_the_joints_and_rates_that_move_it():
+    rate = 5000.0
+    bench = BlockBench(LegInverseKinematics, robot="bruce", rate=rate)
+    for tick in range(800):
+        joints, speeds = swing(tick / rate)
+        position, rotation = feet_of(joints)
+        after, _ = feet_of(joints + 1e-6 * speeds)
+        before, _ = feet_of(joints - 1e-6 * speeds)
+        bench.set("feet", position=position, rotation=rotation, velocity=(after - before) / 2e-6)
+        bench.step()
+        target = bench.get("target")
+        assert target.reachable.all()
+        assert np.abs(target.position - joints).max() < 1e-9
+        if tick:
+            assert np.abs(target.velocity - speeds).max() < 0.02 * 2.7  # of the largest rate
+
+
+@given(
+    arrays(np.float64, (2, 3), elements=any_number),
+    arrays(np.float64, (2, 3), elements=any_number),
+    arrays(np.float64, (2, 3, 3), elements=any_number),
+    arrays(np.float64, 10, elements=st.floats(-10.0, 10.0)),
+)
+def test_anything_finite_gives_finite_targets_within_limits(position, velocity, rotation, joints):
+    bench = BlockBench(LegInverseKinematics, robot="bruce")
+    bench.set("feet", position=position, velocity=velocity, rotation=rotation)
+    bench.set("joints", position=joints)
+    for _ in range(2):
+        bench.step()
+    target = bench.get("target")
+    limits = ROBOT.joint_limits
+    assert (target.position >= limits[:, 0] + 0.019).all()
+    assert (target.position <= limits[:, 1] - 0.019).all()
+    assert (np.abs(target.velocity) <= 30.0).all()
+
+
+def test_a_stretched_leg_is_not_reachable_and_its_knee_does_not_move():
+    bench = BlockBench(LegInverseKinematics, robot="bruce")
+    position, rotation = feet_of(ROBOT.standing_position)
+    position[0, 2] -= 0.2
+    bench.set("feet", position=position, rotation=rotation, velocity=[[0, 0, -1.0], [0, 0, 0]])
+    bench.step()
+    target = bench.get("target")
+    assert target.reachable.tolist() == [False, True]
+    assert target.position[3] == ROBOT.joint_limits[3, 1] - 0.02
+    assert target.velocity[3] == 0.0
+
+
+def test_a_line_given_anew_is_not_a_motion():
+    bench = BlockBench(LegInverseKinematics, robot="bruce")
+    position, rotation = feet_of(ROBOT.standing_position)
+    bench.set("feet", position=position, rotation=rotation)
+    bench.step()
+    slope = 0.3
+    turned = np.array(
+        [[math.cos(slope), 0, -math.sin(slope)], [0, 1, 0], [math.sin(slope), 0, math.cos(slope)]]
+    )
+    bench.set("feet", rotation=np.stack([turned, turned]))
+    bench.step()
+    assert np.abs(bench.get("target").velocity).max() == 0.0
+    assert bench.get("target").reachable.all()
+
+
+def test_the_margin_is_kept_and_the_description_is_not_changed():
+    before = ROBOT.joint_limits.copy()
+    BlockBench(LegInverseKinematics, {"margin": 0.1}, robot="bruce")
+    assert np.array_equal(ROBOT.joint_limits, before)
+
+
+def test_needs_a_robot():
+    with pytest.raises(BlockError, match="name one in the graph"):
+        BlockBench(LegInverseKinematics, dimensions=dict(ROBOT.dimensions))
