@@ -37,7 +37,7 @@ test: $(READY)  ## run all tests
 lint: $(READY)  ## check style and types
 	@$(BIN)/ruff check .
 	@$(BIN)/ruff format --check .
-	@$(BIN)/mypy .
+	@sh scripts/check_types.sh
 
 format: $(READY)  ## rewrite the files in the project's style
 	@$(BIN)/ruff check --fix .

@@ -14,13 +14,13 @@ MOST_NAMES = 24
 def names_along(size: int | str, length: int, robot: RobotDescription | None) -> list[str]:
     """The names along one axis of a field: the robot's own for its dimensions, x y z for three."""
     if robot is not None:
-        parts = {
-            "n_joints": robot.joints,
-            "n_contacts": robot.contacts,
-            "n_feet": robot.feet,
-        }.get(str(size), ())
-        if parts:
-            return [part.name for part in parts]
+        known = {
+            "n_joints": [joint.name for joint in robot.joints],
+            "n_contacts": [contact.name for contact in robot.contacts],
+            "n_feet": [foot.name for foot in robot.feet],
+        }
+        if size in known:
+            return known[str(size)]
     if length in (3, 4):
         return list("xyzw"[:length])
     return [str(k) for k in range(length)]

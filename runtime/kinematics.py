@@ -41,7 +41,7 @@ def matrices_of_quaternions(quaternions: Array) -> Array:
         [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
         [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
     ]
-    return np.moveaxis(np.array(rows), -1, 0)
+    return np.ascontiguousarray(np.moveaxis(np.array(rows), -1, 0))
 
 
 def rotations_about(axis: tuple[float, float, float], angles: Array) -> Array:
@@ -49,7 +49,8 @@ def rotations_about(axis: tuple[float, float, float], angles: Array) -> Array:
     x, y, z = axis
     cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
     sine, cosine = np.sin(angles)[:, None, None], np.cos(angles)[:, None, None]
-    return np.eye(3) + sine * cross + (1.0 - cosine) * (cross @ cross)
+    turns: Array = np.eye(3) + sine * cross + (1.0 - cosine) * (cross @ cross)
+    return turns
 
 
 def from_base_outwards(robot: RobotDescription) -> list[tuple[int, Joint]]:

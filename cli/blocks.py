@@ -1,0 +1,73 @@
+"""``aloft blocks``: which blocks there are, and the contract of one."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from .output import console, errors_reported, print_json, table
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from ..runtime.reference import BlockReference, PortReference
+
+
+def blocks(
+    name: Annotated[str, typer.Argument(help="One block, e.g. blocks.JointPD.")] = "",
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
+    markdown: Annotated[bool, typer.Option(help="Print the reference of all as Markdown.")] = False,
+) -> None:
+    """List all blocks, or print the contract of one: equations, ports, units, parameters."""
+    from ..runtime.reference import block_reference
+    from ..runtime.registry import find_block, known_names
+
+    with errors_reported(as_json):
+        names = [name] if name else list(known_names())
+        found = [block_reference(each, find_block(each)) for each in names]
+    if markdown:
+        from .markdown import reference_page
+
+        typer.echo(reference_page(found), nl=False)
+    elif as_json:
+        print_json(found[0].as_json() if name else {"blocks": [each.as_json() for each in found]})
+    elif name:
+        print_contract(console(), found[0])
+    else:
+        rows = [(each.name, each.machine, each.summary) for each in found]
+        console().print(table("", ("block", "machine", "what it does"), rows))
+
+
+def print_contract(out: Console, block: BlockReference) -> None:
+    """Print a block's docstring and the tables of its declarations."""
+    out.print(f"[bold]{block.name}[/]  ({block.machine})\n")
+    out.print(block.text, markup=False)
+    for title, ports in (
+        ("Inputs", block.inputs),
+        ("Outputs", block.outputs),
+        ("State", block.states),
+    ):
+        if ports:
+            out.print()
+            out.print(
+                table(title, ("port", "signal", "field", "type", "what it is"), port_rows(ports))
+            )
+    if block.parameters:
+        rows = [
+            (p.name, p.type, p.default or "required", p.unit, p.bounds, p.text)
+            for p in block.parameters
+        ]
+        out.print()
+        columns = ("parameter", "type", "default", "unit", "bounds", "what it is")
+        out.print(table("Parameters", columns, rows))
+
+
+def port_rows(ports: tuple[PortReference, ...]) -> list[tuple[str, str, str, str, str]]:
+    """A row for every port with its text, and one for every field of its signal."""
+    rows = []
+    for port in ports:
+        text = f"{port.text} ({port.note})" if port.note else port.text
+        rows.append((port.name, port.signal, "", "", text))
+        rows += [("", "", field.name, field.type, field.text) for field in port.fields]
+    return rows

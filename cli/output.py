@@ -1,0 +1,98 @@
+"""What every verb prints: tables for people, one JSON object for machines, errors as either."""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+import typer
+
+from ..runtime.errors import AloftError, ExitCode, RunError
+from ..runtime.loading.problems import LoadError
+
+if TYPE_CHECKING:
+    from rich.console import Console
+    from rich.table import Table
+
+
+def console(*, to_stderr: bool = False) -> Console:
+    """Rich's console on standard output, or on standard error where JSON goes to the former."""
+    from rich.console import Console
+
+    return Console(stderr=to_stderr, soft_wrap=False, highlight=False)
+
+
+def table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> Table:
+    """A table without boxes; columns whose name starts with ``>`` are set to the right."""
+    from rich import box
+    from rich.table import Table
+
+    made = Table(title=title or None, box=box.SIMPLE_HEAD, title_justify="left", pad_edge=False)
+    for column in columns:
+        made.add_column(column.removeprefix(">"), justify="right" if column[0] == ">" else "left")
+    for row in rows:
+        made.add_row(*row)
+    return made
+
+
+def number(value: Any) -> str:
+    """A metric for a table: floats with four significant digits."""
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, float):
+        return f"{value:.4g}"
+    return str(value)
+
+
+def plain(value: Any) -> Any:
+    """``value`` as JSON can hold it: numbers that are not finite become null."""
+    if isinstance(value, Mapping):
+        return {str(key): plain(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [plain(item) for item in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    if hasattr(value, "tolist"):
+        return plain(value.tolist())  # NumPy's scalars and arrays
+    return value if value is None or isinstance(value, (bool, int, float, str)) else str(value)
+
+
+def print_json(value: Mapping[str, Any]) -> None:
+    """Print one JSON object on one line of its own: the last thing on standard output."""
+    sys.stdout.write(json.dumps(plain(value), allow_nan=False) + "\n")
+    sys.stdout.flush()
+
+
+def print_error(message: str) -> None:
+    """Print an error for a person, on standard error."""
+    typer.secho("error: ", fg=typer.colors.RED, bold=True, nl=False, err=True)
+    typer.echo(message, err=True)
+
+
+@contextmanager
+def errors_reported(as_json: bool) -> Iterator[None]:
+    """Turn what aloft raises on purpose into a message and the exit code that belongs to it."""
+    try:
+        yield
+    except LoadError as error:
+        if as_json:
+            print_json(
+                {"success": False, "reason": error.report.headline(), **error.report.as_json()}
+            )
+        else:
+            console(to_stderr=True).print(error.report.rich(), soft_wrap=True)
+        raise typer.Exit(ExitCode.BAD_INPUT) from error
+    except AloftError as error:
+        code = ExitCode.RUN_FAILED if isinstance(error, RunError) else ExitCode.BAD_INPUT
+        if as_json:
+            details = (
+                {"block": error.block, "tick": error.tick} if isinstance(error, RunError) else {}
+            )
+            print_json({"success": False, "reason": str(error), **details})
+        else:
+            print_error(str(error))
+        raise typer.Exit(code) from error

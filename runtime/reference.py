@@ -1,0 +1,151 @@
+"""A block's contract as data: its docstring, and its ports and parameters from their declarations.
+
+Whatever documents blocks (``aloft blocks``, the reference in docs) is made from this, so it cannot
+disagree with the code.
+"""
+
+from __future__ import annotations
+
+import inspect
+import types
+from dataclasses import asdict, dataclass
+from typing import Any, Literal, Union, get_args, get_origin
+
+from pydantic.fields import FieldInfo
+from pydantic_core import PydanticUndefined
+
+from .block import Block, Input, Output, Port
+
+
+@dataclass(frozen=True)
+class FieldReference:
+    """One field of a signal: its name, its type in one line, and its text."""
+
+    name: str
+    type: str
+    text: str
+
+
+@dataclass(frozen=True)
+class PortReference:
+    """One port; ``note`` says what is special: optional, simulation truth."""
+
+    name: str
+    signal: str
+    text: str
+    note: str
+    fields: tuple[FieldReference, ...]
+
+
+@dataclass(frozen=True)
+class ParameterReference:
+    """One parameter; ``default`` is empty where a graph must give a value."""
+
+    name: str
+    type: str
+    default: str
+    unit: str
+    bounds: str
+    text: str
+
+
+@dataclass(frozen=True)
+class BlockReference:
+    """Everything a user of a block needs to know."""
+
+    name: str
+    summary: str
+    """The docstring's first sentence or paragraph, on one line."""
+    text: str
+    """The whole docstring."""
+    machine: str
+    """``Mealy`` (outputs follow inputs in the same tick) or ``Moore`` (they follow from state)."""
+    inputs: tuple[PortReference, ...]
+    outputs: tuple[PortReference, ...]
+    states: tuple[PortReference, ...]
+    parameters: tuple[ParameterReference, ...]
+
+    def as_json(self) -> dict[str, Any]:
+        """The reference as plain data."""
+        return asdict(self)
+
+
+def block_reference(name: str, block_type: type[Block]) -> BlockReference:
+    """The contract of the block class that graph files call ``name``."""
+    text = inspect.getdoc(block_type) or ""
+    return BlockReference(
+        name=name,
+        summary=" ".join(text.partition("\n\n")[0].split()),
+        text=text,
+        machine="Moore" if block_type.is_moore() else "Mealy",
+        inputs=tuple(_port(port) for port in block_type.inputs.values()),
+        outputs=tuple(_port(port) for port in block_type.outputs.values()),
+        states=tuple(_port(port) for port in block_type.states.values()),
+        parameters=tuple(
+            _parameter(name, info) for name, info in block_type.Params.model_fields.items()
+        ),
+    )
+
+
+def _port(port: Port[Any]) -> PortReference:
+    notes = []
+    if isinstance(port, Input):
+        notes += ["optional"] * port.optional + ["reads simulation truth"] * port.reads_truth
+    if isinstance(port, Output):
+        notes += ["simulation truth"] * port.truth
+    fields = tuple(
+        FieldReference(name, field.describe(), field.text)
+        for name, field in port.signal.fields.items()
+    )
+    return PortReference(port.name, port.signal.__name__, port.text, ", ".join(notes), fields)
+
+
+def _parameter(name: str, info: FieldInfo) -> ParameterReference:
+    extra = info.json_schema_extra
+    default = info.get_default(call_default_factory=True)
+    return ParameterReference(
+        name=name,
+        type=type_text(info.annotation),
+        default="" if default is PydanticUndefined else _value_text(default),
+        unit=str(extra.get("unit", "")) if isinstance(extra, dict) else "",
+        bounds=_bounds(info),
+        text=info.description or "",
+    )
+
+
+def type_text(annotation: Any) -> str:
+    """A type as one would write it: ``float``, ``list[float]``, ``'daqp' | 'quadprog'``."""
+    origin = get_origin(annotation)
+    arguments = get_args(annotation)
+    if origin is Literal:
+        return " | ".join(map(repr, arguments))
+    if origin in (Union, types.UnionType):
+        return " | ".join(type_text(argument) for argument in arguments)
+    if origin is not None:
+        inner = ", ".join("..." if a is Ellipsis else type_text(a) for a in arguments)
+        return f"{origin.__name__}[{inner}]"
+    if annotation is type(None):
+        return "none"
+    return getattr(annotation, "__name__", str(annotation))
+
+
+def _value_text(value: Any) -> str:
+    if isinstance(value, bool):
+        return str(value).lower()
+    if value is None:
+        return "none"
+    return str(value)
+
+
+def _bounds(info: FieldInfo) -> str:
+    signs = {"ge": "≥", "gt": ">", "le": "≤", "lt": "<"}
+    lengths = {"min_length": "at least", "max_length": "at most"}
+    parts = []
+    for constraint in info.metadata:
+        for attribute, sign in signs.items():
+            if getattr(constraint, attribute, None) is not None:
+                parts.append(f"{sign} {getattr(constraint, attribute):g}")
+        for attribute, words in lengths.items():
+            if getattr(constraint, attribute, None) is not None:
+                parts.append(f"{words} {getattr(constraint, attribute)} long")
+    return ", ".join(parts)

@@ -1,0 +1,194 @@
+"""The house stays as it was drawn: who may import whom, how long a file may be, what is not said.
+
+Read from the syntax trees of all tracked Python files, so a rule also holds for code that no test
+runs.
+"""
+
+import ast
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from aloft.runtime.registry import find_block, known_names
+
+ROOT = Path(__file__).parent.parent
+PACKAGES = ("runtime", "blocks", "hal", "logs", "benchmarks", "cli", "graphs")
+ALLOWED = {
+    "graphs": set(),
+    "runtime": {"runtime"},
+    "blocks": {"blocks", "runtime"},
+    "hal": {"hal", "runtime"},
+    "logs": {"logs", "runtime"},
+    "benchmarks": {"benchmarks", "runtime", "blocks", "hal", "logs"},
+    "cli": {"cli", "benchmarks", "runtime", "blocks", "hal", "logs"},
+}
+HEAVY = {"mujoco", "pinocchio", "qpsolvers", "daqp", "rerun", "scipy", "numba", "pyarrow"}
+LONGEST = 400
+
+
+def files(folder: str) -> list[Path]:
+    return sorted(p for p in (ROOT / folder).rglob("*.py") if "__pycache__" not in p.parts)
+
+
+def project_files() -> list[Path]:
+    """All of the project's own Python files."""
+    own = [path for folder in (*PACKAGES, "tests", "docs", "scripts") for path in files(folder)]
+    return [*own, *sorted(ROOT.glob("*.py"))]
+
+
+def module_of(path: Path) -> tuple[str, ...]:
+    """``blocks/joint_pd.py`` -> ("blocks", "joint_pd")."""
+    parts = path.relative_to(ROOT).with_suffix("").parts
+    return parts[:-1] if parts[-1] == "__init__" else parts
+
+
+def imports(path: Path, *, only_at_import: bool = False) -> Iterator[tuple[str, ...]]:
+    """The modules a file imports, relative ones resolved to the project's own names.
+
+    With ``only_at_import`` those in functions and under ``if TYPE_CHECKING`` are left out.
+    """
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    package = path.relative_to(ROOT).parent.parts
+    pending: list[ast.AST] = [tree]
+    while pending:
+        node = pending.pop()
+        if only_at_import and isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+            continue
+        if only_at_import and isinstance(node, ast.If) and "TYPE_CHECKING" in ast.dump(node.test):
+            continue
+        pending += ast.iter_child_nodes(node)
+        if isinstance(node, ast.Import):
+            yield from (tuple(alias.name.split(".")) for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            start = package[: len(package) - node.level + 1] if node.level else ()
+            module = (*start, *(node.module.split(".") if node.module else ()))
+            # `from . import x` names modules; `from .x import y` names what is in one
+            names = [(*module, alias.name) for alias in node.names] if not node.module else [module]
+            yield from names
+
+
+def own(name: tuple[str, ...]) -> tuple[str, ...] | None:
+    """An import as a project-relative name, or None when it is somebody else's."""
+    if name[:1] == ("aloft",):
+        name = name[1:]
+    return name if name and name[0] in PACKAGES else None
+
+
+@pytest.mark.parametrize("package", PACKAGES)
+def test_imports_point_one_way(package: str) -> None:
+    wrong = [
+        f"{path.relative_to(ROOT)} imports {'.'.join(target)}"
+        for path in files(package)
+        for name in imports(path)
+        if (target := own(name)) is not None
+        and target[0] not in ALLOWED[package]
+        # the one thing blocks and hal share
+        and not (package == "hal" and target[:2] == ("blocks", "signals"))
+    ]
+    assert not wrong, f"{package} may import only {sorted(ALLOWED[package])}"
+
+
+def test_inside_the_package_imports_are_relative() -> None:
+    # an absolute one would import a second copy of the package from a checkout of another name
+    wrong = [
+        str(path.relative_to(ROOT))
+        for package in PACKAGES
+        for path in files(package)
+        if any(name[:1] == ("aloft",) or name[0] in PACKAGES[:4] for name in absolute(path))
+    ]
+    assert not wrong
+
+
+def absolute(path: Path) -> Iterator[tuple[str, ...]]:
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            yield from (tuple(alias.name.split(".")) for alias in node.names)
+        elif isinstance(node, ast.ImportFrom) and node.level == 0 and node.module:
+            yield tuple(node.module.split("."))
+
+
+def block_files() -> dict[tuple[str, ...], Path]:
+    """The modules of blocks and hal in which a block is declared."""
+    found = {}
+    for name in known_names():
+        module = tuple(find_block(name).__module__.split(".")[1:])
+        if name.startswith(("blocks.", "hal.")):
+            found[module] = ROOT.joinpath(*module).with_suffix(".py")
+    return found
+
+
+def test_no_block_imports_another_blocks_file() -> None:
+    blocks = block_files()
+    assert blocks, "no block was found: the rule below would check nothing"
+    wrong = [
+        f"{path.relative_to(ROOT)} imports {'.'.join(target)}"
+        for path in blocks.values()
+        for name in imports(path)
+        if (target := own(name)) in blocks
+    ]
+    assert not wrong, "shared mathematics belongs in a module of its own"
+
+
+def test_blocks_can_be_imported_without_the_libraries_they_compute_with() -> None:
+    # `aloft check` imports every block of a graph and must answer at once
+    wrong = [
+        f"{path.relative_to(ROOT)} imports {name[0]}"
+        for package in PACKAGES
+        for path in files(package)
+        for name in imports(path, only_at_import=True)
+        if name and name[0] in HEAVY
+    ]
+    assert not wrong, "import it inside setup() or the function that needs it"
+
+
+def test_one_block_has_one_test_of_the_same_name() -> None:
+    missing = [
+        f"tests/{'/'.join(module[:-1])}/test_{module[-1]}.py"
+        for module in block_files()
+        if not (ROOT / "tests" / Path(*module[:-1]) / f"test_{module[-1]}.py").is_file()
+    ]
+    assert not missing
+
+
+def test_no_file_is_too_long() -> None:
+    lengths = {p: len(p.read_text(encoding="utf-8").splitlines()) for p in project_files()}
+    too_long = {str(p.relative_to(ROOT)): n for p, n in lengths.items() if n > LONGEST}
+    assert not too_long, "two things live in it"
+
+
+def texts() -> list[Path]:
+    """All of the project's own text files."""
+    found = project_files()
+    for pattern in ("*.md", "*.toml", "Makefile", "graphs/**/*.yaml", "hal/**/*.yaml", "docs/*.md"):
+        found += sorted(ROOT.glob(pattern))
+    return [*found, *sorted((ROOT / "scripts").glob("*.sh")), ROOT / ".ci" / "run"]
+
+
+def test_no_file_knows_the_machine_it_was_written_on() -> None:
+    # spelt in pieces, so that this file does not find itself
+    forbidden = re.compile(
+        "|".join(("/wo" + "rk/", "/ro" + "ot/", "/ho" + "me/[a-z]", "/far" + "m"))
+    )
+    wrong = [str(p.relative_to(ROOT)) for p in texts() if forbidden.search(p.read_text("utf-8"))]
+    assert not wrong
+
+
+def test_nothing_listens_beyond_the_loopback() -> None:
+    forbidden = re.compile(
+        "|".join((r"0\.0\." + r"0\.0", r"\[:" + r":\]", "serve_" + "grpc", "serve_" + "web"))
+    )
+    wrong = [str(p.relative_to(ROOT)) for p in texts() if forbidden.search(p.read_text("utf-8"))]
+    assert not wrong
+
+
+def test_hidden_configuration_is_refused() -> None:
+    # a graph is data: no environment variable may change what it computes
+    wrong = [
+        str(path.relative_to(ROOT))
+        for package in ("runtime", "blocks", "hal")
+        for path in files(package)
+        if re.search(r"\bos\.(environ|getenv)\b", path.read_text("utf-8"))
+    ]
+    assert not wrong
