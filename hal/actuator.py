@@ -1,0 +1,75 @@
+"""The actuators: motor torque limits by speed, and the torque a drive produces for a command.
+
+Pure functions over arrays that write into ``out`` arrays. Motors are not joints: with ``A`` the
+transmission's ``joint_to_motor``, motor speed is ``A qd``, motor torque ``kappa = A^-T tau`` and
+joint torque ``tau = A^T kappa``. A motor limit is therefore a box in motor space and a rotated box
+in joint space.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+def motor_torque_limits(
+    speed: Array, peak: float, corner: float, no_load: float, lower: Array, upper: Array
+) -> None:
+    """The torques [N m] a motor can produce at ``speed`` [rad/s], into ``lower`` and ``upper``.
+
+    ``peak`` is available up to the ``corner`` speed and falls linearly to zero at ``no_load``;
+    above that the motor cannot drive at all. Against the motion (braking) ``peak`` is available
+    at any speed.
+    """
+    slope = peak / (no_load - corner)
+    np.subtract(no_load, speed, out=upper)
+    np.multiply(upper, slope, out=upper)
+    np.minimum(upper, peak, out=upper)
+    np.maximum(upper, 0.0, out=upper)
+    np.add(no_load, speed, out=lower)
+    np.multiply(lower, -slope, out=lower)
+    np.maximum(lower, -peak, out=lower)
+    np.minimum(lower, 0.0, out=lower)
+
+
+def joint_feedback_torque(
+    feedforward: Array,
+    stiffness: Array,
+    damping: Array,
+    position_target: Array,
+    velocity_target: Array,
+    position: Array,
+    velocity: Array,
+    out: Array,
+    scratch: Array,
+) -> None:
+    """Feedforward plus joint feedback [N m] into ``out``: the first equation of section V,
+    ``tau_ff + Kp (q_d - q) + Kd (qd_d - qd)``."""
+    np.subtract(position_target, position, out=out)
+    np.multiply(out, stiffness, out=out)
+    np.add(out, feedforward, out=out)
+    np.subtract(velocity_target, velocity, out=scratch)
+    np.multiply(scratch, damping, out=scratch)
+    np.add(out, scratch, out=out)
+
+
+def clip_joint_torque(
+    torque: Array,
+    torque_to_motor: Array,
+    motor_to_torque: Array,
+    lower: Array,
+    upper: Array,
+    motor_wanted: Array,
+    motor_torque: Array,
+) -> None:
+    """Replace joint ``torque`` by what the motors can produce.
+
+    ``motor_wanted`` receives the motor torques asked for and ``motor_torque`` those produced,
+    within ``lower`` and ``upper``. ``motor_to_torque`` is the transpose of ``joint_to_motor``.
+    """
+    np.dot(torque_to_motor, torque, out=motor_wanted)
+    np.minimum(motor_wanted, upper, out=motor_torque)
+    np.maximum(motor_torque, lower, out=motor_torque)
+    np.dot(motor_to_torque, motor_torque, out=torque)

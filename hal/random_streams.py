@@ -1,0 +1,83 @@
+"""Random numbers of a simulated robot: one independent stream for every purpose.
+
+Because no two purposes share a stream, switching one disturbance off leaves all others exactly as
+they were. Streams depend on the seed and the purpose's number only.
+"""
+
+from __future__ import annotations
+
+from enum import IntEnum
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+class Purpose(IntEnum):
+    """What a stream is for. Numbers are never reused: they are part of what a seed means."""
+
+    FRICTION = 0
+    CONTACT_STIFFNESS = 1
+    MASS = 2
+    BASE_COM = 3
+    ATTITUDE = 4
+    GYRO_BIAS = 5
+    ACCELEROMETER_BIAS = 6
+    ENCODER_OFFSET = 7
+    SWITCH_THRESHOLD = 8
+    START_PHASE = 9
+    GYRO = 10
+    ACCELEROMETER = 11
+    JOINT_VELOCITY = 12
+    JITTER = 13
+    BOUNCE = 14
+
+
+RUNNING = (
+    Purpose.GYRO, Purpose.ACCELEROMETER, Purpose.JOINT_VELOCITY, Purpose.JITTER, Purpose.BOUNCE,
+)  # fmt: skip
+"""The streams that are drawn from during a run; the others are drawn once, before it."""
+WORDS = 3 * len(RUNNING)
+"""How many integers the state of the running streams takes."""
+
+
+def stream(seed: int, purpose: Purpose) -> np.random.Generator:
+    """A fresh stream of that seed for that purpose."""
+    sequence = np.random.SeedSequence(seed, spawn_key=(int(purpose),))
+    return np.random.Generator(np.random.PCG64(sequence))
+
+
+def _signed(word: int) -> int:
+    return word - (1 << 64) if word >= 1 << 63 else word
+
+
+class RandomStreams:
+    """The streams of a run, whose state can be saved as integers and taken back exactly."""
+
+    def __init__(self, seed: int) -> None:
+        self._streams = {purpose: stream(seed, purpose) for purpose in RUNNING}
+
+    def __getitem__(self, purpose: Purpose) -> np.random.Generator:
+        return self._streams[purpose]
+
+    def save(self, out: NDArray[np.int64]) -> None:
+        """Write the state of all streams into ``WORDS`` integers."""
+        for k, generator in enumerate(self._streams.values()):
+            state = generator.bit_generator.state
+            value = state["state"]["state"]
+            out[3 * k] = _signed(value & (1 << 64) - 1)
+            out[3 * k + 1] = _signed(value >> 64)
+            out[3 * k + 2] = state["has_uint32"] << 32 | state["uinteger"]
+
+    def load(self, words: NDArray[np.int64]) -> None:
+        """Take the state back; the seed must be the one it was saved with."""
+        mask = (1 << 64) - 1
+        for k, generator in enumerate(self._streams.values()):
+            low, high, rest = (int(word) & mask for word in words[3 * k : 3 * k + 3])
+            present: Any = generator.bit_generator.state
+            generator.bit_generator.state = {
+                **present,
+                "state": {**present["state"], "state": high << 64 | low},
+                "has_uint32": rest >> 32,
+                "uinteger": rest & (1 << 32) - 1,
+            }

@@ -1,0 +1,240 @@
+"""Finds blocks by the name a graph file uses, and imports only those that are used.
+
+Three kinds of names:
+
+* ``blocks.LandingHeuristic``, ``hal.MujocoRobot``, ``runtime.Constant``: one of our packages and
+  the class; the file is ``landing_heuristic.py`` by convention, otherwise found by a scan;
+* ``package.module:Class``: any importable class, also from a file beside the graph;
+* the name of an entry point of the group ``aloft.blocks`` of an installed package.
+"""
+
+from __future__ import annotations
+
+import importlib
+import importlib.util
+import re
+import sys
+import traceback
+from collections.abc import Mapping
+from functools import lru_cache
+from importlib import metadata
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+from .block import Block
+from .errors import AloftError, DeclarationError, UnknownBlockError
+
+PACKAGES = ("blocks", "hal", "runtime")
+"""Our packages that hold blocks."""
+ENTRY_POINTS = "aloft.blocks"
+"""The group in which other packages announce blocks."""
+
+_OURS = __name__.rpartition(".runtime.")[0]
+_ROOT = Path(__file__).parent.parent
+_CLASS = re.compile(r"^class\s+(\w+)\s*\(([^)]*)\)\s*:(.*?)(?=^\S|\Z)", re.MULTILINE | re.DOTALL)
+_MACHINE = re.compile(r"^    def (?:step|emit)\(", re.MULTILINE)
+_PORT = re.compile(r"^    \w+ = (?:Input|Output)\(", re.MULTILINE)
+
+
+class BlockImportError(AloftError):
+    """A block's module or class cannot be used; the message is one line, ``where`` its origin."""
+
+    def __init__(self, message: str, where: str = "") -> None:
+        super().__init__(message)
+        self.where = where
+
+
+def snake_case(name: str) -> str:
+    """``LandingHeuristic`` -> ``landing_heuristic``, ``JointPD`` -> ``joint_pd``."""
+    parts = re.sub(r"(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])", "_", name)
+    return parts.lower()
+
+
+@lru_cache(maxsize=1)
+def _scan() -> Mapping[str, str]:
+    """Our blocks and their modules, by reading the files and importing none."""
+    found: dict[str, str] = {}
+    classes: list[tuple[str, str, str, list[str], frozenset[str]]] = []
+    for package in PACKAGES:
+        for path in sorted((_ROOT / package).rglob("*.py")):
+            parts = (_OURS, *path.relative_to(_ROOT).with_suffix("").parts)
+            module = ".".join(parts).removesuffix(".__init__")
+            for name, bases, body in _CLASS.findall(path.read_text(encoding="utf-8")):
+                parents = [b.split("[")[0].rpartition(".")[2].strip() for b in bases.split(",")]
+                patterns = (("machine", _MACHINE), ("port", _PORT))
+                has = frozenset(what for what, pattern in patterns if pattern.search(body))
+                classes.append((package, name, module, parents, has))
+    # A class is a block if it derives from one, however far away; it can be used if it, or one of
+    # those it derives from, has a machine's methods and a port.
+    known: dict[str, frozenset[str]] = {"Block": frozenset()}
+    while True:
+        new = [c for c in classes if c[1] not in known and any(p in known for p in c[3])]
+        if not new:
+            break
+        for package, name, module, parents, own in new:
+            known[name] = own.union(*(known.get(parent, frozenset()) for parent in parents))
+            if len(known[name]) == 2 and not name.startswith("_"):
+                found.setdefault(f"{package}.{name}", module)
+    return dict(sorted(found.items()))
+
+
+@lru_cache(maxsize=1)
+def _entry_points() -> Mapping[str, str]:
+    return {point.name: point.value for point in metadata.entry_points(group=ENTRY_POINTS)}
+
+
+def known_names() -> tuple[str, ...]:
+    """The names of all blocks of ours and of installed packages, sorted; imports none of them."""
+    return tuple(sorted({**_scan(), **_entry_points()}))
+
+
+def all_blocks() -> dict[str, type[Block]]:
+    """All blocks by name. Imports every one of them.
+
+    Raises:
+        BlockImportError: one cannot be imported.
+    """
+    return {name: find_block(name) for name in known_names()}
+
+
+def block_name(block_type: type[Block]) -> str:
+    """The name a graph file may use for that class."""
+    module = block_type.__module__
+    package = module.removeprefix(f"{_OURS}.").partition(".")[0]
+    if module.startswith(f"{_OURS}.") and package in PACKAGES:
+        return f"{package}.{block_type.__name__}"
+    return f"{module}:{block_type.__name__}"
+
+
+def find_block(name: str, folder: Path | None = None) -> type[Block]:
+    """The block class called ``name``; files in ``folder`` can be imported as modules.
+
+    Raises:
+        UnknownBlockError: there is no such block; the message names the nearest ones.
+        BlockImportError: its module fails when imported, or the class is not a block.
+    """
+    if ":" in name:
+        module_name, _, class_name = name.partition(":")
+        return _class_of(_user_module(module_name, folder, name), class_name, name)
+    package, _, class_name = name.partition(".")
+    if package in PACKAGES and class_name:
+        module_name = f"{_OURS}.{package}.{snake_case(class_name)}"
+        module = _own_module(module_name, package, class_name)
+        if module is not None:
+            return _class_of(module, class_name, name)
+    point = _entry_points().get(name)
+    if point is not None:
+        module_name, _, class_name = point.partition(":")
+        return _class_of(_import(module_name), class_name, name)
+    raise UnknownBlockError(f"there is no block called {name!r}")
+
+
+def _own_module(module_name: str, package: str, class_name: str) -> ModuleType | None:
+    """The module of ours that has the class: the one by convention, or any other."""
+    file = _ROOT / package / f"{snake_case(class_name)}.py"
+    if class_name.isidentifier() and file.is_file():
+        module = _import(module_name)
+        if hasattr(module, class_name):
+            return module
+    scanned = _scan().get(f"{package}.{class_name}")
+    return _import(scanned) if scanned else None
+
+
+def _user_module(module_name: str, folder: Path | None, name: str) -> ModuleType:
+    """A module from a file in ``folder``, else from anywhere Python finds it."""
+    if not module_name or not all(part.isidentifier() for part in module_name.split(".")):
+        raise UnknownBlockError(f"{name!r} is not of the form package.module:Class")
+    file = None
+    if folder is not None:
+        base = folder.resolve().joinpath(*module_name.split("."))
+        files = (base.with_name(f"{base.name}.py"), base / "__init__.py")
+        file = next((candidate for candidate in files if candidate.is_file()), None)
+    if file is None:
+        return _import(module_name)
+    present = sys.modules.get(module_name)
+    if present is None:
+        # At the end, so that a file beside a graph never hides an installed package from others.
+        top = str(folder.resolve()) if folder is not None else ""
+        if top not in sys.path:
+            sys.path.append(top)
+        importlib.invalidate_caches()
+        if importlib.util.find_spec(module_name.partition(".")[0]) is not None:
+            present = _import(module_name)
+    if present is not None and _same_file(present, file):
+        return present
+    return _import_file(f"{module_name}@{file.parent}", file)
+
+
+def _same_file(module: ModuleType, file: Path) -> bool:
+    origin = getattr(module, "__file__", None)
+    return origin is not None and Path(origin).resolve() == file
+
+
+def _import_file(key: str, file: Path) -> ModuleType:
+    """A file whose module name is taken by another file, under a name of its own."""
+    if key in sys.modules:
+        return sys.modules[key]
+    spec = importlib.util.spec_from_file_location(key, file)
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[key] = module
+    try:
+        spec.loader.exec_module(module)
+    except BaseException as error:
+        del sys.modules[key]
+        _raise_import_error(file.stem, error)
+    return module
+
+
+def _import(module_name: str) -> ModuleType:
+    try:
+        return importlib.import_module(module_name)
+    except BaseException as error:
+        return _raise_import_error(module_name, error)
+
+
+def _raise_import_error(module_name: str, error: BaseException) -> Any:
+    if isinstance(error, KeyboardInterrupt):
+        raise error
+    last = traceback.format_exception_only(error)[-1].strip()
+    if isinstance(error, SyntaxError):
+        raise BlockImportError(last, f"{error.filename}:{error.lineno}:{error.offset}") from error
+    missing = isinstance(error, ModuleNotFoundError) and error.name is not None
+    if missing and f"{module_name}.".startswith(f"{error.name}."):  # type: ignore[attr-defined]
+        raise UnknownBlockError(f"there is no module {module_name!r}") from error
+    frames = traceback.extract_tb(error.__traceback__)
+    outside = [f for f in frames if "importlib" not in f.filename and f.filename != __file__]
+    where = f"{outside[-1].filename}:{outside[-1].lineno}" if outside else ""
+    raise BlockImportError(last, where) from error
+
+
+def _class_of(module: ModuleType, class_name: str, name: str) -> type[Block]:
+    found = getattr(module, class_name, None)
+    if found is None:
+        raise UnknownBlockError(f"module {module.__name__!r} has no class {class_name!r}")
+    if not (isinstance(found, type) and issubclass(found, Block)):
+        raise BlockImportError(f"{name} is not a block: it does not derive from aloft's Block")
+    try:
+        found.is_moore()
+    except DeclarationError as error:
+        raise BlockImportError(str(error)) from error
+    return found
+
+
+def similar_names(name: str, folder: Path | None = None) -> tuple[str, ...]:
+    """Names a user may write in place of an unknown one: candidates for the nearest."""
+    if ":" not in name:
+        return known_names()
+    module_name, _, _ = name.partition(":")
+    candidates = []
+    if folder is not None:
+        for path in sorted(folder.glob("*.py")):
+            for class_name, bases, _ in _CLASS.findall(path.read_text(encoding="utf-8")):
+                if bases.strip():
+                    candidates.append(f"{path.stem}:{class_name}")
+    module = sys.modules.get(module_name)
+    for attribute, value in vars(module).items() if module is not None else ():
+        if isinstance(value, type) and issubclass(value, Block) and value is not Block:
+            candidates.append(f"{module_name}:{attribute}")
+    return tuple(dict.fromkeys(candidates))
