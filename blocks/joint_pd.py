@@ -1,0 +1,232 @@
+"""The joint controller: feedforward torque on the ground, joint feedback in the air."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..runtime.block import Block, Input, Output, State
+from ..runtime.description import RobotDescription
+from ..runtime.errors import BlockError
+from ..runtime.parameters import Parameters, parameter
+from ..runtime.signals import Field, Signal
+from .signals import (
+    CommandMode,
+    JointCommand,
+    JointState,
+    JointTarget,
+    Phase,
+    PhaseState,
+    WholeBodyCommand,
+)
+
+Array = NDArray[np.float64]
+
+
+class JointFollower(Signal):
+    """How far each leg's gains have moved to those of flight, and the stance targets."""
+
+    airborne = Field("n_feet", unit="", text="0: stance gains, 1: flight gains")
+    position = Field("n_joints", unit="rad", text="integrated stance targets")
+    velocity = Field("n_joints", unit="rad/s", text="their velocities")
+    started = Field(dtype="bool", text="whether the targets have begun at the measured joints")
+
+
+class JointPD(Block):
+    """The joint command of every tick (paper, V, first equation)::
+
+        tau = tau_ff + Kp (q_d - q) + Kd (q_d' - q')
+
+    The drives evaluate it at their own rate with the command's targets and gains. A leg with a
+    stance point gets the whole-body controller's tau_ff and the stance gains; a leg without one
+    during FLIGHT or LANDING gets tau_ff = 0, the flight gains and the targets of its inverse
+    kinematics, so a leg that lands late keeps swinging while the other already stands. Between the
+    two everything moves linearly within ``blend``.
+
+    Stance gains are zero by default: the feedforward alone carries the robot. With
+    ``stance_feedback`` their targets are the whole-body controller's accelerations integrated
+    twice, pulled back to the measured joints with time constant ``leak``; without, the measured
+    joints, so that only the damping acts, towards zero velocity. ``friction`` adds that torque in
+    the direction each joint moves.
+
+    Gains are per leg joint from the hip outwards, the same for every leg. For a sampled drive keep
+    Kd times its period below half the joint's inertia (ankle: 1.8e-3 kg m^2). Limits no torque:
+    the drives do, and the whole-body controller should. Raises ``BlockError`` at load where a
+    gain list does not fit a leg.
+    """
+
+    class Params(Parameters):
+        flight_stiffness: list[float] = parameter(
+            [40.0, 60.0, 60.0, 60.0, 15.0], unit="N m/rad", text="Kp in the air, per leg joint"
+        )
+        flight_damping: list[float] = parameter(
+            [1.0, 1.5, 1.5, 1.2, 0.3], unit="N m s/rad", text="Kd in the air, per leg joint"
+        )
+        stance_stiffness: list[float] = parameter(
+            [0.0] * 5, unit="N m/rad", text="Kp on the ground, per leg joint"
+        )
+        stance_damping: list[float] = parameter(
+            [0.0] * 5, unit="N m s/rad", text="Kd on the ground, per leg joint"
+        )
+        blend: float = parameter(0.004, unit="s", ge=0.0, text="from one set of gains to another")
+        stance_feedback: bool = parameter(
+            False, text="integrate the whole-body accelerations to stance targets"
+        )
+        leak: float = parameter(0.02, unit="s", gt=0.0, text="how fast those forget")
+        friction: float = parameter(0.0, unit="N m", ge=0.0, text="joint friction to compensate")
+        friction_speed: float = parameter(
+            0.3, unit="rad/s", gt=0.0, text="joint speed at which most of it is compensated"
+        )
+
+    params: Params
+
+    wbc = Input(WholeBodyCommand, text="feedforward torques and accelerations")
+    legs = Input(JointTarget, text="joint targets of the legs in the air")
+    phase = Input(PhaseState, text="the phase and which points may push")
+    joints = Input(JointState, text="measured joints")
+    command = Output(JointCommand, text="what the drives execute")
+    follower = State(JointFollower, text="blending and stance targets")
+
+    def setup(self) -> None:
+        robot = self.context.robot
+        if robot is None:
+            raise BlockError("JointPD needs a robot: name one in the graph, e.g. robot: bruce")
+        self._chains = [leg_joints(robot, foot) for foot in range(len(robot.feet))]
+        self._foot_of_point = robot.foot_of_contact()
+        n = len(robot.joints)
+        gains = np.zeros((4, n))
+        for row, name in enumerate(
+            ("flight_stiffness", "flight_damping", "stance_stiffness", "stance_damping")
+        ):
+            values: list[float] = getattr(self.params, name)
+            for foot, chain in zip(robot.feet, self._chains, strict=True):
+                if len(values) != len(chain):
+                    raise BlockError(
+                        f"{name} has {len(values)} gains; {foot.name}'s leg has {len(chain)} "
+                        f"joints: {', '.join(robot.joints[j].name for j in chain)}"
+                    )
+                gains[row, list(chain)] = values
+        self._flight_stiffness, self._flight_damping = gains[0], gains[1]
+        self._stance_stiffness, self._stance_damping = gains[2], gains[3]
+        self._airborne = np.zeros(n)
+        self._grounded = np.zeros(n)
+        self._part = np.zeros(n)
+        self._stance_position = np.zeros(n)
+        self._stance_velocity = np.zeros(n)
+
+    def step(self) -> None:
+        self._blend()
+        self._follow()
+        command, legs, joints = self.command, self.legs, self.joints
+        command.mode[()] = CommandMode.ACTIVE
+        np.multiply(self._grounded, self.wbc.torque, out=command.torque)
+        if self.params.friction > 0.0:
+            np.divide(joints.velocity, self.params.friction_speed, out=self._part)
+            np.tanh(self._part, out=self._part)
+            self._part *= self.params.friction
+            command.torque += self._part
+        superpose(
+            self._airborne, self._flight_stiffness, self._stance_stiffness,
+            legs.position, self._stance_position, joints.position,
+            command.stiffness, command.position,
+        )  # fmt: skip
+        superpose(
+            self._airborne, self._flight_damping, self._stance_damping,
+            legs.velocity, self._stance_velocity, joints.velocity,
+            command.damping, command.velocity,
+        )  # fmt: skip
+
+    def _blend(self) -> None:
+        """Move every leg's weight towards flight where none of its points may push."""
+        airborne, phase = self.follower.airborne, int(self.phase.phase[()])
+        rate = self.period / self.params.blend if self.params.blend > self.period else 1.0
+        for foot, chain in enumerate(self._chains):
+            swings = phase in (Phase.FLIGHT, Phase.LANDING)
+            for point, owner in enumerate(self._foot_of_point):
+                if owner == foot and self.phase.stance[point]:
+                    swings = False
+            weight = float(airborne[foot]) + (rate if swings else -rate)
+            airborne[foot] = weight = min(max(weight, 0.0), 1.0)
+            for joint in chain:
+                self._airborne[joint] = weight
+        np.subtract(1.0, self._airborne, out=self._grounded)
+
+    def _follow(self) -> None:
+        """The stance targets: the measured joints at rest, or the integrated accelerations."""
+        follower, joints = self.follower, self.joints
+        if not self.params.stance_feedback:
+            self._stance_position[...] = joints.position
+            self._stance_velocity[...] = 0.0
+            return
+        if not follower.started[()]:
+            follower.position[...] = joints.position
+            follower.velocity[...] = joints.velocity
+            follower.started[()] = True
+        n = joints.position.shape[0]
+        follow(
+            self.period, self.params.leak, self.wbc.acceleration[-n:], joints.position,
+            joints.velocity, follower.position, follower.velocity,
+        )  # fmt: skip
+        self._stance_position[...] = follower.position
+        self._stance_velocity[...] = follower.velocity
+
+
+def leg_joints(robot: RobotDescription, foot: int) -> tuple[int, ...]:
+    """The joints between the base and a foot, from the base outwards."""
+    chain: list[int] = []
+    link = robot.feet[foot].link
+    carrier = {joint.child: index for index, joint in enumerate(robot.joints)}
+    while link in carrier:
+        chain.insert(0, carrier[link])
+        link = robot.joints[chain[0]].parent
+    return tuple(chain)
+
+
+def superpose(
+    weight: Array,
+    first_gain: Array,
+    second_gain: Array,
+    first_target: Array,
+    second_target: Array,
+    measured: Array,
+    gain: Array,
+    target: Array,
+) -> None:
+    """One feedback that equals ``weight`` of the first plus the rest of the second.
+
+    K = w K1 + (1 - w) K2 towards (w K1 x1 + (1 - w) K2 x2) / K; the measured value where K = 0.
+    """
+    for i in range(gain.shape[0]):
+        first = float(weight[i]) * float(first_gain[i])
+        second = (1.0 - float(weight[i])) * float(second_gain[i])
+        total = first + second
+        gain[i] = total
+        if total > 0.0:
+            share = first / total
+            target[i] = share * float(first_target[i]) + (1.0 - share) * float(second_target[i])
+        else:
+            target[i] = measured[i]
+
+
+def follow(
+    period: float,
+    leak: float,
+    acceleration: Array,
+    measured_position: Array,
+    measured_velocity: Array,
+    position: Array,
+    velocity: Array,
+) -> None:
+    """Integrate accelerations to ``velocity`` and ``position``, drawn to the measured joints.
+
+    x' = v + (q - x) / leak, v' = a + (q' - v) / leak: below the corner 1/leak the targets are
+    the measurements and the feedback vanishes; above it they are the controller's intention.
+    """
+    share = min(period / leak, 1.0)
+    for i in range(position.shape[0]):
+        speed = float(velocity[i])
+        x = float(position[i]) + period * speed
+        velocity[i] = (
+            speed + period * float(acceleration[i]) + share * (float(measured_velocity[i]) - speed)
+        )
+        position[i] = x + share * (float(measured_position[i]) - x)

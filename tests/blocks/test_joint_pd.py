@@ -1,0 +1,122 @@
+"""Who commands which leg when, and that blending is the sum of both feedbacks."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from aloft.blocks.joint_pd import JointPD
+from aloft.blocks.signals import CommandMode, Phase
+from aloft.runtime.description import find_robot
+from aloft.runtime.errors import BlockError
+from aloft.runtime.testing import BlockBench
+
+ROBOT = find_robot("bruce")
+FLIGHT_KP = np.tile([40.0, 60.0, 60.0, 60.0, 15.0], 2)
+FLIGHT_KD = np.tile([1.0, 1.5, 1.5, 1.2, 0.3], 2)
+
+
+def make(**params):
+    bench = BlockBench(JointPD, params, robot="bruce")
+    bench.set("wbc", torque=np.arange(1.0, 11.0))
+    bench.set("legs", position=0.1, velocity=0.2)
+    bench.set("joints", position=np.linspace(-1, 1, 10), velocity=0.5)
+    return bench
+
+
+def settle(bench, phase, stance):
+    bench.set("phase", phase=int(phase), stance=stance)
+    bench.step(10)
+    return bench.get("command")
+
+
+@pytest.mark.parametrize("phase", [Phase.STAND, Phase.THRUST, Phase.LANDING, Phase.RECOVER])
+def test_on_the_ground_only_the_feedforward_acts(phase):
+    command = settle(make(), phase, True)
+    assert command.mode == CommandMode.ACTIVE
+    assert np.array_equal(command.torque, np.arange(1.0, 11.0))
+    assert not command.stiffness.any() and not command.damping.any()
+    assert np.array_equal(command.position, np.linspace(-1, 1, 10))
+
+
+def test_in_the_air_only_the_feedback_acts():
+    command = settle(make(), Phase.FLIGHT, False)
+    assert not command.torque.any()
+    assert np.array_equal(command.stiffness, FLIGHT_KP)
+    assert np.array_equal(command.damping, FLIGHT_KD)
+    assert (command.position == 0.1).all() and (command.velocity == 0.2).all()
+
+
+def test_a_leg_that_lands_late_keeps_swinging():
+    command = settle(make(), Phase.LANDING, [True, False, False, False])
+    assert np.array_equal(command.torque, np.r_[np.arange(1.0, 6.0), np.zeros(5)])
+    assert np.array_equal(command.stiffness, np.r_[np.zeros(5), FLIGHT_KP[5:]])
+
+
+def test_a_standing_robot_without_contact_does_not_swing_its_legs():
+    command = settle(make(), Phase.STAND, False)
+    assert not command.stiffness.any()
+    assert command.torque.any()
+
+
+def test_blend_is_linear_in_time():
+    bench = make(blend=0.01)
+    settle(bench, Phase.STAND, True)
+    bench.set("phase", phase=int(Phase.FLIGHT), stance=False)
+    for tick in range(1, 8):
+        bench.step()
+        weight = min(tick / 5.0, 1.0)
+        assert bench.get("command").stiffness == pytest.approx(weight * FLIGHT_KP)
+        assert bench.get("command").torque == pytest.approx((1 - weight) * np.arange(1.0, 11.0))
+
+
+def test_no_blend_switches_at_once():
+    bench = make(blend=0.0)
+    bench.set("phase", phase=int(Phase.FLIGHT), stance=False)
+    bench.step()
+    assert np.array_equal(bench.get("command").stiffness, FLIGHT_KP)
+
+
+def test_half_way_the_torque_is_the_mean_of_both_controllers():
+    bench = make(blend=0.004, stance_stiffness=[20.0] * 5, stance_damping=[1.0] * 5)
+    settle(bench, Phase.STAND, True)
+    bench.set("phase", phase=int(Phase.FLIGHT), stance=False)
+    bench.step()
+    command = bench.get("command")
+    q, rate = np.linspace(-1, 1, 10), 0.5
+    torque = (
+        command.torque
+        + command.stiffness * (command.position - q)
+        + command.damping * (command.velocity - rate)
+    )
+    flight = FLIGHT_KP * (0.1 - q) + FLIGHT_KD * (0.2 - rate)
+    stance = np.arange(1.0, 11.0) + 1.0 * (0.0 - rate)
+    assert torque == pytest.approx(0.5 * flight + 0.5 * stance)
+
+
+def test_stance_feedback_leads_the_joints_by_the_commanded_acceleration():
+    """A steady acceleration a leads a joint at rest by a times leak, and leak squared."""
+    bench = make(stance_feedback=True, leak=0.02, stance_stiffness=[20.0] * 5)
+    bench.set("joints", velocity=0.0)
+    acceleration = np.zeros(16)
+    acceleration[6 + 3] = 10.0
+    bench.set("wbc", acceleration=acceleration)
+    bench.set("phase", phase=int(Phase.STAND), stance=True)
+    bench.step(500)
+    command = bench.get("command")
+    lead = command.position - np.linspace(-1, 1, 10)
+    assert lead[3] == pytest.approx(10.0 * 0.02**2, rel=0.15)
+    assert np.abs(np.delete(lead, 3)).max() < 1e-12
+
+
+def test_friction_pushes_the_way_the_joint_moves():
+    bench = make(friction=0.07)
+    bench.set("wbc", torque=0.0)
+    bench.set("joints", velocity=np.r_[np.full(5, 10.0), np.full(5, -10.0)])
+    command = settle(bench, Phase.STAND, True)
+    assert command.torque == pytest.approx(np.r_[np.full(5, 0.07), np.full(5, -0.07)])
+
+
+def test_gains_must_fit_the_leg():
+    with pytest.raises(BlockError, match=r"flight_damping has 2 gains; right_foot's leg has 5 "):
+        make(flight_damping=[1.0, 2.0])
