@@ -35,6 +35,7 @@ _ROOT = Path(__file__).parent.parent
 _CLASS = re.compile(r"^class\s+(\w+)\s*\(([^)]*)\)\s*:(.*?)(?=^\S|\Z)", re.MULTILINE | re.DOTALL)
 _MACHINE = re.compile(r"^    def (?:step|emit)\(", re.MULTILINE)
 _PORT = re.compile(r"^    \w+ = (?:Input|Output)\(", re.MULTILINE)
+_ABSTRACT = re.compile(r"^    @abstractmethod$", re.MULTILINE)
 
 
 class BlockImportError(AloftError):
@@ -62,11 +63,11 @@ def _scan() -> Mapping[str, str]:
             module = ".".join(parts).removesuffix(".__init__")
             for name, bases, body in _CLASS.findall(path.read_text(encoding="utf-8")):
                 parents = [b.split("[")[0].rpartition(".")[2].strip() for b in bases.split(",")]
-                patterns = (("machine", _MACHINE), ("port", _PORT))
+                patterns = (("machine", _MACHINE), ("port", _PORT), ("abstract", _ABSTRACT))
                 has = frozenset(what for what, pattern in patterns if pattern.search(body))
                 classes.append((package, name, module, parents, has))
     # A class is a block if it derives from one, however far away; it can be used if it, or one of
-    # those it derives from, has a machine's methods and a port.
+    # those it derives from, has a machine's methods and a port, and it leaves nothing abstract.
     known: dict[str, frozenset[str]] = {"Block": frozenset()}
     while True:
         new = [c for c in classes if c[1] not in known and any(p in known for p in c[3])]
@@ -74,7 +75,8 @@ def _scan() -> Mapping[str, str]:
             break
         for package, name, module, parents, own in new:
             known[name] = own.union(*(known.get(parent, frozenset()) for parent in parents))
-            if len(known[name]) == 2 and not name.startswith("_"):
+            complete = known[name] >= {"machine", "port"} and "abstract" not in own
+            if complete and not name.startswith("_"):
                 found.setdefault(f"{package}.{name}", module)
     return dict(sorted(found.items()))
 
