@@ -1,0 +1,205 @@
+"""The executor: takes a graph through its whole life, and ends every run in good order.
+
+While a run goes on the garbage collector is off and what exists is frozen.
+"""
+
+from __future__ import annotations
+
+import gc
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from typing import Any
+
+from .block import Metric
+from .errors import ExitCode, RunError
+from .interrupts import Interrupts
+from .life_cycle import LifeCycle, LifeState, describe
+from .memory import BoundGraph
+from .pacing import TimeSource, WallTime
+from .run_result import RunResult, merge_metrics
+from .sinks import MemoryLog, RunHash, Sink
+from .stages import CheckedGraph, ClockSpec
+from .ticker import Ticker
+from .timing import block_times
+
+
+class Executor:
+    """Runs a graph, once.
+
+    Args:
+        graph: a checked graph, or a bound one.
+        clock: how to pace it; by default as the graph says.
+        sinks: what records the run, beside the log and the hash.
+        log: whether to keep every tick in memory.
+        run_hash: whether to hash every tick.
+        timing: whether to time every block. Only benchmarks switch it off.
+        finite_check: whether to check every tick. Only benchmarks switch it off.
+        time_source: what time is; tests have one of their own.
+
+    Raises:
+        RunError: a block could not be set up.
+        AloftError: the graph's clock is the robot's, and there is none to drive it.
+    """
+
+    def __init__(
+        self,
+        graph: CheckedGraph | BoundGraph,
+        *,
+        clock: ClockSpec | None = None,
+        sinks: Sequence[Sink] = (),
+        log: bool = True,
+        run_hash: bool = True,
+        timing: bool = True,
+        finite_check: bool = True,
+        time_source: TimeSource | None = None,
+    ) -> None:
+        self.bound = graph if isinstance(graph, BoundGraph) else BoundGraph(graph)
+        self.life = LifeCycle(self.bound.blocks)
+        self._time: TimeSource = time_source or WallTime()
+        self.ticker = Ticker(
+            self.bound,
+            clock or self.bound.graph.clock,
+            self._time,
+            timing=timing,
+            finite_check=finite_check,
+        )
+        self._log = MemoryLog() if log else None
+        self._hash = RunHash() if run_hash else None
+        own: list[Sink] = [sink for sink in (self._log, self._hash) if sink is not None]
+        self._sinks: list[Sink] = [*own, *sinks]
+        self._opened: list[Sink] = []
+
+    def run(self, ticks: int | None = None) -> RunResult:
+        """The whole life of the graph: start, tick, stop cycles, close; it raises nothing.
+
+        Runs for ``ticks``, by default as long as the graph says. SIGINT and SIGTERM stop it after
+        the present tick, and so does a block that asks for it. Whatever ended the run is in the
+        result, an error too: see ``RunResult.raise_if_failed``.
+        """
+        clock, graph = self.bound.clock, self.bound.graph
+        limit = graph.ticks if ticks is None else ticks
+        error: RunError | None = None
+        problems: list[str] = []
+        start_time = end_time = self._time.now()
+        first_tick = clock.tick
+        with Interrupts(clock, self.life) as interrupts, _quiet_collector():
+            try:
+                self._open_sinks(limit)
+                self.life.start()
+                self.life.move(LifeState.RUNNING)
+                start_time = self._time.now()
+                self.ticker.advance(limit)
+            except RunError as failure:
+                error = failure
+            except BaseException as failure:  # noqa: BLE001  # the stop cycles come first
+                error = RunError(f"the run failed: {describe(failure)}", tick=clock.tick)
+                error.__cause__ = failure
+            finally:
+                end_time = self._time.now()
+                self.life.stop(self._pause if self.ticker.pacer is not None else None)
+                problems += self.life.problems
+                problems += self._close_sinks()
+        return self._result(
+            clock.tick - first_tick, (end_time - start_time) * 1e-9, error, problems, interrupts
+        )
+
+    def _open_sinks(self, ticks: int | None) -> None:
+        if self._log is not None:
+            self._log.expect(ticks)
+        for sink in self._sinks:
+            self._opened.append(sink)  # before, as a failed open may have opened something
+            sink.open(self.bound)
+            self.ticker.records.append(sink.record)
+
+    def _close_sinks(self) -> list[str]:
+        problems = []
+        for sink in self._opened:
+            try:
+                sink.close()
+            except Exception as error:  # noqa: BLE001  # the next sink must be closed too
+                problems.append(f"{type(sink).__name__} failed in close: {describe(error)}")
+        return problems
+
+    def _pause(self) -> None:
+        """The time between stop cycles: a period, so that a bus can carry each."""
+        self._time.sleep(self.bound.clock.base_period)
+
+    def _result(
+        self,
+        ticks: int,
+        wall_time: float,
+        error: RunError | None,
+        problems: list[str],
+        interrupts: Interrupts,
+    ) -> RunResult:
+        by_block: dict[str, dict[str, Metric]] = {}
+        for path, block in self.bound.blocks.items():
+            try:
+                by_block[path] = dict(block.metrics())
+            except Exception as failure:  # noqa: BLE001  # the other blocks' metrics still count
+                problems.append(f"block '{path}' failed in metrics: {describe(failure)}")
+        metrics, unmet = merge_metrics(by_block)
+        code, reason = self._verdict(error, problems, interrupts, unmet)
+        for program in self.ticker.programs:
+            program.fold()
+        pacer = self.ticker.pacer
+        return RunResult(
+            success=code is ExitCode.SUCCESS,
+            reason=reason,
+            exit_code=code,
+            ticks=ticks,
+            period=self.bound.clock.base_period,
+            wall_time_s=wall_time,
+            run_hash=self._hash.hexdigest() if self._hash is not None else "",
+            metrics=metrics,
+            blocks={
+                path: block_times(self.ticker.programs, path, self.ticker.overruns_by_block[path])
+                for path in self.bound.graph.order
+            },
+            overruns=pacer.overruns if pacer is not None else 0,
+            skipped_periods=pacer.skipped_periods if pacer is not None else 0,
+            error=error,
+            stop_problems=tuple(problems),
+            log=self._log,
+        )
+
+    def _verdict(
+        self,
+        error: RunError | None,
+        problems: Sequence[str],
+        interrupts: Interrupts,
+        unmet: str | None,
+    ) -> tuple[ExitCode, str]:
+        """The exit code and the reason: the first that applies, gravest first."""
+        stopped = self.bound.clock.stop_reason
+        if error is not None and not isinstance(error.__cause__, KeyboardInterrupt):
+            return ExitCode.RUN_FAILED, str(error)
+        if interrupts.received is not None:
+            code = ExitCode(128 + interrupts.received)
+            return code, str(error or f"stopped by {interrupts.received.name}")
+        if error is not None:
+            return ExitCode.INTERRUPTED, str(error)
+        if problems:
+            return ExitCode.RUN_FAILED, problems[0]
+        if unmet is not None:
+            return ExitCode.NOT_SUCCESSFUL, unmet
+        return ExitCode.SUCCESS, stopped or "ran to its end"
+
+
+@contextmanager
+def _quiet_collector() -> Iterator[None]:
+    """No garbage collection within, and what exists now is never looked at: no pauses."""
+    enabled = gc.isenabled()
+    with ExitStack() as after:
+        gc.collect()
+        gc.freeze()
+        after.callback(gc.unfreeze)
+        gc.disable()
+        if enabled:
+            after.callback(gc.enable)
+        yield
+
+
+def run(graph: CheckedGraph | BoundGraph, ticks: int | None = None, **options: Any) -> RunResult:
+    """Run a graph from start to close; the options are those of ``Executor``."""
+    return Executor(graph, **options).run(ticks)
