@@ -2,30 +2,29 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-if TYPE_CHECKING:
-    from .recording import RunLog
+from .logged_run import LoggedRun, entity_of
 
 MAIN_FIELDS = ("com", "com_velocity", "contact_force", "motor_torque", "motor_speed")
 """Shown as time series where the port that poses the robot has them, in this order."""
 MOST_PLOTS = 5
 
 
-def main_plots(run: RunLog, pose_port: str | None) -> list[str]:
+def main_plots(run: LoggedRun, pose_port: str | None) -> list[str]:
     """Full names of the fields to plot: the robot's main ones, or just the first of the graph."""
+    known = [name for name, _ in run.fields()]
     if pose_port is None:
-        return list(run.names())[:MOST_PLOTS]
-    known = set(run.names(pose_port))
+        return known[:MOST_PLOTS]
     return [name for field in MAIN_FIELDS if (name := f"{pose_port}.{field}") in known]
 
 
-def recording_blueprint(run: RunLog, pose_port: str | None) -> Any:
+def recording_blueprint(run: LoggedRun, pose_port: str | None) -> Any:
     """The layout, saved in the file so that it needs no set-up to look at."""
     import rerun.blueprint as rrb
 
     plots = [
-        rrb.TimeSeriesView(origin=entity_of_name(name), name=name)
+        rrb.TimeSeriesView(origin=entity_of("signals", name), name=name)
         for name in main_plots(run, pose_port)
     ]
     below = rrb.Horizontal(
@@ -49,9 +48,3 @@ def recording_blueprint(run: RunLog, pose_port: str | None) -> Any:
         rrb.SelectionPanel(state="collapsed"),
         rrb.BlueprintPanel(state="collapsed"),
     )
-
-
-def entity_of_name(name: str) -> str:
-    """The entity that holds the signal ``block.port.field``."""
-    block, port, field = name.rsplit(".", 2)
-    return f"signals/{block}/{port}/{field}"

@@ -10,7 +10,7 @@ In the file:
   changes, and ``events``: the same as text.
 * ``world``: the robot, forces and centre of mass, at 100 Hz; see ``robot_view``.
 * ``graph``: the graph as it ran, as text; and the properties ``aloft``: overrides, seeds, versions,
-  the run's hash, metrics.
+  the run's hash and its outcome.
 
 Nothing here opens a socket, and nothing runs while the robot does: the whole file is written from
 the log in memory when the run is over.
@@ -21,41 +21,21 @@ from __future__ import annotations
 import json
 import platform
 import time
-from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..runtime.run_result import RunResult
 from ..runtime.stages import CheckedGraph
 from .blueprint import recording_blueprint
+from .logged_run import LoggedRun, entity_of, time_columns
 from .robot_view import port_with_pose, write_robot
 from .signal_names import element_names
 
-POSE_RATE = 100.0
-"""Pictures a second [Hz]: more than an eye sees, a fifth of the bytes."""
 RECORDED_VERSIONS = ("aloft", "numpy", "mujoco-core", "pin", "qpsolvers", "daqp", "rerun-sdk")
-
-
-class RunLog(Protocol):
-    """What a recording needs to know of a run."""
-
-    @property
-    def graph(self) -> CheckedGraph:
-        """The graph that ran."""
-
-    @property
-    def ticks(self) -> int:
-        """How many ticks ran."""
-
-    def names(self, port: str = "") -> Sequence[str]:
-        """Every ``block.port.field``, or those of one port."""
-
-    def signal(self, name: str) -> NDArray[Any]:
-        """One field at every tick, (ticks, ...)."""
 
 
 @dataclass(frozen=True)
@@ -67,101 +47,78 @@ class Recording:
     seconds: float
 
 
-def write_recording(path: Path, run: RunLog, properties: Mapping[str, Any]) -> Recording:
-    """Write the whole run to ``path``, replacing what is there.
+def write_recording(path: Path, graph: CheckedGraph, result: RunResult) -> Recording:
+    """Write a whole run, also one that failed, to ``path``, replacing what is there.
 
     Raises:
         ImportError: Rerun is not installed.
         OSError: the file cannot be written.
+        RuntimeError: the run kept no log.
     """
     import rerun as rr
 
     began = time.perf_counter()
+    run = LoggedRun.of(graph, result)
     path.parent.mkdir(parents=True, exist_ok=True)
-    path.open("wb").close()  # Rerun only logs a failure to open, so find out here
+    path.open("wb").close()  # Rerun would only warn, so find out here whether it can be written
     # No wall-clock time and no random name: two recordings of one run hold the same data.
     stream = rr.RecordingStream(
-        "aloft", recording_id=str(properties.get("run_hash", "run")), send_properties=False
+        "aloft", recording_id=result.run_hash or graph.name, send_properties=False
     )
     rr.set_log_time_enabled(False, recording=stream)
-    pose_port = port_with_pose(run.graph)
+    pose_port = port_with_pose(graph)
     stream.save(path, default_blueprint=recording_blueprint(run, pose_port))
     try:
-        stream.log("graph", rr.TextDocument(run.graph.text, media_type="text/plain"), static=True)
-        stream.send_property("aloft", rr.AnyValues(**describe(run.graph, properties)))
-        ticks = np.arange(run.ticks, dtype=np.int64)
-        write_signals(stream, run, time_columns(run.graph, ticks))
-        write_states(stream, run)
-        if pose_port is not None:
-            rows = slice(None, None, max(1, round(run.graph.base_rate / POSE_RATE)))
-            write_robot(stream, time_columns(run.graph, ticks[rows]), run, pose_port, rows)
+        stream.log("graph", rr.TextDocument(graph.text, media_type="text/plain"), static=True)
+        stream.send_property("aloft", rr.AnyValues(**describe(graph, result)))
+        if len(run.ticks):
+            write_signals(stream, run)
+            write_states(stream, run)
+            if pose_port is not None:
+                write_robot(stream, run, pose_port)
     finally:
         stream.flush(timeout_sec=30)
         stream.disconnect()
     return Recording(path, path.stat().st_size, time.perf_counter() - began)
 
 
-def time_columns(graph: CheckedGraph, ticks: NDArray[np.int64]) -> list[Any]:
-    """The timelines ``t`` and ``tick``; nanoseconds as integers, because floats would round."""
-    import rerun as rr
-
-    nanoseconds = np.rint(ticks * (1e9 / graph.base_rate)).astype("timedelta64[ns]")
-    return [rr.TimeColumn("t", duration=nanoseconds), rr.TimeColumn("tick", sequence=ticks)]
-
-
-def write_signals(stream: Any, run: RunLog, columns: Sequence[Any]) -> None:
+def write_signals(stream: Any, run: LoggedRun) -> None:
     """Write every field of every output as float64 series with a legend."""
     import rerun as rr
 
-    for spec in run.graph.blocks:
-        for port, output in spec.block_type.outputs.items():
-            for name, field in output.signal.fields.items():
-                values = run.signal(f"{spec.path}.{port}.{name}")
-                entity = entity_of("signals", spec.path, port, name)
-                names = element_names(field, values.shape[1:], run.graph.robot)
-                if names:
-                    stream.log(entity, rr.SeriesLines(names=names), static=True)
-                flat = values.reshape(len(values), -1).astype(np.float64)
-                stream.send_columns(entity, columns, rr.Scalars.columns(scalars=flat))
+    columns = time_columns(run.graph, run.ticks)
+    for name, field in run.fields():
+        values = run.signal(name)
+        entity = entity_of("signals", name)
+        names = element_names(field, values.shape[1:], run.graph.robot)
+        if names:
+            stream.log(entity, rr.SeriesLines(names=names), static=True)
+        flat = values.reshape(len(values), -1).astype(np.float64)
+        stream.send_columns(entity, columns, rr.Scalars.columns(scalars=flat))
 
 
-def write_states(stream: Any, run: RunLog) -> None:
-    """Write each change of a field whose numbers have names, and the same as a line of text."""
+def write_states(stream: Any, run: LoggedRun) -> None:
+    """Write each change of a number whose values have names, and the same as a line of text."""
     import rerun as rr
 
-    for full_name, entity, values in named_states(run):
-        numbers = run.signal(full_name)
-        changes = np.flatnonzero(np.diff(numbers, prepend=numbers[:1] - 1)).astype(np.int64)
-        labels = [values.get(int(numbers[k]), str(numbers[k])) for k in changes]
-        columns = time_columns(run.graph, changes)
-        stream.send_columns(entity, columns, rr.StateChange.columns(state=labels))
-        texts = [f"{full_name}: {label}" for label in labels]
+    for name, field in run.fields():
+        if field.values is None or field.shape:
+            continue
+        numbers = run.signal(name)
+        changes = np.flatnonzero(np.diff(numbers, prepend=numbers[0] - 1))
+        known = {int(value): value.name.lower() for value in field.values}
+        labels = [known.get(int(number), str(number)) for number in numbers[changes]]
+        columns = time_columns(run.graph, run.ticks[changes])
         stream.send_columns(
-            "events", columns, rr.TextLog.columns(text=texts, level=["INFO"] * len(texts))
+            entity_of("states", name), columns, rr.StateChange.columns(state=labels)
         )
+        texts = [f"{name}: {label}" for label in labels]
+        levels = ["INFO"] * len(texts)
+        stream.send_columns("events", columns, rr.TextLog.columns(text=texts, level=levels))
 
 
-def named_states(run: RunLog) -> Iterable[tuple[str, str, Mapping[int, str]]]:
-    """Every single number with named values: its full name, its entity, and the names."""
-    for spec in run.graph.blocks:
-        for port, output in spec.block_type.outputs.items():
-            for name, field in output.signal.fields.items():
-                if field.values is not None and not field.shape:
-                    names = {int(v): v.name.lower() for v in field.values}
-                    yield (
-                        f"{spec.path}.{port}.{name}",
-                        entity_of("states", spec.path, port, name),
-                        names,
-                    )
-
-
-def entity_of(kind: str, block: str, port: str, field: str) -> str:
-    """The entity path of a field; nested blocks nest."""
-    return f"{kind}/{block}/{port}/{field}"
-
-
-def describe(graph: CheckedGraph, properties: Mapping[str, Any]) -> dict[str, str]:
-    """What is needed to repeat the run, and what came out, as texts."""
+def describe(graph: CheckedGraph, result: RunResult) -> dict[str, str]:
+    """What is needed to repeat the run, and what came of it, as texts."""
     seeds = {
         f"{spec.path}.seed": spec.params.seed
         for spec in graph.blocks
@@ -173,10 +130,8 @@ def describe(graph: CheckedGraph, properties: Mapping[str, Any]) -> dict[str, st
         "overrides": json.dumps(dict(graph.overrides)),
         "seeds": json.dumps(seeds),
         "versions": json.dumps(versions()),
-        **{
-            key: value if isinstance(value, str) else json.dumps(value)
-            for key, value in properties.items()
-        },
+        "run_hash": result.run_hash,
+        "outcome": json.dumps(result.to_json()),
     }
 
 

@@ -7,7 +7,7 @@ has them, contact points, contact forces and the centre of mass: the simulator's
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,15 +15,17 @@ from numpy.typing import NDArray
 from ..runtime.description import Link, RobotDescription, Shape
 from ..runtime.kinematics import link_poses
 from ..runtime.stages import CheckedGraph
-
-if TYPE_CHECKING:
-    from .recording import RunLog
+from .logged_run import LoggedRun, time_columns
 
 Array = NDArray[np.float64]
 
 POSE_FIELDS = ("base_position", "base_orientation", "joint_position")
+POSE_RATE = 100.0
+"""Pictures a second [Hz]: more than an eye sees, a fifth of the bytes."""
 FORCE_SCALE = 0.002
 """Length of an arrow [m] for each newton: the weight of BRUCE is 10 cm."""
+SHORTEST_FLIGHT = 0.03
+"""Without load for less [s] is a bounce, not a flight."""
 SIMULATED, FORCE, MASS_CENTRE = 0x90A4AEFF, 0xE53935FF, 0xFDD835FF
 
 
@@ -38,15 +40,14 @@ def port_with_pose(graph: CheckedGraph) -> str | None:
     return None
 
 
-def write_robot(stream: Any, columns: Sequence[Any], run: RunLog, port: str, rows: slice) -> None:
-    """Write the links' shapes once and their poses, forces and centre of mass for ``rows``.
-
-    ``columns`` are the time columns of the same rows.
-    """
+def write_robot(stream: Any, run: LoggedRun, port: str) -> None:
+    """Write the links' shapes once, then their poses, forces and centre of mass over time."""
     import rerun as rr
 
     robot = run.graph.robot
     assert robot is not None, "port_with_pose has found a robot"
+    rows = slice(None, None, max(1, round(run.graph.base_rate / POSE_RATE)))
+    columns = time_columns(run.graph, run.ticks[rows])
     stream.log("world", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
     base, orientation, joints = (run.signal(f"{port}.{field}")[rows] for field in POSE_FIELDS)
     poses = link_poses(robot, base, orientation, joints)
@@ -57,7 +58,7 @@ def write_robot(stream: Any, columns: Sequence[Any], run: RunLog, port: str, row
         stream.send_columns(
             entity, columns, rr.Transform3D.columns(translation=position, mat3x3=rotation)
         )
-    known = {name.rpartition(".")[2] for name in run.names(port)}
+    known = {name.removeprefix(f"{port}.") for name, _ in run.fields()}
     if {"contact_position", "contact_force"} <= known:
         origins = run.signal(f"{port}.contact_position")[rows]
         vectors = run.signal(f"{port}.contact_force")[rows] * FORCE_SCALE
@@ -69,6 +70,14 @@ def write_robot(stream: Any, columns: Sequence[Any], run: RunLog, port: str, row
                 origins=origins.reshape(-1, 3), vectors=vectors.reshape(-1, 3)
             ).partition(np.full(len(origins), origins.shape[1])),
         )
+        forces = run.signal(f"{port}.contact_force")
+        least = max(1, round(SHORTEST_FLIGHT * run.graph.base_rate))
+        flights = flight_events((forces != 0.0).any(axis=2), least)
+        if flights:
+            instants = time_columns(run.graph, run.ticks[[row for row, _ in flights]])
+            texts = [text for _, text in flights]
+            levels = ["INFO"] * len(texts)
+            stream.send_columns("events", instants, rr.TextLog.columns(text=texts, level=levels))
     if "com" in known:
         stream.log(
             "world/com", rr.Points3D.from_fields(colors=[MASS_CENTRE], radii=[0.012]), static=True
@@ -76,6 +85,23 @@ def write_robot(stream: Any, columns: Sequence[Any], run: RunLog, port: str, row
         stream.send_columns(
             "world/com", columns, rr.Points3D.columns(positions=run.signal(f"{port}.com")[rows])
         )
+
+
+def flight_events(loaded: NDArray[np.bool_], least: int) -> list[tuple[int, str]]:
+    """When the robot left the ground and when it came back, as (row, text).
+
+    ``loaded`` (n, n_contacts) says which points carry load; a time in the air shorter than
+    ``least`` rows is a bounce and no event.
+    """
+    in_air = np.logical_not(loaded.any(axis=1)).reshape(-1)
+    edges = np.flatnonzero(np.diff(in_air, prepend=False, append=False))
+    events = []
+    for start, end in edges.reshape(-1, 2).tolist():
+        if end - start >= least:
+            events.append((start, "lift-off"))
+            if end < len(in_air):
+                events.append((end, "touchdown"))
+    return events
 
 
 def shapes_of(robot: RobotDescription, link: Link) -> list[Shape]:

@@ -1,0 +1,84 @@
+"""What is shipped: every sub-package, every data file, and a command line that starts at once."""
+
+import shutil
+import subprocess
+import sys
+import tomllib
+import zipfile
+from importlib import metadata
+from pathlib import Path
+
+import pytest
+
+import aloft
+
+ROOT = Path(__file__).parent.parent
+NOT_SHIPPED = {"tests", "docs", "scripts", "recordings", "build", "dist", "aloft.egg-info"}
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
+LISTED = PROJECT["tool"]["setuptools"]["packages"]
+
+
+def sub_packages() -> set[str]:
+    folders = {path.parent for path in ROOT.glob("*/**/__init__.py")}
+    parts = {folder.relative_to(ROOT).parts for folder in folders}
+    ours = {p for p in parts if p[0] not in NOT_SHIPPED and not p[0].startswith(".")}
+    return {".".join(("aloft", *p)) for p in ours} | {"aloft"}
+
+
+def test_every_sub_package_is_listed() -> None:
+    assert set(LISTED) == sub_packages()
+    assert len(LISTED) == len(set(LISTED))
+
+
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A wheel built from a copy of the tracked files, so nothing here is touched."""
+    folder = tmp_path_factory.mktemp("wheel")
+    source = folder / "some-folder"
+    ignored = shutil.ignore_patterns(".*", *(NOT_SHIPPED - {"tests", "docs"}), "__pycache__")
+    shutil.copytree(ROOT, source, ignore=ignored)
+    code = f"from setuptools import build_meta; build_meta.build_wheel({str(folder)!r})"
+    subprocess.run([sys.executable, "-c", code], cwd=source, check=True, capture_output=True)
+    (built,) = folder.glob("*.whl")
+    return built
+
+
+def test_the_wheel_holds_all_code_and_data(wheel: Path) -> None:
+    inside = set(zipfile.ZipFile(wheel).namelist())
+    expected = {"aloft/py.typed", "aloft/hal/bruce/bruce.yaml"}
+    for package in LISTED:
+        folder = ROOT.joinpath(*package.split(".")[1:])
+        expected |= {f"{package.replace('.', '/')}/{path.name}" for path in folder.glob("*.py")}
+    for path in (ROOT / "graphs").rglob("*.yaml"):
+        expected.add(f"aloft/{path.relative_to(ROOT).as_posix()}")
+    assert expected - inside == set()
+
+
+def test_the_wheel_holds_nothing_else(wheel: Path) -> None:
+    tops = {name.split("/")[0] for name in zipfile.ZipFile(wheel).namelist()}
+    assert tops == {"aloft", f"aloft-{aloft.__version__}.dist-info"}
+    shipped = {name.split("/")[1] for name in zipfile.ZipFile(wheel).namelist()}
+    assert shipped.isdisjoint(NOT_SHIPPED)
+
+
+def test_one_version() -> None:
+    assert PROJECT["project"]["version"] == aloft.__version__ == metadata.version("aloft")
+
+
+def loaded_by(code: str) -> set[str]:
+    """The top-level modules in memory after ``code`` in a fresh interpreter."""
+    script = f"import sys\n{code}\nprint(' '.join(m for m in sys.modules if '.' not in m))"
+    done = subprocess.run(
+        [sys.executable, "-c", script], check=True, capture_output=True, text=True
+    )
+    return set(done.stdout.split())
+
+
+@pytest.mark.parametrize("code", ["import aloft.cli", "import aloft; aloft.load"])
+def test_importing_loads_no_heavy_library(code: str) -> None:
+    heavy = {"mujoco", "pinocchio", "rerun", "qpsolvers", "scipy", "pyarrow", "daqp"}
+    assert loaded_by(code) & heavy == set()
+
+
+def test_importing_the_package_itself_loads_nothing() -> None:
+    assert loaded_by("import aloft") & {"numpy", "pydantic", "typer", "yaml"} == set()
