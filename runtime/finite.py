@@ -40,11 +40,13 @@ class FiniteCheck:
             for i in range(0, floats.size, _PIECE)
         ]
         self._product = np.zeros(())
+        self._value = self._product.reshape(1).data  # read through this, no array is made
 
     def check(self) -> None:
         """Raise ``NotFiniteError`` for the first element that is not finite."""
         for floats, tiny in self._pieces:
-            if not isfinite(np.dot(floats, tiny, self._product).item()):
+            np.dot(floats, tiny, self._product)
+            if not isfinite(self._value[0]):
                 self._report()
 
     def _report(self) -> None:
