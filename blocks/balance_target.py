@@ -1,0 +1,162 @@
+"""What the whole-body controller is to achieve: the plan, then balance over the feet."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..runtime.block import Block, Input, Output, State
+from ..runtime.parameters import Parameters, parameter
+from ..runtime.signals import Field, Signal
+from .polynomials import minimum_jerk
+from .rotations import conjugate, exponential, from_matrix, logarithm, multiply
+from .signals import DynamicsTerms, JumpReference, Phase, PhaseState, WholeBodyTarget
+
+Array = NDArray[np.float64]
+
+
+class BalanceMemory(Signal):
+    """What the balance remembers."""
+
+    standing_height = Field(unit="m", text="planned height of the centre of mass at the start")
+    trim = Field(3, unit="rad", frame="body", text="rotation added to the level target")
+
+
+class BalanceTarget(Block):
+    """Follows the plan until touchdown; after it, rest over the middle of the measured feet.
+
+    Before touchdown positions and heading are the plan's, shifted and turned with the measured
+    feet: the plan is relative to where the feet stand, so a drift of the estimated position or
+    heading does not matter.
+
+    After touchdown the centre of mass goes over the middle of the sole centres, at
+    ``landing_depth`` below standing height; when the phase is RECOVER it rises to standing height
+    with least jerk within ``rise_time``. The torso goes level, heading as the feet do on average.
+    Joint friction leaves a small steady tilt; ``trim`` integrates it away,
+
+        trim' = trim_rate Log(R' R_level), within trim_limit,    R_target = R_level Exp(trim),
+
+    about the body's x and y axes. Angular momentum and its rate are wanted zero.
+
+    Does not plan a step: the feet stay where they are.
+    """
+
+    class Params(Parameters):
+        landing_depth: float = parameter(
+            0.06, unit="m", ge=0.0, le=0.2, text="height held after touchdown, below standing"
+        )
+        rise_time: float = parameter(0.6, unit="s", gt=0.0, text="from there to standing height")
+        trim_rate: float = parameter(
+            1.0, unit="1/s", ge=0.0, le=20.0, text="how fast a steady tilt is integrated away"
+        )
+        trim_limit: float = parameter(
+            0.08, unit="rad", ge=0.0, le=0.5, text="largest trim about each axis"
+        )
+
+    params: Params
+    reference = Input(JumpReference, text="the plan")
+    phase = Input(PhaseState, text="the phase the robot is in")
+    terms = Input(DynamicsTerms, text="the present state")
+    target = Output(WholeBodyTarget, text="what to achieve now")
+    memory = State(BalanceMemory)
+
+    def setup(self) -> None:
+        self._quaternion = np.zeros(4)
+        self._turn = np.zeros(4)
+        self._vector = np.zeros(3)
+        self._middle = np.zeros(3)
+        self._planned_middle = np.zeros(3)
+        self._feet = self.context.dimensions["n_feet"]
+
+    def step(self) -> None:
+        phase, reference = int(self.phase.phase), self.reference
+        if phase == Phase.STAND and float(self.memory.standing_height) == 0.0:
+            self.memory.standing_height[()] = reference.com[2]
+        middle_point(self.terms.foot_position, self._middle)
+        heading = mean_heading(self.terms.foot_rotation)
+        if phase < Phase.LANDING:
+            self._follow(heading)
+        else:
+            self._balance(phase, heading)
+
+    def _follow(self, heading: float) -> None:
+        reference, target, planned = self.reference, self.target, 0.0
+        for foot in range(self._feet):
+            planned += float(reference.foot_yaw[foot]) / self._feet
+        middle_point(reference.foot_position, self._planned_middle)
+        turn = heading - planned
+        for name in ("com", "com_velocity", "com_acceleration", "angular_momentum",
+                     "angular_momentum_rate"):  # fmt: skip
+            out = getattr(target, name)
+            source = getattr(reference, name)
+            if name == "com":
+                np.subtract(source, self._planned_middle, out=self._vector)
+                turn_about_vertical(self._vector, turn, out)
+                np.add(out, self._middle, out=out)
+            else:
+                turn_about_vertical(source, turn, out)
+        self._set_heading(turn)
+        multiply(self._turn, reference.orientation, target.orientation)
+        target.angular_velocity[...] = reference.angular_velocity
+
+    def _balance(self, phase: int, heading: float) -> None:
+        p, target, trim = self.params, self.target, self.memory.trim
+        standing = float(self.memory.standing_height)
+        share = rate = bend = 0.0
+        if phase == Phase.RECOVER:
+            share, rate, bend = minimum_jerk(float(self.phase.time_in_phase) / p.rise_time)
+        low = standing - p.landing_depth
+        target.com[...] = self._middle
+        target.com[2] += low + share * p.landing_depth
+        target.com_velocity[...] = 0.0
+        target.com_velocity[2] = rate * p.landing_depth / p.rise_time
+        target.com_acceleration[...] = 0.0
+        target.com_acceleration[2] = bend * p.landing_depth / (p.rise_time * p.rise_time)
+        target.angular_velocity[...] = 0.0
+        target.angular_momentum[...] = 0.0
+        target.angular_momentum_rate[...] = 0.0
+        self._set_heading(heading)
+        from_matrix(self.terms.base_rotation, self._quaternion)
+        conjugate(self._quaternion, self._quaternion)
+        multiply(self._quaternion, self._turn, self._quaternion)
+        logarithm(self._quaternion, self._vector)
+        integrate_trim(self._vector, p.trim_rate * self.period, p.trim_limit, trim)
+        exponential(trim, self._quaternion)
+        multiply(self._turn, self._quaternion, target.orientation)
+
+    def _set_heading(self, angle: float) -> None:
+        self._turn[0] = self._turn[1] = 0.0
+        self._turn[2], self._turn[3] = math.sin(0.5 * angle), math.cos(0.5 * angle)
+
+
+def middle_point(points: Array, out: Array) -> None:
+    """The mean of points (n, 3)."""
+    out[:] = 0.0
+    for i in range(points.shape[0]):
+        for k in range(3):
+            out[k] += float(points[i, k]) / points.shape[0]
+
+
+def mean_heading(rotations: Array) -> float:
+    """The heading [rad] of the mean of the x axes of rotations (n, 3, 3)."""
+    x = y = 0.0
+    for i in range(rotations.shape[0]):
+        x += float(rotations[i, 0, 0])
+        y += float(rotations[i, 1, 0])
+    return math.atan2(y, x)
+
+
+def turn_about_vertical(vector: Array, angle: float, out: Array) -> None:
+    """A vector (3,) turned about the world's z axis."""
+    cosine, sine = math.cos(angle), math.sin(angle)
+    x, y = float(vector[0]), float(vector[1])
+    out[0], out[1], out[2] = cosine * x - sine * y, sine * x + cosine * y, vector[2]
+
+
+def integrate_trim(error: Array, gain: float, limit: float, trim: Array) -> None:
+    """One step of the integral about x and y, kept within the limit; none about z."""
+    for k in range(2):
+        trim[k] = min(max(float(trim[k]) + gain * float(error[k]), -limit), limit)
+    trim[2] = 0.0

@@ -1,0 +1,203 @@
+"""Which phase of the jump the robot is really in."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..runtime.block import Block, Input, Output, State
+from ..runtime.parameters import Parameters, parameter
+from ..runtime.signals import Field, Signal
+from .signals import ContactState, DynamicsTerms, JumpReference, Phase, PhaseState
+
+_GRAVITY = 9.81
+
+
+class PhaseMemory(Signal):
+    """What the phase machine remembers."""
+
+    phase = Field(dtype="int64", text="see Phase")
+    began = Field(unit="s", text="plan time at which the phase began")
+    touchdown = Field(unit="s", text="plan time of the first touchdown, negative before it")
+    unloaded = Field("n_contacts", unit="s", text="how long each point has been without contact")
+    stance = Field("n_contacts", dtype="bool", text="the points in stance after touchdown")
+
+
+class JumpPhase(Block):
+    """The phase by plan time and measured contact, the stance points, and the time to touchdown.
+
+    ============  =====================================================================
+    phase         ends
+    ============  =====================================================================
+    STAND, SQUAT  at the planned times
+    THRUST        at the planned lift-off; up to ``late_lift_off`` later while any point
+                  still has contact; in its second half at once when no point has had
+                  contact for ``early_lift_off``
+    FLIGHT        at the first contact after ``touchdown_share`` of the predicted flight
+    LANDING       ``landing_time`` after touchdown
+    FAULT         never; entered from any other phase on the conditions below
+    ============  =====================================================================
+
+    RECOVER follows LANDING and stays. FAULT: no point has had contact for ``lost_contact`` while
+    the robot should stand, or the flight has lasted that much longer than predicted at its start
+    by the plan.
+
+    Stance: before lift-off all points; in flight none; after touchdown every point that had
+    contact within the last ``contact_hold``, and if that leaves none, those of the tick before.
+
+    The time to touchdown is the ballistic fall of the measured centre of mass to the height it is
+    planned to touch down at: z + v s - g s^2 / 2 = z_td.
+
+    Does not judge tilt, torques or sensors (``SafetyMonitor`` does), and never goes back.
+    """
+
+    class Params(Parameters):
+        late_lift_off: float = parameter(
+            0.0, unit="s", ge=0.0, text="how long to wait for the feet to leave the ground"
+        )
+        early_lift_off: float = parameter(
+            0.01, unit="s", gt=0.0, text="without any contact for this long the robot flies"
+        )
+        touchdown_share: float = parameter(
+            0.5, ge=0.0, le=1.0, text="share of the predicted flight before touchdown counts"
+        )
+        landing_time: float = parameter(
+            0.35, unit="s", ge=0.0, text="from touchdown until the robot rises again"
+        )
+        contact_hold: float = parameter(
+            0.03, unit="s", ge=0.0, text="how long a point stays in stance without contact"
+        )
+        lost_contact: float = parameter(
+            0.2, unit="s", gt=0.0, text="how long without contact before it is a fault"
+        )
+
+    params: Params
+    reference = Input(JumpReference, text="the plan")
+    contacts = Input(ContactState, text="which points carry load")
+    terms = Input(DynamicsTerms, text="the present state")
+    phase = Output(PhaseState, text="the phase, its times and the stance points")
+    memory = State(PhaseMemory)
+
+    def start(self) -> None:
+        self.memory.touchdown[()] = -1.0
+
+    def step(self) -> None:
+        p, memory, out = self.params, self.memory, self.phase
+        now = float(self.reference.time)
+        touchdown_time = float(self.reference.touchdown_time)
+        active, unloaded = self.contacts.active, memory.unloaded
+        shortest = count_unloaded(active, self.period, unloaded)
+        lift_off = float(self.reference.lift_off_time)
+        remaining = 0.0
+        if int(memory.phase) <= Phase.FLIGHT:
+            remaining = time_to_height(
+                float(self.terms.com[2]), float(self.terms.com_velocity[2]),
+                planned_touchdown_height(
+                    float(self.reference.com[2]), float(self.reference.com_velocity[2]),
+                    touchdown_time - max(now, lift_off),
+                ),
+            )  # fmt: skip
+        before = int(memory.phase)
+        phase = next_phase(
+            before, int(self.reference.phase), now - float(memory.began), now, lift_off,
+            touchdown_time, remaining, shortest, p.late_lift_off, p.early_lift_off,
+            p.touchdown_share, p.landing_time, p.lost_contact,
+        )  # fmt: skip
+        if phase != before:
+            memory.phase[()] = phase
+            memory.began[()] = now
+            if phase == Phase.LANDING:
+                memory.touchdown[()] = now
+        choose_stance(phase, unloaded, p.contact_hold, memory.stance)
+        out.phase[()] = phase
+        out.time_in_phase[()] = now - float(memory.began)
+        out.time_to_touchdown[()] = remaining if phase == Phase.FLIGHT else 0.0
+        since = now - float(memory.touchdown) if float(memory.touchdown) >= 0.0 else 0.0
+        out.time_since_touchdown[()] = since
+        out.stance[...] = memory.stance
+
+
+def count_unloaded(
+    active: NDArray[np.bool_], period: float, unloaded: NDArray[np.float64]
+) -> float:
+    """Count on how long each point has been without contact; the shortest of these times [s]."""
+    shortest = math.inf
+    for i in range(active.shape[0]):
+        unloaded[i] = 0.0 if active[i] else float(unloaded[i]) + period
+        shortest = min(shortest, float(unloaded[i]))
+    return shortest
+
+
+def planned_touchdown_height(height: float, velocity: float, remaining: float) -> float:
+    """Where a body at ``height`` with ``velocity`` will be after falling for ``remaining``."""
+    return height + remaining * (velocity - 0.5 * _GRAVITY * remaining)
+
+
+def time_to_height(height: float, velocity: float, goal: float) -> float:
+    """The time [s] until a falling body comes down to ``goal``; its apex where it is below that."""
+    square = velocity * velocity + 2.0 * _GRAVITY * (height - goal)
+    return max(0.0, (velocity + math.sqrt(max(square, 0.0))) / _GRAVITY)
+
+
+def next_phase(
+    phase: int,
+    planned: int,
+    time_in_phase: float,
+    now: float,
+    lift_off_time: float,
+    touchdown_time: float,
+    remaining: float,
+    unloaded: float,
+    late_lift_off: float,
+    early_lift_off: float,
+    touchdown_share: float,
+    landing_time: float,
+    lost_contact: float,
+) -> int:
+    """The phase that follows; see the block's text.
+
+    Args:
+        unloaded: how long no point has had contact [s].
+        remaining: predicted time to touchdown [s].
+    """
+    if phase == Phase.FAULT:
+        return Phase.FAULT
+    if phase == Phase.FLIGHT:
+        if unloaded == 0.0 and time_in_phase >= touchdown_share * (time_in_phase + remaining):
+            return Phase.LANDING
+        if time_in_phase > touchdown_time - lift_off_time + lost_contact:
+            return Phase.FAULT
+        return Phase.FLIGHT
+    if unloaded > lost_contact:
+        return Phase.FAULT
+    if phase >= Phase.LANDING:
+        if phase == Phase.LANDING and time_in_phase >= landing_time:
+            return Phase.RECOVER
+        return phase
+    if now >= lift_off_time:
+        waiting = unloaded == 0.0 and now < lift_off_time + late_lift_off
+        return Phase.THRUST if waiting else Phase.FLIGHT
+    second_half = phase == Phase.THRUST and now + time_in_phase >= lift_off_time
+    if second_half and unloaded >= early_lift_off:
+        return Phase.FLIGHT
+    return max(phase, min(planned, int(Phase.THRUST)))
+
+
+def choose_stance(
+    phase: int, unloaded: NDArray[np.float64], hold: float, stance: NDArray[np.bool_]
+) -> None:
+    """The points in stance, written over those of the tick before."""
+    if phase < Phase.FLIGHT:
+        stance[:] = True
+        return
+    if phase == Phase.FLIGHT:
+        stance[:] = False
+        return
+    found = False
+    for i in range(unloaded.shape[0]):
+        found = found or unloaded[i] <= hold
+    if found:
+        for i in range(unloaded.shape[0]):
+            stance[i] = unloaded[i] <= hold

@@ -1,0 +1,102 @@
+"""A planned jump as a table over time, and how a reference is read from it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .rotations import normalise
+from .signals import JumpReference, Phase
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class JumpTable:
+    """A planned jump, row by row in time.
+
+    Attributes:
+        time: increasing times since the plan began [s], (n,). Two rows may share an instant
+            where something jumps, such as the joint velocities at touchdown.
+        columns: by the name of a ``JumpReference`` field its values over time, (n, ...).
+        squat_time, thrust_time, lift_off_time, touchdown_time, recover_time: when the phases of
+            these names begin, flight beginning with lift-off and landing with touchdown [s].
+    """
+
+    time: Array
+    columns: dict[str, Array]
+    squat_time: float
+    thrust_time: float
+    lift_off_time: float
+    touchdown_time: float
+    recover_time: float
+
+
+class JumpTableReader:
+    """Writes the reference of any instant of a table without allocating."""
+
+    def __init__(self, table: JumpTable) -> None:
+        self._table = table
+        self._time = table.time
+        self._columns = list(table.columns.items())
+        self._scratch = {name: np.zeros(rows.shape[1:]) for name, rows in self._columns}
+
+    def read(self, time: float, reference: JumpReference) -> None:
+        """The reference at ``time``; before the table its first row, after it its last."""
+        table = self._table
+        row, share = locate(self._time, time)
+        for name, rows in self._columns:
+            out, scratch = getattr(reference, name), self._scratch[name]
+            np.subtract(rows[row + 1], rows[row], out=scratch)
+            np.multiply(scratch, share, out=scratch)
+            np.add(rows[row], scratch, out=out)
+        normalise(reference.orientation, reference.orientation)
+        phase = planned_phase(
+            time, table.squat_time, table.thrust_time, table.lift_off_time,
+            table.touchdown_time, table.recover_time,
+        )  # fmt: skip
+        reference.time[()] = time
+        reference.phase[()] = phase
+        reference.lift_off_time[()] = table.lift_off_time
+        reference.touchdown_time[()] = table.touchdown_time
+        reference.contact[...] = phase != Phase.FLIGHT
+
+
+def locate(times: Array, time: float) -> tuple[int, float]:
+    """The row before ``time`` and the share of the way from it to the next, from 0 to 1."""
+    low, high = 0, times.shape[0] - 1
+    if time <= times[0]:
+        return 0, 0.0
+    if time >= times[high]:
+        return high - 1, 1.0
+    while high - low > 1:
+        middle = (low + high) // 2
+        if times[middle] <= time:
+            low = middle
+        else:
+            high = middle
+    return low, (time - float(times[low])) / (float(times[high]) - float(times[low]))
+
+
+def planned_phase(
+    time: float,
+    squat_time: float,
+    thrust_time: float,
+    lift_off_time: float,
+    touchdown_time: float,
+    recover_time: float,
+) -> int:
+    """The phase a plan is in at ``time``, from when its phases begin."""
+    if time < squat_time:
+        return 0
+    if time < thrust_time:
+        return 1
+    if time < lift_off_time:
+        return 2
+    if time < touchdown_time:
+        return 3
+    if time < recover_time:
+        return 4
+    return 5

@@ -1,0 +1,51 @@
+"""Quadratic programs through qpsolvers: one call, any installed solver, no exceptions."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+class QuadraticProgramSolver:
+    """Minimises 1/2 x'Px + q'x subject to Gx <= h and Ax = b, from a cold start every time.
+
+    A cold start makes the answer a function of the problem alone; with an active-set solver such
+    as DAQP or quadprog it is also exact and the same in every process.
+
+    Args:
+        name: any solver that qpsolvers finds installed and that takes dense matrices.
+        options: passed to the solver, e.g. its tolerances.
+
+    Raises:
+        LookupError: the solver is not installed; the message names those that are.
+    """
+
+    def __init__(self, name: str, options: dict[str, float] | None = None) -> None:
+        from qpsolvers import Problem, available_solvers, solve_problem
+
+        if name not in available_solvers:
+            raise LookupError(
+                f"no quadratic-program solver {name!r} is installed; "
+                f"there is {', '.join(available_solvers)}"
+            )
+        self.name = name
+        self._options = dict(options or {})
+        self._problem: Any = Problem
+        self._solve: Any = solve_problem
+
+    def solve(self, p: Array, q: Array, g: Array, h: Array, a: Array, b: Array) -> Array | None:
+        """The minimiser, or None where the solver found none or failed."""
+        try:
+            answer = self._solve(self._problem(p, q, g, h, a, b), self.name, **self._options)
+        except Exception:  # noqa: BLE001
+            # Solvers raise whatever they please on a hopeless problem; to the caller, who has a
+            # defined fallback, all of it is the same: there is no answer.
+            return None
+        x = answer.x
+        if not answer.found or x is None or not np.isfinite(x).all():
+            return None
+        return np.asarray(x)
