@@ -30,6 +30,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, Generic, Self, TypeVar, overload
 
+import numpy as np
+
 from .description import RobotDescription
 from .errors import DeclarationError
 from .parameters import Parameters
@@ -208,6 +210,23 @@ class Block:
         cls, params: Parameters, robot: RobotDescription | None
     ) -> Mapping[str, int]:
         """Further dimensions that only state fields use; may build models, so it runs at bind."""
+        return {}
+
+    @classmethod
+    def example_parameters(cls) -> Mapping[str, Any]:
+        """What the conformance suite sets on the block, which must at least be what is required."""
+        return {}
+
+    @classmethod
+    def example_inputs(
+        cls, rng: np.random.Generator, dimensions: Mapping[str, int]
+    ) -> Mapping[str, Mapping[str, Any]]:
+        """Legal inputs for the conformance suite, by input and field, drawn anew every tick.
+
+        Only for fields where the suite's own are not legal: those are numbers within +-1, unit
+        quaternions for an ``orientation``, rotation matrices for a ``rotation``, and members of a
+        field's ``values``.
+        """
         return {}
 
     @property

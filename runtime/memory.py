@@ -179,8 +179,13 @@ class BoundGraph:
         return self.memory.snapshot(self.clock.tick)
 
     def restore(self, snapshot: Snapshot) -> None:
-        """Go back to a snapshot, ending with every block's ``thaw``. Raises ``ValueError``."""
+        """Go back to a snapshot, ending with every block's ``thaw``; the graph may run on from it.
+
+        Raises:
+            ValueError: the snapshot is of another graph, by its sizes.
+        """
         self.memory.restore(snapshot)
         self.clock.tick = snapshot.tick
+        self.clock.stop_reason = None
         for block in self.blocks.values():
             block.thaw()

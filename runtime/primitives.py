@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,6 +42,11 @@ class Constant(Block):
         assert isinstance(params, cls.Params)
         return {"n": len(params.value)}
 
+    @classmethod
+    def example_parameters(cls) -> Mapping[str, Any]:
+        """Three numbers."""
+        return {"value": [1.0, -2.0, 0.5]}
+
     def setup(self) -> None:
         """Make the vector."""
         self._value = np.array(self.params.value)
@@ -62,8 +68,8 @@ class Gain(Block):
     y = Output(Vector, text="gain times u")
 
     def setup(self) -> None:
-        """Keep the factor at hand."""
-        self._gain = self.params.gain
+        """Keep the factor at hand, as an array so that no tick makes one."""
+        self._gain = np.array(self.params.gain)
 
     def step(self) -> None:
         """Multiply."""
@@ -85,8 +91,8 @@ class Sum(Block):
     y = Output(Vector, text="the sum")
 
     def setup(self) -> None:
-        """Keep the factors at hand."""
-        self._first, self._second = self.params.weights
+        """Keep the factors at hand, as arrays so that no tick makes them."""
+        self._first, self._second = (np.array(weight) for weight in self.params.weights)
         self._product = np.zeros(self.params.n)
 
     def step(self) -> None:
@@ -154,7 +160,7 @@ class Integrator(Block):
         """Start from the initial value."""
         self.x.value[...] = self.params.start_value()
         self._step = np.zeros(self.params.n)
-        self._period = self.period
+        self._period = np.array(self.period)
 
     def emit(self) -> None:
         """Write the integral so far."""

@@ -135,9 +135,10 @@ class BlockBench(Generic[B]):
         return self.memory.snapshot(self.clock.tick)
 
     def restore(self, snapshot: Snapshot) -> None:
-        """Go back to a snapshot."""
+        """Go back to a snapshot, also one that another bench of the same block took."""
         self.memory.restore(snapshot)
         self.clock.tick = snapshot.tick
+        self.clock.stop_reason = None
         self.block.thaw()
 
     def close(self) -> None:

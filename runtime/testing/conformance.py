@@ -1,0 +1,296 @@
+"""What every block promises, as checks that need nothing but the block's class.
+
+For a block of your own, one parametrised test::
+
+    @pytest.mark.parametrize("case", conformance_cases())
+    def test_conformance(case: str) -> None:
+        check_block(MyBlock, {"gain": 2.0}, cases=[case])
+
+Parameters and inputs come from ``Block.example_parameters`` and ``Block.example_inputs``, and where
+those say nothing inputs are random, finite and of order one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from types import CodeType, FunctionType
+from typing import Any
+
+import numpy as np
+
+from ..block import Block
+from ..description import RobotDescription
+from ..finite import FiniteCheck
+from .allocations import count_array_allocations
+from .bench import BlockBench
+from .examples import random_inputs
+
+TICKS = 12
+"""Ticks of each check: enough to fill most delays."""
+WARM_UP = 3
+"""Ticks before arrays are counted: libraries allocate what they keep in their first calls."""
+
+
+class ConformanceError(AssertionError):
+    """A block breaks a promise; the message says which and how."""
+
+
+@dataclass(frozen=True)
+class Subject:
+    """A block under test and how to make one."""
+
+    block_type: type[Block]
+    params: Mapping[str, Any]
+    robot: str | RobotDescription | None
+    rate: float
+    dimensions: Mapping[str, int]
+    seed: int
+
+    def bench(self) -> BlockBench[Block]:
+        """A new instance, on a bench of its own."""
+        return BlockBench(
+            self.block_type,
+            self.params,
+            robot=self.robot,
+            rate=self.rate,
+            dimensions=self.dimensions,
+        )
+
+    def feed(self, bench: BlockBench[Block], ticks: int, seed: int = 0) -> Iterator[int]:
+        """Set new inputs for each tick, the same for the same seed; the caller steps."""
+        rng = np.random.default_rng([self.seed, seed])
+        for tick in range(ticks):
+            inputs = random_inputs(self.block_type, bench.block.context.dimensions, rng)
+            for port, fields in inputs.items():
+                bench.set(port, **fields)
+            yield tick
+
+    def trace(self, bench: BlockBench[Block], ticks: int = TICKS, seed: int = 0) -> list[bytes]:
+        """Step with fed inputs; all memory after each tick."""
+        result = []
+        for _ in self.feed(bench, ticks, seed):
+            bench.step()
+            snapshot = bench.snapshot()
+            result.append(snapshot.bus + snapshot.state)
+        return result
+
+    def expect(self, holds: bool, message: str) -> None:
+        """Raise ``ConformanceError`` unless it holds."""
+        if not holds:
+            raise ConformanceError(f"{self.block_type.__name__}: {message}")
+
+
+def _documented(subject: Subject) -> None:
+    """The docstring is its own, and every port and parameter has a text."""
+    kind = subject.block_type
+    subject.expect(bool((kind.__doc__ or "").strip()), "no docstring")
+    subject.expect(kind.__doc__ != Block.__doc__, "no docstring of its own")
+    for name, port in {**kind.inputs, **kind.outputs, **kind.states}.items():
+        subject.expect(bool(port.text), f"port {name!r} has no text")
+        for field_name, field in port.signal.fields.items():
+            subject.expect(bool(field.text), f"{name}.{field_name} has no text")
+    for name, info in kind.Params.model_fields.items():
+        subject.expect(bool(info.description), f"parameter {name!r} has no text")
+
+
+def _names(code: CodeType) -> Iterator[str]:
+    yield from code.co_names
+    for constant in code.co_consts:
+        if isinstance(constant, CodeType):
+            yield from _names(constant)
+
+
+def _ports_used(subject: Subject) -> None:
+    """Every declared port is named somewhere in the code of the class."""
+    kind = subject.block_type
+    used: dict[str, None] = {}
+    for owner in kind.__mro__:
+        for value in vars(owner).values() if issubclass(owner, Block) else ():
+            function = getattr(value, "__func__", value)
+            if isinstance(function, FunctionType):
+                used.update(dict.fromkeys(_names(function.__code__)))
+    for name in {**kind.inputs, **kind.outputs, **kind.states}:
+        subject.expect(name in used, f"port {name!r} is declared, but no method uses it")
+
+
+def _outputs_written(subject: Subject) -> None:
+    """Every run writes every output, whatever was in it; so nothing is remembered there."""
+    kind = subject.block_type
+    clean, spoiled = subject.bench(), subject.bench()
+    feed = zip(subject.feed(clean, TICKS), subject.feed(spoiled, TICKS), strict=True)
+    for tick, _ in feed:
+        for port in kind.outputs:
+            for _, view in spoiled.get(port):
+                view[...] = np.nan if view.dtype == np.float64 else view.dtype.type(tick % 2)
+        clean.step()
+        spoiled.step()
+        for port in kind.outputs:
+            for name, view in clean.get(port):
+                subject.expect(
+                    spoiled.get(port).views()[name].tobytes() == view.tobytes(),
+                    f"output {port}.{name} is not written by every run, or depends on what was in "
+                    "it; what is remembered belongs in a State",
+                )
+
+
+def _inputs_kept(subject: Subject) -> None:
+    """Inputs are not written."""
+    bench = subject.bench()
+    for _ in subject.feed(bench, TICKS):
+        before = {port: [v.tobytes() for _, v in bench.get(port)] for port in bench.block.inputs}
+        bench.step()
+        for port, values in before.items():
+            after = [view.tobytes() for _, view in bench.get(port)]
+            subject.expect(after == values, f"input {port!r} was written")
+
+
+def _machine(subject: Subject) -> None:
+    """A Moore block emits what follows from its state alone, and updates no output."""
+    if not subject.block_type.is_moore():
+        return
+    one, other = subject.bench(), subject.bench()
+    feeds = zip(subject.feed(one, TICKS), subject.feed(other, TICKS, seed=1), strict=True)
+    for _, _ in feeds:
+        one_block: Any = one.block
+        other_block: Any = other.block
+        one_block.emit()
+        other_block.emit()
+        for port in subject.block_type.outputs:
+            for name, view in one.get(port):
+                subject.expect(
+                    other.get(port).views()[name].tobytes() == view.tobytes(),
+                    f"emit() makes {port}.{name} depend on an input, which is of the tick before",
+                )
+        for port in subject.block_type.inputs:  # from here on both have the same inputs
+            other.set(port, **one.get(port).views())
+        written = one.memory.bus.buffer.tobytes()
+        one_block.update()
+        other_block.update()
+        subject.expect(one.memory.bus.buffer.tobytes() == written, "update() writes an output")
+        one.clock.tick += 1
+        other.clock.tick += 1
+
+
+def _deterministic(subject: Subject) -> None:
+    """Two instances with the same inputs do the same, to the last bit."""
+    first, second = subject.trace(subject.bench()), subject.trace(subject.bench())
+    for tick, (one, other) in enumerate(zip(first, second, strict=True)):
+        subject.expect(one == other, f"two instances with equal inputs differ in tick {tick}")
+
+
+def _restored(subject: Subject) -> None:
+    """A restored block goes on as it did, and so does a new one restored to the same."""
+    bench = subject.bench()
+    subject.trace(bench)
+    snapshot = bench.snapshot()
+    expected = subject.trace(bench, seed=1)
+    for what, target in (("itself", bench), ("a new instance", subject.bench())):
+        target.restore(snapshot)
+        found = subject.trace(target, seed=1)
+        for tick, (one, other) in enumerate(zip(expected, found, strict=True)):
+            subject.expect(
+                one == other,
+                f"{what}, restored from a snapshot, goes on differently {tick + 1} ticks later; "
+                "something is remembered outside the declared State",
+            )
+
+
+def _array_allocations(subject: Subject) -> None:
+    """No tick allocates more arrays than declared, and a budget has its reason."""
+    kind = subject.block_type
+    subject.expect(
+        kind.array_allocations == 0 or bool(kind.allocation_reason),
+        "array_allocations without an allocation_reason",
+    )
+    bench = subject.bench()
+    for tick in subject.feed(bench, TICKS):
+        with count_array_allocations() as counted:
+            bench.step()
+        if tick >= WARM_UP:
+            subject.expect(
+                counted.count <= kind.array_allocations,
+                f"tick {tick} allocates {counted.count} arrays, declared are "
+                f"{kind.array_allocations}; the first at {', '.join(counted.places)}",
+            )
+
+
+def _finite(subject: Subject) -> None:
+    """Finite inputs give finite outputs."""
+    bench = subject.bench()
+    check = FiniteCheck(bench.memory.bus)
+    for _ in subject.feed(bench, TICKS):
+        bench.step()
+        check.check()
+
+
+def _life(subject: Subject) -> None:
+    """A block can be stopped before its first tick and after; metrics are plain values."""
+    for ticks in (0, TICKS):
+        bench = subject.bench()
+        subject.trace(bench, ticks)
+        for _ in range(5):
+            bench.block.stop_cycle()
+        metrics = bench.block.metrics() if ticks else {}
+        bench.close()
+        for name, value in metrics.items():
+            subject.expect(
+                isinstance(value, (bool, int, float, str)),
+                f"metric {name!r} is of type {type(value).__name__}, not a plain value",
+            )
+
+
+CASES: Mapping[str, Callable[[Subject], None]] = {
+    "documented": _documented,
+    "ports used": _ports_used,
+    "outputs written": _outputs_written,
+    "inputs kept": _inputs_kept,
+    "machine": _machine,
+    "deterministic": _deterministic,
+    "restored": _restored,
+    "array allocations": _array_allocations,
+    "finite": _finite,
+    "life": _life,
+}
+"""The checks by name."""
+
+
+def conformance_cases() -> tuple[str, ...]:
+    """The names of all checks, to parametrise a test with."""
+    return tuple(CASES)
+
+
+def check_block(
+    block_type: type[Block],
+    params: Mapping[str, Any] | None = None,
+    *,
+    robot: str | RobotDescription | None = None,
+    rate: float = 500.0,
+    dimensions: Mapping[str, int] | None = None,
+    seed: int = 0,
+    cases: Iterable[str] | None = None,
+) -> None:
+    """Check a block, all cases or those named.
+
+    Args:
+        block_type: the block's class.
+        params: its parameters; by default its ``example_parameters``.
+        robot: a robot's name or description, for blocks that need one.
+        rate: how often it runs [Hz].
+        dimensions: named sizes.
+        seed: of the random inputs.
+        cases: names from ``conformance_cases``.
+
+    Raises:
+        ConformanceError: the block breaks a promise.
+    """
+    subject = Subject(
+        block_type,
+        block_type.example_parameters() if params is None else params,
+        robot,
+        rate,
+        dimensions or {},
+        seed,
+    )
+    for name in CASES if cases is None else cases:
+        CASES[name](subject)
