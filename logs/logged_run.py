@@ -25,12 +25,12 @@ class LoggedRun:
     layout: Layout
 
     @classmethod
-    def of(cls, graph: CheckedGraph, result: RunResult) -> Self:
+    def of(cls, result: RunResult) -> Self:
         """The run that gave ``result``. Raises ``RuntimeError`` if it kept no log."""
-        if result.log is None or result.log.layout is None:
+        if result.graph is None or result.log is None or result.log.layout is None:
             raise RuntimeError("this run kept no log; run it with log=True")
         ticks = np.array(result.log.ticks, np.int64)
-        return cls(graph, ticks, result.log.rows(), result.log.layout)
+        return cls(result.graph, ticks, result.log.rows(), result.log.layout)
 
     def fields(self) -> Iterator[tuple[str, Field]]:
         """Every field of every output with its name ``block.port.field``, in file order."""

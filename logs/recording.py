@@ -23,6 +23,7 @@ import platform
 import time
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
+from os import PathLike
 from pathlib import Path
 from typing import Any
 
@@ -47,7 +48,7 @@ class Recording:
     seconds: float
 
 
-def write_recording(path: Path, graph: CheckedGraph, result: RunResult) -> Recording:
+def write_recording(path: str | PathLike[str], result: RunResult) -> Recording:
     """Write a whole run, also one that failed, to ``path``, replacing what is there.
 
     Raises:
@@ -58,7 +59,8 @@ def write_recording(path: Path, graph: CheckedGraph, result: RunResult) -> Recor
     import rerun as rr
 
     began = time.perf_counter()
-    run = LoggedRun.of(graph, result)
+    run = LoggedRun.of(result)
+    graph, path = run.graph, Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
     path.open("wb").close()  # Rerun would only warn, so find out here whether it can be written
     # No wall-clock time and no random name: two recordings of one run hold the same data.

@@ -161,6 +161,7 @@ class Executor:
             error=error,
             stop_problems=tuple(problems),
             log=self._log,
+            graph=self.bound.graph,
         )
 
     def _verdict(

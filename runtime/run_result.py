@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from .block import Metric
 from .errors import ExitCode, RunError
 from .sinks import MemoryLog
+from .stages import CheckedGraph
 from .timing import BlockTimes
 
 
@@ -43,6 +44,8 @@ class RunResult:
     error: RunError | None = None
     stop_problems: tuple[str, ...] = ()
     log: MemoryLog | None = None
+    graph: CheckedGraph | None = None
+    """What ran; ``None`` only in a result made by hand."""
 
     @property
     def duration_s(self) -> float:

@@ -102,7 +102,7 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> tuple[CheckedGraph, Ru
     )
     result = run(graph)
     path = tmp_path_factory.mktemp("recording") / "new folder" / "hop.rrd"
-    recording = write_recording(path, graph, result)
+    recording = write_recording(path, result)
     assert recording.path == path
     assert recording.size == path.stat().st_size
     assert 0 < recording.seconds < 60
@@ -123,9 +123,9 @@ def batches(path: Path, content: str) -> dict[str, Any]:
 def test_every_signal_of_every_tick_is_read_back_exactly(
     recorded: tuple[CheckedGraph, RunResult, Path],
 ) -> None:
-    graph, result, path = recorded
+    _, result, path = recorded
     found = batches(path, "/signals/**")
-    names = [name for name, _ in LoggedRun.of(graph, result).fields()]
+    names = [name for name, _ in LoggedRun.of(result).fields()]
     assert set(found) == {f"signals/{name.replace('.', '/')}" for name in names}
     assert len(names) == 2 * len(HopperTruth.fields)
     for name in names:
@@ -191,18 +191,18 @@ def test_the_file_says_how_to_repeat_the_run(
 def test_what_cannot_be_written_is_an_os_error(
     recorded: tuple[CheckedGraph, RunResult, Path], tmp_path: Path
 ) -> None:
-    graph, result, _ = recorded
+    _, result, _ = recorded
     (tmp_path / "file").write_text("")
     with pytest.raises(OSError, match="file"):
-        write_recording(tmp_path / "file" / "hop.rrd", graph, result)
+        write_recording(tmp_path / "file" / "hop.rrd", result)
     with pytest.raises(IsADirectoryError):
-        write_recording(tmp_path, graph, result)
+        write_recording(tmp_path, result)
 
 
 def test_a_run_without_a_log_cannot_be_recorded(tmp_path: Path) -> None:
     graph = checked_graph({"robot": Use(Hopper)}, robot=hopper_description(), ticks=3)
     with pytest.raises(RuntimeError, match="log=True"):
-        write_recording(tmp_path / "hop.rrd", graph, run(graph, log=False))
+        write_recording(tmp_path / "hop.rrd", run(graph, log=False))
     assert not (tmp_path / "hop.rrd").exists()
 
 
