@@ -1,1 +1,66 @@
-"""Speed as ratios to peers and hand-written loops, measured in one run."""
+"""Speed as ratios to peers and hand-written loops, measured in one run.
+
+Absolute times depend on the machine and on who else uses it; ratios of cases that take turns in one
+process do so far less. Every row says what it is compared to and what the goal is.
+"""
+
+from __future__ import annotations
+
+import os
+import platform
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any
+
+import numpy as np
+
+from .rows import Row
+from .scheduler import scheduler
+
+BENCHMARKS: Mapping[str, Callable[[], list[Row]]] = {"scheduler": scheduler}
+"""All benchmarks by name; each returns its rows."""
+
+
+def run_benchmarks(names: Iterable[str] | None = None) -> dict[str, Any]:
+    """Run the named benchmarks, by default all.
+
+    Returns:
+        ``machine``, ``load`` (averages before and after) and ``rows``, as plain data for JSON.
+
+    Raises:
+        KeyError: there is no such benchmark; the message names those that exist.
+    """
+    chosen = tuple(BENCHMARKS) if names is None else tuple(names)
+    for name in chosen:
+        if name not in BENCHMARKS:
+            raise KeyError(f"no benchmark {name!r}; there is {', '.join(BENCHMARKS)}")
+    before = _load()
+    rows = [row for name in chosen for row in BENCHMARKS[name]()]
+    return {
+        "machine": _machine(),
+        "load": {"before": before, "after": _load()},
+        "rows": [row.to_json() for row in rows],
+    }
+
+
+def _load() -> list[float] | None:
+    """The load averages over 1, 5 and 15 minutes, where the system tells."""
+    return [round(x, 2) for x in os.getloadavg()] if hasattr(os, "getloadavg") else None
+
+
+def _machine() -> dict[str, Any]:
+    return {
+        "processor": _processor(),
+        "cores": os.cpu_count(),
+        "system": platform.platform(),
+        "python": platform.python_version(),
+        "numpy": np.__version__,
+    }
+
+
+def _processor() -> str:
+    try:
+        with open("/proc/cpuinfo", encoding="utf-8") as file:
+            names = [line.partition(":")[2].strip() for line in file if "model name" in line]
+    except OSError:
+        names = []
+    return names[0] if names else platform.processor() or platform.machine()

@@ -110,16 +110,17 @@ class Memory:
 
     def bind(self, block: Block, spec: BlockSpec) -> None:
         """Give a block its ports and state as attributes; inputs cannot be written."""
+        # setattr, as touching __dict__ makes CPython's attribute access slower for good
         for name, port in spec.block_type.inputs.items():
             wire = spec.wires.get(name)
             source = wire.source if wire is not None else ""
-            block.__dict__[name] = self.bus.signal(
-                port.signal, f"{spec.path}.{name}", writable=False, source=source
-            )
+            full_name = f"{spec.path}.{name}"
+            signal = self.bus.signal(port.signal, full_name, writable=False, source=source)
+            setattr(block, name, signal)
         for name, output in spec.block_type.outputs.items():
-            block.__dict__[name] = self.bus.signal(output.signal, f"{spec.path}.{name}")
+            setattr(block, name, self.bus.signal(output.signal, f"{spec.path}.{name}"))
         for name, state in spec.block_type.states.items():
-            block.__dict__[name] = self.state.signal(state.signal, f"{spec.path}.{name}")
+            setattr(block, name, self.state.signal(state.signal, f"{spec.path}.{name}"))
 
     def snapshot(self, tick: int) -> Snapshot:
         """A copy of both buffers."""

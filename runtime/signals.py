@@ -121,7 +121,8 @@ class Signal:
     def bind(cls, views: Mapping[str, NDArray[Any]]) -> Self:
         """An instance whose fields are the given arrays, themselves not copied."""
         signal = cls.__new__(cls)
-        signal.__dict__.update(views)
+        for name, view in views.items():  # not through __dict__, which would slow every access
+            setattr(signal, name, view)
         return signal
 
     @classmethod

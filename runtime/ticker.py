@@ -115,15 +115,11 @@ class Ticker:
                         break
                 program = table[tick % length]
                 if timing:
-                    stamps, cursor = program.stamps, program.cursor
-                    stamps[cursor] = now()
+                    row = [now()]
                     for call in program.calls:
                         call()
-                        cursor += 1
-                        stamps[cursor] = now()
-                    program.cursor = cursor + 1
-                    if program.cursor == program.end:
-                        program.fold()
+                        row.append(now())
+                    program.keep(row)
                     self._previous = program
                 else:
                     for call in program.calls:

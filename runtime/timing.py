@@ -6,9 +6,9 @@ is the difference of two neighbours. Nothing here allocates an array while the r
 
 from __future__ import annotations
 
-from array import array
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from struct import Struct
 from typing import Any
 
 import numpy as np
@@ -44,11 +44,11 @@ class Program:
         self.calls = tuple(calls)
         self.owners = tuple(owners)
         self.width = len(self.calls) + 1
-        self.stamps = array("q", bytes(8 * self.width * STAMPED_TICKS))
-        self.cursor = 0
-        self.end = len(self.stamps)
         self.ticks = 0
-        self._stamps = np.frombuffer(self.stamps, np.int64).reshape(STAMPED_TICKS, self.width)
+        self._stamps = np.zeros((STAMPED_TICKS, self.width), np.int64)
+        self._bytes = self._stamps.data.cast("B")
+        self._pack = Struct(f"{self.width}q").pack_into
+        self._cursor = 0
         self._kept: NDArray[np.int64] = np.zeros((KEPT_TICKS, len(self.calls)), np.int64)
         self._total = np.zeros(len(self.calls), np.int64)
         self._maximum = np.zeros(len(self.calls), np.int64)
@@ -61,10 +61,17 @@ class Program:
             first.setdefault(owner, column)
         self.columns = {owner: column for owner, column in first.items() if owner}
 
+    def keep(self, stamps: Sequence[int]) -> None:
+        """Keep the stamps [ns] of one tick: one before the first call and one after each."""
+        self._pack(self._bytes, self._cursor, *stamps)
+        self._cursor += 8 * self.width
+        if self._cursor == len(self._bytes):
+            self.fold()
+
     def fold(self) -> None:
-        """Take the finished rows of stamps into the statistics, and start over."""
-        rows = self.cursor // self.width
-        self.cursor = 0
+        """Take the kept stamps into the statistics, and start over."""
+        rows = self._cursor // (8 * self.width)
+        self._cursor = 0
         if rows == 0 or not self.calls:
             self.ticks += rows
             return
@@ -82,8 +89,7 @@ class Program:
 
     def running_at(self, instant: int) -> str:
         """The owner of the call that was running at ``instant`` in the last stamped tick."""
-        row = (self.cursor or self.end) // self.width - 1
-        ends = self.stamps[row * self.width + 1 : (row + 1) * self.width]
+        ends = self._stamps[self._cursor // (8 * self.width) - 1, 1:].tolist()
         return next((o for o, end in zip(self.owners, ends, strict=True) if end > instant), "")
 
     def times(self, block: str) -> tuple[int, int, int, NDArray[np.int64]]:
