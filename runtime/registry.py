@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import importlib
 import importlib.util
+import inspect
 import re
 import sys
 import traceback
@@ -20,7 +21,6 @@ from functools import lru_cache
 from importlib import metadata
 from pathlib import Path
 from types import ModuleType
-from typing import Any
 
 from .block import Block
 from .errors import AloftError, DeclarationError, UnknownBlockError
@@ -183,32 +183,30 @@ def _import_file(key: str, file: Path) -> ModuleType:
     sys.modules[key] = module
     try:
         spec.loader.exec_module(module)
-    except BaseException as error:
+    except (Exception, SystemExit) as error:
         del sys.modules[key]
-        _raise_import_error(file.stem, error)
+        raise _import_error(file.stem, error) from error
     return module
 
 
 def _import(module_name: str) -> ModuleType:
     try:
         return importlib.import_module(module_name)
-    except BaseException as error:
-        return _raise_import_error(module_name, error)
+    except (Exception, SystemExit) as error:  # whatever a user's module may raise
+        raise _import_error(module_name, error) from error
 
 
-def _raise_import_error(module_name: str, error: BaseException) -> Any:
-    if isinstance(error, KeyboardInterrupt):
-        raise error
+def _import_error(module_name: str, error: BaseException) -> AloftError:
+    """What to raise for a module that failed: it is not there, or it is broken."""
     last = traceback.format_exception_only(error)[-1].strip()
     if isinstance(error, SyntaxError):
-        raise BlockImportError(last, f"{error.filename}:{error.lineno}:{error.offset}") from error
-    missing = isinstance(error, ModuleNotFoundError) and error.name is not None
-    if missing and f"{module_name}.".startswith(f"{error.name}."):  # type: ignore[attr-defined]
-        raise UnknownBlockError(f"there is no module {module_name!r}") from error
+        return BlockImportError(last, f"{error.filename}:{error.lineno}:{error.offset}")
+    if isinstance(error, ModuleNotFoundError) and f"{module_name}.".startswith(f"{error.name}."):
+        return UnknownBlockError(f"there is no module {module_name!r}")
     frames = traceback.extract_tb(error.__traceback__)
     outside = [f for f in frames if "importlib" not in f.filename and f.filename != __file__]
     where = f"{outside[-1].filename}:{outside[-1].lineno}" if outside else ""
-    raise BlockImportError(last, where) from error
+    return BlockImportError(last, where)
 
 
 def _class_of(module: ModuleType, class_name: str, name: str) -> type[Block]:
@@ -217,6 +215,8 @@ def _class_of(module: ModuleType, class_name: str, name: str) -> type[Block]:
         raise UnknownBlockError(f"module {module.__name__!r} has no class {class_name!r}")
     if not (isinstance(found, type) and issubclass(found, Block)):
         raise BlockImportError(f"{name} is not a block: it does not derive from aloft's Block")
+    if inspect.isabstract(found):
+        raise BlockImportError(f"{name} is abstract: it is there to be derived from")
     try:
         found.is_moore()
     except DeclarationError as error:

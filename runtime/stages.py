@@ -18,14 +18,17 @@ from .parameters import Parameters
 
 @dataclass(frozen=True, order=True)
 class Position:
-    """A place in a file; lines and columns count from one. Printed as ``file:line:col``."""
+    """A place in a file; lines and columns count from one. Printed as ``file:line:col``.
+
+    Line zero stands for the file as a whole, or for an override.
+    """
 
     file: str
     line: int
     column: int
 
     def __str__(self) -> str:
-        return f"{self.file}:{self.line}:{self.column}"
+        return f"{self.file}:{self.line}:{self.column}" if self.line else self.file
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,261 @@
+"""From the flat graph to the checked one, every check in one pass."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+from ..block import Block
+from ..errors import UnknownBlockError
+from ..registry import BlockImportError, find_block, similar_names
+from ..schedule import ScheduleBlock, find_loops, order_blocks
+from ..signals import Signal
+from ..stages import BlockSpec, CheckedGraph, Position, Wire
+from .flat import FlatBlock, FlatGraph
+from .inserted import insert_constant, insert_delay, read_values
+from .parameter_check import check_parameters
+from .problems import Code, Problems, nearest
+from .rates import check_hyperperiod, read_offset, read_period
+from .settings import Settings, read_settings
+from .wire_check import Draft, WireCheck
+
+
+def examine(graph: FlatGraph, problems: Problems) -> CheckedGraph | None:
+    """Check everything; the checked graph if nothing is wrong, now or before."""
+    settings = read_settings(graph, problems)
+    if not graph.blocks and not graph.incomplete and not graph.broken:
+        where = Position(graph.file, 1, 1)
+        problems.add(Code.MISSING_KEY, "the graph has no blocks", where, fix="blocks: ...")
+    drafts = {flat.path: _draft(flat, graph, settings, problems) for flat in graph.blocks}
+    if settings.base_rate is not None and graph.rate is not None:
+        check_hyperperiod(drafts.values(), graph.rate.key_where, problems)
+    wires = WireCheck(graph, drafts, problems)
+    values: dict[str, Any] = {}
+    for draft in drafts.values():
+        wires.check(draft)
+        _read_values(draft, drafts, values, problems)
+    _report_loops(drafts, problems)
+    if len(problems) or settings.base_rate is None:
+        return None
+    return _assemble(graph, settings, settings.base_rate, drafts, values)
+
+
+def _draft(flat: FlatBlock, graph: FlatGraph, settings: Settings, problems: Problems) -> Draft:
+    draft = Draft(flat)
+    if settings.base_rate is not None:
+        draft.period_ticks = read_period(flat, settings.base_rate, problems)
+        draft.offset_ticks = read_offset(flat, draft.period_ticks, problems)
+    draft.block_type = _find(flat, graph, problems) if flat.use else None
+    if draft.block_type is None:
+        return draft
+    draft.params = check_parameters(flat, draft.block_type, problems)
+    draft.dimensions = settings.dimensions
+    if draft.params is None:
+        return draft
+    try:
+        local = draft.block_type.local_dimensions(draft.params, settings.robot)
+    except Exception as error:  # noqa: BLE001  the block's own code must not hide others
+        if settings.robot_known:
+            problems.add(
+                Code.DIMENSION,
+                f"the dimensions of {flat.path} cannot be told: {type(error).__name__}: {error}",
+                flat.where,
+                at=flat.path,
+                fix="robot: bruce" if settings.robot is None else "",
+            )
+        return draft
+    draft.dimensions = {**settings.dimensions, **local}
+    draft.complete = _check_dimensions(draft, settings, problems)
+    return draft
+
+
+def _find(flat: FlatBlock, graph: FlatGraph, problems: Problems) -> type[Block] | None:
+    """The block's class, seen from its own file, then from the graph's."""
+    folders = dict.fromkeys([flat.folder, graph.folder])
+    message = ""
+    for folder in folders:
+        try:
+            return find_block(flat.use, folder)
+        except UnknownBlockError as error:
+            message = message or str(error)
+        except BlockImportError as error:
+            problems.add(
+                Code.BLOCK_IMPORT,
+                f"{flat.use} cannot be used: {error}",
+                flat.use_where,
+                at=flat.path,
+                other=error.where,
+            )
+            return None
+    names = [name for folder in folders for name in similar_names(flat.use, folder)]
+    near = nearest(flat.use, names)
+    problems.add(
+        Code.UNKNOWN_BLOCK,
+        message,
+        flat.use_where,
+        at=flat.path,
+        expected="a block of `aloft blocks`, module:Class, or a file.yaml",
+        found=flat.use,
+        nearest=near,
+        fix=f"use: {near[0]}" if near else "",
+    )
+    return None
+
+
+def _check_dimensions(draft: Draft, settings: Settings, problems: Problems) -> bool:
+    """Whether every named dimension of the block's ports is known and at least 1."""
+    assert draft.block_type is not None
+    missing: dict[str, str] = {}
+    for ports in (draft.inputs, draft.outputs):
+        for port_name, port in ports.items():
+            for field_name, field in port.signal.fields.items():
+                for size in field.shape:
+                    if isinstance(size, str) and draft.dimensions.get(size, 0) < 1:
+                        missing.setdefault(size, f"{port_name}.{field_name}")
+    flat = draft.flat
+    for name, field_path in missing.items():
+        if not settings.robot_known:
+            continue  # the robot would have had it
+        value = draft.dimensions.get(name)
+        near = nearest(name, draft.dimensions)
+        of_robots = name in ("n_joints", "n_velocities", "n_contacts", "n_feet")
+        fix = f"dimensions: {{{name}: 3}}"
+        if of_robots:
+            fix = "robot: bruce"
+        elif near:
+            fix = f"dimensions: {{{name}: {draft.dimensions[near[0]]}}}"
+        problems.add(
+            Code.DIMENSION,
+            f"{flat.path} ({flat.use}) needs the dimension {name!r}, which nothing gives"
+            if value is None
+            else f"{flat.path} ({flat.use}): dimension {name!r} is {value}",
+            flat.where,
+            at=f"{flat.path}.{field_path}",
+            expected="a whole number from 1, from the robot, 'dimensions' or a parameter",
+            found="nothing" if value is None else str(value),
+            nearest=near if value is None else (),
+            fix=fix if value is None else "",
+        )
+    return not missing
+
+
+def _read_values(
+    draft: Draft, drafts: Mapping[str, Draft], values: dict[str, Any], problems: Problems
+) -> None:
+    """Check and keep the initial values of delays, and constants, by ``block.input``."""
+    for name, wire in draft.flat.wires.items():
+        at = f"{draft.flat.path}.{name}"
+        port = draft.inputs.get(name)
+        signal: type[Signal] | None = None
+        owner: Draft | None = draft
+        node = wire.constant
+        if wire.constant is not None and port is not None:
+            signal = port.signal
+        elif wire.initial is not None and wire.delay:
+            owner, node = drafts.get(wire.source_block), wire.initial
+            output = owner.outputs.get(wire.source_port) if owner else None
+            signal = output.signal if output else None
+        if signal is not None and owner is not None and node is not None:
+            values[at] = read_values(node, signal, owner, at, problems)
+
+
+def _machines(drafts: Mapping[str, Draft]) -> list[ScheduleBlock]:
+    return [
+        ScheduleBlock(
+            path,
+            draft.block_type.is_moore(),
+            {
+                name: wire.source
+                for name, wire in draft.flat.wires.items()
+                if not wire.delay and wire.constant is None and name in draft.inputs
+            },
+        )
+        for path, draft in drafts.items()
+        if draft.block_type is not None
+    ]
+
+
+def _report_loops(drafts: Mapping[str, Draft], problems: Problems) -> None:
+    for loop in find_loops(_machines(drafts)):
+        # The last wire leads back to the ring's first block in the file: the feedback, mostly.
+        source, target = loop.ports[-2:]
+        block, _, name = target.rpartition(".")
+        reader = drafts[block].flat
+        ring = [*loop.blocks, loop.blocks[0]]
+        start = loop.blocks.index(block)
+        in_order = [*loop.blocks[start:], *loop.blocks[:start], block]
+        problems.add(
+            Code.LOOP,
+            f"{' -> '.join(in_order if in_order else ring)} is a loop without a delay: "
+            "each needs the next one's answer of the same tick",
+            reader.wires[name].where,
+            at=target,
+            other=source,
+            other_where=drafts[source.rpartition(".")[0]].flat.where,
+            expected="a delay, or a block that emits from its state, somewhere in the ring",
+            found=" -> ".join([*loop.ports, loop.ports[0]]),
+            fix=f"{name}: {{from: {source}, delay: 1}}",
+        )
+
+
+def _assemble(
+    graph: FlatGraph,
+    settings: Settings,
+    base_rate: float,
+    drafts: Mapping[str, Draft],
+    values: Mapping[str, Any],
+) -> CheckedGraph:
+    specs: list[BlockSpec] = []
+    for draft in drafts.values():
+        flat = draft.flat
+        assert draft.block_type is not None and draft.params is not None
+        wires: dict[str, Wire] = {}
+        for name in draft.block_type.inputs:
+            flat_wire = flat.wires.get(name)
+            if flat_wire is None:
+                continue
+            at = f"{flat.path}.{name}"
+            wire = Wire(flat_wire.source, at, 0, {}, flat_wire.truth, flat_wire.where)
+            given = values.get(at, {})
+            if flat_wire.constant is not None:
+                specs.append(insert_constant(draft, name, flat_wire, given))
+                wire = replace(wire, source=f"{specs[-1].path}.y")
+            elif flat_wire.delay:
+                source = drafts[flat_wire.source_block]
+                specs.append(insert_delay(draft, name, flat_wire, source, given))
+                wire = replace(
+                    wire, source=f"{specs[-1].path}.y", delay=flat_wire.delay, initial=given
+                )
+            wires[name] = wire
+        specs.append(
+            BlockSpec(
+                flat.path,
+                draft.block_type,
+                draft.params,
+                wires,
+                draft.dimensions,
+                draft.period_ticks,
+                draft.offset_ticks,
+                flat.where,
+            )
+        )
+    order = order_blocks(
+        ScheduleBlock(
+            spec.path,
+            spec.block_type.is_moore(),
+            {name: wire.source for name, wire in spec.wires.items()},
+        )
+        for spec in specs
+    )
+    return CheckedGraph(
+        name=graph.name,
+        base_rate=base_rate,
+        blocks=tuple(specs),
+        order=order,
+        ticks=settings.ticks,
+        robot=settings.robot,
+        clock=settings.clock,
+        text=graph.text,
+        overrides=graph.overrides,
+    )

@@ -1,0 +1,141 @@
+"""The second stage: one graph without includes and sub-graphs, overrides applied."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from ..stages import Position
+from .nodes import Entry, MapNode, Node, plain, text_of
+
+_WIDTH = 100
+
+
+@dataclass(frozen=True)
+class FlatWire:
+    """What one input reads: the output ``source`` (``block.port``), or a ``constant``."""
+
+    source: str
+    where: Position
+    delay: int = 0
+    initial: MapNode | None = None
+    truth: bool = False
+    constant: MapNode | None = None
+
+    @property
+    def source_block(self) -> str:
+        """The path of the block that writes."""
+        return self.source.rpartition(".")[0]
+
+    @property
+    def source_port(self) -> str:
+        """The name of the output."""
+        return self.source.rpartition(".")[2]
+
+    def plain(self) -> Any:
+        """The wire as a graph file says it."""
+        if self.constant is not None:
+            return {"value": plain(self.constant)}
+        if not self.delay and not self.truth:
+            return self.source
+        data: dict[str, Any] = {"from": self.source}
+        if self.delay:
+            data["delay"] = self.delay
+        if self.initial is not None:
+            data["initial"] = plain(self.initial)
+        if self.truth:
+            data["allow"] = "truth"
+        return data
+
+
+@dataclass(frozen=True)
+class FlatBlock:
+    """One block; ``excused`` inputs are not wired because of a problem already reported."""
+
+    path: str
+    where: Position
+    use: str
+    use_where: Position
+    folder: Path
+    parameters: MapNode
+    wires: Mapping[str, FlatWire] = field(default_factory=dict)
+    rate: Node | None = None
+    offset: Node | None = None
+    excused: tuple[str, ...] = ()
+    input_places: Mapping[str, Position] = field(default_factory=dict)
+    """Where each wired input's name is written."""
+
+    def text(self) -> str:
+        """The block as an entry of ``blocks``."""
+        lines = [f"  {self.path}:", f"    use: {text_of(self.use)}"]
+        lines += _section("with", _escape(plain(self.parameters)))
+        lines += _section("in", {name: wire.plain() for name, wire in self.wires.items()})
+        for key, node in (("rate", self.rate), ("offset", self.offset)):
+            if node is not None:
+                lines.append(f"    {key}: {text_of(plain(node))}")
+        return "\n".join(lines)
+
+
+@dataclass(frozen=True)
+class FlatGraph:
+    """The whole graph. ``incomplete``: some file could not be read, so names may be missing;
+    ``broken``: sub-graph blocks that could not be expanded."""
+
+    name: str
+    file: str
+    folder: Path
+    blocks: tuple[FlatBlock, ...]
+    rate: Entry | None = None
+    duration: Entry | None = None
+    robot: Entry | None = None
+    robot_folder: Path = Path()
+    dimensions: MapNode | None = None
+    clock: MapNode | None = None
+    overrides: Mapping[str, Any] = field(default_factory=dict)
+    incomplete: bool = False
+    broken: tuple[str, ...] = ()
+    subgraphs: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    """The sub-graph blocks that were expanded, and the names of their outputs."""
+
+    @property
+    def text(self) -> str:
+        """The graph as a file that loads to the same graph, in ``folder``."""
+        lines = []
+        for entry in (self.rate, self.duration):
+            if entry is not None:
+                lines.append(f"{entry.key}: {text_of(plain(entry.value))}")
+        if self.robot is not None:
+            robot = plain(self.robot.value)
+            if isinstance(robot, str) and robot.endswith((".yaml", ".yml")):
+                robot = Path(os.path.relpath(self.robot_folder / robot, self.folder)).as_posix()
+            lines.append(f"robot: {text_of(robot)}")
+        for key, node in (("dimensions", self.dimensions), ("clock", self.clock)):
+            if node is not None and node.entries:
+                lines.append(f"{key}: {text_of(plain(node))}")
+        lines.append("blocks:" if self.blocks else "blocks: {}")
+        lines.extend(block.text() for block in self.blocks)
+        return "\n".join(lines) + "\n"
+
+
+def _section(key: str, data: Mapping[str, Any]) -> list[str]:
+    """A mapping inside a block: on one line where it fits."""
+    if not data:
+        return []
+    line = f"    {key}: {text_of(data)}"
+    if len(line) <= _WIDTH:
+        return [line]
+    return [f"    {key}:", *(f"      {text_of(k)}: {text_of(v)}" for k, v in data.items())]
+
+
+def _escape(value: Any) -> Any:
+    """The value with every leading ``$`` of a text doubled, which reads back as one."""
+    if isinstance(value, str):
+        return f"${value}" if value.startswith("$") else value
+    if isinstance(value, list):
+        return [_escape(item) for item in value]
+    if isinstance(value, dict):
+        return {key: _escape(item) for key, item in value.items()}
+    return value

@@ -1,0 +1,170 @@
+"""The blocks that loading inserts: a delay behind a delayed wire, a constant behind a value."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from ..block import Block, Output
+from ..delay import DelayParameters, delay_block_type
+from ..errors import UnitError
+from ..parameters import Parameters, parameter
+from ..signals import Field, Signal
+from ..stages import BlockSpec, Wire
+from ..units import parse_quantity
+from .flat import FlatWire
+from .nodes import MapNode, Node, ScalarNode, plain, text_of
+from .problems import Code, Problems, listing, nearest
+from .wire_check import Draft
+
+
+class ConstantParameters(Parameters):
+    """The parameters of every constant."""
+
+    value: Mapping[str, Any] = parameter({}, text="values by field; fields not named are zero")
+
+
+class ConstantSignal(Block):
+    """The same values for ever, y[n] = value, zero for fields not named.
+
+    Stands for ``{value: {field: number}}`` in place of a source. Subclasses made by
+    ``constant_block_type`` fix the signal. Raises nothing: values are checked at load.
+    """
+
+    Params = ConstantParameters
+    params: ConstantParameters
+
+    def setup(self) -> None:
+        """Write the values, once: nobody else writes there."""
+        signal: Signal = self.__dict__["y"]
+        for name, value in self.params.value.items():
+            signal.views()[name][...] = value
+
+    def step(self) -> None:
+        """Nothing changes."""
+
+
+@lru_cache(maxsize=256)
+def constant_block_type(signal: type[Signal]) -> type[ConstantSignal]:
+    """The block type that holds a constant ``signal`` in its output ``y``."""
+    text = "the values"
+    body = {"__doc__": ConstantSignal.__doc__, "y": Output(signal, text=text)}
+    return type(f"Constant{signal.__name__}", (ConstantSignal,), body)
+
+
+def insert_delay(reader: Draft, name: str, wire: FlatWire, source: Draft, values: Any) -> BlockSpec:
+    """The block behind a delayed wire; it runs when the source's block does."""
+    signal = source.outputs[wire.source_port].signal
+    return BlockSpec(
+        path=f"{reader.flat.path}/{name}~delay",
+        block_type=delay_block_type(signal, wire.delay),
+        params=DelayParameters(initial=values),
+        wires={"u": Wire(wire.source, f"{reader.flat.path}/{name}~delay.u", where=wire.where)},
+        dimensions=source.dimensions,
+        period_ticks=source.period_ticks,
+        offset_ticks=source.offset_ticks,
+        where=wire.where,
+    )
+
+
+def insert_constant(reader: Draft, name: str, wire: FlatWire, values: Any) -> BlockSpec:
+    """The block behind a constant in place of a source."""
+    signal: type[Any] = reader.inputs[name].signal
+    return BlockSpec(
+        path=f"{reader.flat.path}/{name}~constant",
+        block_type=constant_block_type(signal),  # type: ignore[arg-type]
+        params=ConstantParameters(value=values),
+        wires={},
+        dimensions=reader.dimensions,
+        period_ticks=reader.period_ticks,
+        offset_ticks=reader.offset_ticks,
+        where=wire.where,
+    )
+
+
+def read_values(
+    values: MapNode, signal: type[Signal], owner: Draft, at: str, problems: Problems
+) -> dict[str, Any]:
+    """Values by field of ``signal``: numbers, nested lists, or texts with a unit, all checked."""
+    found: dict[str, Any] = {}
+    for entry in values:
+        field = signal.fields.get(entry.key)
+        if field is None:
+            similar = nearest(entry.key, signal.fields)
+            problems.add(
+                Code.INITIAL,
+                f"{signal.__name__} has no field {entry.key!r}",
+                entry.key_where,
+                at=at,
+                expected=listing(signal.fields),
+                found=entry.key,
+                nearest=similar,
+                fix=similar[0] if similar else f"remove {entry.key!r}",
+            )
+            continue
+        value, expected = _array(entry.value, field, owner)
+        if expected:
+            problems.add(
+                Code.INITIAL,
+                f"{at}: {entry.key} cannot be {_short(entry.value)}",
+                entry.value.where,
+                at=at,
+                expected=expected,
+                found=_short(entry.value),
+            )
+        else:
+            found[entry.key] = value
+    return found
+
+
+def _array(node: Node, field: Field, owner: Draft) -> tuple[Any, str]:
+    """The value and nothing, or nothing and what was expected in its place."""
+    shape = owner.shape(field)
+    unit = f" in {field.unit}" if field.unit is not None and str(field.unit) != "1" else ""
+    types: tuple[type, ...]
+    if field.dtype_name == "bool":
+        types = (bool,)
+        expected = "true or false"
+    elif field.dtype_name == "int64":
+        types = (int,)
+        expected = "a whole number"
+    else:
+        types = (int, float)
+        expected = f"a finite number{unit}"
+    if shape:
+        expected = f"{expected}, or a list of shape [{', '.join(map(str, shape))}]"
+    try:
+        value = _numbers(node, field, types)
+        array = np.asarray(value, np.float64)
+    except (TypeError, ValueError, OverflowError):
+        return None, expected
+    if not np.isfinite(array).all() or (shape is not None and array.shape not in ((), shape)):
+        return None, expected
+    if field.dtype_name == "int64" and np.abs(array).max(initial=0.0) >= 2.0**63:
+        return None, expected
+    return value, ""
+
+
+def _numbers(node: Node, field: Field, types: tuple[type, ...]) -> Any:
+    """Plain numbers. Raises ``ValueError`` for anything else."""
+    if isinstance(node, ScalarNode):
+        value = node.value
+        if isinstance(value, str) and field.unit is not None:
+            try:
+                return parse_quantity(value, field.unit.text)
+            except UnitError as error:
+                raise ValueError(str(error)) from error
+        if not isinstance(value, types) or (isinstance(value, bool) and bool not in types):
+            raise ValueError(f"{value!r} is not a number")
+        return value
+    if isinstance(node, MapNode):
+        raise TypeError("a mapping is not a number")
+    return [_numbers(item, field, types) for item in node.items]
+
+
+def _short(node: Node) -> str:
+    text = text_of(plain(node))
+    return text if len(text) <= 60 else f"{text[:57]}..."

@@ -1,0 +1,64 @@
+"""The entrances: a file or a text to a checked graph, or to the report of what is wrong."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from ..stages import CheckedGraph
+from .examine import examine
+from .flat import FlatGraph
+from .flatten import flatten_file, flatten_text
+from .overrides import Overrides
+from .problems import LoadError, Problems, Report
+
+
+def load(path: str | Path, overrides: Overrides = ()) -> CheckedGraph:
+    """The graph in a file, ready to be bound and run.
+
+    Args:
+        path: the graph file; messages show it as it is given.
+        overrides: ``{"landing.w_l": [0.03, 0.04]}`` or ``["landing.w_l=[0.03, 0.04]"]``.
+
+    Raises:
+        LoadError: something is wrong; it carries the report of everything that is.
+    """
+    problems = Problems()
+    graph = examine(flatten_file(Path(path), overrides, problems), problems)
+    return _result(graph, problems, str(path))
+
+
+def load_text(text: str, path: str | Path, overrides: Overrides = ()) -> CheckedGraph:
+    """The graph in a text that stands for the file ``path``; what it names is found beside that.
+
+    Raises:
+        LoadError: something is wrong; it carries the report of everything that is.
+    """
+    problems = Problems()
+    graph = examine(flatten_text(text, Path(path), overrides, problems), problems)
+    return _result(graph, problems, str(path))
+
+
+def check(path: str | Path, overrides: Overrides = ()) -> Report:
+    """The report on a graph file; ``ok`` when it may run."""
+    problems = Problems()
+    examine(flatten_file(Path(path), overrides, problems), problems)
+    return problems.report(str(path))
+
+
+def flatten(path: str | Path, overrides: Overrides = ()) -> FlatGraph:
+    """The graph with includes and sub-graphs expanded and overrides applied; see its ``text``.
+
+    Raises:
+        LoadError: some file cannot be read or expanded. Wires and values are not checked here.
+    """
+    problems = Problems()
+    graph = flatten_file(Path(path), overrides, problems)
+    if len(problems):
+        raise LoadError(problems.report(str(path)))
+    return graph
+
+
+def _result(graph: CheckedGraph | None, problems: Problems, file: str) -> CheckedGraph:
+    if graph is None:
+        raise LoadError(problems.report(file))
+    return graph

@@ -1,0 +1,216 @@
+"""The load report: every problem of a graph at once, each with its place and a fix to paste."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import TYPE_CHECKING, Any
+
+from ..errors import AloftError, ExitCode
+from ..stages import Position
+
+if TYPE_CHECKING:
+    from rich.text import Text
+
+
+class Code(StrEnum):
+    """The kinds of problems, by the stable name that the JSON form carries."""
+
+    FILE = "file"
+    YAML = "yaml"
+    DUPLICATE_KEY = "duplicate-key"
+    UNKNOWN_KEY = "unknown-key"
+    MISSING_KEY = "missing-key"
+    WRONG_KIND = "wrong-kind"
+    BAD_VALUE = "bad-value"
+    MISPLACED_KEY = "misplaced-key"
+    CYCLE = "cycle"
+    TOO_LARGE = "too-large"
+    DUPLICATE_BLOCK = "duplicate-block"
+    BLOCK_NAME = "block-name"
+    UNKNOWN_BLOCK = "unknown-block"
+    BLOCK_IMPORT = "block-import"
+    BLOCK_DECLARATION = "block-declaration"
+    UNKNOWN_PARAMETER = "unknown-parameter"
+    MISSING_PARAMETER = "missing-parameter"
+    BAD_PARAMETER = "bad-parameter"
+    UNUSED_PARAMETER = "unused-parameter"
+    UNKNOWN_REFERENCE = "unknown-reference"
+    UNKNOWN_INPUT = "unknown-input"
+    UNWIRED_INPUT = "unwired-input"
+    UNUSED_INPUT = "unused-input"
+    WIRED_TWICE = "wired-twice"
+    UNKNOWN_SOURCE = "unknown-source"
+    FIELD_MISSING = "field-missing"
+    DTYPE = "dtype"
+    SHAPE = "shape"
+    UNIT = "unit"
+    FRAME = "frame"
+    TRUTH = "truth"
+    DELAY = "delay"
+    INITIAL = "initial"
+    LOOP = "loop"
+    RATE = "rate"
+    OFFSET = "offset"
+    DIMENSION = "dimension"
+    ROBOT = "robot"
+    OVERRIDE = "override"
+
+
+@dataclass(frozen=True)
+class Problem:
+    """One mistake: what, where, both ends, what would be right, and how to get there."""
+
+    code: Code
+    message: str
+    where: Position
+    at: str = ""
+    """The path in the graph: a block, ``block.input`` or ``block.parameter``."""
+    other: str = ""
+    """The other end: the source of a wire, the first of two duplicates."""
+    other_where: Position | None = None
+    expected: str = ""
+    found: str = ""
+    nearest: tuple[str, ...] = ()
+    """Legal names like the one found, the likeliest first."""
+    fix: str = ""
+
+    def lines(self) -> list[tuple[str, str]]:
+        """The details under the headline, as (label, text)."""
+        other = self.other
+        if self.other_where is not None:
+            other = f"{other} at {self.other_where}" if other else str(self.other_where)
+        rows = [
+            ("at", self.at),
+            ("other end", other),
+            ("expected", self.expected),
+            ("found", self.found),
+            ("nearest", ", ".join(self.nearest)),
+            ("fix", self.fix),
+        ]
+        return [(label, text) for label, text in rows if text]
+
+    def text(self) -> str:
+        """The problem as plain text of several lines."""
+        head = f"{self.where}: {self.code}: {self.message}"
+        return "\n".join([head, *(f"    {label:<9}  {text}" for label, text in self.lines())])
+
+    def as_json(self) -> dict[str, Any]:
+        """The problem as plain data."""
+        return {
+            "code": str(self.code),
+            "message": self.message,
+            **_place(self.where),
+            "at": self.at,
+            "other": {
+                "path": self.other,
+                **(_place(self.other_where) if self.other_where else {}),
+            }
+            if self.other or self.other_where
+            else None,
+            "expected": self.expected,
+            "found": self.found,
+            "nearest": list(self.nearest),
+            "fix": self.fix,
+        }
+
+
+def _place(where: Position) -> dict[str, Any]:
+    return {"file": where.file, "line": where.line, "column": where.column}
+
+
+@dataclass(frozen=True)
+class Report:
+    """All problems of one graph, sorted by position; empty when the graph may run."""
+
+    file: str
+    problems: tuple[Problem, ...] = ()
+
+    @property
+    def ok(self) -> bool:
+        """Whether there is no problem."""
+        return not self.problems
+
+    def headline(self) -> str:
+        """One line that counts the problems."""
+        count = len(self.problems)
+        return f"{self.file}: {count or 'no'} problem{'s' if count != 1 else ''}"
+
+    def text(self) -> str:
+        """The whole report as plain text."""
+        return "\n\n".join([*(p.text() for p in self.problems), self.headline()])
+
+    def rich(self) -> Text:
+        """The whole report for a terminal, in colour."""
+        from rich.text import Text
+
+        styles = {"expected": "green", "found": "red", "nearest": "cyan", "fix": "bold green"}
+        out = Text()
+        for problem in self.problems:
+            out.append(f"{problem.where}: ", "bold")
+            out.append(f"{problem.code}: ", "bold red")
+            out.append(f"{problem.message}\n")
+            for label, text in problem.lines():
+                out.append(f"    {label:<9}  ", "dim")
+                out.append(f"{text}\n", styles.get(label, ""))
+            out.append("\n")
+        out.append(self.headline(), "bold green" if self.ok else "bold red")
+        return out
+
+    def as_json(self) -> dict[str, Any]:
+        """The report as plain data: ``file``, ``ok``, ``count``, ``problems``."""
+        return {
+            "file": self.file,
+            "ok": self.ok,
+            "count": len(self.problems),
+            "problems": [problem.as_json() for problem in self.problems],
+        }
+
+
+class LoadError(AloftError):
+    """A graph that may not run; its text is the whole report."""
+
+    exit_code = ExitCode.BAD_INPUT
+
+    def __init__(self, report: Report) -> None:
+        super().__init__(report.text())
+        self.report = report
+
+
+class Problems:
+    """Collects problems while a graph is loaded; the same one is kept once."""
+
+    def __init__(self) -> None:
+        self._found: dict[Problem, None] = {}
+
+    def add(self, code: Code, message: str, where: Position, **details: Any) -> None:
+        """Note a problem; ``details`` are the further fields of ``Problem``."""
+        self._found.setdefault(Problem(code, message, where, **details))
+
+    def __len__(self) -> int:
+        return len(self._found)
+
+    def report(self, file: str) -> Report:
+        """Everything noted so far, sorted by position; ties as they were found."""
+        return Report(file, tuple(sorted(self._found, key=lambda problem: problem.where)))
+
+
+def nearest(name: str, legal: Iterable[str], count: int = 3) -> tuple[str, ...]:
+    """The legal names most like ``name``, the likeliest first; none if nothing is alike."""
+    names = list(dict.fromkeys(legal))
+    lowered: dict[str, str] = {}
+    for candidate in names:
+        lowered.setdefault(candidate.lower(), candidate)
+    found = difflib.get_close_matches(name.lower(), list(lowered), n=count, cutoff=0.6)
+    return tuple(lowered[match] for match in found)
+
+
+def listing(names: Iterable[str], limit: int = 12) -> str:
+    """Names in one line, cut off where there are many."""
+    all_names = list(names)
+    shown = ", ".join(all_names[:limit])
+    if len(all_names) > limit:
+        return f"{shown}, ... ({len(all_names)} in all)"
+    return shown or "none"

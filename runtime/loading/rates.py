@@ -1,0 +1,72 @@
+"""Checks when every block runs: rates divide the base rate, offsets lie within a period."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from ..errors import AloftError
+from ..schedule import hyperperiod
+from ..stages import Position
+from .flat import FlatBlock
+from .nodes import ScalarNode, kind
+from .problems import Code, Problems
+from .settings import read_quantity
+from .wire_check import Draft
+
+
+def read_period(flat: FlatBlock, base_rate: float, problems: Problems) -> int:
+    """The ticks between two runs of a block; 1 after a problem."""
+    if flat.rate is None:
+        return 1
+    rate = read_quantity(flat.rate, f"{flat.path}.rate", "Hz", problems)
+    if rate is None:
+        return 1
+    ratio = base_rate / rate
+    period = round(ratio)
+    if period >= 1 and abs(ratio - period) <= 1e-9 * period:
+        return period
+    periods = [1] if ratio < 1 else [int(ratio), int(ratio) + 1]
+    legal = tuple(f"{base_rate / p:.12g} Hz" for p in periods)
+    problems.add(
+        Code.RATE,
+        f"{flat.path} cannot run at {rate:.12g} Hz in a graph of {base_rate:.12g} Hz",
+        flat.rate.where,
+        at=f"{flat.path}.rate",
+        expected=f"{base_rate:.12g} Hz divided by a whole number",
+        found=f"{rate:.12g} Hz",
+        nearest=legal,
+        fix=f"rate: {legal[0]}",
+    )
+    return 1
+
+
+def read_offset(flat: FlatBlock, period: int, problems: Problems) -> int:
+    """The tick of a block's first run; 0 after a problem."""
+    if flat.offset is None:
+        return 0
+    node = flat.offset
+    value = node.value if isinstance(node, ScalarNode) else None
+    if isinstance(value, int) and not isinstance(value, bool) and 0 <= value < period:
+        return value
+    problems.add(
+        Code.OFFSET,
+        f"{flat.path} runs every {period} ticks, so its offset cannot be {kind(node)}"
+        if period > 1
+        else f"{flat.path} runs in every tick, so it has no offset",
+        node.where,
+        at=f"{flat.path}.offset",
+        expected=f"a whole number of ticks from 0 to {period - 1}" if period > 1 else "0",
+        found=kind(node),
+        fix="remove 'offset'"
+        if period == 1 or not isinstance(value, int)
+        else f"offset: {value % period}",
+    )
+    return 0
+
+
+def check_hyperperiod(drafts: Iterable[Draft], where: Position, problems: Problems) -> None:
+    """Note rates whose common pattern takes too long to repeat."""
+    try:
+        hyperperiod(draft.period_ticks for draft in drafts)
+    except AloftError as error:
+        problems.add(Code.RATE, str(error), where, at="rate")

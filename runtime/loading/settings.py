@@ -1,0 +1,186 @@
+"""Checks what a graph says about itself: rate, duration, robot, dimensions and clock."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import yaml
+from pydantic import ValidationError
+
+from ..description import RobotDescription, find_robot
+from ..errors import UnitError
+from ..stages import ClockSpec, Position
+from ..units import parse_quantity
+from .flat import FlatGraph
+from .nodes import Entry, Node, ScalarNode, kind, plain
+from .problems import Code, Problems, listing, nearest
+from .written import CLOCK_KEYS, unknown_key
+
+_CLOCK_WORDS: Mapping[str, tuple[str, ...]] = {
+    "kind": ("free", "paced", "robot"),
+    "overrun": ("skip", "stop"),
+}
+
+
+@dataclass(frozen=True)
+class Settings:
+    """The graph's own settings; ``None`` where a problem was found or nothing is said."""
+
+    base_rate: float | None = None
+    ticks: int | None = None
+    robot: RobotDescription | None = None
+    robot_known: bool = True
+    """False where a robot is named but could not be read."""
+    dimensions: Mapping[str, int] = field(default_factory=dict)
+    clock: ClockSpec = field(default_factory=ClockSpec)
+
+
+def read_settings(graph: FlatGraph, problems: Problems) -> Settings:
+    """All settings of a graph; what is wrong is noted."""
+    rate = None
+    if graph.rate is not None:
+        rate = read_quantity(graph.rate.value, "rate", "Hz", problems)
+    elif not graph.incomplete:
+        problems.add(
+            Code.MISSING_KEY,
+            "the graph does not say its rate",
+            Position(graph.file, 1, 1),
+            expected="the base rate, which all blocks' rates divide",
+            fix="rate: 500 Hz",
+        )
+    ticks = None
+    if graph.duration is not None:
+        duration = read_quantity(graph.duration.value, "duration", "s", problems)
+        if duration is not None and rate is not None:
+            ticks = max(1, round(duration * rate))
+    robot = _read_robot(graph, problems) if graph.robot is not None else None
+    return Settings(
+        rate,
+        ticks,
+        robot,
+        robot is not None or graph.robot is None,
+        _read_dimensions(graph, robot, problems),
+        _read_clock(graph, problems),
+    )
+
+
+def read_quantity(node: Node, what: str, unit: str, problems: Problems) -> float | None:
+    """A positive quantity as a number, or text with a unit."""
+    value = node.value if isinstance(node, ScalarNode) else None
+    example = {"Hz": "500 Hz", "s": "4 s"}[unit]
+    number: float | None = None
+    reason = ""
+    if isinstance(value, str):
+        try:
+            number = parse_quantity(value, unit)
+        except UnitError as error:
+            reason = str(error)
+    elif isinstance(value, (int, float)) and not isinstance(value, bool):
+        number = float(value) if abs(value) < 1e300 else math.inf
+    if number is not None and math.isfinite(number) and number > 0 and number < 1e12:
+        return number
+    problems.add(
+        Code.BAD_VALUE,
+        f"{what} cannot be {kind(node)}" + (f": {reason}" if reason else ""),
+        node.where,
+        at=what,
+        expected=f"a positive number in {unit}, such as {example}",
+        found=kind(node),
+    )
+    return None
+
+
+def _read_robot(graph: FlatGraph, problems: Problems) -> RobotDescription | None:
+    assert graph.robot is not None
+    node = graph.robot.value
+    name = node.value if isinstance(node, ScalarNode) else None
+    message = ""
+    if not isinstance(name, str):
+        message = f"robot cannot be {kind(node)}"
+    else:
+        try:
+            return find_robot(name, graph.robot_folder)
+        except LookupError as error:
+            message = str(error)
+        except ValidationError as error:
+            first = error.errors()[0]
+            place = ".".join(map(str, first["loc"]))
+            message = f"robot {name} is described wrongly: {place}: {first['msg']}"
+        except (yaml.YAMLError, OSError, UnicodeDecodeError, ValueError) as error:
+            message = f"robot {name} cannot be read: {' '.join(str(error).split())}"
+    problems.add(
+        Code.ROBOT,
+        message,
+        node.where,
+        at="robot",
+        expected="the name of a robot of ours, or a YAML file relative to the graph",
+        found=kind(node),
+    )
+    return None
+
+
+def _read_dimensions(
+    graph: FlatGraph, robot: RobotDescription | None, problems: Problems
+) -> dict[str, int]:
+    found = dict(robot.dimensions) if robot else {}
+    for entry in graph.dimensions or ():
+        value = plain(entry.value)
+        if not isinstance(value, int) or isinstance(value, bool) or value < 1:
+            problems.add(
+                Code.DIMENSION,
+                f"dimension {entry.key!r} cannot be {kind(entry.value)}",
+                entry.value.where,
+                at=f"dimensions.{entry.key}",
+                expected="a whole number from 1",
+                found=kind(entry.value),
+            )
+        elif found.get(entry.key, value) != value:
+            assert robot is not None
+            problems.add(
+                Code.DIMENSION,
+                f"dimension {entry.key!r} is {value}, but robot {robot.name} has "
+                f"{found[entry.key]}",
+                entry.value.where,
+                at=f"dimensions.{entry.key}",
+                other="robot",
+                other_where=graph.robot.key_where if graph.robot else None,
+                expected=str(found[entry.key]),
+                found=str(value),
+                fix=f"remove {entry.key!r}",
+            )
+        else:
+            found[entry.key] = value
+    return found
+
+
+def _read_clock(graph: FlatGraph, problems: Problems) -> ClockSpec:
+    values: dict[str, Any] = {}
+    for entry in graph.clock or ():
+        if entry.key not in CLOCK_KEYS:
+            unknown_key(entry, CLOCK_KEYS, "of 'clock'", problems)
+            continue
+        value = plain(entry.value)
+        words = _CLOCK_WORDS.get(entry.key)
+        if words is not None and value not in words:
+            _bad_clock(entry, listing(words), words, problems)
+        elif words is None and (not isinstance(value, int) or isinstance(value, bool) or value < 1):
+            _bad_clock(entry, "overruns in a row, a whole number from 1", (), problems)
+        else:
+            values[entry.key] = value
+    return ClockSpec(**values)
+
+
+def _bad_clock(entry: Entry, expected: str, words: tuple[str, ...], problems: Problems) -> None:
+    value = plain(entry.value)
+    problems.add(
+        Code.BAD_VALUE,
+        f"clock.{entry.key} cannot be {kind(entry.value)}",
+        entry.value.where,
+        at=f"clock.{entry.key}",
+        expected=expected,
+        found=kind(entry.value),
+        nearest=nearest(value, words) if isinstance(value, str) else (),
+    )

@@ -1,0 +1,194 @@
+"""Uses of sub-graphs, and following wires through them to real outputs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+from ..stages import Position
+from .flat import FlatWire
+from .links import Link
+from .nodes import MapNode, ScalarNode, kind
+from .problems import Code, Problems, listing, nearest
+from .written import WrittenGraph
+
+UNWIRED = "unwired"
+"""What a wire resolves to that ends at an optional, unwired input of a sub-graph."""
+
+
+@dataclass
+class Instance:
+    """One use of a sub-graph. ``broken``: it could not be expanded, and that is reported."""
+
+    path: str
+    where: Position
+    file: str
+    links: dict[str, Link | None]
+    inputs: dict[str, MapNode | str | None] = field(default_factory=dict)
+    """The declared inputs: ``None`` required, ``"unwired"`` optional, or constant values."""
+    outputs: dict[str, Link | None] = field(default_factory=dict)
+    broken: bool = True
+
+    def declare_inputs(
+        self, subgraph: WrittenGraph, places: Mapping[str, Position], problems: Problems
+    ) -> None:
+        """Take the interface of the sub-graph's file; check what is wired against it."""
+        for entry in subgraph.inputs:
+            value = entry.value
+            text = value.value if isinstance(value, ScalarNode) else ""
+            if isinstance(value, MapNode):
+                self.inputs[entry.key] = value
+            elif text is None or text == "required":
+                self.inputs[entry.key] = None
+            elif text == "optional":
+                self.inputs[entry.key] = UNWIRED
+            else:
+                self.inputs[entry.key] = None
+                problems.add(
+                    Code.WRONG_KIND,
+                    f"the default of input {entry.key!r} cannot be {kind(value)}",
+                    value.where,
+                    at=entry.key,
+                    expected="nothing (required), optional, or constant fields {field: 0.0}",
+                    found=kind(value),
+                )
+        for name in self.links:
+            if name not in self.inputs:
+                similar = nearest(name, self.inputs)
+                problems.add(
+                    Code.UNKNOWN_INPUT,
+                    f"{self.path} has no input {name!r}",
+                    places.get(name, self.where),
+                    at=f"{self.path}.{name}",
+                    expected=listing(self.inputs),
+                    found=name,
+                    nearest=similar,
+                    fix=similar[0] if similar else f"remove {name!r}",
+                )
+        for entry in subgraph.inputs:
+            if self.inputs[entry.key] is None and entry.key not in self.links:
+                problems.add(
+                    Code.UNWIRED_INPUT,
+                    f"input {entry.key!r} of {self.path} is not wired",
+                    self.where,
+                    at=f"{self.path}.{entry.key}",
+                    other=entry.key,
+                    other_where=entry.key_where,
+                    fix=f"in: {{{entry.key}: block.port}}",
+                )
+
+
+class Resolver:
+    """Follows links through the inputs and outputs of sub-graphs."""
+
+    def __init__(self, instances: Mapping[str, Instance], problems: Problems) -> None:
+        self.instances = instances
+        self.problems = problems
+
+    def resolve(self, link: Link | None, at: str) -> FlatWire | str | None:
+        """The wire behind a link, ``UNWIRED``, or ``None`` after a problem."""
+        if link is None:
+            return None
+        start, seen = link, {}  # type: Link, dict[str, None]
+        total = FlatWire("", start.where)
+        while True:
+            if link.constant is not None:
+                if total.delay:
+                    self._delayed_constant(start, at)
+                return FlatWire("", start.where, constant=link.constant)
+            if link.delay and total.delay:
+                self._delayed_twice(link, start, at)
+                return None
+            if link.delay:
+                total = replace(total, delay=link.delay, initial=link.initial)
+            total = replace(total, truth=total.truth or link.truth)
+            block, _, port = link.source.rpartition(".")
+            key = f"{link.instance}<{link.source}" if link.instance else link.source
+            if key in seen:
+                self._ring(seen, key, start, at)
+                return None
+            seen[key] = None
+            following: Link | str | None
+            if link.instance is not None:
+                following = self._input(link, at)
+            elif block in self.instances:
+                following = self._output(self.instances[block], port, link, at)
+            else:
+                return replace(total, source=link.source)
+            if following is None or isinstance(following, str):
+                return following
+            link = following
+
+    def _input(self, link: Link, at: str) -> Link | str | None:
+        assert link.instance is not None
+        instance = self.instances[link.instance]
+        if link.source not in instance.inputs:
+            similar = nearest(link.source, instance.inputs)
+            self.problems.add(
+                Code.UNKNOWN_SOURCE,
+                f"this sub-graph has no input {link.source!r}",
+                link.where,
+                at=at,
+                expected=listing(f"inputs.{name}" for name in instance.inputs),
+                found=f"inputs.{link.source}",
+                nearest=tuple(f"inputs.{name}" for name in similar),
+                fix=f"inputs.{similar[0]}" if similar else f"inputs: {{{link.source}: }}",
+            )
+            return None
+        if link.source in instance.links:
+            return instance.links[link.source]
+        default = instance.inputs[link.source]
+        if isinstance(default, MapNode):
+            return Link(default.where, constant=default)
+        return default
+
+    def _output(self, instance: Instance, port: str, link: Link, at: str) -> Link | None:
+        if instance.broken:
+            return None
+        if port not in instance.outputs:
+            similar = nearest(port, instance.outputs)
+            self.problems.add(
+                Code.UNKNOWN_SOURCE,
+                f"{instance.path} ({instance.file}) has no output {port!r}",
+                link.where,
+                at=at,
+                other=instance.path,
+                other_where=instance.where,
+                expected=listing(f"{instance.path}.{name}" for name in instance.outputs),
+                found=link.source,
+                nearest=tuple(f"{instance.path}.{name}" for name in similar),
+                fix=f"{instance.path}.{similar[0]}" if similar else "",
+            )
+            return None
+        return instance.outputs[port]
+
+    def _ring(self, seen: Mapping[str, None], key: str, start: Link, at: str) -> None:
+        names = [name.replace("<", ".inputs.") for name in seen]
+        ring = names[list(seen).index(key) :]
+        self.problems.add(
+            Code.LOOP,
+            f"the wires to {at} run in a ring that holds no block",
+            start.where,
+            at=at,
+            found=" -> ".join([*ring, ring[0]]),
+        )
+
+    def _delayed_twice(self, link: Link, start: Link, at: str) -> None:
+        self.problems.add(
+            Code.DELAY,
+            f"the wire to {at} is delayed inside and outside of a sub-graph",
+            start.where,
+            at=at,
+            other="the other delay",
+            other_where=link.where,
+            fix="give the delay in one of the two places",
+        )
+
+    def _delayed_constant(self, start: Link, at: str) -> None:
+        self.problems.add(
+            Code.DELAY,
+            f"the wire to {at} delays a constant",
+            start.where,
+            at=at,
+            fix="remove 'delay'",
+        )

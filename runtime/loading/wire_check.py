@@ -1,0 +1,280 @@
+"""Checks every wire: both ends exist, and what is written is what is read."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from ..block import Block, Input, Output
+from ..parameters import Parameters
+from ..signals import Field, Signal
+from .flat import FlatBlock, FlatGraph, FlatWire
+from .problems import Code, Problems, listing, nearest
+
+
+@dataclass
+class Draft:
+    """A block while it is checked; ``complete`` where its dimensions are all known."""
+
+    flat: FlatBlock
+    block_type: type[Block] | None = None
+    params: Parameters | None = None
+    dimensions: Mapping[str, int] = field(default_factory=dict)
+    complete: bool = False
+    period_ticks: int = 1
+    offset_ticks: int = 0
+
+    @property
+    def inputs(self) -> Mapping[str, Input[Any]]:
+        """The declared inputs."""
+        return self.block_type.inputs if self.block_type else {}
+
+    @property
+    def outputs(self) -> Mapping[str, Output[Any]]:
+        """The declared outputs."""
+        return self.block_type.outputs if self.block_type else {}
+
+    def shape(self, item: Field) -> tuple[int, ...] | None:
+        """A field's shape in numbers, where it is known."""
+        try:
+            return item.resolve(self.dimensions)
+        except KeyError:
+            return None
+
+
+@dataclass(frozen=True)
+class Mismatch:
+    """One way in which a reader's field differs from the writer's."""
+
+    code: Code
+    message: str
+    expected: str
+    found: str
+    fix: str = ""
+
+
+def compare(
+    writer: type[Signal], reader: type[Signal], source: Draft, target: Draft
+) -> Iterator[Mismatch]:
+    """All mismatches of the fields that both signals have."""
+    for name, wanted in reader.fields.items():
+        given = writer.fields.get(name)
+        if given is None:
+            continue
+        if given.dtype_name != wanted.dtype_name:
+            yield Mismatch(
+                Code.DTYPE,
+                f"field {name!r} has another element type",
+                wanted.dtype_name,
+                given.dtype_name,
+            )
+        expected, found = target.shape(wanted), source.shape(given)
+        if expected is not None and found is not None and expected != found:
+            yield Mismatch(
+                Code.SHAPE,
+                f"field {name!r} has another shape",
+                _shape_text(wanted, expected),
+                _shape_text(given, found),
+            )
+        yield from _compare_units(name, given, wanted)
+        if given.frame and wanted.frame and given.frame != wanted.frame:
+            yield Mismatch(
+                Code.FRAME,
+                f"field {name!r} is expressed in another frame",
+                wanted.frame,
+                given.frame,
+                f"rotate it from {given.frame} to {wanted.frame} in a block between",
+            )
+
+
+def _compare_units(name: str, given: Field, wanted: Field) -> Iterator[Mismatch]:
+    if given.unit is None or wanted.unit is None or given.unit.matches(wanted.unit):
+        return
+    if given.unit.same_dimension(wanted.unit):
+        factor = given.unit.factor_to(wanted.unit)
+        yield Mismatch(
+            Code.UNIT,
+            f"field {name!r} has another scale",
+            str(wanted.unit),
+            str(given.unit),
+            f"multiply by {factor:.9g} in a block between: 1 {given.unit} is {factor:.9g} "
+            f"{wanted.unit}",
+        )
+    else:
+        yield Mismatch(
+            Code.UNIT,
+            f"field {name!r} is another quantity",
+            str(wanted.unit),
+            str(given.unit),
+        )
+
+
+def _shape_text(item: Field, shape: tuple[int, ...]) -> str:
+    """``[10]``, or ``[n_joints] = [10]`` where names are involved."""
+    numbers = f"[{', '.join(map(str, shape))}]"
+    if all(isinstance(size, int) for size in item.shape):
+        return numbers
+    return f"[{', '.join(map(str, item.shape))}] = {numbers}"
+
+
+def fits(output: Output[Any], port: Input[Any], source: Draft, target: Draft) -> bool:
+    """Whether a wire from ``output`` to ``port`` would have no problem."""
+    if output.truth and not port.reads_truth:
+        return False
+    if any(name not in output.signal.fields for name in port.signal.fields):
+        return False
+    return next(compare(output.signal, port.signal, source, target), None) is None
+
+
+class WireCheck:
+    """All wires of a graph, with every end in reach."""
+
+    def __init__(self, graph: FlatGraph, drafts: Mapping[str, Draft], problems: Problems) -> None:
+        self.graph = graph
+        self.drafts = drafts
+        self.problems = problems
+
+    def check(self, draft: Draft) -> None:
+        """Note every problem of the wires into one block."""
+        if draft.block_type is None:
+            return
+        flat = draft.flat
+        for name, wire in flat.wires.items():
+            port = draft.inputs.get(name)
+            if port is None:
+                self._unknown_input(draft, name, wire)
+            elif wire.constant is None:
+                self._check_wire(draft, name, port, wire)
+        for name, port in draft.inputs.items():
+            if name not in flat.wires and name not in flat.excused and not port.optional:
+                candidates = self._candidates(draft, port)
+                self.problems.add(
+                    Code.UNWIRED_INPUT,
+                    f"input {name!r} of {flat.path} is not wired",
+                    flat.where,
+                    at=f"{flat.path}.{name}",
+                    expected=_signal_text(port.signal) + (f" ({port.text})" if port.text else ""),
+                    nearest=candidates,
+                    fix=f"in: {{{name}: {candidates[0] if candidates else 'block.port'}}}",
+                )
+
+    def _unknown_input(self, draft: Draft, name: str, wire: FlatWire) -> None:
+        flat = draft.flat
+        free = [n for n in draft.inputs if n not in flat.wires]
+        similar = nearest(name, draft.inputs)
+        best = next((n for n in similar if n in free), similar[0] if similar else "")
+        if not best and len(free) == 1:
+            best = free[0]
+        self.problems.add(
+            Code.UNKNOWN_INPUT,
+            f"{flat.path} ({flat.use}) has no input {name!r}",
+            flat.input_places.get(name, wire.where),
+            at=f"{flat.path}.{name}",
+            expected=listing(draft.inputs),
+            found=name,
+            nearest=similar,
+            fix=f"{best}: {wire.source}" if best else f"remove {name!r}",
+        )
+
+    def _check_wire(self, target: Draft, name: str, port: Input[Any], wire: FlatWire) -> None:
+        at = f"{target.flat.path}.{name}"
+        source = self.drafts.get(wire.source_block)
+        if source is None:
+            self._unknown_block(target, port, wire, at)
+            return
+        if source.block_type is None:
+            return  # reported at that block
+        other = {"at": at, "other": wire.source, "other_where": source.flat.where}
+        output = source.outputs.get(wire.source_port)
+        if output is None:
+            similar = nearest(wire.source_port, source.outputs)
+            if not similar:
+                similar = tuple(
+                    n for n, o in source.outputs.items() if fits(o, port, source, target)
+                )
+            names = tuple(f"{wire.source_block}.{match}" for match in similar)
+            legal = listing(f"{wire.source_block}.{n}" for n in source.outputs)
+            self.problems.add(
+                Code.UNKNOWN_SOURCE,
+                f"{wire.source_block} ({source.flat.use}) has no output {wire.source_port!r}",
+                wire.where,
+                at=at,
+                other=wire.source_block,
+                other_where=source.flat.where,
+                expected=legal,
+                found=wire.source,
+                nearest=names,
+                fix=f"{name}: {names[0]}" if names else "",
+            )
+            return
+        if output.truth and not port.reads_truth and not wire.truth:
+            self.problems.add(
+                Code.TRUTH,
+                f"{at} reads {wire.source}, which only a simulator knows",
+                wire.where,
+                **other,
+                expected="a measured or estimated signal",
+                found="simulation truth",
+                nearest=self._candidates(target, port),
+                fix=f"{name}: {{from: {wire.source}, allow: truth}}, if that is meant",
+            )
+        missing = [n for n in port.signal.fields if n not in output.signal.fields]
+        if missing:
+            candidates = self._candidates(target, port)
+            self.problems.add(
+                Code.FIELD_MISSING,
+                f"{wire.source} does not carry {listing(missing)}",
+                wire.where,
+                **other,
+                expected=_signal_text(port.signal),
+                found=_signal_text(output.signal),
+                nearest=candidates,
+                fix=f"{name}: {candidates[0]}" if candidates else "",
+            )
+        for mismatch in compare(output.signal, port.signal, source, target):
+            self.problems.add(
+                mismatch.code,
+                f"{at} does not fit {wire.source}: {mismatch.message}",
+                wire.where,
+                **other,
+                expected=mismatch.expected,
+                found=mismatch.found,
+                fix=mismatch.fix,
+            )
+
+    def _unknown_block(self, target: Draft, port: Input[Any], wire: FlatWire, at: str) -> None:
+        block = wire.source_block
+        prefixes = [f"{path}/" for path in self.graph.broken]
+        if self.graph.incomplete or any(f"{block}/".startswith(prefix) for prefix in prefixes):
+            return  # it may be in a file that could not be read, and that is reported
+        similar = nearest(block, [*self.drafts, *self.graph.subgraphs])
+        names = tuple(f"{match}.{wire.source_port}" for match in similar)
+        candidates = names or self._candidates(target, port)
+        self.problems.add(
+            Code.UNKNOWN_SOURCE,
+            f"{at} reads {wire.source}, but there is no block {block!r}",
+            wire.where,
+            at=at,
+            expected=listing([*self.drafts, *self.graph.subgraphs]),
+            found=wire.source,
+            nearest=candidates,
+            fix=f"{at.rpartition('.')[2]}: {candidates[0]}" if candidates else "",
+        )
+
+    def _candidates(self, target: Draft, port: Input[Any]) -> tuple[str, ...]:
+        """Outputs that could feed an input; those of the very same signal first."""
+        exact: list[str] = []
+        other: list[str] = []
+        for source in self.drafts.values():
+            if source is target:
+                continue
+            for name, output in source.outputs.items():
+                if fits(output, port, source, target):
+                    same = output.signal is port.signal
+                    (exact if same else other).append(f"{source.flat.path}.{name}")
+        return tuple([*exact, *other][:3])
+
+
+def _signal_text(signal: type[Signal]) -> str:
+    return f"{signal.__name__} {{{listing(signal.fields, 8)}}}"
