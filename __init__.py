@@ -1,3 +1,65 @@
-"""aloft: a block-diagram control framework for robots that leave the ground."""
+"""aloft: a block-diagram control framework for robots that leave the ground.
+
+What users need is here; it is imported when it is first asked for, so ``import aloft`` is free.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from .logs.recording import write_recording
+    from .runtime.block import Block, Input, Output, State
+    from .runtime.errors import AloftError, BlockError, RunError
+    from .runtime.graph import Graph, load
+    from .runtime.loading import LoadError
+    from .runtime.parameters import Parameters, parameter
+    from .runtime.run_result import RunResult
+    from .runtime.signals import Field, Signal
 
 __version__ = "0.1.0"
+
+_HOMES = {
+    "write_recording": "logs.recording",
+    **dict.fromkeys(("Block", "Input", "Output", "State"), "runtime.block"),
+    **dict.fromkeys(("AloftError", "BlockError", "RunError"), "runtime.errors"),
+    **dict.fromkeys(("Graph", "load"), "runtime.graph"),
+    "LoadError": "runtime.loading",
+    **dict.fromkeys(("Parameters", "parameter"), "runtime.parameters"),
+    "RunResult": "runtime.run_result",
+    **dict.fromkeys(("Field", "Signal"), "runtime.signals"),
+}
+
+__all__ = [
+    "AloftError",
+    "Block",
+    "BlockError",
+    "Field",
+    "Graph",
+    "Input",
+    "LoadError",
+    "Output",
+    "Parameters",
+    "RunError",
+    "RunResult",
+    "Signal",
+    "State",
+    "__version__",
+    "load",
+    "parameter",
+    "write_recording",
+]
+
+
+def __getattr__(name: str) -> Any:
+    home = _HOMES.get(name)
+    if home is None:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    value = getattr(import_module(f".{home}", __name__), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted([*globals(), *_HOMES])

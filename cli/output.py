@@ -19,11 +19,11 @@ if TYPE_CHECKING:
     from rich.table import Table
 
 
-def console(*, to_stderr: bool = False) -> Console:
+def console(*, to_stderr: bool = False, quiet: bool = False) -> Console:
     """Rich's console on standard output, or on standard error where JSON goes to the former."""
     from rich.console import Console
 
-    return Console(stderr=to_stderr, soft_wrap=False, highlight=False)
+    return Console(stderr=to_stderr, quiet=quiet, highlight=False)
 
 
 def table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> Table:
@@ -70,6 +70,12 @@ def print_json(value: Mapping[str, Any]) -> None:
 def print_error(message: str) -> None:
     """Print an error for a person, on standard error."""
     typer.secho("error: ", fg=typer.colors.RED, bold=True, nl=False, err=True)
+    typer.echo(message, err=True)
+
+
+def print_warning(message: str) -> None:
+    """Print what went wrong but ends nothing, on standard error."""
+    typer.secho("warning: ", fg=typer.colors.YELLOW, bold=True, nl=False, err=True)
     typer.echo(message, err=True)
 
 

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from aloft.runtime.description import RobotDescription
+from aloft.blocks.pinocchio_model import build_pinocchio_model
+from aloft.runtime.description import RobotDescription, find_robot
 from aloft.runtime.kinematics import (
     from_base_outwards,
     link_poses,
@@ -78,3 +79,24 @@ def test_a_joint_that_hangs_on_nothing_is_named() -> None:
         ValueError, match="joints elbow, loose are not connected to the base 'base'"
     ):
         from_base_outwards(two_links(joints=joints))
+
+
+def test_bruce_is_where_pinocchio_puts_it() -> None:
+    import pinocchio
+
+    robot = find_robot("bruce")
+    model = build_pinocchio_model(robot).model
+    data = model.createData()
+    random = np.random.default_rng(5)
+    orientation = random.standard_normal((4, 4))
+    orientation /= np.linalg.norm(orientation, axis=1, keepdims=True)
+    base, joints = random.standard_normal((4, 3)), random.uniform(-1.5, 1.5, (4, 10))
+    poses = link_poses(robot, base, orientation, joints)
+    for row in range(4):
+        q = np.concatenate([base[row], orientation[row], joints[row]])
+        pinocchio.framesForwardKinematics(model, data, q)
+        for joint in robot.joints:
+            placement = data.oMi[model.getJointId(joint.name)]
+            position, rotation = poses.of(joint.child)
+            np.testing.assert_allclose(position[row], placement.translation, atol=1e-12)
+            np.testing.assert_allclose(rotation[row], placement.rotation, atol=1e-12)

@@ -1,0 +1,80 @@
+"""The verbs put together, and the process around them: arguments in, an exit code out."""
+
+from __future__ import annotations
+
+import sys
+from typing import Annotated, Any, cast
+
+import typer
+
+from .. import __version__
+from ..runtime.errors import ExitCode
+from .bench import bench
+from .blocks import blocks
+from .check import check
+from .graph import graph
+from .output import print_json
+from .run import run
+
+EXIT_CODES = """Exit codes:
+
+0  the graph ran and its own criteria hold
+
+1  it ran to its end, but a criterion failed: a fall, a missed target
+
+2  the graph, an override or the command line is wrong; nothing moved
+
+3  a block failed, a signal was not finite, or a deadline policy stopped the run
+
+130, 143  stopped cleanly by SIGINT, SIGTERM
+"""
+
+app = typer.Typer(
+    name="aloft",
+    help="Run, check and look at graphs of blocks.",
+    epilog=EXIT_CODES,
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+)
+for _verb in (run, check, graph, blocks, bench):
+    app.command(epilog=EXIT_CODES if _verb is run else None)(_verb)
+
+
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"aloft {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _options(
+    version: Annotated[
+        bool,
+        typer.Option(
+            "--version", callback=_print_version, is_eager=True, help="Print the version."
+        ),
+    ] = False,
+) -> None:
+    pass
+
+
+def main() -> None:
+    """Run the command line and leave with one of ``ExitCode``."""
+    # typer exports only the most special of the errors that a wrong command line raises
+    usage_error = cast("type[Exception]", typer.BadParameter.__bases__[0])
+    try:
+        code = app(standalone_mode=False)
+    except usage_error as caught:
+        error: Any = caught
+        if "--json" in sys.argv:
+            print_json({"success": False, "reason": error.format_message()})
+        else:
+            error.show()
+        code = ExitCode.BAD_INPUT
+    except (typer.Abort, KeyboardInterrupt):
+        code = ExitCode.INTERRUPTED
+    except BrokenPipeError:  # `aloft ... | head`
+        sys.stderr.close()
+        code = ExitCode.SUCCESS
+    sys.exit(int(code or 0))

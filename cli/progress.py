@@ -1,0 +1,52 @@
+"""How far a run is: a sink that counts ticks, and a bar that looks at the count now and then."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from rich.console import Console
+    from rich.progress import Progress, TaskID
+
+    from ..runtime.memory import BoundGraph
+
+TICKS_A_STEP = 100
+"""Ticks between two updates of the bar: the control thread pays microseconds for each."""
+
+
+class TickCounter:
+    """A sink that moves a progress bar."""
+
+    def __init__(self, progress: Progress, task: TaskID) -> None:
+        self._progress = progress
+        self._task = task
+
+    def open(self, bound: BoundGraph) -> None:
+        """Nothing to prepare."""
+
+    def record(self, tick: int) -> None:
+        """Move on, once in a while."""
+        if tick % TICKS_A_STEP == 0:
+            self._progress.update(self._task, completed=tick)
+
+    def close(self) -> None:
+        """Nothing to finish."""
+
+
+@contextmanager
+def progress_bar(out: Console, text: str, total: int | None) -> Iterator[tuple[Progress, TaskID]]:
+    """A bar that goes away when it is done; nothing at all where nobody watches."""
+    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
+
+    columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn())
+    with Progress(
+        *columns,
+        TimeElapsedColumn(),
+        console=out,
+        transient=True,
+        disable=not out.is_terminal,
+        refresh_per_second=5,
+    ) as progress:
+        yield progress, progress.add_task(text, total=total)

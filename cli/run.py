@@ -1,0 +1,176 @@
+"""``aloft run``: run a graph once, or once for each of many seeds."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from ..runtime.errors import ExitCode
+from .output import console, errors_reported, number, print_json, print_warning, table
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from ..runtime.graph import Graph
+    from ..runtime.run_result import RunResult
+    from ..runtime.seeds import SeedRow
+
+MOST_METRIC_COLUMNS = 4
+
+
+def run(
+    graph: Annotated[Path, typer.Argument(help="The graph file.")],
+    overrides: Annotated[
+        list[str] | None,
+        typer.Option("--set", help="Set a parameter: block.parameter=value. Repeatable."),
+    ] = None,
+    seeds: Annotated[
+        str, typer.Option(help="Run once a seed: 0:20 or 1,5,7. Sets every parameter 'seed'.")
+    ] = "",
+    duration: Annotated[
+        str, typer.Option(help="How long [s of the graph's time]; the same as --set duration=.")
+    ] = "",
+    record: Annotated[
+        Path | None,
+        typer.Option(help="Where the recording goes; by default recordings/NAME.rrd."),
+    ] = None,
+    no_record: Annotated[bool, typer.Option("--no-record", help="Write no recording.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="End with one JSON object.")] = False,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print the verdict only.")] = False,
+) -> None:
+    """Run a graph; print its metrics and the time each block took; write a recording."""
+    from ..runtime.graph import load
+    from ..runtime.seeds import parse_seeds
+
+    settings = [*(overrides or []), *([f"duration={duration}"] if duration else [])]
+    out = console(to_stderr=as_json, quiet=quiet)
+    with errors_reported(as_json):
+        if seeds:
+            code = run_many(graph, settings, parse_seeds(seeds), out, as_json)
+        else:
+            loaded = load(graph, settings)
+            default = Path("recordings") / f"{loaded.checked.name}.rrd"
+            code = run_once(loaded, None if no_record else record or default, out, as_json)
+    raise typer.Exit(code)
+
+
+def run_once(graph: Graph, record: Path | None, out: Console, as_json: bool) -> ExitCode:
+    """Run the graph, record it, print what came of it."""
+    from .progress import TickCounter, progress_bar
+
+    name = graph.checked.name
+    with progress_bar(out, f"running {name}", graph.checked.ticks) as (progress, task):
+        result = graph.run(sinks=[TickCounter(progress, task)])
+    recording = write_recording(record, result) if record is not None else None
+    if as_json:
+        shown = str(recording) if recording else None
+        overrides = dict(graph.checked.overrides)
+        print_json({"graph": name, "overrides": overrides, **result.to_json(), "recording": shown})
+    else:
+        print_result(out, name, result)
+        if recording is not None:
+            out.print(f"recording: {recording}; to see it: {viewer()} {recording}")
+        print_verdict(result)
+    return result.exit_code
+
+
+def write_recording(path: Path, result: RunResult) -> Path | None:
+    """Record the run; without Rerun, or where it cannot be written, warn and go on."""
+    from ..logs import recording
+
+    try:
+        return recording.write_recording(path, result).path
+    except ImportError as error:
+        print_warning(f"no recording: Rerun cannot be imported ({error}); pip install rerun-sdk")
+    except OSError as error:
+        print_warning(f"no recording: {path} cannot be written ({error.strerror or error})")
+    return None
+
+
+def viewer() -> str:
+    """How to call the viewer that came with this Python, as short as it can be said."""
+    program = Path(sys.executable).with_name("rerun")
+    here = Path.cwd()
+    return str(program.relative_to(here) if program.is_relative_to(here) else program)
+
+
+def print_result(out: Console, name: str, result: RunResult) -> None:
+    """Print the metrics and the times of a run."""
+    metrics = [(key, number(value)) for key, value in result.metrics.items()]
+    if metrics:
+        out.print(table(f"{name}: metrics", ("metric", ">value"), metrics))
+    rows = [
+        (path, str(t.calls), f"{t.p50_us:.1f}", f"{t.p99_us:.1f}", f"{t.max_us:.1f}")
+        for path, t in result.blocks.items()
+    ]
+    columns = ("block", ">runs", ">median [us]", ">99 % [us]", ">longest [us]")
+    out.print(table(f"{name}: time a run of each block takes", columns, rows))
+    speed = result.duration_s / result.wall_time_s if result.wall_time_s else 0.0
+    out.print(
+        f"{result.ticks} ticks, {result.duration_s:.3f} s of the graph in "
+        f"{result.wall_time_s:.2f} s ({speed:.1f} x real time); run hash {result.run_hash}"
+    )
+    if result.overruns:
+        out.print(f"{result.overruns} overruns, {result.skipped_periods} periods skipped")
+
+
+def print_verdict(result: RunResult) -> None:
+    """Print whether the run succeeded and why, also when all else is quiet."""
+    for problem in result.stop_problems:
+        print_warning(problem)
+    if result.success:
+        typer.secho(f"success: {result.reason}", fg=typer.colors.GREEN)
+    else:
+        typer.secho(f"no success: {result.reason}", fg=typer.colors.RED, err=True)
+
+
+def run_many(
+    path: Path, overrides: list[str], seeds: list[int], out: Console, as_json: bool
+) -> ExitCode:
+    """Run the graph once a seed, print a row each and how many succeeded."""
+    from ..runtime.seeds import run_seeds
+    from .progress import progress_bar
+
+    rows: list[SeedRow] = []
+    with progress_bar(out, f"running {len(seeds)} seeds", len(seeds)) as (progress, task):
+        for row in run_seeds(path, overrides, seeds):
+            rows.append(row)
+            progress.advance(task)
+    successes = sum(row.success for row in rows)
+    reason = f"{successes} of {len(rows)} seeds succeeded"
+    success = successes == len(rows)
+    if as_json:
+        summary = {"n": len(rows), "successes": successes, "seeds": seeds}
+        outcome: dict[str, Any] = {"success": success, "reason": reason, "recording": None}
+        outcome |= {"overrides": overrides, "summary": summary}
+        print_json({**outcome, "rows": [vars(row) for row in rows]})
+    else:
+        print_rows(out, rows)
+        typer.secho(reason, fg=typer.colors.GREEN if success else typer.colors.RED)
+    return ExitCode.SUCCESS if success else ExitCode.NOT_SUCCESSFUL
+
+
+def print_rows(out: Console, rows: list[SeedRow]) -> None:
+    """Print one line a seed, with the first few metrics that are numbers."""
+    names: list[str] = []
+    for row in rows:
+        names += [n for n, v in row.metrics.items() if isinstance(v, float) and n not in names]
+    names = names[:MOST_METRIC_COLUMNS]
+    out.print(
+        table(
+            "",
+            (">seed", "success", *(f">{name}" for name in names), "reason"),
+            [
+                (
+                    str(row.seed),
+                    "yes" if row.success else "no",
+                    *(number(row.metrics.get(name, "")) for name in names),
+                    row.reason,
+                )
+                for row in rows
+            ],
+        )
+    )

@@ -1,0 +1,104 @@
+"""The documentation is true: its files work as they stand, its links lead somewhere."""
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from aloft.cli.markdown import reference_page
+from aloft.runtime.reference import block_reference
+from aloft.runtime.registry import find_block, known_names
+
+ROOT = Path(__file__).parent.parent
+FILE = re.compile(r"<!-- file: (\S+) -->\n```\w+\n(.*?)```", re.DOTALL)
+EXCERPT = re.compile(r"<!-- from: (\S+) -->\n```\w+\n(.*?)```", re.DOTALL)
+YAML = re.compile(r"```yaml\n(.*?)```", re.DOTALL)
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+
+
+@pytest.fixture(scope="module")
+def tutorial(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with every file that the tutorial shows."""
+    folder = tmp_path_factory.mktemp("tutorial")
+    files = FILE.findall((ROOT / "docs" / "tutorial.md").read_text())
+    assert [name for name, _ in files] == [
+        "low_pass.py",
+        "test_low_pass.py",
+        "filter.yaml",
+        "use.py",
+    ]
+    for name, text in files:
+        (folder / name).write_text(text)
+    return folder
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        ["pytest", "-q", "-p", "no:cacheprovider", "test_low_pass.py"],
+        ["aloft", "check", "filter.yaml"],
+        ["aloft", "graph", "filter.yaml"],
+        ["aloft", "run", "filter.yaml", "--no-record", "--set", "filter.tau=0.2"],
+        ["aloft", "blocks", "low_pass:LowPass"],
+        ["use.py"],
+    ],
+    ids=lambda command: " ".join(command[:2]),
+)
+def test_the_tutorial_works(tutorial: Path, command: list[str]) -> None:
+    if command[0] == "pytest":
+        command = ["-m", *command]
+    elif command[0] == "aloft":
+        command = ["-c", "from aloft.cli import main; main()", *command[1:]]
+    done = subprocess.run(
+        [sys.executable, *command],
+        cwd=tutorial,
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_the_whole_graph_in_the_documentation_runs(tmp_path: Path) -> None:
+    from aloft import load
+
+    whole = [
+        t for t in YAML.findall((ROOT / "docs" / "graph_files.md").read_text()) if "rate:" in t
+    ]
+    path = tmp_path / "servo.yaml"
+    path.write_text(whole[0])
+    result = load(path).run()
+    assert result.success
+    # a proportional controller follows a slow sine with a lag of 1 / gain
+    error = result.signal("error.y.value")
+    assert 0.1 < abs(error[-100:]).max() < 1.0
+
+
+def test_the_reference_of_blocks_is_up_to_date() -> None:
+    references = [block_reference(name, find_block(name)) for name in known_names()]
+    written = (ROOT / "docs" / "blocks.md").read_text()
+    assert written == reference_page(references), "run: aloft blocks --markdown > docs/blocks.md"
+
+
+def test_excerpts_are_from_the_files_they_name() -> None:
+    excerpts = EXCERPT.findall((ROOT / "README.md").read_text())
+    assert excerpts
+    for path, text in excerpts:
+        assert text in (ROOT / path).read_text(), path
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_links_lead_somewhere(page: Path) -> None:
+    text = re.sub(r"```.*?```", "", page.read_text(), flags=re.DOTALL)
+    for target in re.findall(r"\]\(([^)#\s]+)[^)]*\)", text):
+        if not target.startswith("https://"):
+            assert (page.parent / target).exists(), target
+
+
+def test_the_readme_shows_files_that_are_there() -> None:
+    text = (ROOT / "README.md").read_text()
+    for path in re.findall(r"`([\w/]+\.(?:py|yaml|md))`", text):
+        assert (ROOT / path).is_file(), path
