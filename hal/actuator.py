@@ -3,7 +3,8 @@
 Pure functions over arrays that write into ``out`` arrays. Motors are not joints: with ``A`` the
 transmission's ``joint_to_motor``, motor speed is ``A qd``, motor torque ``kappa = A^-T tau`` and
 joint torque ``tau = A^T kappa``. A motor limit is therefore a box in motor space and a rotated box
-in joint space.
+in joint space. Where every motor is geared 1:1 to at most two joints, as in BRUCE, these products
+round the same on every CPU.
 """
 
 from __future__ import annotations

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from math import atan2, cos, degrees, radians, sin
+from typing import Any
 
 from ..runtime.parameters import Parameters, parameter
 from ..runtime.signals import Field, Signal
 
 NEVER = -1.0
 """The value of an instant that has not come."""
+Verdict = tuple[Any, str]
+"""Whether a criterion holds (Python's truth value or NumPy's), and what to say if it does not."""
 
 
 class JumpRecord(Signal):
@@ -130,21 +133,21 @@ def first_failure(record: JumpRecord, limits: JumpCriteria, planned: bool) -> st
     return next((text for holds, text in _judge(record, limits, planned) if not holds), None)
 
 
-def _judge(r: JumpRecord, c: JumpCriteria, planned: bool) -> Iterator[tuple[bool, str]]:
+def _judge(r: JumpRecord, c: JumpCriteria, planned: bool) -> Iterator[Verdict]:
     """Every criterion of any jump, in the order in which a failure explains those behind it."""
+    yield (
+        r.fall_time == NEVER,
+        (
+            f"fell at {r.fall_time:.3f} s: tilt {degrees(r.fall_tilt):.1f} deg (fall from "
+            f"{degrees(c.fall_tilt):.0f} deg), base {r.fall_height:.3f} m above the ground (fall "
+            f"below {c.fall_height} m)"
+        ),
+    )
     yield (
         r.forbidden == 0,
         (
             f"something other than toes and heels touched, first at {r.forbidden_time:.3f} s, "
             f"in {r.forbidden} physics steps"
-        ),
-    )
-    yield (
-        r.fall_time == NEVER,
-        (
-            f"fell at {r.fall_time:.3f} s: tilt {degrees(r.fall_tilt):.1f} deg (fall from "
-            f"{degrees(c.fall_tilt):.0f} deg), base {r.fall_height:.3f} m above the ground (fall below "
-            f"{c.fall_height} m)"
         ),
     )
     yield r.lift_off_time != NEVER, f"never left the ground for {c.flight_confirmation} s"
@@ -163,8 +166,8 @@ def _judge(r: JumpRecord, c: JumpCriteria, planned: bool) -> Iterator[tuple[bool
         yield (
             error <= c.lift_off_tolerance * abs(float(r.planned_speed)),
             (
-                f"lift-off at {r.lift_off_speed:.3f} m/s is not within {c.lift_off_tolerance:.0%} of "
-                f"the planned {r.planned_speed:.3f} m/s"
+                f"lift-off at {r.lift_off_speed:.3f} m/s is not within {c.lift_off_tolerance:.0%} "
+                f"of the planned {r.planned_speed:.3f} m/s"
             ),
         )
     yield r.violation <= c.joint_limit, f"a joint went {r.violation:.4f} rad over its limit"
@@ -220,7 +223,7 @@ def _judge(r: JumpRecord, c: JumpCriteria, planned: bool) -> Iterator[tuple[bool
     yield from _judge_task(r, c, planned)
 
 
-def _judge_task(r: JumpRecord, c: JumpCriteria, planned: bool) -> Iterator[tuple[bool, str]]:
+def _judge_task(r: JumpRecord, c: JumpCriteria, planned: bool) -> Iterator[Verdict]:
     """The criteria of the task: where it should have jumped, how high, how far round."""
     rise = float(r.apex_height - r.standing_height)
     target = c.rise

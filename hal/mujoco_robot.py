@@ -168,8 +168,10 @@ class MujocoRobot(Robot):
         centre_on_origin(self._data, self._robot)
         self._data.time = 0.0
         self.physics.step[()] = -self._steps
+        self.record.bounce_end.fill(-self._steps)
         self._step1(self._model, self._data)
-        self.advance()
+        self._clear_record()
+        self._simulate(self._steps)
 
     def read(self) -> None:
         """Publish the sensors and the truth at the present instant."""
