@@ -67,7 +67,7 @@ class JumpPhase(Block):
             0.35, unit="s", ge=0.0, text="from touchdown until the robot rises again"
         )
         contact_hold: float = parameter(
-            0.03, unit="s", ge=0.0, text="how long a point stays in stance without contact"
+            0.0, unit="s", ge=0.0, text="how long a point stays in stance after its contact ends"
         )
         lost_contact: float = parameter(
             0.2, unit="s", gt=0.0, text="how long without contact before it is a fault"

@@ -28,6 +28,10 @@ class LandingMemory(Signal):
         ("n_feet", 3), unit="m", frame="world", text="feet at lift-off, measured minus planned"
     )
     goal = Field(("n_feet", 3), unit="m", frame="world", text="where the feet last aimed")
+    planned = Field(("n_feet", 3), unit="m", frame="world", text="planned feet from the com")
+    linear = Field(3, unit="kg m/s", frame="world", text="planned linear momentum")
+    angular = Field(3, unit="N m s", frame="world", text="planned angular momentum")
+    orientation = Field(4, unit="", text="planned base quaternion x, y, z, w")
 
 
 class LandingHeuristic(Block):
@@ -57,6 +61,7 @@ class LandingHeuristic(Block):
     With z up a push along +x gives l^x > 0 and k^y > 0, and along +y l^y > 0 and k^x < 0: so the
     helpful signs are W_l > 0, W_k^x > 0 and W_k^y < 0. In LANDING a foot that is still in the air
     goes on to where it last aimed, at the height of the lowest sole; else the target is the plan.
+    A flight longer than planned goes on with the plan's last instant before touchdown.
     Does not ask whether a leg can reach the target (its inverse kinematics does).
     """
 
@@ -105,7 +110,7 @@ class LandingHeuristic(Block):
         self._sides = foot_sides(robot)
         self._w_l, self._w_k, self._p_max = np.array(p.w_l), np.array(p.w_k), np.array(p.p_max)
         n = len(robot.feet)
-        self._place, self._planned, self._speed = np.zeros((n, 3)), np.zeros((n, 3)), np.zeros(3)
+        self._place, self._speed = np.zeros((n, 3)), np.zeros(3)
         self._linear, self._angular = np.zeros(3), np.zeros(3)
         self._quaternion, self._other = np.zeros(4), np.zeros(4)
         self._rotation, self._heading = np.zeros((3, 3)), np.zeros((3, 3))
@@ -114,30 +119,34 @@ class LandingHeuristic(Block):
 
     def step(self) -> None:
         p, reference, terms, memory = self.params, self.reference, self.terms, self.memory
-        flying = int(self.phase.phase) == Phase.FLIGHT
-        landing = int(self.phase.phase) == Phase.LANDING
-        lowest = lowest_height(terms.foot_position)
+        phase = int(self.phase.phase)
+        flying, landing = phase == Phase.FLIGHT, phase == Phase.LANDING
+        overdue = flying and int(reference.phase) > Phase.FLIGHT
+        if not overdue:
+            self._remember_plan()
         self._feed_back()
-        np.subtract(reference.foot_position, reference.com, out=self._planned)
         if flying and not memory.flying:
             np.subtract(terms.foot_position, terms.com, out=memory.offset)
-            np.subtract(memory.offset, self._planned, out=memory.offset)
+            np.subtract(memory.offset, memory.planned, out=memory.offset)
         memory.flying[()] = flying
         elapsed, left = float(self.phase.time_in_phase), float(self.phase.time_to_touchdown)
         reach = p.reach_share * max(elapsed + left, self.period)
         share, rate, _ = minimum_jerk(elapsed / reach)
         lift, lift_rate = retraction(left, p.retraction, p.retraction_time)
-        self._turn_frame(p.alpha)
+        lowest = lowest_height(terms.foot_position)
+        self._turn_frame(p.alpha, overdue)
         for foot in range(len(self._sides)):
-            place = self.feet.landing[foot]
+            planned, place = memory.planned[foot], self.feet.landing[foot]
             landing_place(
-                self._planned[foot], self._sides[foot], self._linear, self._angular,
+                planned, self._sides[foot], self._linear, self._angular,
                 self._w_l, self._w_k, p.w_c, self._p_max, place,
             )  # fmt: skip
             np.subtract(reference.foot_velocity[foot], reference.com_velocity, out=self._speed)
+            if overdue:
+                self._speed[:] = 0.0
             if flying:
                 swing(
-                    self._planned[foot], place, memory.offset[foot], share, rate / reach,
+                    planned, place, memory.offset[foot], share, rate / reach,
                     self._place[foot], self._speed,
                 )  # fmt: skip
                 self._place[foot, 2] += lift
@@ -148,21 +157,28 @@ class LandingHeuristic(Block):
                 self._place[foot, 2] = lowest - float(terms.com[2])
                 np.negative(terms.com_velocity, out=self._speed)
             else:
-                self._place[foot] = self._planned[foot]
+                self._place[foot] = planned
             self._to_body(foot)
+
+    def _remember_plan(self) -> None:
+        """The plan of this instant, for as long as it is not past its touchdown."""
+        reference, memory = self.reference, self.memory
+        np.subtract(reference.foot_position, reference.com, out=memory.planned)
+        np.multiply(reference.com_velocity, self._mass, out=memory.linear)
+        memory.angular[...] = reference.angular_momentum
+        memory.orientation[...] = reference.orientation
 
     def _feed_back(self) -> None:
         """The momenta that the law answers."""
         self._linear[:] = self.terms.linear_momentum
         self._angular[:] = self.terms.angular_momentum
         if self.params.law == "deviation":
-            np.multiply(self.reference.com_velocity, self._mass, out=self._vector)
-            np.subtract(self._linear, self._vector, out=self._linear)
-            np.subtract(self._angular, self.reference.angular_momentum, out=self._angular)
+            np.subtract(self._linear, self.memory.linear, out=self._linear)
+            np.subtract(self._angular, self.memory.angular, out=self._angular)
 
-    def _turn_frame(self, alpha: float) -> None:
+    def _turn_frame(self, alpha: float, overdue: bool) -> None:
         """The frame the targets are fixed in, its rate, and the centre of mass in the body's."""
-        terms, planned, turn = self.terms, self.reference.orientation, self._other
+        terms, planned, turn = self.terms, self.memory.orientation, self._other
         from_matrix(terms.base_rotation, self._quaternion)
         conjugate(planned, turn)
         multiply(turn, self._quaternion, turn)
@@ -171,10 +187,10 @@ class LandingHeuristic(Block):
         exponential(self._vector, turn)
         multiply(planned, turn, turn)
         to_matrix(turn, self._rotation)
-        rate = terms.velocity[3:6]
-        np.subtract(rate, self.reference.angular_velocity, out=self._rate)
-        np.multiply(self._rate, alpha, out=self._rate)
-        np.add(self._rate, self.reference.angular_velocity, out=self._rate)
+        np.multiply(terms.velocity[3:6], alpha, out=self._rate)
+        if not overdue:
+            np.multiply(self.reference.angular_velocity, 1.0 - alpha, out=self._vector)
+            np.add(self._rate, self._vector, out=self._rate)
         np.subtract(terms.com, terms.base_position, out=self._vector)
         np.dot(terms.base_rotation.T, self._vector, self._com_body)
 
