@@ -56,7 +56,7 @@ def scheduler(rounds: int = 60) -> list[Row]:
         PLAIN: plain.advance,
     }
     _assert_same(cases, expected, (bare, checked, full, plain))
-    peers, missing = peer_chains(expected)
+    peers, missing = peer_chains(expected, COMPARED_TICKS)
     gc.collect()
     gc.freeze()
     gc.disable()
