@@ -38,7 +38,7 @@ class Drives:
         n = len(robot.joints)
         self._scratch, self._speed, self._wanted, self._motor = (np.zeros(n) for _ in range(4))
         self._lower, self._upper, self._excess = (np.zeros(n) for _ in range(3))
-        self._clipped = np.zeros(n, dtype=np.bool_)
+        self._clipped, self._one = np.zeros(n, dtype=np.bool_), np.ones(n, dtype=np.int64)
         self._slots = len(state.due)
         self._rows = [
             (state.torque[k], state.stiffness[k], state.damping[k], state.position[k],
@@ -122,7 +122,7 @@ class Drives:
             self._wanted, self._motor,
         )  # fmt: skip
         np.not_equal(self._wanted, self._motor, out=self._clipped)
-        np.add(record.saturated, self._clipped, out=record.saturated)
+        np.add(record.saturated, self._one, out=record.saturated, where=self._clipped)
         np.maximum(record.torque_high, self._motor, out=record.torque_high)
         np.minimum(record.torque_low, self._motor, out=record.torque_low)
         np.maximum(record.speed_high, self._speed, out=record.speed_high)
