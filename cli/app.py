@@ -16,17 +16,14 @@ from .graph import graph
 from .output import print_json
 from .run import run
 
-EXIT_CODES = """Exit codes:
-
-0  the graph ran and its own criteria hold
-
-1  it ran to its end, but a criterion failed: a fall, a missed target
-
-2  the graph, an override or the command line is wrong; nothing moved
-
-3  a block failed, a signal was not finite, or a deadline policy stopped the run
-
-130, 143  stopped cleanly by SIGINT, SIGTERM
+EXIT_CODES = """\b
+Exit codes:
+  0    the graph ran and its own criteria hold
+  1    it ran to its end, but a criterion failed: a fall, a missed target
+  2    the graph, an override or the command line is wrong; nothing moved
+  3    a block failed, a signal was not finite, or a policy ended the run
+  130  stopped cleanly by SIGINT
+  143  stopped cleanly by SIGTERM
 """
 
 app = typer.Typer(

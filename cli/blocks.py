@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -20,12 +21,8 @@ def blocks(
     markdown: Annotated[bool, typer.Option(help="Print the reference of all as Markdown.")] = False,
 ) -> None:
     """List all blocks, or print the contract of one: equations, ports, units, parameters."""
-    from ..runtime.reference import block_reference
-    from ..runtime.registry import find_block, known_names
-
     with errors_reported(as_json):
-        names = [name] if name else list(known_names())
-        found = [block_reference(each, find_block(each)) for each in names]
+        found = [reference(name)] if name else all_references()
     if markdown:
         from .markdown import reference_page
 
@@ -39,10 +36,34 @@ def blocks(
         console().print(table("", ("block", "machine", "what it does"), rows))
 
 
+def reference(name: str) -> BlockReference:
+    """The contract of one block. Raises ``UnknownBlockError`` with the names that are alike."""
+    from ..runtime.errors import UnknownBlockError
+    from ..runtime.loading.problems import nearest
+    from ..runtime.reference import block_reference
+    from ..runtime.registry import find_block, known_names
+
+    here = Path.cwd()  # where a block of the user's may lie
+    try:
+        return block_reference(name, find_block(name, here))
+    except UnknownBlockError as error:
+        similar = ", ".join(nearest(name, known_names()))
+        hint = f"; the nearest are {similar}" if similar else "; 'aloft blocks' lists all"
+        raise UnknownBlockError(f"{error}{hint}") from error
+
+
+def all_references() -> list[BlockReference]:
+    """The contracts of all blocks, by name."""
+    from ..runtime.reference import block_reference
+    from ..runtime.registry import all_blocks
+
+    return [block_reference(name, block_type) for name, block_type in all_blocks().items()]
+
+
 def print_contract(out: Console, block: BlockReference) -> None:
     """Print a block's docstring and the tables of its declarations."""
     out.print(f"[bold]{block.name}[/]  ({block.machine})\n")
-    out.print(block.text, markup=False)
+    out.print(block.text, markup=False, soft_wrap=True)
     for title, ports in (
         ("Inputs", block.inputs),
         ("Outputs", block.outputs),

@@ -29,14 +29,21 @@ def console(*, to_stderr: bool = False, quiet: bool = False) -> Console:
 def table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> Table:
     """A table without boxes; columns whose name starts with ``>`` are set to the right."""
     from rich import box
+    from rich.markup import escape
     from rich.table import Table
 
     made = Table(title=title or None, box=box.SIMPLE_HEAD, title_justify="left", pad_edge=False)
     for column in columns:
-        made.add_column(column.removeprefix(">"), justify="right" if column[0] == ">" else "left")
+        right = column.startswith(">")
+        made.add_column(escape(column.removeprefix(">")), justify="right" if right else "left")
     for row in rows:
-        made.add_row(*row)
+        made.add_row(*(escape(cell) for cell in row))
     return made
+
+
+def say(out: Console, text: str) -> None:
+    """Print a line as it is: no markup read, no words wrapped."""
+    out.print(text, markup=False, soft_wrap=True)
 
 
 def number(value: Any) -> str:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..runtime.errors import ExitCode
-from .output import console, errors_reported, number, print_json, print_warning, table
+from .output import console, errors_reported, number, print_json, print_warning, say, table
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -72,7 +72,7 @@ def run_once(graph: Graph, record: Path | None, out: Console, as_json: bool) -> 
     else:
         print_result(out, name, result)
         if recording is not None:
-            out.print(f"recording: {recording}; to see it: {viewer()} {recording}")
+            say(out, f"recording: {recording}; to see it: {viewer()} {recording}")
         print_verdict(result)
     return result.exit_code
 
@@ -109,12 +109,13 @@ def print_result(out: Console, name: str, result: RunResult) -> None:
     columns = ("block", ">runs", ">median [us]", ">99 % [us]", ">longest [us]")
     out.print(table(f"{name}: time a run of each block takes", columns, rows))
     speed = result.duration_s / result.wall_time_s if result.wall_time_s else 0.0
-    out.print(
+    say(
+        out,
         f"{result.ticks} ticks, {result.duration_s:.3f} s of the graph in "
-        f"{result.wall_time_s:.2f} s ({speed:.1f} x real time); run hash {result.run_hash}"
+        f"{result.wall_time_s:.2f} s ({speed:.1f} x real time); run hash {result.run_hash}",
     )
     if result.overruns:
-        out.print(f"{result.overruns} overruns, {result.skipped_periods} periods skipped")
+        say(out, f"{result.overruns} overruns, {result.skipped_periods} periods skipped")
 
 
 def print_verdict(result: RunResult) -> None:

@@ -75,7 +75,7 @@ def block_reference(name: str, block_type: type[Block]) -> BlockReference:
     text = inspect.getdoc(block_type) or ""
     return BlockReference(
         name=name,
-        summary=" ".join(text.partition("\n\n")[0].split()),
+        summary=" ".join(text.partition("\n\n")[0].split()).rstrip(":"),
         text=text,
         machine="Moore" if block_type.is_moore() else "Mealy",
         inputs=tuple(_port(port) for port in block_type.inputs.values()),

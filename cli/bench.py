@@ -1,0 +1,57 @@
+"""``aloft bench``: how fast the runtime is, as ratios to peers in the same process."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from ..runtime.errors import AloftError, ExitCode
+from .output import console, errors_reported, number, print_json, say, table
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+
+def bench(
+    name: Annotated[str, typer.Argument(help="One benchmark; by default all.")] = "",
+    as_json: Annotated[bool, typer.Option("--json", help="End with one JSON object.")] = False,
+) -> None:
+    """Measure the runtime beside hand-written loops and peers; exit with 1 if a goal is missed."""
+    from ..benchmarks import BENCHMARKS, run_benchmarks
+
+    out = console(to_stderr=as_json)
+    with errors_reported(as_json):
+        if name and name not in BENCHMARKS:
+            raise AloftError(f"there is no benchmark {name!r}; there is {', '.join(BENCHMARKS)}")
+        with out.status("measuring, about a minute"):
+            results = run_benchmarks([name] if name else None)
+    if as_json:
+        print_json(results)
+    else:
+        print_results(out, results)
+    missed = any(row["met"] is False for row in results["rows"])
+    raise typer.Exit(ExitCode.NOT_SUCCESSFUL if missed else ExitCode.SUCCESS)
+
+
+def print_results(out: Console, results: Mapping[str, Any]) -> None:
+    """Print the rows as a table, with the machine and its load, which explain odd figures."""
+    rows = [
+        (
+            row["name"],
+            "" if row["value"] is None else number(row["value"]),
+            row["unit"],
+            "" if row["ratio"] is None else number(row["ratio"]),
+            row["peer"],
+            "" if row["goal"] is None else f"≤ {row['goal']:g}",
+            "" if row["met"] is None else number(row["met"]),
+            row.get("note", ""),
+        )
+        for row in results["rows"]
+    ]
+    columns = ("case", ">value", "unit", ">ratio", "to", ">goal", "met", "note")
+    out.print(table("", columns, rows))
+    machine = results["machine"]
+    say(out, f"{machine['processor']}, {machine['cores']} cores, Python {machine['python']}")
+    say(out, f"load before {results['load']['before']}, after {results['load']['after']}")

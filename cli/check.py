@@ -1,0 +1,41 @@
+"""``aloft check``: whether a graph may run, and everything that is wrong if it may not."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from .output import errors_reported, print_json
+
+
+def check(
+    graph: Annotated[Path | None, typer.Argument(help="The graph file.")] = None,
+    overrides: Annotated[
+        list[str] | None,
+        typer.Option("--set", help="Set a parameter: block.parameter=value. Repeatable."),
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
+    schema: Annotated[
+        bool, typer.Option("--schema", help="Print the JSON Schema of graph files, for editors.")
+    ] = False,
+) -> None:
+    """Report every mistake in a graph at once: where, what is expected, what is found, the fix."""
+    from ..runtime.loading import load
+
+    if schema:
+        from ..runtime.loading.schema import graph_schema
+
+        typer.echo(json.dumps(graph_schema(), indent=2))
+        return
+    if graph is None:
+        raise typer.BadParameter("a graph file is needed, or --schema")
+    with errors_reported(as_json):
+        checked = load(graph, overrides or [])
+    if as_json:
+        print_json({"success": True, "file": str(graph), "ok": True, "count": 0, "problems": []})
+    else:
+        count = len(checked.blocks)
+        typer.echo(f"{graph}: no problems; {count} blocks at {checked.base_rate:g} Hz")
