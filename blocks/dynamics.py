@@ -71,11 +71,19 @@ class Dynamics(Block):
         data = self._data
         self._mass_matrix: Array = data.M
         self._jacobian: Array = data.J
-        self._jacobian_rate: Array = data.dJ
         self._momentum: Array = data.hg.vector
         self._momentum_rate: Array = data.dhg.vector
         self._foot_place = [data.oMi[joint].translation for joint in joints]
         self._foot_turn = [data.oMi[joint].rotation for joint in joints]
+        self._foot_motion = [
+            (
+                data.v[joint].linear,
+                data.v[joint].angular,
+                data.a[joint].linear,
+                data.a[joint].angular,
+            )
+            for joint in joints
+        ]
         # Which columns move each foot: Pinocchio's Jacobian holds those of all joints at once.
         self._moves = np.zeros((len(joints), 1, n_velocities))
         for foot, joint in enumerate(joints):
@@ -88,9 +96,7 @@ class Dynamics(Block):
         self._foot_of_point = robot.foot_of_contact()
         n_feet = len(joints)
         self._foot_jacobian = np.zeros((n_feet, 6, n_velocities))
-        self._foot_jacobian_rate = np.zeros((n_feet, 6, n_velocities))
-        self._twist = np.zeros((n_feet, 6))
-        self._twist_rate = np.zeros((n_feet, 6))
+        self._local = np.zeros((2, 3))
         self._shift = np.zeros((3, 6))
         self._shift[:, :3] = np.eye(3)
 
@@ -106,7 +112,7 @@ class Dynamics(Block):
 
         pinocchio, model, data = self._pinocchio, self._model, self._data
         pinocchio.computeAllTerms(model, data, q, v)
-        pinocchio.computeJointJacobiansTimeVariation(model, data, q, v)
+        # Also leaves every joint's spatial acceleration at v' = 0 in the model's data.
         pinocchio.computeCentroidalMomentumTimeVariation(model, data, q, v, self._still)
 
         terms.velocity[...] = v
@@ -126,57 +132,60 @@ class Dynamics(Block):
             terms.foot_rotation[foot] = turn
             np.dot(turn, sole, terms.foot_position[foot])
             terms.foot_position[foot] += self._foot_place[foot]
-            moves = self._moves[foot]
-            np.multiply(self._jacobian, moves, out=self._foot_jacobian[foot])
-            np.multiply(self._jacobian_rate, moves, out=self._foot_jacobian_rate[foot])
-            np.dot(self._foot_jacobian[foot], v, self._twist[foot])
-            np.dot(self._foot_jacobian_rate[foot], v, self._twist_rate[foot])
+            np.multiply(self._jacobian, self._moves[foot], out=self._foot_jacobian[foot])
         for point, foot in enumerate(self._foot_of_point):
-            position = terms.contact_position[point]
-            np.dot(self._foot_turn[foot], self._points[point], position)
+            position, turn = terms.contact_position[point], self._foot_turn[foot]
+            np.dot(turn, self._points[point], position)
             position += self._foot_place[foot]
-            point_motion(
-                position,
-                self._foot_jacobian[foot],
-                self._twist[foot],
-                self._twist_rate[foot],
-                self._shift,
-                terms.contact_jacobian[point],
-                terms.contact_velocity[point],
-                terms.contact_drift[point],
+            move_jacobian(
+                self._foot_jacobian[foot], position, self._shift, terms.contact_jacobian[point]
             )
+            point_motion(*self._foot_motion[foot], self._points[point], self._local)
+            np.dot(turn, self._local[0], terms.contact_velocity[point])
+            np.dot(turn, self._local[1], terms.contact_drift[point])
+
+
+def move_jacobian(origin_jacobian: Array, point: Array, shift: Array, out: Array) -> None:
+    """The linear velocity of a body's point per v, (3, n), from the body's at the world's origin.
+
+    A body that moves with (v_0, w) at the origin moves with v_0 + w x p at p, so
+    J_p = [1 | -[p]x] J_0.
+
+    Args:
+        origin_jacobian: spatial velocity at the world's origin per v, linear first, (6, n).
+        point: in the world [m].
+        shift: scratch (3, 6) whose left half is the identity.
+    """
+    x, y, z = float(point[0]), float(point[1]), float(point[2])
+    shift[0, 4], shift[0, 5], shift[1, 5] = z, -y, x
+    shift[1, 3], shift[2, 3], shift[2, 4] = -z, y, -x
+    np.dot(shift, origin_jacobian, out)
 
 
 def point_motion(
-    position: Array,
-    body_jacobian: Array,
-    twist: Array,
-    twist_rate: Array,
-    shift: Array,
-    jacobian: Array,
-    velocity: Array,
-    drift: Array,
+    linear: Array,
+    angular: Array,
+    linear_rate: Array,
+    angular_rate: Array,
+    offset: Array,
+    out: Array,
 ) -> None:
-    """The motion of one point of a body whose motion is known at the world's origin.
+    """Velocity (row 0) and classical acceleration (row 1) of a body's point, in the body's frame.
 
-    A body that moves with (v_0, w) there moves with v_0 + w x p at p, so J_p = [1 | -[p]x] J_0;
-    the derivative of that along the moving p is a_0 + w' x p + w x v_p.
+    From the body's spatial velocity (v, w) and spatial acceleration (a, w') in its own frame:
+    v_p = v + w x r, a_p = a + w' x r + w x v_p.
 
     Args:
-        position: of the point in the world [m], (3,).
-        body_jacobian: spatial velocity at the world's origin per v, linear part first, (6, n).
-        twist, twist_rate: that velocity, and its rate at v' = 0, (6,).
-        shift: scratch (3, 6) whose left half is the identity.
-        jacobian, velocity, drift: results, (3, n), (3,), (3,).
+        linear, angular, linear_rate, angular_rate: v, w, a, w', (3,).
+        offset: r, the point in the body's frame [m].
     """
-    x, y, z = float(position[0]), float(position[1]), float(position[2])
-    shift[0, 4], shift[0, 5], shift[1, 5] = z, -y, x
-    shift[1, 3], shift[2, 3], shift[2, 4] = -z, y, -x
-    np.dot(shift, body_jacobian, jacobian)
-    np.dot(shift, twist, velocity)
-    np.dot(shift, twist_rate, drift)
-    u, v, w = float(velocity[0]), float(velocity[1]), float(velocity[2])
-    rate_x, rate_y, rate_z = float(twist[3]), float(twist[4]), float(twist[5])
-    drift[0] += rate_y * w - rate_z * v
-    drift[1] += rate_z * u - rate_x * w
-    drift[2] += rate_x * v - rate_y * u
+    x, y, z = float(offset[0]), float(offset[1]), float(offset[2])
+    wx, wy, wz = float(angular[0]), float(angular[1]), float(angular[2])
+    ax, ay, az = float(angular_rate[0]), float(angular_rate[1]), float(angular_rate[2])
+    vx = float(linear[0]) + wy * z - wz * y
+    vy = float(linear[1]) + wz * x - wx * z
+    vz = float(linear[2]) + wx * y - wy * x
+    out[0, 0], out[0, 1], out[0, 2] = vx, vy, vz
+    out[1, 0] = float(linear_rate[0]) + ay * z - az * y + wy * vz - wz * vy
+    out[1, 1] = float(linear_rate[1]) + az * x - ax * z + wz * vx - wx * vz
+    out[1, 2] = float(linear_rate[2]) + ax * y - ay * x + wx * vy - wy * vx

@@ -76,7 +76,8 @@ class LegInverseKinematics(Block):
         self._velocity = np.zeros(3)
         self._rate = np.zeros(3)
         self._jacobian = np.zeros((6, 5))
-        self._rows = np.zeros((5, 6))
+        self._rows = np.zeros((5, 5))
+        self._turns = np.zeros((3, 5))
         self._normal = np.zeros((5, 5))
 
     def step(self) -> None:
@@ -98,7 +99,7 @@ class LegInverseKinematics(Block):
             np.clip(feet.velocity[foot], -_FASTEST, _FASTEST, out=self._velocity)
             inverse_velocity(
                 self._jacobian, turn, self._velocity, self._rate, self.params.damping,
-                self._rows, self._normal, speeds,
+                self._rows, self._turns, self._normal, speeds,
             )  # fmt: skip
             for i, joint in enumerate(leg.joints):
                 angle, speed = float(angles[i]), float(speeds[i])

@@ -257,6 +257,7 @@ def inverse_velocity(
     line_rate: Array,
     damping: float,
     rows: Array,
+    turns: Array,
     normal: Array,
     out: Array,
 ) -> None:
@@ -271,24 +272,26 @@ def inverse_velocity(
         velocity: of the sole [m/s, base frame].
         line_rate: the time derivative of the line's unit direction [1/s, base frame].
         damping: in m; 1e-4 changes nothing until a leg is stretched to within 1e-4 rad.
-        rows, normal: scratch of shapes (5, 6) and (5, 5).
+        rows, turns, normal: scratch of shapes (5, 5), (3, 5) and (5, 5).
     """
     length = 0.3
-    rows[0:3, 0:5] = sole_jacobian[0:3, :]
+    np.dot(rotation.T, sole_jacobian[3:6, :], turns)
     turn, nod = 0.0, 0.0
     for i in range(3):
-        rows[i, 5] = velocity[i]
         turn += float(rotation[i, 1]) * float(line_rate[i])
         nod -= float(rotation[i, 2]) * float(line_rate[i])
-    np.dot(rotation[:, 2], sole_jacobian[3:6, :], rows[3, 0:5])
-    np.dot(rotation[:, 1], sole_jacobian[3:6, :], rows[4, 0:5])
-    rows[3, 5], rows[4, 5] = turn, nod
-    rows[3, :] *= length
-    rows[4, :] *= length
-    np.dot(rows[:, 0:5].T, rows[:, 0:5], normal)
-    np.dot(rows[:, 0:5].T, rows[:, 5], out)
-    for i in range(5):
-        normal[i, i] += damping * damping
+    for j in range(5):
+        for i in range(3):
+            rows[i, j] = sole_jacobian[i, j]
+        rows[3, j] = length * float(turns[2, j])
+        rows[4, j] = length * float(turns[1, j])
+    np.dot(rows.T, rows, normal)
+    for j in range(5):
+        value = length * (float(rows[3, j]) * turn + float(rows[4, j]) * nod)
+        for i in range(3):
+            value += float(rows[i, j]) * float(velocity[i])
+        out[j] = value
+        normal[j, j] += damping * damping
     solve_positive(normal, out)
 
 

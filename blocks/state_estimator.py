@@ -145,7 +145,7 @@ class StateEstimator(Block):
             raise BlockError("StateEstimator needs a robot: name one in the graph")
         built = build_pinocchio_model(robot)
         data: Any = built.model.createData()
-        self._centre: Any = pinocchio.centerOfMass
+        self._momentum: Any = pinocchio.computeCentroidalMomentum
         self._model: Any = built.model
         self._data: Any = data
         self._position = np.array(pinocchio.neutral(built.model))
@@ -156,7 +156,8 @@ class StateEstimator(Block):
         self._places = [data.oMi[joint].translation for joint in carriers]
         self._linear = [data.v[joint].linear for joint in carriers]
         self._angular = [data.v[joint].angular for joint in carriers]
-        self._com_rate = data.vcom[0]
+        self._linear_momentum = data.hg.linear
+        self._mass = robot.total_mass
         self._radii = [contact.radius for contact in robot.contacts]
         self._centres = [
             np.array([x, y, z + contact.radius])
@@ -236,7 +237,7 @@ class StateEstimator(Block):
         q[7:] = self.joints.position
         np.clip(self.joints.velocity, -_FASTEST_JOINT, _FASTEST_JOINT, out=v[6:])
         v[3:6] = self.estimate.angular_velocity
-        self._centre(self._model, self._data, q, v, False)
+        self._momentum(self._model, self._data, q, v)
         rotate_back(self.estimate.orientation, _DOWN, self._down)
         for i, centre in enumerate(self._centres):
             point, rate, foot, arm = self._points[i], self._rates[i], self._turns[i], self._arm
@@ -373,7 +374,8 @@ class StateEstimator(Block):
         if ticks == 0:
             return
         average = max(round(0.02 / self.period), 1)
-        rotate(estimate.orientation, self._com_rate, self._spare)
+        rotate(estimate.orientation, self._linear_momentum, self._spare)
+        self._spare /= self._mass
         fallen = -GRAVITY * self.period * ticks
         self._spare += estimate.velocity
         self._spare[2] -= fallen

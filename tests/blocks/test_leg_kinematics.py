@@ -182,7 +182,7 @@ def test_inverse_velocity_undoes_the_jacobian(side, fraction, rate):
     out = np.empty(5)
     legs.inverse_velocity(
         sole_jacobian, rotation, twist[:3], np.cross(twist[3:], rotation[:, 0]), 1e-5,
-        np.empty((5, 6)), np.empty((5, 5)), out,
+        np.empty((5, 5)), np.empty((3, 5)), np.empty((5, 5)), out,
     )  # fmt: skip
     assert np.abs(out - rate).max() < 1e-5
 
