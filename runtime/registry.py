@@ -10,6 +10,7 @@ Three kinds of names:
 
 from __future__ import annotations
 
+import difflib
 import importlib
 import importlib.util
 import inspect
@@ -224,19 +225,46 @@ def _class_of(module: ModuleType, class_name: str, name: str) -> type[Block]:
     return found
 
 
-def similar_names(name: str, folder: Path | None = None) -> tuple[str, ...]:
-    """Names a user may write in place of an unknown one: candidates for the nearest."""
-    if ":" not in name:
-        return known_names()
-    module_name, _, _ = name.partition(":")
-    candidates = []
-    if folder is not None:
-        for path in sorted(folder.glob("*.py")):
-            for class_name, bases, _ in _CLASS.findall(path.read_text(encoding="utf-8")):
-                if bases.strip():
-                    candidates.append(f"{path.stem}:{class_name}")
-    module = sys.modules.get(module_name)
-    for attribute, value in vars(module).items() if module is not None else ():
-        if isinstance(value, type) and issubclass(value, Block) and value is not Block:
-            candidates.append(f"{module_name}:{attribute}")
-    return tuple(dict.fromkeys(candidates))
+def nearest_names(name: str, folder: Path | None = None, count: int = 3) -> tuple[str, ...]:
+    """Blocks whose names are like an unknown one, the likeliest first; the class counts most."""
+    candidates = [*known_names(), *_names_beside(folder), *_names_loaded(name)]
+    package, class_name = _parts(name)
+    scored = []
+    for candidate in dict.fromkeys(candidates):
+        other_package, other_class = _parts(candidate)
+        score = _likeness(class_name, other_class)
+        if score >= 0.6:
+            scored.append((-score - 0.2 * _likeness(package, other_package), candidate))
+    scored.sort()
+    return tuple(name for score, name in scored[:count] if score <= scored[0][0] + 0.2)
+
+
+def _parts(name: str) -> tuple[str, str]:
+    parts = re.split(r"[:.\s/]+", name.strip())
+    return ".".join(parts[:-1]), parts[-1]
+
+
+def _likeness(a: str, b: str) -> float:
+    return difflib.SequenceMatcher(None, a.lower(), b.lower()).ratio()
+
+
+def _names_beside(folder: Path | None) -> list[str]:
+    """Blocks in the files of a folder, found without importing them."""
+    names = []
+    for path in sorted(folder.glob("*.py")) if folder is not None else ():
+        for class_name, bases, _ in _CLASS.findall(
+            path.read_text(encoding="utf-8", errors="replace")
+        ):
+            if any(base.strip().endswith("Block") for base in bases.split(",")):
+                names.append(f"{path.stem}:{class_name}")
+    return names
+
+
+def _names_loaded(name: str) -> list[str]:
+    module_name = name.partition(":")[0]
+    values = vars(sys.modules[module_name]) if module_name in sys.modules else {}
+    return [
+        f"{module_name}:{attribute}"
+        for attribute, value in values.items()
+        if isinstance(value, type) and issubclass(value, Block) and value is not Block
+    ]

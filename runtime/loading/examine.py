@@ -8,7 +8,7 @@ from typing import Any
 
 from ..block import Block
 from ..errors import UnknownBlockError
-from ..registry import BlockImportError, find_block, similar_names
+from ..registry import BlockImportError, find_block, nearest_names
 from ..schedule import ScheduleBlock, find_loops, order_blocks
 from ..signals import Signal
 from ..stages import BlockSpec, CheckedGraph, Position, Wire
@@ -24,7 +24,7 @@ from .wire_check import Draft, WireCheck
 def examine(graph: FlatGraph, problems: Problems) -> CheckedGraph | None:
     """Check everything; the checked graph if nothing is wrong, now or before."""
     settings = read_settings(graph, problems)
-    if not graph.blocks and not graph.incomplete and not graph.broken:
+    if graph.empty:
         where = Position(graph.file, 1, 1)
         problems.add(Code.MISSING_KEY, "the graph has no blocks", where, fix="blocks: ...")
     drafts = {flat.path: _draft(flat, graph, settings, problems) for flat in graph.blocks}
@@ -35,6 +35,9 @@ def examine(graph: FlatGraph, problems: Problems) -> CheckedGraph | None:
     for draft in drafts.values():
         wires.check(draft)
         _read_values(draft, drafts, values, problems)
+    for path, outputs in graph.subgraphs.items():
+        for name, wire in outputs.items():
+            wires.check_output(f"{path}.{name}", wire)
     _report_loops(drafts, problems)
     if len(problems) or settings.base_rate is None:
         return None
@@ -88,8 +91,7 @@ def _find(flat: FlatBlock, graph: FlatGraph, problems: Problems) -> type[Block] 
                 other=error.where,
             )
             return None
-    names = [name for folder in folders for name in similar_names(flat.use, folder)]
-    near = nearest(flat.use, names)
+    near = nearest_names(flat.use, flat.folder)
     problems.add(
         Code.UNKNOWN_BLOCK,
         message,

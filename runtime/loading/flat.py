@@ -95,10 +95,12 @@ class FlatGraph:
     dimensions: MapNode | None = None
     clock: MapNode | None = None
     overrides: Mapping[str, Any] = field(default_factory=dict)
+    empty: bool = False
+    """No file has any blocks."""
     incomplete: bool = False
     broken: tuple[str, ...] = ()
-    subgraphs: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
-    """The sub-graph blocks that were expanded, and the names of their outputs."""
+    subgraphs: Mapping[str, Mapping[str, FlatWire]] = field(default_factory=dict)
+    """The sub-graph blocks that were expanded, and where their outputs come from."""
 
     @property
     def text(self) -> str:

@@ -70,12 +70,14 @@ class _Flattener:
         shown = str(path)
         commands = read_overrides(overrides, self.problems)
         graph: dict[str, tuple[Entry, Path]] = {}
+        empty = False
         if tree is None:
             self.files.incomplete = True
         if tree is not None:
             root = read_graph(tree, shown, path.parent, self.problems, subgraph=False)
             scope = _Scope(Bindings(None, self.problems), stack=((path.resolve(), shown),))
             files = self.files.gather(root, scope.stack)
+            empty = not any(_has_blocks(file) for file in files)
             names = [block.name for file in files for block in file.blocks]
             own = tuple(o for o in commands if not _is_graph_key(o, names))
             for file in files:
@@ -103,9 +105,10 @@ class _Flattener:
             dimensions=self._mapping(written("dimensions")),
             clock=self._mapping(written("clock")),
             overrides={command.key: plain(command.value) for command in commands},
+            empty=empty and not self.files.incomplete,
             incomplete=self.files.incomplete,
             broken=tuple(p for p, instance in self.instances.items() if instance.broken),
-            subgraphs={p: tuple(i.outputs) for p, i in self.instances.items() if not i.broken},
+            subgraphs=resolver.outputs(),
         )
 
     def _mapping(self, entry: Entry | None) -> MapNode | None:
@@ -297,9 +300,11 @@ class _Flattener:
     def _parameters(self, block: FlatBlock, subgraph: WrittenGraph) -> dict[str, Node] | None:
         """The values of a sub-graph's parameters for one use; none if one is missing."""
         declared = {entry.key: entry for entry in subgraph.parameters}
+        misspelt: dict[str, None] = {}
         for entry in block.parameters:
             if entry.key not in declared:
                 similar = nearest(entry.key, declared)
+                misspelt.update(dict.fromkeys(similar[:1]))
                 self.problems.add(
                     Code.UNKNOWN_PARAMETER,
                     f"{subgraph.file} has no parameter {entry.key!r}",
@@ -319,6 +324,8 @@ class _Flattener:
                 values[name] = given.value
             elif isinstance(default, ScalarNode) and default.value is None:
                 complete = False
+                if name in misspelt:
+                    continue  # one mistake, one problem
                 self.problems.add(
                     Code.MISSING_PARAMETER,
                     f"{block.path} does not give the parameter {name!r}",
@@ -344,6 +351,12 @@ def _finish(draft: _Draft, resolver: Resolver) -> FlatBlock:
         elif resolved is None:
             excused.append(name)
     return replace(draft.block, wires=wires, excused=tuple(excused))
+
+
+def _has_blocks(file: WrittenGraph) -> bool:
+    """Whether anything is written under ``blocks``, even if it is wrong."""
+    entry = file.tree.get("blocks")
+    return entry is not None and bool(plain(entry.value))
 
 
 def _is_graph_key(override: Override, names: Iterable[str]) -> bool:

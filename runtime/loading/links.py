@@ -44,11 +44,15 @@ def read_link(
         wrong_kind(node, f"the source of {at}", _EXAMPLE, problems, at=at)
         return None
     keys = {entry.key: entry for entry in node if not entry.key.startswith("_")}
-    for entry in keys.values():
-        if entry.key not in WIRE_KEYS:
-            unknown_key(entry, WIRE_KEYS, f"of the wire to {at}", problems)
+    meant = [
+        unknown_key(entry, WIRE_KEYS, f"of the wire to {at}", problems)
+        for entry in keys.values()
+        if entry.key not in WIRE_KEYS
+    ]
     if "value" in keys:
         return _read_constant(node, keys, at, problems)
+    if "from" not in keys and "from" in meant:
+        return None
     if "from" not in keys:
         problems.add(
             Code.MISSING_KEY,
@@ -161,10 +165,8 @@ def _read_allow(entry: Entry | None, at: str, problems: Problems) -> bool:
     if entry is None:
         return False
     items = entry.value.items if isinstance(entry.value, ListNode) else (entry.value,)
-    allowed = False
     for item in items:
         if isinstance(item, ScalarNode) and item.value == "truth":
-            allowed = True
             continue
         value = item.value if isinstance(item, ScalarNode) else None
         problems.add(
@@ -177,4 +179,4 @@ def _read_allow(entry: Entry | None, at: str, problems: Problems) -> bool:
             nearest=nearest(value, ["truth"]) if isinstance(value, str) else (),
             fix="allow: truth",
         )
-    return allowed
+    return True

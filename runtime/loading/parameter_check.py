@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -134,7 +134,22 @@ def _report(
             legal = tuple(w.strip("' ") for w in expected.replace(" or ", ",").split(","))
             found.near = found.near or nearest(node.value, [w for w in legal if w])
     for mistake in mistakes.values():
+        if mistake.code is Code.BAD_PARAMETER and mistake.near:
+            mistake.fix = f"{mistake.name}: {mistake.near[0]}"
+        if mistake.code is Code.MISSING_PARAMETER and _is_meant(mistake, mistakes.values()):
+            continue  # one mistake, one problem
         _add(flat, model, mistake, problems)
+
+
+def _is_meant(missing: _Mistake, mistakes: Iterable[_Mistake]) -> bool:
+    """Whether a missing parameter is there under a misspelt name."""
+    parent = missing.place.rpartition(".")[0]
+    return any(
+        other.code is Code.UNKNOWN_PARAMETER
+        and other.place.rpartition(".")[0] == parent
+        and other.near[:1] == (missing.name,)
+        for other in mistakes
+    )
 
 
 def _add(flat: FlatBlock, model: type[Parameters], mistake: _Mistake, problems: Problems) -> None:

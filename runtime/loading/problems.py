@@ -59,6 +59,9 @@ class Code(StrEnum):
     OVERRIDE = "override"
 
 
+_UNREADABLE = (Code.YAML, Code.UNKNOWN_REFERENCE)
+
+
 @dataclass(frozen=True)
 class Problem:
     """One mistake: what, where, both ends, what would be right, and how to get there."""
@@ -193,8 +196,13 @@ class Problems:
         return len(self._found)
 
     def report(self, file: str) -> Report:
-        """Everything noted so far, sorted by position; ties as they were found."""
-        return Report(file, tuple(sorted(self._found, key=lambda problem: problem.where)))
+        """Everything noted so far, sorted by position; ties as they were found.
+
+        What is wrong at a place that could not even be read follows from that, and is left out.
+        """
+        unread = {p.where: p for p in self._found if p.code in _UNREADABLE}
+        kept = [p for p in self._found if unread.get(p.where, p) is p]
+        return Report(file, tuple(sorted(kept, key=lambda problem: problem.where)))
 
 
 def nearest(name: str, legal: Iterable[str], count: int = 3) -> tuple[str, ...]:

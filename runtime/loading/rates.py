@@ -69,4 +69,5 @@ def check_hyperperiod(drafts: Iterable[Draft], where: Position, problems: Proble
     try:
         hyperperiod(draft.period_ticks for draft in drafts)
     except AloftError as error:
-        problems.add(Code.RATE, str(error), where, at="rate")
+        message, _, fix = str(error).partition(". ")
+        problems.add(Code.RATE, message, where, at="rate", fix=fix[:1].lower() + fix[1:])

@@ -175,6 +175,7 @@ def _read_clock(graph: FlatGraph, problems: Problems) -> ClockSpec:
 
 def _bad_clock(entry: Entry, expected: str, words: tuple[str, ...], problems: Problems) -> None:
     value = plain(entry.value)
+    similar = nearest(value, words) if isinstance(value, str) else ()
     problems.add(
         Code.BAD_VALUE,
         f"clock.{entry.key} cannot be {kind(entry.value)}",
@@ -182,5 +183,6 @@ def _bad_clock(entry: Entry, expected: str, words: tuple[str, ...], problems: Pr
         at=f"clock.{entry.key}",
         expected=expected,
         found=kind(entry.value),
-        nearest=nearest(value, words) if isinstance(value, str) else (),
+        nearest=similar,
+        fix=f"{entry.key}: {similar[0]}" if similar else "",
     )

@@ -43,7 +43,7 @@ class Instance:
             elif text == "optional":
                 self.inputs[entry.key] = UNWIRED
             else:
-                self.inputs[entry.key] = None
+                self.inputs[entry.key] = UNWIRED
                 problems.add(
                     Code.WRONG_KIND,
                     f"the default of input {entry.key!r} cannot be {kind(value)}",
@@ -52,9 +52,11 @@ class Instance:
                     expected="nothing (required), optional, or constant fields {field: 0.0}",
                     found=kind(value),
                 )
+        misspelt: dict[str, None] = {}
         for name in self.links:
             if name not in self.inputs:
                 similar = nearest(name, self.inputs)
+                misspelt.update(dict.fromkeys(similar[:1]))
                 problems.add(
                     Code.UNKNOWN_INPUT,
                     f"{self.path} has no input {name!r}",
@@ -66,7 +68,8 @@ class Instance:
                     fix=similar[0] if similar else f"remove {name!r}",
                 )
         for entry in subgraph.inputs:
-            if self.inputs[entry.key] is None and entry.key not in self.links:
+            wired = entry.key in self.links or entry.key in misspelt
+            if self.inputs[entry.key] is None and not wired:
                 problems.add(
                     Code.UNWIRED_INPUT,
                     f"input {entry.key!r} of {self.path} is not wired",
@@ -118,6 +121,16 @@ class Resolver:
             if following is None or isinstance(following, str):
                 return following
             link = following
+
+    def outputs(self) -> dict[str, dict[str, FlatWire]]:
+        """For every sub-graph block that was expanded, where its outputs come from."""
+        found: dict[str, dict[str, FlatWire]] = {}
+        for path, instance in self.instances.items():
+            if instance.broken:
+                continue
+            wires = {n: self.resolve(link, f"{path}.{n}") for n, link in instance.outputs.items()}
+            found[path] = {n: wire for n, wire in wires.items() if isinstance(wire, FlatWire)}
+        return found
 
     def _input(self, link: Link, at: str) -> Link | str | None:
         assert link.instance is not None

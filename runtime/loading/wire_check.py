@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -10,6 +10,7 @@ from ..block import Block, Input, Output
 from ..parameters import Parameters
 from ..signals import Field, Signal
 from .flat import FlatBlock, FlatGraph, FlatWire
+from .nodes import text_of
 from .problems import Code, Problems, listing, nearest
 
 
@@ -112,6 +113,8 @@ def _compare_units(name: str, given: Field, wanted: Field) -> Iterator[Mismatch]
 
 def _shape_text(item: Field, shape: tuple[int, ...]) -> str:
     """``[10]``, or ``[n_joints] = [10]`` where names are involved."""
+    if not shape:
+        return "one number"
     numbers = f"[{', '.join(map(str, shape))}]"
     if all(isinstance(size, int) for size in item.shape):
         return numbers
@@ -140,14 +143,16 @@ class WireCheck:
         if draft.block_type is None:
             return
         flat = draft.flat
+        meant: dict[str, None] = {}
         for name, wire in flat.wires.items():
             port = draft.inputs.get(name)
             if port is None:
-                self._unknown_input(draft, name, wire)
+                meant[self._unknown_input(draft, name, wire)] = None
             elif wire.constant is None:
                 self._check_wire(draft, name, port, wire)
         for name, port in draft.inputs.items():
-            if name not in flat.wires and name not in flat.excused and not port.optional:
+            wired = name in flat.wires or name in flat.excused or name in meant
+            if not wired and not port.optional:
                 candidates = self._candidates(draft, port)
                 self.problems.add(
                     Code.UNWIRED_INPUT,
@@ -159,13 +164,18 @@ class WireCheck:
                     fix=f"in: {{{name}: {candidates[0] if candidates else 'block.port'}}}",
                 )
 
-    def _unknown_input(self, draft: Draft, name: str, wire: FlatWire) -> None:
+    def _unknown_input(self, draft: Draft, name: str, wire: FlatWire) -> str:
+        """Note an input that is not there; return the one that was meant, if that is clear."""
         flat = draft.flat
         free = [n for n in draft.inputs if n not in flat.wires]
         similar = nearest(name, draft.inputs)
         best = next((n for n in similar if n in free), similar[0] if similar else "")
-        if not best and len(free) == 1:
-            best = free[0]
+        if not best:  # another name altogether: what could take that signal?
+            source = self.drafts.get(wire.source_block)
+            output = source.outputs.get(wire.source_port) if source else None
+            if source is not None and output is not None:
+                able = [n for n in free if fits(output, draft.inputs[n], source, draft)]
+                best = able[0] if len(able) == 1 else ""
         self.problems.add(
             Code.UNKNOWN_INPUT,
             f"{flat.path} ({flat.use}) has no input {name!r}",
@@ -174,41 +184,20 @@ class WireCheck:
             expected=listing(draft.inputs),
             found=name,
             nearest=similar,
-            fix=f"{best}: {wire.source}" if best else f"remove {name!r}",
+            fix=f"{best}: {text_of(wire.plain())}" if best else f"remove {name!r}",
         )
+        return best
 
     def _check_wire(self, target: Draft, name: str, port: Input[Any], wire: FlatWire) -> None:
         at = f"{target.flat.path}.{name}"
-        source = self.drafts.get(wire.source_block)
-        if source is None:
-            self._unknown_block(target, port, wire, at)
+        ends = self._source(at, wire, target, port)
+        if ends is None:
             return
-        if source.block_type is None:
-            return  # reported at that block
+        source, output = ends
         other = {"at": at, "other": wire.source, "other_where": source.flat.where}
-        output = source.outputs.get(wire.source_port)
-        if output is None:
-            similar = nearest(wire.source_port, source.outputs)
-            if not similar:
-                similar = tuple(
-                    n for n, o in source.outputs.items() if fits(o, port, source, target)
-                )
-            names = tuple(f"{wire.source_block}.{match}" for match in similar)
-            legal = listing(f"{wire.source_block}.{n}" for n in source.outputs)
-            self.problems.add(
-                Code.UNKNOWN_SOURCE,
-                f"{wire.source_block} ({source.flat.use}) has no output {wire.source_port!r}",
-                wire.where,
-                at=at,
-                other=wire.source_block,
-                other_where=source.flat.where,
-                expected=legal,
-                found=wire.source,
-                nearest=names,
-                fix=f"{name}: {names[0]}" if names else "",
-            )
-            return
         if output.truth and not port.reads_truth and not wire.truth:
+            nearby = self._local(self._candidates(target, port), at, wire)
+            allowed = f"{name}: {{from: {wire.source}, allow: truth}}"
             self.problems.add(
                 Code.TRUTH,
                 f"{at} reads {wire.source}, which only a simulator knows",
@@ -216,12 +205,14 @@ class WireCheck:
                 **other,
                 expected="a measured or estimated signal",
                 found="simulation truth",
-                nearest=self._candidates(target, port),
-                fix=f"{name}: {{from: {wire.source}, allow: truth}}, if that is meant",
+                nearest=nearby,
+                fix=f"{name}: {nearby[0]}; or, where truth is meant, {allowed}"
+                if nearby
+                else allowed,
             )
         missing = [n for n in port.signal.fields if n not in output.signal.fields]
         if missing:
-            candidates = self._candidates(target, port)
+            candidates = self._local(self._candidates(target, port), at, wire)
             self.problems.add(
                 Code.FIELD_MISSING,
                 f"{wire.source} does not carry {listing(missing)}",
@@ -243,14 +234,61 @@ class WireCheck:
                 fix=mismatch.fix,
             )
 
-    def _unknown_block(self, target: Draft, port: Input[Any], wire: FlatWire, at: str) -> None:
+    def check_output(self, at: str, wire: FlatWire) -> None:
+        """Note a sub-graph's output that comes from nowhere."""
+        if wire.constant is None:
+            self._source(at, wire, None, None)
+
+    def _source(
+        self, at: str, wire: FlatWire, target: Draft | None, port: Input[Any] | None
+    ) -> tuple[Draft, Output[Any]] | None:
+        """The block and the output that a wire comes from; ``None`` after a problem."""
+        name = at.rpartition(".")[2]
+        source = self.drafts.get(wire.source_block)
+        if source is None:
+            candidates = self._candidates(target, port) if target and port else ()
+            self._unknown_block(wire, at, candidates)
+            return None
+        if source.block_type is None:
+            return None  # reported at that block
+        output = source.outputs.get(wire.source_port)
+        if output is not None:
+            return source, output
+        similar = nearest(wire.source_port, source.outputs)
+        if not similar and target is not None and port is not None:
+            able = [n for n, o in source.outputs.items() if fits(o, port, source, target)]
+            similar = tuple(able)
+        names = self._local([f"{wire.source_block}.{match}" for match in similar], at, wire)
+        self.problems.add(
+            Code.UNKNOWN_SOURCE,
+            f"{wire.source_block} ({source.flat.use}) has no output {wire.source_port!r}",
+            wire.where,
+            at=at,
+            other=wire.source_block,
+            other_where=source.flat.where,
+            expected=listing(f"{wire.source_block}.{n}" for n in source.outputs),
+            found=wire.source,
+            nearest=names,
+            fix=f"{name}: {names[0]}" if names else "",
+        )
+        return None
+
+    def _local(self, names: Iterable[str], at: str, wire: FlatWire) -> tuple[str, ...]:
+        """Paths as the file of the wire writes them: within a sub-graph, without its own path."""
+        owner = at.rpartition(".")[0]
+        scope = owner if owner in self.graph.subgraphs else owner.rpartition("/")[0]
+        if not scope or wire.where.file == self.graph.file:
+            return tuple(names)
+        return tuple(name.removeprefix(f"{scope}/") for name in names)
+
+    def _unknown_block(self, wire: FlatWire, at: str, candidates: tuple[str, ...]) -> None:
         block = wire.source_block
         prefixes = [f"{path}/" for path in self.graph.broken]
         if self.graph.incomplete or any(f"{block}/".startswith(prefix) for prefix in prefixes):
             return  # it may be in a file that could not be read, and that is reported
         similar = nearest(block, [*self.drafts, *self.graph.subgraphs])
-        names = tuple(f"{match}.{wire.source_port}" for match in similar)
-        candidates = names or self._candidates(target, port)
+        names = [f"{match}.{wire.source_port}" for match in similar]
+        candidates = self._local(names or candidates, at, wire)
         self.problems.add(
             Code.UNKNOWN_SOURCE,
             f"{at} reads {wire.source}, but there is no block {block!r}",

@@ -104,8 +104,8 @@ def read_graph(
     )
 
 
-def unknown_key(entry: Entry, legal: Iterable[str], of: str, problems: Problems) -> None:
-    """Note a key that means nothing there."""
+def unknown_key(entry: Entry, legal: Iterable[str], of: str, problems: Problems) -> str:
+    """Note a key that means nothing there; return the one that was meant, if that is clear."""
     names = tuple(legal)
     similar = nearest(entry.key, names)
     problems.add(
@@ -117,6 +117,7 @@ def unknown_key(entry: Entry, legal: Iterable[str], of: str, problems: Problems)
         nearest=similar,
         fix=f"{similar[0]}: ..." if similar else f"remove {entry.key!r}",
     )
+    return similar[0] if similar else ""
 
 
 def wrong_kind(node: Node, what: str, expected: str, problems: Problems, **details: str) -> None:
@@ -171,10 +172,12 @@ def _read_block(entry: Entry, problems: Problems) -> WrittenBlock | None:
         wrong_kind(entry.value, f"block {name!r}", example, problems, at=name)
         return WrittenBlock(name, where)
     found = {item.key: item for item in entry.value if not item.key.startswith("_")}
-    for item in found.values():
-        if item.key not in BLOCK_KEYS:
-            unknown_key(item, BLOCK_KEYS, f"of block {name!r}", problems)
-    if "use" not in found:
+    meant = [
+        unknown_key(item, BLOCK_KEYS, f"of block {name!r}", problems)
+        for item in found.values()
+        if item.key not in BLOCK_KEYS
+    ]
+    if "use" not in found and "use" not in meant:
         problems.add(
             Code.MISSING_KEY,
             f"block {name!r} does not say which block it uses",

@@ -1,0 +1,146 @@
+"""Small blocks for the wrong graphs, so that these depend on no block of ours."""
+
+from typing import Literal
+
+from pydantic import model_validator
+
+from aloft.runtime.block import Block, Input, Output
+from aloft.runtime.parameters import Parameters, parameter
+from aloft.runtime.signals import Field, Signal
+
+
+class Imu(Signal):
+    rate = Field(3, unit="rad/s", frame="body")
+    force = Field(3, unit="m/s^2", frame="body")
+
+
+class Joints(Signal):
+    position = Field("n_joints", unit="rad")
+    velocity = Field("n_joints", unit="rad/s")
+
+
+class Height(Signal):
+    height = Field(unit="m", frame="world")
+
+
+class HeightInMillimetres(Signal):
+    height = Field(unit="mm", frame="world")
+
+
+class Weight(Signal):
+    height = Field(unit="N", frame="world")
+
+
+class HeightInBody(Signal):
+    height = Field(unit="m", frame="body")
+
+
+class Heights(Signal):
+    height = Field(2, unit="m", frame="world")
+
+
+class Storey(Signal):
+    height = Field(dtype="int64", unit="m", frame="world")
+
+
+class Robot(Block):
+    """A Moore block with sensors and simulation truth."""
+
+    command = Input(Joints, text="joint targets")
+    imu = Output(Imu, text="the sensor")
+    joints = Output(Joints, text="the encoders")
+    truth = Output(Height, truth=True, text="the real height")
+
+    def emit(self) -> None: ...
+
+    def update(self) -> None: ...
+
+
+class Estimator(Block):
+    """A height from a sensor."""
+
+    imu = Input(Imu, text="the sensor")
+    height = Output(Height, text="the estimate")
+
+    def step(self) -> None: ...
+
+
+class Controller(Block):
+    """Joint targets from a height."""
+
+    class Params(Parameters):
+        class Limits(Parameters):
+            low: float = 0.0
+            high: float = 1.0
+
+        gain: float = parameter(unit="N m/rad", ge=0.0, le=100.0, text="stiffness")
+        mode: Literal["stiff", "soft"] = parameter("stiff", text="how it feels")
+        shares: list[float] = parameter([0.5, 0.5], min_length=2, max_length=2, text="per leg")
+        delay: float = parameter(0.0, unit="s", text="waiting time")
+        limits: Limits = parameter(Limits(), text="range")
+
+        @model_validator(mode="after")
+        def _check(self) -> "Controller.Params":
+            if self.mode == "soft" and self.gain > 50.0:
+                raise ValueError("a soft controller has a gain of at most 50")
+            return self
+
+    params: Params
+    height = Input(Height, text="where it is")
+    joints = Input(Joints, text="how it stands")
+    push = Input(Weight, default={"height": 0.0}, text="an outer force")
+    command = Output(Joints, text="joint targets")
+
+    def step(self) -> None: ...
+
+
+class Judge(Block):
+    """Reads truth, and may."""
+
+    truth = Input(Height, reads_truth=True, text="the real height")
+
+    def step(self) -> None: ...
+
+
+class Samples(Signal):
+    value = Field("n_samples", unit="m")
+
+
+class Window(Block):
+    """Needs a dimension that only a graph can give."""
+
+    samples = Output(Samples, text="the last heights")
+
+    def step(self) -> None: ...
+
+
+class Source(Block):
+    """One of each kind of height."""
+
+    metres = Output(Height)
+    millimetres = Output(HeightInMillimetres)
+    weight = Output(Weight)
+    body = Output(HeightInBody)
+    pair = Output(Heights)
+    storey = Output(Storey)
+
+    def step(self) -> None: ...
+
+
+class Relay(Block):
+    """The input again."""
+
+    height = Input(Height)
+    again = Output(Height)
+
+    def step(self) -> None: ...
+
+
+class Motionless(Block):
+    """Neither machine."""
+
+    height = Input(Height)
+
+
+class NotABlock:
+    """No block at all."""
