@@ -63,6 +63,7 @@ class JumpRecord(Signal):
     planned_flight = Field(unit="s", text="flight time of the reference")
     planned_speed = Field(unit="m/s", text="vertical com speed of the reference at lift-off")
     planned_speed_time = Field(unit="s", text="when it was read")
+    planned_standing = Field(unit="m", text="com height of the reference at the start")
     planned_apex = Field(unit="m", text="greatest com height of the reference")
     planned_start = Field(("n_feet", 2), unit="m", text="feet of the reference at the start")
     planned_foot = Field(("n_feet", 2), unit="m", text="feet of the reference now")
@@ -228,7 +229,7 @@ def _judge_task(r: JumpRecord, c: JumpCriteria, planned: bool) -> Iterator[Verdi
     rise = float(r.apex_height - r.standing_height)
     target = c.rise
     if target is None and planned:
-        target = float(r.planned_apex - r.standing_height)
+        target = float(r.planned_apex - r.planned_standing)
     if target is not None:
         yield (
             abs(rise - target) <= c.rise_tolerance * target,

@@ -151,7 +151,7 @@ class JumpScore(Block):
                 "planned_flight_time_s": float(record.planned_flight),
                 "planned_lift_off_speed_m_s": float(record.planned_speed),
                 "planned_apex_above_standing_m": float(
-                    record.planned_apex - record.standing_height
+                    record.planned_apex - record.planned_standing
                 ),
             }
         return values
@@ -187,6 +187,7 @@ class JumpScore(Block):
         if first:
             record.planned_start[:] = record.planned_foot
             record.planned_yaw_start[()] = yaw
+            record.planned_standing[()] = height
             record.planned_apex[()] = height
             record.planned_speed_time[()] = NEVER
         record.planned_apex[()] = max(record.planned_apex.item(), height)

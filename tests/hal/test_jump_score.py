@@ -267,6 +267,14 @@ def test_targets_of_the_reference() -> None:
     assert "jumped (0.0, 0.0) mm" in str(run(change_plan=forward)[0]["reason"])
 
 
+def test_the_planned_rise_is_above_the_plans_own_standing_height() -> None:
+    def raised(time: float, reference: Fields) -> None:
+        x, y, z = reference["com"]
+        reference["com"] = [x, y, z + 0.02]  # the plan's model has its com elsewhere
+
+    assert run(change_plan=raised)[0]["success"] is True
+
+
 def test_without_a_reference_only_what_is_given_is_judged() -> None:
     metrics, _ = run(faster_lift_off, wired=("truth",))
     assert metrics["success"] is True and "planned_flight_time_s" not in metrics
