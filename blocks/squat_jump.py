@@ -237,14 +237,23 @@ class _Jump:
         duration = self.task.landing_time
         speed = np.array([self.forward, 0.0, -self.fall])
         goal = np.array([self.task.distance, 0.0, self.rest_height])
+        # A quintic that begins with speed passes its end unless it is given this short a time.
+        stop = min(duration, 2.5 * (float(self.touch_com[2]) - self.rest_height) / self.fall)
+        times = (duration, duration, max(stop, 0.02))
         paths = [
-            quintic(duration, (float(self.touch_com[k]), float(speed[k]), 0.0),
-                    (float(goal[k]), 0.0, 0.0))
+            quintic(
+                times[k],
+                (float(self.touch_com[k]), float(speed[k]), 0.0),
+                (float(goal[k]), 0.0, 0.0),
+            )
             for k in range(3)
-        ]  # fmt: skip
-        motion = self._motion(np.array([path.position(t) for path in paths]))
-        motion.com_velocity = np.array([path.velocity(t) for path in paths])
-        motion.com_acceleration = np.array([path.acceleration(t) for path in paths])
+        ]
+        motion = self._motion(goal)
+        for k, path in enumerate(paths):
+            if t < times[k]:
+                motion.com[k] = path.position(t)
+                motion.com_velocity[k] = path.velocity(t)
+                motion.com_acceleration[k] = path.acceleration(t)
         rate = minimum_jerk(t / duration)[1] / duration
         motion.rotation = np.array([0.0, -rate * pitch, 0.0])
         return motion

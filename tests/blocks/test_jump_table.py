@@ -1,0 +1,65 @@
+"""Reading a plan: rows, what lies between them, and the phase by time."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from aloft.blocks.jump_table import JumpTable, JumpTableReader, locate, planned_phase
+from aloft.blocks.signals import JumpReference, Phase
+from aloft.runtime.description import find_robot
+
+TIMES = np.array([0.0, 0.1, 0.1, 0.4])
+
+
+@pytest.mark.parametrize(
+    ("time", "row", "share"),
+    [(-1.0, 0, 0.0), (0.0, 0, 0.0), (0.05, 0, 0.5), (0.1, 2, 0.0), (0.25, 2, 0.5), (9.0, 2, 1.0)],
+)
+def test_locate(time, row, share):
+    assert locate(TIMES, time) == (row, pytest.approx(share))
+
+
+def test_an_instant_with_two_rows_takes_the_second():
+    rows = np.array([1.0, 2.0, 5.0, 6.0])
+    row, share = locate(TIMES, 0.1)
+    assert rows[row] + share * (rows[row + 1] - rows[row]) == 5.0
+
+
+def test_phases_begin_at_their_times():
+    marks = (1.0, 2.0, 3.0, 4.0, 5.0)
+    for phase in range(6):
+        assert planned_phase(phase, *marks) == phase
+        assert planned_phase(phase + 0.999, *marks) == phase
+
+
+def table():
+    robot = find_robot("bruce")
+    fields = JumpReference.allocate(robot.dimensions).views()
+    skip = {"time", "phase", "lift_off_time", "touchdown_time", "contact"}
+    columns = {
+        name: np.stack([np.full(view.shape, value) for value in (1.0, 3.0)])
+        for name, view in fields.items()
+        if name not in skip
+    }
+    columns["orientation"] = np.array([[0.0, 0.0, 0.0, 1.0], [1.0, 0.0, 0.0, 0.0]])
+    return JumpTable(np.array([0.0, 1.0]), columns, 0.1, 0.2, 0.3, 0.6, 0.8)
+
+
+def test_reading_interpolates_every_field_and_normalises_the_orientation():
+    reference = JumpReference.allocate(find_robot("bruce").dimensions)
+    JumpTableReader(table()).read(0.25, reference)
+    assert reference.com.tolist() == [1.5, 1.5, 1.5]
+    assert (reference.joint_velocity == 1.5).all()
+    assert reference.orientation == pytest.approx(np.array([0.25, 0.0, 0.0, 0.75]) / 0.625**0.5)
+    assert (float(reference.time), int(reference.phase)) == (0.25, Phase.THRUST)
+    assert (float(reference.lift_off_time), float(reference.touchdown_time)) == (0.3, 0.6)
+
+
+@pytest.mark.parametrize(
+    ("time", "contact"), [(0.29, True), (0.3, False), (0.59, False), (0.6, True)]
+)
+def test_points_are_planned_in_contact_outside_flight(time, contact):
+    reference = JumpReference.allocate(find_robot("bruce").dimensions)
+    JumpTableReader(table()).read(time, reference)
+    assert reference.contact.tolist() == [contact] * 4
