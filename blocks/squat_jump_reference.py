@@ -42,7 +42,7 @@ class SquatJumpReference(Block):
             0.8, unit="rad", ge=0.0, le=1.3, text="forward pitch of the torso in the squat"
         )
         touchdown_pitch: float = parameter(
-            0.0, unit="rad", ge=-0.5, le=0.5, text="forward pitch of the torso at touchdown"
+            -0.06, unit="rad", ge=-0.5, le=0.5, text="forward pitch of the torso at touchdown"
         )
         squat_depth: float = parameter(
             0.094, unit="m", gt=0.0, le=0.15, text="bottom of the squat below standing"
@@ -60,7 +60,7 @@ class SquatJumpReference(Block):
             0.7, ge=0.0, le=1.0, text="share of the weight taken off the feet at lift-off"
         )
         settle_time: float = parameter(
-            0.12, unit="s", gt=0.02, le=0.5, text="from lift-off to the legs' landing posture"
+            0.1, unit="s", gt=0.02, le=0.5, text="from lift-off to the legs' landing posture"
         )
         stand_time: float = parameter(
             0.4, unit="s", gt=0.0, text="standing, for the estimator to settle"

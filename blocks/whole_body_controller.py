@@ -128,12 +128,14 @@ class WholeBodyController(Block):
         stand: TaskGains = parameter(TaskGains(), text="gains while standing and squatting")
         thrust: TaskGains = parameter(
             TaskGains(
-                torso_weight=(10.0, 0.003, 10.0),
-                angular_weight=(1.0, 1.5e4, 1.0),
+                linear_stiffness=(100.0, 100.0, 70.0),
+                linear_damping=(20.0, 20.0, 14.0),
+                torso_weight=(1.0, 0.003, 1.0),
+                angular_weight=(1.5e3, 1.5e4, 1.5e3),
                 angular_damping=(30.0, 30.0, 30.0),
                 track_angular_momentum=True,
             ),
-            text="gains in the thrust: momentum about y before the torso's pitch",
+            text="gains in the thrust: angular momentum before the torso",
         )
         landing: TaskGains = parameter(
             TaskGains(
