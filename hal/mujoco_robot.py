@@ -12,11 +12,13 @@ from ..blocks.signals import ExternalForce, RobotTruth
 from ..runtime.block import Input, Metric, Output, State
 from ..runtime.description import RobotDescription
 from ..runtime.parameters import Parameters
-from .mujoco_model import Variation, build_mujoco_model
+from .mujoco_model import Variation
 from .random_streams import WORDS, Purpose, RandomStreams, stream
 from .robot import Robot
 from .simulated_drives import Drives
 from .simulated_sensors import Sensors
+from .simulated_truth import TruthReport
+from .simulated_world import build_world, draw_variation
 from .simulator_parameters import SimulatorParameters
 from .simulator_state import DriveState, PhysicsState, TickRecord
 from .stance import centre_on_origin, holding_torque, place_standing
@@ -68,6 +70,17 @@ class MujocoRobot(Robot):
     record = State(TickRecord, text="what happened in the physics steps of the last tick")
 
     @classmethod
+    def example_parameters(cls) -> Mapping[str, Any]:
+        """Every disturbance at once, so that the conformance suite meets them all."""
+        return {
+            "gyro_noise": 0.02, "gyro_bias": 0.01, "gyro_range": 30.0,
+            "accelerometer_noise": 0.1, "accelerometer_bias": 0.1, "accelerometer_range": 160.0,
+            "encoder_offset": 0.003, "encoder_resolution": 1e-4, "joint_velocity_noise": 0.05,
+            "switch_threshold": [0.5, 3.0], "switch_bounce": 0.002, "latency": 0.002,
+            "jitter": 0.0005, "initial_attitude_error": 0.01, "random_start_phase": True,
+        }  # fmt: skip
+
+    @classmethod
     def local_dimensions(
         cls, params: Parameters, robot: RobotDescription | None
     ) -> Mapping[str, int]:
@@ -82,7 +95,7 @@ class MujocoRobot(Robot):
         import mujoco
 
         assert isinstance(params, SimulatorParameters)
-        model = _build(params, robot, Variation())
+        model = build_world(params, robot, Variation())
         everything = mujoco.mjtState.mjSTATE_INTEGRATION
         flight = params.latency + params.jitter + params.timestep
         return {
@@ -97,7 +110,7 @@ class MujocoRobot(Robot):
 
         robot, params = self.context.robot, self.params
         self._variation = draw_variation(params)
-        self._model = _build(params, robot, self._variation)
+        self._model = build_world(params, robot, self._variation)
         assert robot is not None
         self._robot = robot
         self._step1, self._step2 = mujoco.mj_step1, mujoco.mj_step2
@@ -108,7 +121,6 @@ class MujocoRobot(Robot):
                 f"timestep {params.timestep} s does not divide the control period "
                 f"{self.period} s; try {self.period / max(1, math.ceil(steps))} s"
             )
-        self._scene = params.build_scene()
         self._streams = RandomStreams(params.seed)
         self._jitter = self._streams[Purpose.JITTER]
         self._sensors = Sensors(robot, params, self._streams)
@@ -118,7 +130,6 @@ class MujocoRobot(Robot):
         self._limits = (robot.joint_limits[:, 0].copy(), robot.joint_limits[:, 1].copy())
         n = len(robot.joints)
         self._encoder, self._excess = np.zeros(n), np.zeros(n)
-        self._mask = np.zeros(n, dtype=np.bool_)
         self._mean_force = np.zeros(3)
         self._attach(mujoco.MjData(self._model))
 
@@ -130,15 +141,12 @@ class MujocoRobot(Robot):
         self._body_rates = data.qvel[3:6]
         self._ctrl, self._external = data.ctrl, data.xfrc_applied
         self._accelerometer = data.sensor("accelerometer").data
-        self._com, self._com_velocity, self._angular_momentum = (
-            data.sensor(name).data for name in ("com", "com_velocity", "angular_momentum")
-        )
         self._contacts = data.sensor("contacts").data
         names = [contact.name for contact in self._robot.contacts]
         first = int(model.sensor(f"load/{names[0]}").adr[0])
         self._load = data.sensordata[first : first + 4 * len(names)].reshape(-1, 4)
         self._vertical = self._load[:, 3]
-        self._contact_places = [data.site(name).xpos for name in names]
+        self._truth = TruthReport(data, self._robot, self.params.build_scene())
         self._points = []
         for point, (link, _) in self._robot.points.items():
             body = model.body(link).id
@@ -180,7 +188,7 @@ class MujocoRobot(Robot):
         self._sensors.read_imu(self._body_rates, self._mean_force, self.imu)
         self._sensors.read_joints(self._position, self._velocity, record.joint_torque, self.joints)
         self._sensors.read_switches(int(self.physics.step), record, self.contacts)
-        self._publish_truth(steps)
+        self._truth.publish(record, self.truth)
 
     def write(self) -> None:
         """Send the command on its way to the drives."""
@@ -288,76 +296,3 @@ class MujocoRobot(Robot):
             high.fill(-np.inf)
         for low in (record.torque_low, record.speed_low):
             low.fill(np.inf)
-
-    def _publish_truth(self, steps: int) -> None:
-        truth, record, data = self.truth, self.record, self._data
-        truth.base_position[:] = data.qpos[:3]
-        truth.base_orientation[:3] = data.qpos[4:7]
-        truth.base_orientation[3] = data.qpos[3]
-        truth.base_linear_velocity[:] = data.qvel[:3]
-        truth.base_angular_velocity[:] = self._body_rates
-        truth.joint_position[:] = self._position
-        truth.joint_velocity[:] = self._velocity
-        truth.com[:] = self._com
-        truth.com_velocity[:] = self._com_velocity
-        truth.angular_momentum[:] = self._angular_momentum
-        np.divide(record.load[:, 1:], -steps, out=truth.contact_force)
-        for k, place in enumerate(self._contact_places):
-            truth.contact_position[k] = place
-            truth.ground_height[k] = self._scene.ground_height(place.item(0), place.item(1))
-            force = truth.contact_force[k]
-            truth.contact_touched[k] = any(force.item(axis) != 0.0 for axis in range(3))
-        truth.forbidden_contacts[()] = record.forbidden
-        truth.joint_limit_violation[()] = max(record.violation.tolist())
-        truth.motor_overload[()] = max(record.overload.tolist())
-        truth.saturated_share[()] = sum(record.saturated.tolist()) / (steps * len(self._mask))
-        for high, low, out in (
-            (record.torque_high, record.torque_low, truth.motor_torque),
-            (record.speed_high, record.speed_low, truth.motor_speed),
-        ):
-            np.negative(low, out=self._excess)
-            np.greater(self._excess, high, out=self._mask)
-            out[:] = high
-            np.copyto(out, low, where=self._mask)
-
-
-def _build(params: SimulatorParameters, robot: RobotDescription | None, world: Variation) -> Any:
-    """The model, with the errors a user can make told plainly."""
-    import mujoco
-
-    if robot is None:
-        raise ValueError("the graph has no robot; add `robot: bruce` to it")
-    if params.profile not in robot.profiles:
-        raise ValueError(
-            f"{robot.name} has no actuator profile {params.profile!r}; "
-            f"it has {', '.join(robot.profiles)}"
-        )
-    model = build_mujoco_model(
-        robot, profile=params.profile, scene=params.build_scene(), timestep=params.timestep,
-        variation=world,
-    )  # fmt: skip
-    # A state that has become NaN must be seen, not be quietly replaced by the initial one.
-    model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
-    return model
-
-
-def draw_variation(params: SimulatorParameters) -> Variation:
-    """The world that the seed of these parameters stands for."""
-
-    def uniform(purpose: Purpose) -> float:
-        return float(stream(params.seed, purpose).uniform(-1.0, 1.0))
-
-    friction = params.friction
-    if params.friction_range is not None:
-        low, high = params.friction_range
-        friction = low + (high - low) * 0.5 * (1.0 + uniform(Purpose.FRICTION))
-    stiffness = params.contact_stiffness * params.contact_stiffness_spread ** uniform(
-        Purpose.CONTACT_STIFFNESS
-    )
-    offsets = stream(params.seed, Purpose.BASE_COM).uniform(-1.0, 1.0, 3)
-    x, y, z = (
-        nominal + params.base_com_spread * float(draw)
-        for nominal, draw in zip(params.base_com_offset, offsets, strict=True)
-    )
-    mass = params.mass_scale * (1.0 + params.mass_spread * uniform(Purpose.MASS))
-    return Variation(friction, stiffness, mass, (x, y, z))
