@@ -55,7 +55,7 @@ class BaseEstimate(Signal):
     ballistic_velocity = Field(3, unit="m/s", frame="world", text="of the CoM, less gravity's part")
     flight_ticks = Field(dtype="int64", text="ticks since the last trusted contact")
     started = Field(dtype="bool", text="whether the first sample has been seen")
-    flown = Field(dtype="bool", text="whether any point has lost contact since")
+    flown = Field(dtype="bool", text="whether all points have lost contact since")
 
 
 class BiasSamples(Signal):
@@ -90,16 +90,20 @@ class StateEstimator(Block):
       velocity, and no point counts while the IMU feels no support. So slipping feet, heels that
       lift and contacts that a latch still holds after lift-off do not spoil the lift-off velocity.
       ``gate`` opens while everything is rejected and in the air, so a wrong prediction recovers.
-    * Until the robot first moves, both feet stand on level ground, which gives tilt to the encoder
-      offsets (about 3 mrad against 10 mrad from a biased accelerometer) and heading along the feet,
-      and so the accelerometer's bias, which is what drifts in flight. Afterwards the orientation
-      is the gyroscope's; when still, the accelerometer less its bias rights it.
+    * Until it first leaves the ground the robot stands on level ground with its feet along x. While
+      all points are in contact and nothing is fast, the heights of the points and the headings of
+      the feet give the orientation to the encoder offsets (about 3 mrad; a biased accelerometer
+      knows it to 10 mrad), and its drift the gyroscope's bias, both as a least squares line over
+      up to 250 ticks; and when it is still, what the accelerometer reads beyond gravity is its
+      bias, which would be the drift in flight. Afterwards the orientation is the gyroscope's; when
+      still, the accelerometer less its bias rights it.
 
-    In both, the gyroscope's bias is learnt whenever the robot stands still, as the mean with a
-    prior of zero. **Flight**: with no point trusted the prediction runs alone. ``flight: imu``
-    integrates the IMU. ``flight: ballistic`` averages the CoM's velocity by the IMU over the first
-    20 ms, and from then on the CoM falls freely and the base follows from the joints; it does not
-    drift, but it also does not feel a push.
+    Otherwise the gyroscope's bias is its mean while the robot stands still, with a prior of zero.
+
+    **Flight.** With no point trusted the prediction runs alone. ``flight: imu`` integrates the IMU.
+    ``flight: ballistic`` averages the CoM's velocity by the IMU over the first 20 ms, and from then
+    on the CoM falls freely and the base follows from the joints; it does not drift, but it also
+    does not feel a push.
 
     It starts at the first sample, standing on level ground: the world's origin is midway between
     the soles and x is where the feet point. Yaw and horizontal position drift; the ground's height
@@ -225,10 +229,13 @@ class StateEstimator(Block):
             rate = min(max(float(self.joints.velocity[i]), -_FASTEST_JOINT), _FASTEST_JOINT)
             estimate.mean_joint_rate[i] = mean = mean + share * (rate - mean)
             fastest = max(fastest, abs(mean))
+        standing = 0
         for point in range(self._weights.shape[0]):
-            if not self.contacts.active[point]:
-                estimate.flown[()] = True
-                fastest = math.inf
+            standing += bool(self.contacts.active[point])
+        if standing == 0 and self.learning.aligned[()]:
+            estimate.flown[()] = True
+        if standing < self._weights.shape[0]:
+            fastest = math.inf
         return fastest
 
     def _see_points(self) -> None:
