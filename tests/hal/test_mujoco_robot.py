@@ -325,3 +325,20 @@ def test_a_tick_allocates_no_array() -> None:
     arrays = [tracemalloc.DomainFilter(inclusive=True, domain=domain)]
     grown = after.filter_traces(arrays).compare_to(before.filter_traces(arrays), "lineno")
     assert sum(entry.size_diff for entry in grown) == 0
+
+
+def test_stands_on_a_platform_and_slides_only_beyond_its_friction() -> None:
+    robot = bench(scene="platform", platform_height=0.35, friction=0.3)
+    hold(robot)
+    robot.step(50)
+    seen = truth(robot)
+    assert seen.contact_force[:, 2].sum() == pytest.approx(WEIGHT, rel=1e-3)
+    start = seen.contact_position.copy()
+    for force, slides in ((0.7 * 0.3 * WEIGHT, False), (1.3 * 0.3 * WEIGHT, True)):
+        robot.set("push", force=[0.0, force, 0.0], point=list(ROBOT.points).index("right_ankle"))
+        robot.step(25)
+        seen = truth(robot)
+        along, normal = seen.contact_force[:, 1], seen.contact_force[:, 2]
+        assert (np.abs(along) <= 0.3 * normal + 0.05).all()
+        moved = np.abs(seen.contact_position - start)[:, 1].max()
+        assert (moved > 0.002) == slides
