@@ -11,7 +11,7 @@ from contextlib import ExitStack, contextmanager
 from typing import Any
 
 from .block import Metric
-from .errors import ExitCode, RunError
+from .errors import AloftError, ExitCode, RunError
 from .interrupts import Interrupts
 from .life_cycle import LifeCycle, LifeState, describe
 from .memory import BoundGraph
@@ -70,12 +70,17 @@ class Executor:
         self._opened: list[Sink] = []
 
     def run(self, ticks: int | None = None) -> RunResult:
-        """The whole life of the graph: start, tick, stop cycles, close; it raises nothing.
+        """The whole life of the graph, once: start, tick, stop cycles, close.
 
         Runs for ``ticks``, by default as long as the graph says. SIGINT and SIGTERM stop it after
         the present tick, and so does a block that asks for it. Whatever ended the run is in the
         result, an error too: see ``RunResult.raise_if_failed``.
+
+        Raises:
+            AloftError: the graph has run already.
         """
+        if self.life.state is not LifeState.IDLE:
+            raise AloftError(f"a graph that is {self.life.state.value} cannot be run again")
         clock, graph = self.bound.clock, self.bound.graph
         limit = graph.ticks if ticks is None else ticks
         error: RunError | None = None

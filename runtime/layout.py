@@ -110,4 +110,4 @@ class Layout:
         part = rows[..., first:last]
         if not part.flags.c_contiguous:
             part = np.ascontiguousarray(part)
-        return part.view(DTYPES[slot.section]).reshape(*rows.shape[:-1], *slot.shape)
+        return part.view(DTYPES[slot.section]).reshape((*rows.shape[:-1], *slot.shape))

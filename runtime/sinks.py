@@ -76,7 +76,7 @@ class MemoryLog:
     def _add_chunk(self, rows: int) -> None:
         chunk = np.empty((rows, self._size), np.uint8)
         self._chunks.append(chunk)
-        self._flat = chunk.data.cast("B") if chunk.size else memoryview(b"")
+        self._flat = chunk.data.cast("B") if chunk.size else memoryview(bytearray())
         self._used = 0
 
     def record(self, tick: int) -> None:

@@ -15,7 +15,7 @@ from .errors import RunError
 from .finite import FiniteCheck, NotFiniteError
 from .life_cycle import describe
 from .memory import BoundGraph
-from .pacing import TimeSource, make_pacer
+from .pacing import RobotDriven, TimeSource, make_pacer
 from .schedule import phases
 from .stages import ClockSpec
 from .timing import Program
@@ -145,6 +145,8 @@ class Ticker:
         self, call: Callable[..., Any] | None, tick: int, error: BaseException
     ) -> RunError:
         owner = getattr(call, "__self__", None)
+        if isinstance(owner, RobotDriven):
+            owner = owner.block
         block = owner.context.path if isinstance(owner, Block) else ""
         if isinstance(owner, Block) or not isinstance(error, NotFiniteError):
             who = f"block '{block}'" if block else f"the runtime ({type(owner).__name__})"

@@ -1,0 +1,261 @@
+"""The conformance suite finds each broken promise, in the case that is meant to."""
+
+import numpy as np
+import pytest
+
+from aloft.runtime.block import Block, Input, Output, State
+from aloft.runtime.finite import NotFiniteError
+from aloft.runtime.parameters import Parameters, parameter
+from aloft.runtime.primitives import Vector
+from aloft.runtime.signals import Field, Signal
+from aloft.runtime.testing.conformance import ConformanceError, check_block, conformance_cases
+
+
+class Sound(Block):
+    """A filter that keeps all promises."""
+
+    class Params(Parameters):
+        n: int = parameter(3, text="elements")
+
+    params: Params
+    u = Input(Vector, text="input")
+    y = Output(Vector, text="output")
+    x = State(Vector, text="the last output")
+
+    def setup(self) -> None:
+        self.half = np.array(0.5)
+
+    def step(self) -> None:
+        np.add(self.u.value, self.x.value, out=self.y.value)
+        np.multiply(self.y.value, self.half, out=self.x.value)
+
+
+class Delay(Block):
+    """A delay that keeps all promises."""
+
+    Params = Sound.Params
+    u = Input(Vector, text="input")
+    y = Output(Vector, text="output")
+    x = State(Vector, text="the last input")
+
+    def emit(self) -> None:
+        np.copyto(self.y.value, self.x.value)
+
+    def update(self) -> None:
+        np.copyto(self.x.value, self.u.value)
+
+
+def failure(block_type: type[Block], case: str) -> str:
+    with pytest.raises((ConformanceError, NotFiniteError)) as caught:
+        check_block(block_type, cases=[case])
+    return str(caught.value)
+
+
+@pytest.mark.parametrize("case", conformance_cases())
+@pytest.mark.parametrize("block_type", [Sound, Delay])
+def test_sound_blocks_pass(block_type: type[Block], case: str) -> None:
+    check_block(block_type, cases=[case])
+
+
+def test_documentation_is_required() -> None:
+    class Silent(Sound):
+        __doc__ = ""
+
+    class SilentPort(Sound):
+        """A block."""
+
+        z = Input(Vector, default={})
+
+    class Bare(Signal):
+        value = Field()
+
+    class SilentField(Sound):
+        """A block."""
+
+        z = Input(Bare, default={}, text="bare")
+
+    class SilentParameter(Sound):
+        """A block."""
+
+        class Params(Sound.Params):
+            m: int = 3
+
+    assert failure(Silent, "documented") == "Silent: no docstring"
+    assert failure(SilentPort, "documented") == "SilentPort: port 'z' has no text"
+    assert failure(SilentField, "documented") == "SilentField: z.value has no text"
+    assert failure(SilentParameter, "documented") == "SilentParameter: parameter 'm' has no text"
+
+
+def test_a_port_that_nothing_uses() -> None:
+    class Idle(Sound):
+        """A block."""
+
+        extra = Input(Vector, default={}, text="ignored")
+
+    assert failure(Idle, "ports used") == "Idle: port 'extra' is declared, but no method uses it"
+
+
+def test_an_output_that_is_not_always_written() -> None:
+    class Sometimes(Sound):
+        """A block."""
+
+        def step(self) -> None:
+            if self.tick % 2 == 0:
+                super().step()
+
+    class Remembers(Sound):
+        """A block."""
+
+        def step(self) -> None:
+            np.add(self.y.value, self.u.value, out=self.y.value)
+
+    for block_type in (Sometimes, Remembers):
+        assert "output y.value is not written by every run, or depends on what was in it" in (
+            failure(block_type, "outputs written")
+        )
+
+
+def test_an_input_that_is_written() -> None:
+    class Rude(Sound):
+        """A block."""
+
+        def step(self) -> None:
+            super().step()
+            self.u.value.base[...] = 0.0  # around the read-only view
+
+    assert failure(Rude, "inputs kept") == "Rude: input 'u' was written"
+
+
+def test_a_moore_block_that_is_none() -> None:
+    class Hasty(Delay):
+        """A block."""
+
+        def emit(self) -> None:
+            np.copyto(self.y.value, self.u.value)
+
+    class Late(Delay):
+        """A block."""
+
+        def update(self) -> None:
+            super().update()
+            np.copyto(self.y.value, self.u.value)
+
+    assert "emit() makes y.value depend on an input" in failure(Hasty, "machine")
+    assert failure(Late, "machine") == "Late: update() writes an output"
+
+
+def test_a_block_that_is_not_deterministic() -> None:
+    class Random(Sound):
+        """A block."""
+
+        def setup(self) -> None:
+            super().setup()
+            self.noise = np.random.default_rng().random(3)
+
+        def step(self) -> None:
+            np.add(self.u.value, self.noise, out=self.y.value)
+
+    assert failure(Random, "deterministic") == (
+        "Random: two instances with equal inputs differ in tick 0"
+    )
+
+
+def test_a_block_that_remembers_in_secret() -> None:
+    class Secret(Sound):
+        """A block."""
+
+        def setup(self) -> None:
+            super().setup()
+            self.memory = np.zeros(3)
+
+        def step(self) -> None:
+            self.memory += self.u.value
+            np.copyto(self.y.value, self.memory)
+
+    class Open(Secret):
+        """A block."""
+
+        def freeze(self) -> None:
+            np.copyto(self.x.value, self.memory)
+
+        def thaw(self) -> None:
+            np.copyto(self.memory, self.x.value)
+
+    assert failure(Secret, "restored") == (
+        "Secret: itself, restored from a snapshot, goes on differently 1 ticks later; something "
+        "is remembered outside the declared State"
+    )
+    check_block(Open, cases=["restored"])
+
+
+def test_a_block_that_allocates() -> None:
+    class Wasteful(Sound):
+        """A block."""
+
+        def step(self) -> None:
+            super().step()
+            self.x.value[:] = self.x.value * 2.0 + self.u.value
+
+    class Declared(Wasteful):
+        """A block."""
+
+        array_allocations = 2
+        allocation_reason = "the library returns new arrays"
+
+    class Unexplained(Declared):
+        """A block."""
+
+        allocation_reason = ""
+
+    text = failure(Wasteful, "array allocations")
+    assert text.startswith("Wasteful: tick 3 allocates 2 arrays, declared are 0; the first at ")
+    assert __file__ in text
+    check_block(Declared, cases=["array allocations"])
+    assert failure(Unexplained, "array allocations") == (
+        "Unexplained: array_allocations without an allocation_reason"
+    )
+
+
+def test_a_block_that_makes_infinity() -> None:
+    class Divides(Sound):
+        """A block."""
+
+        def step(self) -> None:
+            with np.errstate(divide="ignore"):
+                np.divide(1.0, np.maximum(self.u.value, 0.0), out=self.y.value)
+
+    assert failure(Divides, "finite").endswith("] is inf")
+
+
+def test_metrics_that_are_no_plain_values() -> None:
+    class Odd(Sound):
+        """A block."""
+
+        def metrics(self) -> dict[str, object]:
+            return {"values": [1.0]}
+
+    assert failure(Odd, "life") == "Odd: metric 'values' is of type list, not a plain value"
+
+
+def test_example_inputs_and_parameters_are_used() -> None:
+    seen = []
+
+    class Picky(Sound):
+        """A block."""
+
+        @classmethod
+        def example_parameters(cls) -> dict[str, object]:
+            return {"n": 2}
+
+        @classmethod
+        def example_inputs(
+            cls, rng: np.random.Generator, dimensions: dict[str, int]
+        ) -> dict[str, dict[str, object]]:
+            return {"u": {"value": np.full(dimensions["n"], 4.0)}}
+
+        def step(self) -> None:
+            seen.append(self.u.value.tolist())
+            super().step()
+
+    check_block(Picky, cases=["finite"])
+    assert seen and all(value == [4.0, 4.0] for value in seen)
