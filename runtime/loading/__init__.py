@@ -6,6 +6,7 @@ overrides applied) -> checked (``stages.CheckedGraph``).
 
 from .load import check, flatten, load, load_text
 from .problems import Code, LoadError, Problem, Report
+from .schema import graph_schema, schema_text
 
 __all__ = [
     "Code",
@@ -14,6 +15,8 @@ __all__ = [
     "Report",
     "check",
     "flatten",
+    "graph_schema",
     "load",
     "load_text",
+    "schema_text",
 ]
