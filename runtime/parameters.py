@@ -6,7 +6,7 @@ the same dimension: ``force: 70 N``, ``duration: 10 ms``.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
@@ -45,6 +45,8 @@ def _convert(value: Any, unit: str) -> Any:
     """``value`` with every text that starts with a number replaced by the number in ``unit``."""
     if isinstance(value, str):
         return parse_quantity(value, unit)
+    if isinstance(value, Mapping):
+        return {key: _convert(item, unit) for key, item in value.items()}
     if isinstance(value, Sequence) and not isinstance(value, bytes):
         return [_convert(item, unit) for item in value]
     return value

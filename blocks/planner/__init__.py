@@ -1,0 +1,1 @@
+"""The kino-dynamic planner: from a task to a checked plan of the whole body's motion."""

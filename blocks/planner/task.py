@@ -1,0 +1,222 @@
+"""What jump is asked for: a task, written in YAML or made in Python.
+
+name: forward_10cm
+rise: 15 cm
+distance_x: 10 cm
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Literal
+
+import yaml
+from pydantic import ValidationError, model_validator
+
+from ...runtime.description import RobotDescription
+from ...runtime.errors import AloftError
+from ...runtime.parameters import Parameters, parameter
+
+GRAVITY = 9.81
+"""m/s^2"""
+
+PLAN_FORMAT = 1
+"""Part of every task's hash: plans of an older format or meaning are not taken from a library."""
+
+
+class TaskError(AloftError, ValueError):
+    """A task cannot be read, or asks for what contradicts itself; the message has every reason."""
+
+
+class Knots(Parameters):
+    """How many intervals each phase is divided into; about 60 in all is enough for BRUCE."""
+
+    squat: int = parameter(12, ge=2, le=200, text="going down")
+    thrust: int = parameter(16, ge=4, le=200, text="pushing off")
+    flight: int = parameter(18, ge=4, le=400, text="in the air")
+    landing: int = parameter(14, ge=4, le=200, text="absorbing the touchdown and coming to rest")
+
+    @property
+    def total(self) -> int:
+        """The intervals of the whole jump."""
+        return self.squat + self.thrust + self.flight + self.landing
+
+
+class Weights(Parameters):
+    """Weights of the cost's quadratic terms, which are integrated over time; SI units."""
+
+    posture: float = parameter(1.0, ge=0.0, text="joint angles away from the standing pose")
+    orientation: float = parameter(1.0, ge=0.0, text="the torso's rotation away from the nominal")
+    joint_velocity: float = parameter(1e-2, ge=0.0, text="joint velocities")
+    acceleration: float = parameter(2e-5, ge=0.0, text="generalised accelerations")
+    com_acceleration: float = parameter(1e-3, ge=0.0, text="of the centre of mass")
+    momentum_rate: float = parameter(1e-2, ge=0.0, text="of the angular momentum")
+    force: float = parameter(1e-4, ge=0.0, text="contact forces")
+    torque: float = parameter(1e-3, ge=0.0, text="motor torques")
+    impulse: float = parameter(1.0, ge=0.0, text="contact impulses at touchdown")
+
+
+class JumpTask(Parameters):
+    """One jump from standing to standing.
+
+    Heights are the centre of mass's above where it stands at the start. The world's origin is the
+    ground midway between the soles at the start, x forward, z up. What is ``None`` is left to the
+    planner.
+
+    Raises pydantic's ``ValidationError`` for values out of range and for contradictions;
+    ``read_task`` turns it into a ``TaskError``.
+    """
+
+    name: str = parameter(text="what the jump is called")
+    robot: str = parameter("bruce", text="the robot's description, as in a graph file")
+    formulation: Literal["full", "paper", "srbm"] = parameter(
+        "full",
+        text="full: whole-body dynamics; paper: centroidal momentum and kinematics as in the "
+        "paper; srbm: a single rigid body, for comparison",
+    )
+    rise: float | None = parameter(
+        None, unit="m", gt=0.0, le=2.0, text="apex of the centre of mass above standing"
+    )
+    take_off_speed: float | None = parameter(
+        None, unit="m/s", gt=0.0, le=8.0, text="vertical speed of the centre of mass at lift-off"
+    )
+    distance_x: float = parameter(0.0, unit="m", ge=-2.0, le=2.0, text="how far ahead it lands")
+    distance_y: float = parameter(0.0, unit="m", ge=-2.0, le=2.0, text="how far to the left")
+    twist: float = parameter(
+        0.0, unit="rad", ge=-6.3, le=6.3, text="heading at landing, to the left; world frame"
+    )
+    landing_height: float = parameter(
+        0.0, unit="m", ge=-2.0, le=2.0, text="ground at landing above the ground at the start"
+    )
+    step_edge: float | None = parameter(
+        None, unit="m", ge=-2.0, le=2.0,
+        text="x at which the ground changes its height; None: midway between start and landing",
+    )  # fmt: skip
+    rotation: float = parameter(
+        0.0, unit="rad", ge=-12.6, le=12.6,
+        text="the body's turn in pitch from start to landing; 360 deg is a forward somersault",
+    )  # fmt: skip
+    squat_time: float = parameter(0.4, unit="s", gt=0.0, le=5.0, text="going down")
+    thrust_time: float = parameter(0.25, unit="s", gt=0.0, le=2.0, text="pushing off")
+    flight_time: float | None = parameter(
+        None, unit="s", gt=0.0, le=3.0, text="in the air; None: found by the planner"
+    )
+    landing_time: float = parameter(0.5, unit="s", gt=0.0, le=5.0, text="touchdown to rest")
+    impact: bool = parameter(
+        False, text="feet may hit the ground with speed and stop by an impulse; else they arrive "
+        "at rest"
+    )  # fmt: skip
+    knots: Knots = parameter(Knots(), text="intervals in each phase")
+    profile: str = parameter("koala", text="actuator profile of the robot")
+    effort: float = parameter(
+        1.0, gt=0.0, le=1.0,
+        text="share of the profile's torque and speed the plan may use; the rest is the feedback's",
+    )  # fmt: skip
+    friction: float = parameter(0.5, gt=0.0, le=2.0, text="coefficient between foot and ground")
+    foot_clearance: float = parameter(
+        0.02, unit="m", ge=0.0, le=0.5,
+        text="least height of the feet above the ground in the middle of the flight",
+    )  # fmt: skip
+    leg_clearance: float = parameter(
+        0.01, unit="m", ge=0.0, le=0.2, text="least gap between the legs"
+    )
+    weights: Weights = parameter(Weights(), text="weights of the cost")
+    initial: Mapping[str, float] = parameter(
+        {}, unit="rad", text="joint angles at the start, by name; others as the robot stands"
+    )
+    final: Mapping[str, float] = parameter(
+        {}, unit="rad", text="joint angles at the end, by name; others as the robot stands"
+    )
+
+    @model_validator(mode="after")
+    def _check_together(self) -> JumpTask:
+        if self.rise is not None and self.take_off_speed is not None:
+            raise ValueError("give rise or take_off_speed, not both: one follows from the other")
+        free = self.rise is None and self.take_off_speed is None
+        if free and self.flight_time is None and not self.landing_height and not self.rotation:
+            raise ValueError("say how high the jump is: rise, take_off_speed or flight_time")
+        if self.rise is not None and self.rise + 0.15 < self.landing_height:
+            raise ValueError(
+                f"a rise of {self.rise:g} m cannot reach ground that is {self.landing_height:g} m "
+                f"higher; ask for a rise above {self.landing_height:g} m"
+            )
+        return self
+
+    def start_joints(self, robot: RobotDescription) -> dict[str, float]:
+        """Joint angles [rad] by name at the start. Raises ``TaskError`` for an unknown joint."""
+        return _stance(robot, self.initial, "initial")
+
+    def end_joints(self, robot: RobotDescription) -> dict[str, float]:
+        """Joint angles [rad] by name at the end. Raises ``TaskError`` for an unknown joint."""
+        return _stance(robot, self.final, "final")
+
+    def content(self) -> dict[str, Any]:
+        """All that decides the plan, as plain data: everything but the name."""
+        return self.model_dump(mode="json", exclude={"name"})
+
+    def hash(self, robot: RobotDescription) -> str:
+        """What a plan of this task is kept under: the same for the same task, robot and format."""
+        whole = {
+            "format": PLAN_FORMAT,
+            "task": self.content(),
+            "robot": robot.model_dump(mode="json"),
+        }
+        text = json.dumps(whole, sort_keys=True, separators=(",", ":"))
+        return hashlib.sha256(text.encode()).hexdigest()[:20]
+
+
+def _stance(robot: RobotDescription, given: Mapping[str, float], which: str) -> dict[str, float]:
+    known = [joint.name for joint in robot.joints]
+    unknown = [name for name in given if name not in known]
+    if unknown:
+        raise TaskError(
+            f"{which}: {robot.name} has no joint {', '.join(unknown)}; there is {', '.join(known)}"
+        )
+    standing = dict(zip(known, robot.standing_position.tolist(), strict=True))
+    return standing | dict(given)
+
+
+def make_task(values: Mapping[str, Any], *, where: str = "task") -> JumpTask:
+    """A task from plain values, quantities as numbers or text.
+
+    Raises:
+        TaskError: one line for every value that is wrong, with its key, what was found and what
+            is expected.
+    """
+    try:
+        return JumpTask.model_validate(values)
+    except ValidationError as error:
+        lines = []
+        for problem in error.errors():
+            key = ".".join(map(str, problem["loc"]))
+            message = problem["msg"].removeprefix("Value error, ")
+            if problem["type"] == "extra_forbidden":
+                message = f"is no parameter of a task; there is {', '.join(JumpTask.model_fields)}"
+            found = (
+                ""
+                if not key or isinstance(problem["input"], Mapping)
+                else f", found {problem['input']!r}"
+            )
+            lines.append(f"{key}: {message}{found}" if key else message)
+        raise TaskError(f"{where}: " + f"\n{where}: ".join(lines)) from error
+
+
+def read_task(path: str | Path) -> JumpTask:
+    """The task in a YAML file; its name is the file's where it has none.
+
+    Raises:
+        TaskError: the file cannot be read or a value is wrong.
+    """
+    path = Path(path)
+    try:
+        data = yaml.safe_load(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise TaskError(f"cannot read {path}: {error.strerror or error}") from error
+    except yaml.YAMLError as error:
+        raise TaskError(f"{path} is not YAML: {error}") from error
+    if not isinstance(data, dict):
+        raise TaskError(f"{path}: expected keys such as 'rise: 15 cm', found {data!r}")
+    return make_task({"name": path.stem, **data}, where=str(path))
