@@ -21,10 +21,10 @@ setup: $(READY)  ## create .venv with everything
 
 $(READY): pyproject.toml scripts/find_python.sh
 	@python="$$(sh scripts/find_python.sh $(PYTHON))" && \
-	echo "setting up $(VENV) with $$python (a few minutes the first time)" && \
+	echo "setting up $(VENV) with $$python; the first time this downloads some 600 MB" && \
 	"$$python" -m venv $(VENV)
-	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --upgrade 'pip>=25.1'
-	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable . --group dev
+	@$(BIN)/python -m pip install -qq --disable-pip-version-check --upgrade 'pip>=25.1'
+	@$(BIN)/python -m pip install -qq --disable-pip-version-check --editable . --group dev
 	@touch $@
 
 jump: $(READY)  ## run graphs/jump.yaml and write recordings/jump.rrd

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Annotated
 
@@ -26,9 +25,9 @@ def check(
     from ..runtime.loading import load
 
     if schema:
-        from ..runtime.loading.schema import graph_schema
+        from ..runtime.loading.schema import schema_text
 
-        typer.echo(json.dumps(graph_schema(), indent=2))
+        typer.echo(schema_text(), nl=False)
         return
     if graph is None:
         raise typer.BadParameter("a graph file is needed, or --schema")

@@ -19,11 +19,17 @@ if TYPE_CHECKING:
     from rich.table import Table
 
 
+WIDE = 200
+
+
 def console(*, to_stderr: bool = False, quiet: bool = False) -> Console:
     """Rich's console on standard output, or on standard error where JSON goes to the former."""
     from rich.console import Console
 
-    return Console(stderr=to_stderr, quiet=quiet, highlight=False)
+    made = Console(stderr=to_stderr, quiet=quiet, highlight=False)
+    if not made.is_terminal:
+        made.width = WIDE  # a file or a pipe has no edge to wrap at
+    return made
 
 
 def table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> Table:
@@ -35,7 +41,9 @@ def table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> 
     made = Table(title=title or None, box=box.SIMPLE_HEAD, title_justify="left", pad_edge=False)
     for column in columns:
         right = column.startswith(">")
-        made.add_column(escape(column.removeprefix(">")), justify="right" if right else "left")
+        made.add_column(
+            escape(column.removeprefix(">")), justify="right" if right else "left", overflow="fold"
+        )
     for row in rows:
         made.add_row(*(escape(cell) for cell in row))
     return made

@@ -44,7 +44,7 @@ def recording_blueprint(run: LoggedRun, pose_port: str | None) -> Any:
         root = rrb.Horizontal(scene, column, column_shares=[2, 3])
     return rrb.Blueprint(
         root,
-        rrb.TimePanel(state="collapsed", timeline="t"),
+        rrb.TimePanel(state="collapsed", timeline="t", play_state="playing", loop_mode="all"),
         rrb.SelectionPanel(state="collapsed"),
         rrb.BlueprintPanel(state="collapsed"),
     )

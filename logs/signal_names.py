@@ -11,11 +11,15 @@ MOST_NAMES = 24
 """Legends longer than this help nobody."""
 
 
-def names_along(size: int | str, length: int, robot: RobotDescription | None) -> list[str]:
+def names_along(
+    field: Field, size: int | str, length: int, robot: RobotDescription | None
+) -> list[str]:
     """The names along one axis of a field: the robot's own for its dimensions, x y z for three."""
     if robot is not None:
+        joints = [joint.name for joint in robot.joints]
         known = {
-            "n_joints": [joint.name for joint in robot.joints],
+            # as many motors as joints, but a motor may turn two of them
+            "n_joints": list(robot.transmission.motors) if "motor" in field.name else joints,
             "n_contacts": [contact.name for contact in robot.contacts],
             "n_feet": [foot.name for foot in robot.feet],
         }
@@ -33,7 +37,8 @@ def element_names(
     if not shape:
         return [field.name]
     axes = [
-        names_along(size, length, robot) for size, length in zip(field.shape, shape, strict=True)
+        names_along(field, size, length, robot)
+        for size, length in zip(field.shape, shape, strict=True)
     ]
     names = [" ".join(parts) for parts in product(*axes)]
     return names if len(names) <= MOST_NAMES else []

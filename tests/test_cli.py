@@ -13,6 +13,7 @@ from typing import Any
 
 import pytest
 
+import aloft.benchmarks
 from aloft.cli import main
 
 COUNTER = '''
@@ -302,6 +303,63 @@ def test_blocks_names_what_is_alike() -> None:
 
 def test_a_block_beside_the_graph_is_described(folder: Path) -> None:
     assert "Counts up from its seed" in call("blocks", "counter:Counter").stdout
+
+
+def test_graph_prints_order_rates_and_wires(folder: Path) -> None:
+    (folder / "ring.yaml").write_text("""
+rate: 100 Hz
+duration: 2 s
+blocks:
+  wish: {use: runtime.SineWave, rate: 50 Hz}
+  error: {use: runtime.Sum, with: {weights: [1, -1]}, in: {a: wish.y, b: position.y}}
+  position: {use: runtime.Integrator, in: {u: error.y}}
+""")
+    text = call("graph", "ring.yaml").stdout
+    assert text.startswith("ring: base rate 100 Hz, 200 ticks\n")
+    order = [text.index(f" {name} ") for name in ("position", "wish", "error")]
+    assert order == sorted(order)
+    assert "a <- wish.y (Vector, holds 50 Hz)" in text
+    data = call_json("graph", "ring.yaml")
+    assert [row["path"] for row in data["blocks"]] == ["position", "wish", "error"]
+    assert call("graph", "ring.yaml", "--mermaid").stdout.startswith("flowchart LR\n")
+    flat = call("graph", "ring.yaml", "--flat", "--set", "position.initial=0.5").stdout
+    (folder / "flat.yaml").write_text(flat)
+    assert "initial: 0.5" in flat
+    runs = [
+        call_json("run", *arguments, "--no-record")["run_hash"]
+        for arguments in (["flat.yaml"], ["ring.yaml", "--set", "position.initial=0.5"])
+    ]
+    assert runs[0] == runs[1]
+
+
+def test_graph_wants_one_form(folder: Path) -> None:
+    assert "choose one of" in call("graph", "count.yaml", "--flat", "--mermaid", code=2).stderr
+
+
+def test_check_prints_the_schema() -> None:
+    schema = json.loads(call("check", "--schema").stdout)
+    assert {"rate", "blocks"} <= set(schema["properties"])
+    assert "a graph file is needed" in call("check", code=2).stderr
+
+
+def test_bench_refuses_an_unknown_name() -> None:
+    result = call_json("bench", "sheduler", code=2)
+    assert result["reason"].startswith("there is no benchmark 'sheduler'; there is scheduler")
+
+
+def test_bench_prints_rows_and_exits_by_the_goals(monkeypatch: pytest.MonkeyPatch) -> None:
+    row = {"name": "tick", "value": 1.5, "unit": "us", "ratio": 1.2, "peer": "hand loop"}
+    machine = {"processor": "abacus", "cores": 2, "python": "3"}
+    results = {"machine": machine, "load": {"before": [0.1], "after": [0.2]}}
+    for met, code in ((True, 0), (None, 0), (False, 1)):
+        rows = [{**row, "goal": 1.1, "met": met, "note": ""}]
+        monkeypatch.setattr(
+            aloft.benchmarks, "run_benchmarks", lambda _, r=rows: {**results, "rows": r}
+        )
+        assert call_json("bench", "scheduler", code=code)["rows"] == rows
+        text = call("bench", code=code).stdout
+        assert "hand loop" in text
+        assert "abacus" in text
 
 
 def test_help_documents_the_exit_codes() -> None:
