@@ -171,7 +171,7 @@ def test_the_centre_of_mass_is_accelerated_as_asked(dynamics):
     command, _ = solve(terms, target=target, torque_margin=1.0)
     found = command["force"].sum(axis=0) / ROBOT.total_mass - [0.0, 0.0, 9.81]
     wanted = 100.0 * np.array([0.002, -0.001, 0.01]) + 20.0 * np.array([0.02, 0.0, 0.05])
-    assert found == pytest.approx(wanted + [0.1, 0.2, 1.0], rel=0.02, abs=0.02)
+    assert found == pytest.approx(np.add(wanted, [0.1, 0.2, 1.0]), rel=0.02, abs=0.02)
 
 
 def test_the_torso_turns_towards_its_target(dynamics):
