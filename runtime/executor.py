@@ -89,11 +89,15 @@ class Executor:
         first_tick = clock.tick
         with Interrupts(clock, self.life) as interrupts, _quiet_collector():
             try:
-                self._open_sinks(limit)
-                self.life.start()
-                self.life.move(LifeState.RUNNING)
-                start_time = self._time.now()
-                self.ticker.advance(limit)
+                try:
+                    interrupts.armed = True
+                    self._open_sinks(limit)
+                    self.life.start()
+                    self.life.move(LifeState.RUNNING)
+                    start_time = self._time.now()
+                    self.ticker.advance(limit)
+                finally:  # within the outer try, so that nothing interrupts what follows
+                    interrupts.armed = False
             except RunError as failure:
                 error = failure
             except BaseException as failure:  # noqa: BLE001  # the stop cycles come first

@@ -8,18 +8,21 @@ from types import FrameType, TracebackType
 from typing import Any, Self
 
 from .block import Clock
-from .life_cycle import LifeCycle, LifeState
+from .life_cycle import LifeCycle
 
 
 class Interrupts:
     """Handles the two signals within a ``with``; elsewhere than in the main thread does nothing.
 
-    The first signal asks for the run to end after the tick. A second one raises
-    ``KeyboardInterrupt``, for a block that hangs; while stopping only inside a guarded call.
+    The first signal asks for the run to end after the tick. A further one raises
+    ``KeyboardInterrupt``, for a block that hangs, but only where that is caught: while ``armed``,
+    which the executor sets while blocks start and tick, or inside a guarded call while stopping.
+    Raising disarms, so no error can hit who deals with the one before.
     """
 
     def __init__(self, clock: Clock, life: LifeCycle) -> None:
         self.received: signal.Signals | None = None
+        self.armed = False
         self._clock = clock
         self._life = life
         self._before: dict[signal.Signals, Any] = {}
@@ -40,10 +43,10 @@ class Interrupts:
             signal.signal(number, handler)
 
     def _handle(self, number: int, frame: FrameType | None) -> None:
-        stopping = self._life.state in (LifeState.STOPPING, LifeState.STOPPED)
         if self.received is None:
             self.received = signal.Signals(number)
             if self._clock.stop_reason is None:
                 self._clock.stop_reason = f"stopped by {self.received.name}"
-        elif not stopping or self._life.guarding:
+        elif self.armed or self._life.guarding:
+            self.armed = self._life.guarding = False
             raise KeyboardInterrupt

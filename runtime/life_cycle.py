@@ -43,7 +43,7 @@ class LifeCycle:
     """Starts and stops the blocks of a graph, in file order.
 
     ``problems`` collects what went wrong while stopping, one text each. ``guarding`` is true while
-    a stop cycle or a close runs, which is the only place where raising does no harm.
+    a stop cycle or a close runs, where an interrupt may raise without harm to the others.
     """
 
     def __init__(self, blocks: Mapping[str, Block]) -> None:
@@ -94,13 +94,14 @@ class LifeCycle:
 
     def _guard(self, path: str, call: Callable[[], None], what: str) -> None:
         try:
-            self.guarding = True
-            call()
+            try:
+                self.guarding = True
+                call()
+            finally:
+                self.guarding = False
         except BaseException as error:  # noqa: BLE001  # the next block must get its turn
             who = f"block '{path}'" if path else "the runtime"
             self.problems.append(f"{who} failed in {what}: {describe(error)}")
-        finally:
-            self.guarding = False
 
 
 def describe(error: BaseException) -> str:

@@ -1,6 +1,7 @@
 """Real signals to a real process: a clean stop within a tick, stop cycles, exit codes."""
 
 import os
+import random
 import signal
 import subprocess
 import sys
@@ -14,7 +15,7 @@ from aloft.runtime.interrupts import Interrupts
 from aloft.runtime.life_cycle import LifeCycle
 
 PROGRAM = """
-import sys, time
+import signal, sys, time
 from aloft.runtime.block import Block, Output
 from aloft.runtime.executor import run
 from aloft.runtime.primitives import Vector
@@ -22,6 +23,8 @@ from aloft.runtime.stages import ClockSpec
 from aloft.runtime.testing.graphs import Use, checked_graph
 
 MODE = sys.argv[1]
+if MODE == "burst":  # what comes after the run is not of interest
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 class Robot(Block):
     "Says when it runs."
@@ -45,6 +48,8 @@ class Robot(Block):
 
 graph = checked_graph({"robot": Use(Robot)}, dimensions={"n": 1}, clock=ClockSpec("paced"))
 result = run(graph, log=False)
+if MODE == "burst":
+    print(*result.stop_problems, sep="\\n", flush=True)
 print(result.reason, flush=True)
 sys.exit(result.exit_code)
 """
@@ -96,6 +101,21 @@ def test_stop_cycles_that_hang_can_be_ended_one_by_one() -> None:
         process.send_signal(signal.SIGINT)
     output, _ = process.communicate(timeout=20)
     assert output.splitlines() == ["close", "stopped by SIGINT"]
+    assert process.returncode == 130
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_burst_of_signals_never_keeps_stop_cycles_from_going_out(seed: int) -> None:
+    process = start("burst")
+    pauses = random.Random(seed)
+    for _ in range(40):
+        process.send_signal(signal.SIGINT)
+        time.sleep(pauses.uniform(0.0, 0.001))
+    output, _ = process.communicate(timeout=20)
+    for cycle in range(1, 6):  # each was either done or was itself what a signal broke off
+        broken_off = f"block 'robot' failed in stop cycle {cycle}: KeyboardInterrupt" in output
+        assert output.count("stop cycle\n") >= cycle or broken_off
+    assert "close\n" in output or "failed in close: KeyboardInterrupt" in output
     assert process.returncode == 130
 
 
