@@ -1,0 +1,13 @@
+"""What the planner raises."""
+
+from __future__ import annotations
+
+
+class PlanError(Exception):
+    """A jump that cannot be planned. ``family`` names the constraint family that cannot be met,
+    ``violation`` is how far the best attempt missed it, in that family's unit."""
+
+    def __init__(self, message: str, *, family: str = "", violation: float = 0.0) -> None:
+        super().__init__(message)
+        self.family = family
+        self.violation = violation
