@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from ..runtime.run_result import RunResult
     from ..runtime.seeds import SeedRow
 
-MOST_METRIC_COLUMNS = 4
+MOST_METRIC_COLUMNS = 5
 
 
 def run(
@@ -155,11 +155,13 @@ def run_many(
 
 
 def print_rows(out: Console, rows: list[SeedRow]) -> None:
-    """Print one line a seed, with the first few metrics that are numbers."""
-    names: list[str] = []
+    """Print one line a seed, with the first few metrics that differ between them."""
+    values: dict[str, list[Any]] = {}
     for row in rows:
-        names += [n for n, v in row.metrics.items() if isinstance(v, float) and n not in names]
-    names = names[:MOST_METRIC_COLUMNS]
+        for name, value in row.metrics.items():
+            values.setdefault(name, []).append(value)
+    differing = [name for name, found in values.items() if len(set(found)) > 1]
+    names = differing[:MOST_METRIC_COLUMNS]
     out.print(
         table(
             "",

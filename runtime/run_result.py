@@ -114,7 +114,11 @@ def _plain(value: Any) -> Any:
 def merge_metrics(
     by_block: Mapping[str, Mapping[str, Metric]],
 ) -> tuple[dict[str, Metric], str | None]:
-    """All blocks' metrics as one, and the reason if some block says ``success`` is false."""
+    """All blocks' metrics as one, and the reason if some block says ``success`` is false.
+
+    Those of blocks that judge the run, by a metric ``success``, come first.
+    """
+    by_block = dict(sorted(by_block.items(), key=lambda item: "success" not in item[1]))
     owners: dict[str, list[str]] = {}
     failure: str | None = None
     for path, metrics in by_block.items():
