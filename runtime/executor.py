@@ -82,7 +82,9 @@ class Executor:
         if self.life.state is not LifeState.IDLE:
             raise AloftError(f"a graph that is {self.life.state.value} cannot be run again")
         clock, graph = self.bound.clock, self.bound.graph
-        limit = graph.ticks if ticks is None else ticks
+        limit = ticks
+        if ticks is None and graph.ticks is not None:
+            limit = max(0, graph.ticks - clock.tick)  # a restored graph runs only what is left
         error: RunError | None = None
         problems: list[str] = []
         start_time = end_time = self._time.now()

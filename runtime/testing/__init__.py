@@ -1,5 +1,16 @@
 """For tests of blocks and graphs: a bench for one block, conformance checks, counted arrays."""
 
+from .allocations import count_array_allocations
 from .bench import BlockBench
+from .conformance import ConformanceError, check_block, conformance_cases
+from .graphs import Use, checked_graph
 
-__all__ = ["BlockBench"]
+__all__ = [
+    "BlockBench",
+    "ConformanceError",
+    "Use",
+    "check_block",
+    "checked_graph",
+    "conformance_cases",
+    "count_array_allocations",
+]

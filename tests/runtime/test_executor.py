@@ -299,6 +299,19 @@ def test_a_run_restored_from_a_snapshot_goes_on_bit_for_bit() -> None:
             assert found == expected
 
 
+def test_a_restored_graph_runs_what_is_left_of_its_time() -> None:
+    whole = run(chain(Filter))
+    bound = BoundGraph(chain(Filter))
+    Executor(bound).ticker.advance(11)
+    again = BoundGraph(chain(Filter))
+    again.restore(bound.snapshot())
+    rest = run(again)
+    assert (rest.ticks, rest.log.ticks) == (19, list(range(11, 30)))
+    assert rest.time[0] == pytest.approx(0.022)
+    name = "b19.y.value"
+    assert np.array_equal(rest.signal(name), whole.signal(name)[11:])
+
+
 def test_the_hash_is_the_same_with_and_without_log_timing_and_checks() -> None:
     hashes = {
         run(chain(Filter), log=log, timing=timing, finite_check=check).run_hash
