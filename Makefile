@@ -12,7 +12,7 @@ RECORDING := recordings/jump.rrd
 # One thread for each test process: the workers already take every core.
 SINGLE := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 
-.PHONY: setup jump test lint format bench clean help
+.PHONY: setup jump test lint format bench docs clean help
 
 help:  ## list the targets
 	@sed -n 's/^\([a-z]*\):.*##/\1:/p' $(MAKEFILE_LIST)
@@ -45,6 +45,10 @@ format: $(READY)  ## rewrite the files in the project's style
 
 bench: $(READY)  ## run all benchmarks
 	@$(SINGLE) $(BIN)/aloft bench
+
+docs: $(READY)  ## make what is generated under docs/
+	@$(BIN)/aloft blocks --markdown > docs/blocks.md
+	@$(BIN)/python docs/make_pictures.py
 
 clean:  ## remove all that these targets made
 	rm -rf $(VENV) build dist *.egg-info recordings

@@ -18,11 +18,13 @@ if TYPE_CHECKING:
 def blocks(
     name: Annotated[str, typer.Argument(help="One block, e.g. blocks.JointPD.")] = "",
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
-    markdown: Annotated[bool, typer.Option(help="Print the reference of all as Markdown.")] = False,
+    markdown: Annotated[
+        bool, typer.Option(help="Print the reference of ours as Markdown.")
+    ] = False,
 ) -> None:
     """List all blocks, or print the contract of one: equations, ports, units, parameters."""
     with errors_reported(as_json):
-        found = [reference(name)] if name else all_references()
+        found = [reference(name)] if name else all_references(ours=markdown)
     if markdown:
         from .markdown import reference_page
 
@@ -52,12 +54,16 @@ def reference(name: str) -> BlockReference:
         raise UnknownBlockError(f"{error}{hint}") from error
 
 
-def all_references() -> list[BlockReference]:
-    """The contracts of all blocks, by name."""
+def all_references(*, ours: bool = False) -> list[BlockReference]:
+    """The contracts of all blocks by name; ``ours`` leaves out those of installed packages."""
     from ..runtime.reference import block_reference
-    from ..runtime.registry import all_blocks
+    from ..runtime.registry import PACKAGES, all_blocks
 
-    return [block_reference(name, block_type) for name, block_type in all_blocks().items()]
+    return [
+        block_reference(name, block_type)
+        for name, block_type in all_blocks().items()
+        if not ours or name.partition(".")[0] in PACKAGES
+    ]
 
 
 def print_contract(out: Console, block: BlockReference) -> None:

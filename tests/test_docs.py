@@ -4,16 +4,17 @@ import re
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 
+from aloft.cli.blocks import all_references
 from aloft.cli.markdown import reference_page
-from aloft.runtime.reference import block_reference
-from aloft.runtime.registry import find_block, known_names
 
 ROOT = Path(__file__).parent.parent
 FILE = re.compile(r"<!-- file: (\S+) -->\n```\w+\n(.*?)```", re.DOTALL)
 EXCERPT = re.compile(r"<!-- from: (\S+) -->\n```\w+\n(.*?)```", re.DOTALL)
+PYTHON = re.compile(r"```python\n(.*?)```", re.DOTALL)
 YAML = re.compile(r"```yaml\n(.*?)```", re.DOTALL)
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 
@@ -78,9 +79,20 @@ def test_the_whole_graph_in_the_documentation_runs(tmp_path: Path) -> None:
 
 
 def test_the_reference_of_blocks_is_up_to_date() -> None:
-    references = [block_reference(name, find_block(name)) for name in known_names()]
     written = (ROOT / "docs" / "blocks.md").read_text()
-    assert written == reference_page(references), "run: aloft blocks --markdown > docs/blocks.md"
+    assert written == reference_page(all_references(ours=True)), (
+        "run: aloft blocks --markdown > docs/blocks.md"
+    )
+
+
+def test_the_readme_runs_from_python(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (code,) = [c for c in PYTHON.findall((ROOT / "README.md").read_text()) if "aloft.load" in c]
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "graphs").symlink_to(ROOT / "graphs")
+    names: dict[str, Any] = {}
+    exec(code, names)  # noqa: S102  # the page that users copy from
+    assert names["result"].success
+    assert (tmp_path / "recordings" / "jump.rrd").is_file()
 
 
 def test_excerpts_are_from_the_files_they_name() -> None:
