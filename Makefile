@@ -29,7 +29,6 @@ $(READY): pyproject.toml scripts/find_python.sh
 
 jump: $(READY)  ## run graphs/jump.yaml and write recordings/jump.rrd
 	@$(BIN)/aloft run graphs/jump.yaml --record $(RECORDING)
-	@echo "to see it: $(BIN)/rerun $(RECORDING)"
 
 test: $(READY)  ## run all tests
 	@$(SINGLE) $(BIN)/python -m pytest --numprocesses auto
