@@ -103,9 +103,9 @@ def upright(specific_force: Array, orientation: Array) -> None:
 def misalignment(
     orientation: Array, points: Array, forward: Array, out: Array, place: Array
 ) -> bool:
-    """The small turn (3,) [rad, world] that brings all points to one height and ``forward`` to x.
+    """The turn (3,) [rad, world] that brings all points to one height and ``forward`` to x.
 
-    A turn (a, b) about the world's x and y changes the height of a point at (x, y) from the middle
+    A small turn (a, b) about the world's x and y changes the height of a point at (x, y) from the middle
     by a y - b x; least squares over the points. False, and zero, while they are in one line.
 
     Args:
@@ -128,10 +128,10 @@ def misalignment(
     out[0] = out[1] = out[2] = 0.0
     if determinant <= 1e-4 * (xx + yy) * (xx + yy):
         return False
-    out[0] = min(max((xy * xz - xx * yz) / determinant, -0.2), 0.2)
-    out[1] = min(max((yy * xz - xy * yz) / determinant, -0.2), 0.2)
+    out[0] = (xy * xz - xx * yz) / determinant
+    out[1] = (yy * xz - xy * yz) / determinant
     rotate(orientation, forward, place)
-    out[2] = min(max(-math.atan2(float(place[1]), float(place[0])), -0.2), 0.2)
+    out[2] = -math.atan2(float(place[1]), float(place[0]))
     return True
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +12,7 @@ from ..runtime.block import Block, Input, Output, State
 from ..runtime.errors import BlockError
 from ..runtime.parameters import Parameters, parameter
 from ..runtime.signals import Field, Signal
+from .contact_kinematics import ContactKinematics
 from .inertial_filter import (
     GRAVITY,
     misalignment,
@@ -22,13 +23,11 @@ from .inertial_filter import (
     upright,
     weigh,
 )
-from .pinocchio_model import build_pinocchio_model
-from .rotations import cross, rotate, rotate_back
+from .rotations import rotate, rotate_back, wrap
 from .signals import BaseState, ContactState, ImuReading, JointState
 
 Array = NDArray[np.float64]
 
-_DOWN = np.array([0.0, 0.0, -1.0])
 _GRAVITY_UP = np.array([0.0, 0.0, GRAVITY])
 _FASTEST_TURN = 100.0
 _STRONGEST_FORCE = 1000.0
@@ -55,18 +54,20 @@ class BaseEstimate(Signal):
     ballistic_velocity = Field(3, unit="m/s", frame="world", text="of the CoM, less gravity's part")
     flight_ticks = Field(dtype="int64", text="ticks since the last trusted contact")
     started = Field(dtype="bool", text="whether the first sample has been seen")
+    heading = Field(unit="rad", frame="world", text="where the feet point while they stand")
     flown = Field(dtype="bool", text="whether all points have lost contact since")
 
 
 class BiasSamples(Signal):
     """Means in the making: the block of samples being filled and the one before it."""
 
+    facing = Field(dtype="bool", text="whether the feet's heading has been noted")
     aligned = Field(dtype="int64", text="ticks of alignment with the level ground")
-    samples = Field(dtype="int64", text="samples the means are made of")
+    samples = Field(dtype="int64", text="samples the mean is made of")
     filled = Field(dtype="int64", text="samples in the block being filled")
     held = Field(dtype="int64", text="samples in the block before, none or a full block")
-    filling_sum = Field((2, 3), text="of angular velocity [rad/s] and excess force [m/s^2], body")
-    held_sum = Field((2, 3), text="of the block before")
+    filling_sum = Field(3, frame="body", text="of what the learnt bias is the mean of")
+    held_sum = Field(3, frame="body", text="of the block before")
 
 
 class StateEstimator(Block):
@@ -90,15 +91,15 @@ class StateEstimator(Block):
       velocity, and no point counts while the IMU feels no support. So slipping feet, heels that
       lift and contacts that a latch still holds after lift-off do not spoil the lift-off velocity.
       ``gate`` opens while everything is rejected and in the air, so a wrong prediction recovers.
-    * Until it first leaves the ground the robot stands on level ground with its feet along x. While
-      all points are in contact and nothing is fast, the heights of the points and the headings of
-      the feet give the orientation to the encoder offsets (about 3 mrad; a biased accelerometer
-      knows it to 10 mrad), and its drift the gyroscope's bias, both as a least squares line over
-      up to 250 ticks; and when it is still, what the accelerometer reads beyond gravity is its
-      bias, which would be the drift in flight. Afterwards the orientation is the gyroscope's; when
-      still, the accelerometer less its bias rights it.
+    * While all points are in contact and nothing is fast, the feet are flat on level ground: the
+      heights of the points give the tilt to the encoder offsets (about 3 mrad; a biased
+      accelerometer knows it to 10 mrad), the feet the heading, as long as they stand, and the drift
+      of both the gyroscope's bias: a least squares line over up to 250 ticks. Standing still
+      before the first flight, what the accelerometer reads beyond gravity is its bias, which would
+      be the drift in flight. Where the feet may come to stand at different heights, set
+      ``level_ground`` to false: then after a flight only the accelerometer rights the tilt.
 
-    Otherwise the gyroscope's bias is its mean while the robot stands still, with a prior of zero.
+    By the paper's law the gyroscope's bias is its mean while the robot stands still.
 
     **Flight.** With no point trusted the prediction runs alone. ``flight: imu`` integrates the IMU.
     ``flight: ballistic`` averages the CoM's velocity by the IMU over the first 20 ms, and from then
@@ -113,7 +114,7 @@ class StateEstimator(Block):
     class Params(Parameters):
         law: Literal["weighted", "complementary"] = parameter("weighted", text="see above")
         flight: Literal["imu", "ballistic"] = parameter("imu", text="see above")
-        velocity_gain: float = parameter(0.04, gt=0.0, le=1.0, text="per tick, of the legs")
+        velocity_gain: float = parameter(0.03, gt=0.0, le=1.0, text="per tick, of the legs")
         position_gain: float = parameter(0.05, gt=0.0, le=1.0, text="per tick, of the legs")
         tilt_gain: float = parameter(0.002, ge=0.0, le=1.0, text="per tick, of the accelerometer")
         gate: float = parameter(
@@ -124,6 +125,9 @@ class StateEstimator(Block):
         )
         support: float = parameter(
             4.0, unit="m/s^2", gt=0.0, text="upward specific force at which contacts count in full"
+        )
+        level_ground: bool = parameter(
+            True, text="all points are at one height whenever all are in contact"
         )
         still_rate: float = parameter(
             0.08, unit="rad/s", gt=0.0, text="rate of base and joints below which it stands still"
@@ -142,45 +146,17 @@ class StateEstimator(Block):
     learning = State(BiasSamples, text="what the biases are learnt from")
 
     def setup(self) -> None:
-        import pinocchio
-
         robot = self.context.robot
         if robot is None:
             raise BlockError("StateEstimator needs a robot: name one in the graph")
-        built = build_pinocchio_model(robot)
-        data: Any = built.model.createData()
-        self._momentum: Any = pinocchio.computeCentroidalMomentum
-        self._model: Any = built.model
-        self._data: Any = data
-        self._position = np.array(pinocchio.neutral(built.model))
-        self._velocity = np.zeros(built.model.nv)
-        carriers = [built.model.frames[frame].parentJoint for frame in built.contact_frames]
-        # Views of Pinocchio's own memory: the base is its world here.
-        self._turns = [data.oMi[joint].rotation for joint in carriers]
-        self._places = [data.oMi[joint].translation for joint in carriers]
-        self._linear = [data.v[joint].linear for joint in carriers]
-        self._angular = [data.v[joint].angular for joint in carriers]
-        self._linear_momentum = data.hg.linear
-        self._mass = robot.total_mass
-        self._radii = [contact.radius for contact in robot.contacts]
-        self._centres = [
-            np.array([x, y, z + contact.radius])
-            for contact in robot.contacts
-            for x, y, z in [contact.position]
-        ]
-        soles = [built.model.frames[frame].parentJoint for frame in built.sole_frames]
-        self._sole_turns = [data.oMi[joint].rotation for joint in soles]
-        self._sole_places = [data.oMi[joint].translation for joint in soles]
-        self._sole_offsets = [np.array(foot.sole) for foot in robot.feet]
+        self._kinematics = ContactKinematics(robot)
         n = len(robot.contacts)
-        self._points, self._rates = np.zeros((n, 3)), np.zeros((n, 3))
         self._world_points, self._world_rates = np.zeros((n, 3)), np.zeros((n, 3))
         self._weights = np.zeros(n)
-        self._error = np.zeros(3)
         self._gyro, self._force = np.zeros(3), np.zeros(3)
-        self._last_rate, self._forward = np.zeros(3), np.zeros(3)
+        self._joint_rates = np.zeros(len(robot.joints))
+        self._last_rate, self._error = np.zeros(3), np.zeros(3)
         self._spare, self._middle = np.zeros(3), np.zeros(4)
-        self._down, self._arm = np.zeros(3), np.zeros(3)
         self._acceleration = np.zeros(3)
         self._watch_share = min(self.period / 0.02, 1.0)
         self._block = max(round(0.03 / self.period), 1)
@@ -189,6 +165,7 @@ class StateEstimator(Block):
         estimate, base = self.estimate, self.base
         np.clip(self.imu.angular_velocity, -_FASTEST_TURN, _FASTEST_TURN, out=self._gyro)
         np.clip(self.imu.specific_force, -_STRONGEST_FORCE, _STRONGEST_FORCE, out=self._force)
+        np.clip(self.joints.velocity, -_FASTEST_JOINT, _FASTEST_JOINT, out=self._joint_rates)
         started = bool(estimate.started[()])
         fastest = self._watch_motion() if started else 0.0
         self._force -= estimate.accelerometer_bias
@@ -204,8 +181,9 @@ class StateEstimator(Block):
         else:
             self._start()
         self._right(fastest < self.params.still_rate, fastest < self.params.slow_rate)
+        seen = self._kinematics
         for point, rate, world_point, world_rate in zip(
-            self._points, self._rates, self._world_points, self._world_rates, strict=True
+            seen.points, seen.rates, self._world_points, self._world_rates, strict=True
         ):
             rotate(estimate.orientation, point, world_point)
             rotate(estimate.orientation, rate, world_rate)
@@ -224,89 +202,70 @@ class StateEstimator(Block):
             mean = float(estimate.mean_rate[i])
             estimate.mean_rate[i] = mean = mean + share * (float(self._gyro[i]) - mean)
             fastest = max(fastest, abs(mean))
-        for i in range(self.joints.velocity.shape[0]):
+        for i in range(self._joint_rates.shape[0]):
             mean = float(estimate.mean_joint_rate[i])
-            rate = min(max(float(self.joints.velocity[i]), -_FASTEST_JOINT), _FASTEST_JOINT)
-            estimate.mean_joint_rate[i] = mean = mean + share * (rate - mean)
+            mean += share * (float(self._joint_rates[i]) - mean)
+            estimate.mean_joint_rate[i] = mean
             fastest = max(fastest, abs(mean))
         standing = 0
         for point in range(self._weights.shape[0]):
             standing += bool(self.contacts.active[point])
         if standing == 0 and self.learning.aligned[()]:
             estimate.flown[()] = True
+            self.learning.facing[()] = False
         if standing < self._weights.shape[0]:
             fastest = math.inf
         return fastest
 
     def _see_points(self) -> None:
-        """Contact points and their rates from the base, by the joints and the base's turning."""
-        q, v = self._position, self._velocity
-        q[7:] = self.joints.position
-        np.clip(self.joints.velocity, -_FASTEST_JOINT, _FASTEST_JOINT, out=v[6:])
-        v[3:6] = self.estimate.angular_velocity
-        self._momentum(self._model, self._data, q, v)
-        rotate_back(self.estimate.orientation, _DOWN, self._down)
-        for i, centre in enumerate(self._centres):
-            point, rate, foot, arm = self._points[i], self._rates[i], self._turns[i], self._arm
-            # The rubber is round: what touches the ground is its lowest point, however the foot
-            # is turned, and that part of the foot is what stands still while the foot rolls.
-            np.dot(self._down, foot, arm)
-            arm *= self._radii[i]
-            arm += centre
-            cross(self._angular[i], arm, self._spare)
-            self._spare += self._linear[i]
-            np.dot(foot, self._spare, rate)
-            np.dot(foot, arm, point)
-            point += self._places[i]
-        forward = self._forward
-        forward.fill(0.0)
-        for sole_turn in self._sole_turns:
-            forward += sole_turn[:, 0]
+        estimate = self.estimate
+        self._kinematics.evaluate(
+            estimate.orientation, estimate.angular_velocity, self.joints.position, self._joint_rates
+        )
 
     def _start(self) -> None:
         """Standing on level ground around the origin, the feet pointing along x."""
-        estimate = self.estimate
+        estimate, seen = self.estimate, self._kinematics
         upright(self._force, estimate.orientation)
         self._see_points()
         for _ in range(20):
-            misalignment(
-                estimate.orientation, self._points, self._forward, self._error, self._spare
-            )
+            misalignment(estimate.orientation, seen.points, seen.forward, self._error, self._spare)
+            np.clip(self._error, -0.2, 0.2, out=self._error)
             if self.params.law == "complementary":
                 self._error[:2] = 0.0
             turn(estimate.orientation, *self._error.tolist())
-        n_feet, n_points = len(self._sole_offsets), len(self._centres)
-        for sole_turn, place, offset in zip(
-            self._sole_turns, self._sole_places, self._sole_offsets, strict=True
-        ):
-            np.dot(sole_turn, offset, self._acceleration)
-            self._acceleration += place
-            rotate(estimate.orientation, self._acceleration, self._spare)
-            estimate.position[0] -= float(self._spare[0]) / n_feet
-            estimate.position[1] -= float(self._spare[1]) / n_feet
-        for point in self._points:
+        for sole in seen.soles:
+            rotate(estimate.orientation, sole, self._spare)
+            for axis in range(2):
+                estimate.position[axis] -= float(self._spare[axis]) / len(seen.soles)
+        for point in seen.points:
             rotate(estimate.orientation, point, self._spare)
-            estimate.position[2] -= float(self._spare[2]) / n_points
+            estimate.position[2] -= float(self._spare[2]) / len(seen.points)
         estimate.gate[()] = self.params.gate
         estimate.mean_joint_rate.fill(1.0)  # moving, until it is seen not to
-        estimate.started[()] = True
+        estimate.started[()] = self.learning.facing[()] = True
 
     def _right(self, still: bool, slow: bool) -> None:
         """Correct the orientation and learn the biases."""
         estimate, weighted = self.estimate, self.params.law == "weighted"
-        level_ground = weighted and not bool(estimate.flown[()])
-        self._learn(still, level_ground)
+        flown = bool(estimate.flown[()])
+        if not (weighted and flown):
+            self._learn(still)
         x, y, z = (float(self._force[i]) for i in range(3))
         if abs(math.sqrt(x * x + y * y + z * z) - GRAVITY) > 0.1 * GRAVITY:
             return
-        if level_ground and slow:
+        if weighted and slow and (self.params.level_ground or not flown):
             # Least squares over all ticks so far, then over the last 250: angle and its drift.
             self.learning.aligned[()] = ticks = min(int(self.learning.aligned[()]) + 1, 250)
             n = max(ticks, 30)
             angle_gain, drift_gain = 2 * (2 * n - 1) / (n * (n + 1)), 6 / (n * (n + 1))
-            misalignment(
-                estimate.orientation, self._points, self._forward, self._error, self._spare
-            )
+            seen = self._kinematics
+            misalignment(estimate.orientation, seen.points, seen.forward, self._error, self._spare)
+            if not self.learning.facing[()]:
+                estimate.heading[()] = -float(self._error[2])
+                self.learning.facing[()] = True
+            self._error[2] = wrap(float(self._error[2]) + float(estimate.heading))
+            np.clip(self._error, -0.05, 0.05, out=self._error)
             rotate_back(estimate.orientation, self._error, self._spare)
             self._spare *= drift_gain / self.period
             estimate.gyro_bias -= self._spare
@@ -315,11 +274,11 @@ class StateEstimator(Block):
         elif still if weighted else bool(self.contacts.active.any()):
             right_up(estimate.orientation, self._force, self.params.tilt_gain, self._spare)
 
-    def _learn(self, still: bool, level_ground: bool) -> None:
-        """The mean of what the accelerometer reads beyond gravity, or else of the gyroscope.
+    def _learn(self, still: bool) -> None:
+        """The accelerometer's mean beyond gravity; by the paper's law the gyroscope's mean.
 
         A full block of samples counts only once the block after it is full too, so the beginning
-        of a motion, before it is noticed, does not get in. Each mean starts from a prior of zero
+        of a motion, before it is noticed, does not get in. The mean starts from a prior of zero
         with as many samples as the usual ratio of noise to bias is worth.
         """
         estimate, learning = self.estimate, self.learning
@@ -327,24 +286,23 @@ class StateEstimator(Block):
             learning.filled[()] = learning.held[()] = 0
             learning.filling_sum.fill(0.0)
             return
-        learning.filling_sum[0] += self._gyro
-        gravity = self._spare
-        rotate_back(estimate.orientation, _GRAVITY_UP, gravity)
-        learning.filling_sum[1] += self._force
-        learning.filling_sum[1] += estimate.accelerometer_bias
-        learning.filling_sum[1] -= gravity
+        if self.params.law == "weighted":
+            bias, prior = estimate.accelerometer_bias, 3.0
+            rotate_back(estimate.orientation, _GRAVITY_UP, self._spare)
+            learning.filling_sum += self._force
+            learning.filling_sum += bias
+            learning.filling_sum -= self._spare
+        else:
+            bias, prior = estimate.gyro_bias, 10.0
+            learning.filling_sum += self._gyro
         learning.filled[()] = filled = int(learning.filled[()]) + 1
         if filled < self._block:
             return
         if learning.held[()]:
-            samples = min(int(learning.samples[()]) + filled, 1000)
-            learning.samples[()] = samples
-            row, prior = (1, 3.0) if level_ground else (0, 10.0)
-            biases = estimate.accelerometer_bias if level_ground else estimate.gyro_bias
+            learning.samples[()] = samples = min(int(learning.samples[()]) + filled, 1000)
             for i in range(3):
-                bias = float(biases[i])
-                excess = float(learning.held_sum[row, i]) - filled * bias
-                biases[i] = bias + excess / (samples + prior)
+                excess = float(learning.held_sum[i]) - filled * float(bias[i])
+                bias[i] += excess / (samples + prior)
         learning.held_sum[...] = learning.filling_sum
         learning.filling_sum.fill(0.0)
         learning.held[()], learning.filled[()] = filled, 0
@@ -381,8 +339,7 @@ class StateEstimator(Block):
         if ticks == 0:
             return
         average = max(round(0.02 / self.period), 1)
-        rotate(estimate.orientation, self._linear_momentum, self._spare)
-        self._spare /= self._mass
+        rotate(estimate.orientation, self._kinematics.com_velocity, self._spare)
         fallen = -GRAVITY * self.period * ticks
         self._spare += estimate.velocity
         self._spare[2] -= fallen
@@ -390,7 +347,7 @@ class StateEstimator(Block):
         if ticks <= average:
             self._acceleration /= ticks
             estimate.ballistic_velocity += self._acceleration
-        elif np.abs(self._acceleration, out=self._arm).max() < _IMPACT:
+        elif np.abs(self._acceleration, out=self._error).max() < _IMPACT:
             estimate.velocity -= self._acceleration
         else:
             estimate.flight_ticks[()] = 0  # the ground: what the IMU has felt stands

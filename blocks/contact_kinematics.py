@@ -1,0 +1,96 @@
+"""What stands on the ground, seen from the base: places and rates of the contact points."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..runtime.description import RobotDescription
+from .pinocchio_model import build_pinocchio_model
+from .rotations import cross, rotate_back
+
+Array = NDArray[np.float64]
+
+_DOWN = np.array([0.0, 0.0, -1.0])
+
+
+class ContactKinematics:
+    """The robot with its base held in place but turning, evaluated by Pinocchio.
+
+    The rubber of a contact point is round: what touches the ground is its lowest point, however
+    the foot is turned, and that part of the foot is what stands still while the foot rolls.
+
+    Attributes:
+        points: the lowest point of each contact [m, body], (n_contacts, 3).
+        rates: their velocities with the joints' and the base's turning [m/s, body].
+        soles: the sole centres [m, body], (n_feet, 3).
+        forward: the sum of the feet's forward directions [body], (3,).
+        com_velocity: of the centre of mass relative to the base's origin [m/s, body], (3,).
+    """
+
+    def __init__(self, robot: RobotDescription) -> None:
+        import pinocchio
+
+        built = build_pinocchio_model(robot)
+        data: Any = built.model.createData()
+        self._evaluate: Any = pinocchio.computeCentroidalMomentum
+        self._model: Any = built.model
+        self._data: Any = data
+        self._position = np.array(pinocchio.neutral(built.model))
+        self._velocity = np.zeros(built.model.nv)
+        frames = built.model.frames
+        # Views of Pinocchio's own memory; the base's frame is its world here.
+        self._feet = [
+            (data.oMi[joint].rotation, data.oMi[joint].translation,
+             data.v[joint].linear, data.v[joint].angular)
+            for joint in (frames[sole].parentJoint for sole in built.sole_frames)
+        ]  # fmt: skip
+        self._momentum = data.hg.linear
+        self._mass = robot.total_mass
+        self._foot_of_point = robot.foot_of_contact()
+        self._radii = [contact.radius for contact in robot.contacts]
+        self._centres = [
+            np.array([x, y, z + contact.radius])
+            for contact in robot.contacts
+            for x, y, z in [contact.position]
+        ]
+        self._sole_offsets = [np.array(foot.sole) for foot in robot.feet]
+        self._down, self._arm, self._spare = np.zeros(3), np.zeros(3), np.zeros(3)
+        self.points, self.rates = np.zeros((len(self._radii), 3)), np.zeros((len(self._radii), 3))
+        self.soles = np.zeros((len(self._feet), 3))
+        self.forward, self.com_velocity = np.zeros(3), np.zeros(3)
+
+    def evaluate(
+        self, orientation: Array, angular_velocity: Array, position: Array, velocity: Array
+    ) -> None:
+        """Bring all attributes up to date.
+
+        Args:
+            orientation: of the base, quaternion x, y, z, w; it says where down is.
+            angular_velocity: of the base [rad/s, body].
+            position, velocity: of the joints [rad, rad/s].
+        """
+        self._position[7:] = position
+        self._velocity[3:6] = angular_velocity
+        self._velocity[6:] = velocity
+        self._evaluate(self._model, self._data, self._position, self._velocity)
+        rotate_back(orientation, _DOWN, self._down)
+        for i, foot in enumerate(self._foot_of_point):
+            turn, place, linear, angular = self._feet[foot]
+            point, arm = self.points[i], self._arm
+            np.dot(self._down, turn, arm)
+            arm *= self._radii[i]
+            arm += self._centres[i]
+            cross(angular, arm, self._spare)
+            self._spare += linear
+            np.dot(turn, self._spare, self.rates[i])
+            np.dot(turn, arm, point)
+            point += place
+        self.forward.fill(0.0)
+        for foot, (turn, place, _, _) in enumerate(self._feet):
+            self.forward += turn[:, 0]
+            np.dot(turn, self._sole_offsets[foot], self.soles[foot])
+            self.soles[foot] += place
+        np.divide(self._momentum, self._mass, out=self.com_velocity)
