@@ -10,6 +10,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, Literal
 
@@ -189,19 +190,27 @@ def make_task(values: Mapping[str, Any], *, where: str = "task") -> JumpTask:
     try:
         return JumpTask.model_validate(values)
     except ValidationError as error:
-        lines = []
-        for problem in error.errors():
-            key = ".".join(map(str, problem["loc"]))
-            message = problem["msg"].removeprefix("Value error, ")
-            if problem["type"] == "extra_forbidden":
-                message = f"is no parameter of a task; there is {', '.join(JumpTask.model_fields)}"
-            found = (
-                ""
-                if not key or isinstance(problem["input"], Mapping)
-                else f", found {problem['input']!r}"
-            )
-            lines.append(f"{key}: {message}{found}" if key else message)
+        lines = [_explain(problem) for problem in error.errors()]
         raise TaskError(f"{where}: " + f"\n{where}: ".join(lines)) from error
+
+
+def _explain(problem: Any) -> str:
+    """One of pydantic's problems as a line: the key, what is expected and what was found."""
+    key = ".".join(map(str, problem["loc"]))
+    message = str(problem["msg"]).removeprefix("Value error, ")
+    if problem["type"] == "extra_forbidden":
+        nested: dict[str, type[Parameters]] = {"knots": Knots, "weights": Weights}
+        owner = nested.get(str(problem["loc"][0]), JumpTask)
+        near = get_close_matches(key.rpartition(".")[2], owner.model_fields, 1, 0.0)
+        return f"{key}: is no parameter of a task; the nearest is {near[0]}"
+    if problem["type"] == "float_parsing":
+        field = JumpTask.model_fields.get(str(problem["loc"][0]))
+        extra = field.json_schema_extra if field else None
+        unit = extra.get("unit") if isinstance(extra, dict) else ""
+        message = f"expected a number in {unit}" if unit else "expected a number"
+    if not key or isinstance(problem["input"], Mapping):
+        return message
+    return f"{key}: {message}, found {problem['input']!r}"
 
 
 def read_task(path: str | Path) -> JumpTask:

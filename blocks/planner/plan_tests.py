@@ -1,0 +1,312 @@
+"""The tests a plan must pass, each a few lines: what is measured, where, and what is allowed.
+
+Limits are about what the robot's feedback takes no notice of; they are not the solver's own
+tolerances, which are far smaller.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...runtime.description import RobotDescription
+from ...runtime.kinematics import LinkPoses, link_poses, matrices_of_quaternions
+from ..signals import Phase
+from .clearance import body_heights, ground_height, leg_gap
+from .plan import JumpPlan
+from .replay import Replay
+from .task import GRAVITY
+
+Array = NDArray[np.float64]
+DEGREE = math.pi / 180.0
+MILLIMETRE = 1e-3
+
+
+@dataclass(frozen=True)
+class Found:
+    """What a test found: it passes where ``value`` is at most ``limit``."""
+
+    name: str
+    value: float
+    limit: float
+    unit: str
+    text: str
+    where: str = ""
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """A plan, its replay, and what several tests need of them."""
+
+    plan: JumpPlan
+    robot: RobotDescription
+    replay: Replay
+
+    @property
+    def effort(self) -> float:
+        """The share of the motors' limits the plan may use."""
+        return self.plan.task.effort
+
+    @cached_property
+    def motor_torque(self) -> Array:
+        """Motor torques at the samples [N m], by exact dynamics, (n, n_joints)."""
+        return np.asarray(self.replay.samples.torque @ self.robot.torque_to_motor.T)
+
+    @cached_property
+    def motor_speed(self) -> Array:
+        """Motor speeds at the samples [rad/s], (n, n_joints)."""
+        return np.asarray(self.replay.samples.velocity[:, 6:] @ self.robot.joint_to_motor.T)
+
+    @cached_property
+    def poses(self) -> LinkPoses:
+        """The links at the samples."""
+        q = self.replay.samples.position
+        return link_poses(self.robot, q[:, :3], q[:, 3:7], q[:, 7:])
+
+    @cached_property
+    def flight_share(self) -> Array:
+        """How much of the flight's time is past at the samples, (n,)."""
+        start, end = self.plan.lift_off_time, self.plan.touchdown_time
+        return np.asarray((self.replay.samples.time - start) / (end - start))
+
+    @cached_property
+    def point_height(self) -> Array:
+        """The contact points' height above the ground at the samples [m], (n, n_contacts)."""
+        points = self.replay.samples.points
+        share = np.repeat(self.flight_share[:, None], points.shape[1], axis=1)
+        return np.asarray(points[:, :, 2] - ground_height(self.plan.task, points[:, :, 0], share))
+
+    @cached_property
+    def rise(self) -> float:
+        """The apex above standing that the exact state at lift-off leads to [m]."""
+        r, k = self.replay, self.replay.lift_off
+        up = float(r.com_velocity[k, 2])
+        return float(r.com[k, 2] - r.com[0, 2]) + max(up, 0.0) ** 2 / (2.0 * GRAVITY)
+
+    @cached_property
+    def turn(self) -> tuple[float, float]:
+        """How far the base has turned in pitch and in yaw from first knot to last [rad].
+
+        The angles are those of R = Ry Rx Rz, followed through full turns.
+        """
+        matrix = matrices_of_quaternions(self.replay.samples.position[:, 3:7])
+        pitch = np.unwrap(np.arctan2(matrix[:, 0, 2], matrix[:, 2, 2]))
+        yaw = np.unwrap(np.arctan2(matrix[:, 1, 0], matrix[:, 1, 1]))
+        return float(pitch[-1] - pitch[0]), float(yaw[-1] - yaw[0])
+
+    def moment(self, sample: int) -> str:
+        """The time of a sample as text."""
+        return f"at {self.replay.samples.time[sample]:.3f} s"
+
+    def figures(self) -> dict[str, float]:
+        """What the plan does and how hard, by name with unit."""
+        r, lasting = self.replay, np.diff(self.plan.time) > 0.0
+        force = self.plan.contact_force[:-1][lasting].sum(axis=1)[:, 2]
+        k = r.lift_off
+        return {
+            "rise_m": self.rise,
+            "take_off_speed_m_s": float(r.com_velocity[k, 2]),
+            "flight_time_s": self.plan.flight_time,
+            "duration_s": self.plan.duration,
+            "peak_motor_torque_N_m": float(np.abs(self.motor_torque).max()),
+            "peak_motor_speed_rad_s": float(np.abs(self.motor_speed).max()),
+            "peak_vertical_force_N": float(force.max()),
+            "pitch_momentum_at_lift_off_N_m_s": float(r.angular_momentum[k, 1]),
+            "flight_error_mm": r.flight_error[0] / MILLIMETRE,
+            "flight_error_deg": r.flight_error[1] / DEGREE,
+        }
+
+
+def worst(array: Array) -> tuple[int, int]:
+    """The row and column of the largest number."""
+    row, column = np.unravel_index(int(array.argmax()), array.shape)
+    return int(row), int(column)
+
+
+def start_and_end(e: Evidence) -> Iterator[Found]:
+    """The plan begins at rest in its stance over the origin and ends at rest."""
+    plan, joints = e.plan, [joint.name for joint in e.robot.joints]
+    stances = (plan.task.start_joints(e.robot), plan.task.end_joints(e.robot))
+    missed = np.abs(plan.position[0, 7:] - [stances[0][name] for name in joints])
+    yield Found("start", missed.max(), 1e-3, "rad", "the first knot's distance from the stance",
+                joints[int(missed.argmax())])  # fmt: skip
+    middle = np.append(e.replay.soles[0].mean(axis=0), e.replay.heading[0].mean())
+    yield Found("origin", float(np.abs(middle).max()), MILLIMETRE, "m or rad",
+                "the first knot's distance from the origin between the soles")  # fmt: skip
+    for name, knot in (("rest_at_start", 0), ("rest_at_end", -1)):
+        speeds = np.abs(plan.velocity[knot])
+        yield Found(name, speeds.max(), 1e-2, "m/s or rad/s", "the largest velocity")
+
+
+def states(e: Evidence) -> Iterator[Found]:
+    """Centre of mass, momentum and torque are what Pinocchio makes of the states and forces."""
+    plan, r = e.plan, e.replay
+    for name, planned, exact, limit, unit in (
+        ("com", plan.com, r.com, 1e-5, "m"),
+        ("com_velocity", plan.com_velocity, r.com_velocity, 1e-4, "m/s"),
+        ("angular_momentum", plan.angular_momentum, r.angular_momentum, 1e-5, "N m s"),
+    ):
+        yield Found(name, np.abs(planned - exact).max(), limit, unit, "its error at the knots")
+    times, s = np.diff(plan.time) > 0.0, r.samples
+    middle = np.array([k for k in range(len(times)) if times[k]])
+    exact = np.array([s.torque[s.knot == k][(s.knot == k).sum() // 2] for k in middle])
+    missed = np.abs(exact - plan.joint_torque[middle])
+    k, joint = worst(missed)
+    yield Found("joint_torque", missed.max(), 0.2, "N m", "its error in the middle of an interval",
+                f"{e.robot.joints[joint].name} at {plan.time[middle[k]]:.3f} s")  # fmt: skip
+
+
+def interval_defects(e: Evidence) -> Iterator[Found]:
+    """Exact dynamics from each knot leads to the next."""
+    for column, (name, limit, unit) in enumerate(
+        (
+            ("position_defect", MILLIMETRE, "m"),
+            ("rotation_defect", 0.5 * DEGREE, "rad"),
+            ("velocity_defect", 0.05, "m/s"),
+            ("angular_velocity_defect", 0.5, "rad/s"),
+        )
+    ):
+        found = e.replay.defect[:, column]
+        k = int(found.argmax())
+        yield Found(name, found[k], limit, unit, "the base's error after one interval",
+                    f"from {e.plan.time[k]:.3f} s")  # fmt: skip
+
+
+def flight(e: Evidence) -> Iterator[Found]:
+    """The whole flight by exact dynamics ends where the plan says."""
+    position, rotation = e.replay.flight_error
+    yield Found("flight_position", position, MILLIMETRE, "m", "the base's error at touchdown")
+    yield Found("flight_rotation", rotation, 0.5 * DEGREE, "rad", "the base's error at touchdown")
+    plan, r = e.plan, e.replay
+    missed = max(
+        abs(plan.lift_off_time - plan.time[r.lift_off]),
+        abs(plan.touchdown_time - plan.time[r.touchdown]),
+    )
+    yield Found("flight_times", float(missed), 1e-9, "s", "lift-off and touchdown from their knots")
+
+
+def task_done(e: Evidence) -> Iterator[Found]:
+    """The jump is the one that was asked for."""
+    task, r = e.plan.task, e.replay
+    if task.rise is not None:
+        yield Found("rise", abs(e.rise - task.rise), MILLIMETRE, "m",
+                    "how far the apex, from the state at lift-off, misses the one asked for")  # fmt: skip
+    if task.take_off_speed is not None:
+        up = float(r.com_velocity[r.lift_off, 2])
+        yield Found("take_off_speed", abs(up - task.take_off_speed), 5e-3, "m/s", "its error")
+    if task.flight_time is not None:
+        missed = abs(e.plan.flight_time - task.flight_time)
+        yield Found("flight_time", missed, MILLIMETRE, "s", "its error")
+    goal = np.array([task.distance_x, task.distance_y, task.landing_height])
+    missed_by = np.abs(r.soles[-1].mean(axis=0) - goal)
+    yield Found("landing_place", missed_by.max(), 2 * MILLIMETRE, "m", "the feet's distance from it",
+                "xyz"[int(missed_by.argmax())])  # fmt: skip
+    pitch, yaw = e.turn
+    turned = float((r.heading[-1] - r.heading[0]).mean())
+    # Through a somersault a heading is not defined, so it counts as it is at the end.
+    missed = math.remainder(turned - task.twist, math.tau)
+    yield Found("twist", abs(missed), 0.5 * DEGREE, "rad", "the feet's error in heading")
+    if task.rotation:
+        yield Found("rotation", abs(pitch - task.rotation), 5 * DEGREE, "rad", "the body's error")
+    else:
+        yield Found("whole_turn", abs(yaw - task.twist), 20 * DEGREE, "rad",
+                    "how far the torso's turn differs from the feet's")  # fmt: skip
+
+
+def contacts(e: Evidence) -> Iterator[Found]:
+    """Feet stay where they stand, on the ground, and push only there, within the friction cone."""
+    plan, s = e.plan, e.replay.samples
+    names = [contact.name for contact in e.robot.contacts]
+    loaded = plan.contact[s.knot]
+    flying = plan.phase[s.knot] == Phase.FLIGHT
+    before, after = loaded & ~flying[:, None], s.time >= plan.touchdown_time
+    slip = np.zeros(len(names))
+    for period in (~after, after):
+        for number in range(len(names)):
+            places = s.points[before[:, number] & period, number]
+            if len(places):
+                slip[number] = max(slip[number], float(np.ptp(places, axis=0).max()))
+    yield Found("foot_slip", slip.max(), 2 * MILLIMETRE, "m", "how far a loaded point moves",
+                names[int(slip.argmax())])  # fmt: skip
+    height = np.where(before, np.abs(e.point_height), 0.0)
+    yield Found("foot_on_ground", height.max(), MILLIMETRE, "m",
+                "how far a loaded point is off the ground")  # fmt: skip
+    force = plan.contact_force
+    idle = np.where(plan.contact[:, :, None], 0.0, np.abs(force)).max()
+    yield Found("force_without_contact", idle, 1e-6, "N", "the largest force on an unloaded point")
+    pull, tangent = -force[:, :, 2], np.hypot(force[:, :, 0], force[:, :, 1])
+    yield Found("pull", pull.max(), 1e-3, "N", "how hard a foot pulls at the ground")
+    excess = tangent - plan.task.friction * np.maximum(force[:, :, 2], 0.0)
+    k, number = worst(excess)
+    yield Found("friction", excess.max(), 1e-2, "N", "how far a force is outside its cone",
+                f"{names[number]} at {plan.time[k]:.3f} s")  # fmt: skip
+
+
+def touchdown(e: Evidence) -> Iterator[Found]:
+    """Feet that are to arrive at rest do, and every foot arrives on the ground."""
+    plan, r, s = e.plan, e.replay, e.replay.samples
+    sample = int(np.searchsorted(s.time, plan.time[r.touchdown] - 1e-9))
+    if not plan.task.impact:
+        speed = np.linalg.norm(s.point_velocity[sample], axis=1).max()
+        yield Found("touchdown_speed", float(speed), 0.05, "m/s", "the feet's speed at touchdown")
+
+
+def machine(e: Evidence) -> Iterator[Found]:
+    """Joints stay within their limits, motors within what they can do at their speed."""
+    robot, task, s = e.robot, e.plan.task, e.replay.samples
+    angles, limits = s.position[:, 7:], robot.joint_limits
+    excess = np.maximum(angles - limits[:, 1], limits[:, 0] - angles)
+    sample, joint = worst(excess)
+    yield Found("joint_limits", excess.max(), 2e-3, "rad", "how far a joint passes its limit",
+                f"{robot.joints[joint].name} {e.moment(sample)}")  # fmt: skip
+    profile = robot.profiles[task.profile]
+    speed = np.abs(e.motor_speed)
+    sample, motor = worst(speed)
+    yield Found("motor_speed", speed.max(), 1.01 * e.effort * profile.no_load_speed, "rad/s",
+                "the largest motor speed",
+                f"{robot.transmission.motors[motor]} {e.moment(sample)}")  # fmt: skip
+    # Braking torque is the peak at any speed; driving torque falls between corner and no load.
+    driving = np.sign(e.motor_torque) * e.motor_speed / e.effort
+    fall = (profile.no_load_speed - driving) / (profile.no_load_speed - profile.corner_speed)
+    allowed = e.effort * profile.peak_torque * np.clip(fall, 0.0, 1.0)
+    over = np.abs(e.motor_torque) - allowed
+    sample, motor = worst(over)
+    yield Found("motor_torque", over.max(), 0.03 * profile.peak_torque, "N m",
+                "how far a motor torque passes what its speed allows",
+                f"{robot.transmission.motors[motor]} {e.moment(sample)}")  # fmt: skip
+
+
+def clearances(e: Evidence) -> Iterator[Found]:
+    """Nothing but the feet comes near the ground, the feet clear it in flight, legs stay apart."""
+    robot, task = e.robot, e.plan.task
+    names = [contact.name for contact in robot.contacts]
+    low = -e.point_height
+    sample, number = worst(low)
+    yield Found("foot_below_ground", low.max(), MILLIMETRE, "m", "how deep a foot is",
+                f"{names[number]} {e.moment(sample)}")  # fmt: skip
+    at = int(np.abs(e.flight_share - 0.5).argmin())
+    missing = task.foot_clearance - e.point_height[at]
+    yield Found("foot_clearance", missing.max(), MILLIMETRE, "m",
+                "what the feet lack of the clearance asked for in the middle of the flight",
+                names[int(missing.argmax())])  # fmt: skip
+    heights = body_heights(robot, task, e.poses, e.flight_share)
+    link = min(heights, key=lambda name: float(heights[name].min()))
+    sample = int(heights[link].argmin())
+    yield Found("body_on_ground", -float(heights[link][sample]), 0.0, "m",
+                "how deep the body is in the ground", f"{link} {e.moment(sample)}")  # fmt: skip
+    gap = leg_gap(robot, e.poses)
+    sample = int(gap.argmin())
+    yield Found("leg_clearance", task.leg_clearance - float(gap[sample]), MILLIMETRE, "m",
+                "what the legs lack of the gap asked for", e.moment(sample))  # fmt: skip
+
+
+PLAN_TESTS: tuple[Callable[[Evidence], Iterator[Found]], ...] = (
+    start_and_end, states, interval_defects, flight, task_done, contacts, touchdown, machine,
+    clearances,
+)  # fmt: skip
+"""All tests, in the order of the report."""
