@@ -60,7 +60,7 @@ class BalanceTarget(Block):
     phase = Input(PhaseState, text="the phase the robot is in")
     terms = Input(DynamicsTerms, text="the present state")
     target = Output(WholeBodyTarget, text="what to achieve now")
-    memory = State(BalanceMemory)
+    memory = State(BalanceMemory, text="standing height and trim")
 
     def setup(self) -> None:
         self._quaternion = np.zeros(4)

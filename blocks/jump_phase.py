@@ -78,7 +78,7 @@ class JumpPhase(Block):
     contacts = Input(ContactState, text="which points carry load")
     terms = Input(DynamicsTerms, text="the present state")
     phase = Output(PhaseState, text="the phase, its times and the stance points")
-    memory = State(PhaseMemory)
+    memory = State(PhaseMemory, text="the phase, its times, and contacts lately lost")
 
     def start(self) -> None:
         self.memory.touchdown[()] = -1.0

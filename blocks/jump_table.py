@@ -12,6 +12,8 @@ from .signals import JumpReference, Phase
 
 Array = NDArray[np.float64]
 
+_FED_FORWARD = ("com_acceleration", "angular_momentum_rate")
+
 
 @dataclass(frozen=True)
 class JumpTable:
@@ -43,12 +45,17 @@ class JumpTableReader:
         self._columns = list(table.columns.items())
         self._scratch = {name: np.zeros(rows.shape[1:]) for name, rows in self._columns}
 
-    def read(self, time: float, reference: JumpReference) -> None:
-        """The reference at ``time``; before the table its first row, after it its last."""
+    def read(self, time: float, reference: JumpReference, lead: float = 0.0) -> None:
+        """The reference at ``time``; before the table its first row, after it its last.
+
+        What a controller feeds forward, the acceleration and the rate of angular momentum, is
+        that of ``lead`` seconds later.
+        """
         table = self._table
-        row, share = locate(self._time, time)
+        here, there = locate(self._time, time), locate(self._time, time + lead)
         for name, rows in self._columns:
             out, scratch = getattr(reference, name), self._scratch[name]
+            row, share = there if name in _FED_FORWARD else here
             np.subtract(rows[row + 1], rows[row], out=scratch)
             np.multiply(scratch, share, out=scratch)
             np.add(rows[row], scratch, out=out)

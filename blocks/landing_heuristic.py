@@ -88,7 +88,7 @@ class LandingHeuristic(Block):
             0.7, gt=0.0, le=1.0, text="share of the predicted flight by which the feet are there"
         )
         retraction: float = parameter(
-            0.0, unit="m/s", ge=0.0, le=2.0, text="upward speed of the feet at touchdown"
+            0.3, unit="m/s", ge=0.0, le=2.0, text="upward speed of the feet at touchdown"
         )
         retraction_time: float = parameter(
             0.06, unit="s", gt=0.0, text="how long before touchdown it begins"
@@ -99,7 +99,7 @@ class LandingHeuristic(Block):
     phase = Input(PhaseState, text="the phase and the time to touchdown")
     terms = Input(DynamicsTerms, text="the present state")
     feet = Output(FootTarget, text="where the feet should be, and where they should land")
-    memory = State(LandingMemory)
+    memory = State(LandingMemory, text="lift-off, and the plan as long as it lasts")
 
     def setup(self) -> None:
         robot = self.context.robot

@@ -25,6 +25,9 @@ class SquatJumpReference(Block):
     ground early, well before the legs are straight and with the torso still leaning, is what
     keeps the hips slow: their speed, not torque, limits the height.
 
+    Torque follows its command with a delay, so acceleration and the rate of angular momentum, which
+    are fed forward, are published ``lead`` ahead of time.
+
     The plan is made at load (about 0.2 s) and read by the time since the run began; after its end
     it stands still. It knows nothing of what the robot really does, plans no lateral jump and no
     twist, and leaves forces and torque limits to the controller. Raises ``BlockError`` at load
@@ -33,7 +36,7 @@ class SquatJumpReference(Block):
 
     class Params(Parameters):
         rise: float = parameter(
-            0.085, unit="m", gt=0.0, le=0.5, text="apex of the centre of mass above standing"
+            0.09, unit="m", gt=0.0, le=0.5, text="apex of the centre of mass above standing"
         )
         distance: float = parameter(
             0.0, unit="m", ge=-0.3, le=0.4, text="how far ahead of the start the feet land"
@@ -69,6 +72,13 @@ class SquatJumpReference(Block):
         pause_time: float = parameter(0.15, unit="s", gt=0.0, text="waiting at the bottom")
         landing_time: float = parameter(0.35, unit="s", gt=0.05, text="coming to rest")
         recover_time: float = parameter(0.6, unit="s", gt=0.05, text="rising to standing")
+        lead: float = parameter(
+            0.002,
+            unit="s",
+            ge=0.0,
+            le=0.02,
+            text="delay from sensing to torque that is made up for",
+        )
         actuators: str = parameter("koala", text="the actuator profile whose speed must suffice")
 
     params: Params
@@ -89,4 +99,4 @@ class SquatJumpReference(Block):
         self._reader = JumpTableReader(plan_squat_jump(model, robot, task, p.actuators))
 
     def step(self) -> None:
-        self._reader.read(self.time, self.reference)
+        self._reader.read(self.time, self.reference, self.params.lead)

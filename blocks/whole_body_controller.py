@@ -128,8 +128,8 @@ class WholeBodyController(Block):
         stand: TaskGains = parameter(TaskGains(), text="gains while standing and squatting")
         thrust: TaskGains = parameter(
             TaskGains(
-                linear_stiffness=(100.0, 100.0, 70.0),
-                linear_damping=(20.0, 20.0, 14.0),
+                linear_stiffness=(100.0, 100.0, 500.0),
+                linear_damping=(20.0, 20.0, 45.0),
                 torso_weight=(1.0, 0.003, 1.0),
                 angular_weight=(1.5e3, 1.5e4, 1.5e3),
                 angular_damping=(30.0, 30.0, 30.0),
@@ -159,7 +159,7 @@ class WholeBodyController(Block):
     phase = Input(PhaseState, text="the phase and the points in stance")
     joints = Input(JointState, text="joint velocities, for the motors' limits")
     command = Output(WholeBodyCommand, text="torque, acceleration and contact forces")
-    memory = State(SolverMemory)
+    memory = State(SolverMemory, text="for when the solver fails")
 
     def setup(self) -> None:
         robot, p = self.context.robot, self.params

@@ -1,0 +1,122 @@
+"""The target follows the plan with the feet, then brings the robot to rest over them."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from aloft.blocks.balance_target import BalanceTarget
+from aloft.blocks.rotations import to_matrix
+from aloft.blocks.signals import Phase
+from aloft.runtime.testing import BlockBench
+
+FEET = np.array([[0.0, -0.08, 0.0], [0.0, 0.08, 0.0]])
+LEVEL = [0.0, 0.0, 0.0, 1.0]
+STANDING = 0.33
+
+
+def about(axis, angle):
+    out = np.zeros(4)
+    out[axis], out[3] = math.sin(angle / 2), math.cos(angle / 2)
+    return out
+
+
+def matrix(quaternion):
+    out = np.zeros((3, 3))
+    to_matrix(np.array(quaternion), out)
+    return out
+
+
+def make(**params):
+    """Standing in the first tick, exactly as planned."""
+    bench = BlockBench(BalanceTarget, params, robot="bruce")
+    bench.set("reference", com=[0.0, 0.0, STANDING], orientation=LEVEL, foot_position=FEET)
+    bench.set("terms", foot_position=FEET, base_rotation=np.eye(3))
+    bench.set("terms", foot_rotation=np.stack([np.eye(3)] * 2))
+    bench.step()
+    return bench
+
+
+def test_before_lift_off_it_is_the_plan():
+    bench = make()
+    values = {
+        "com": [0.01, 0.0, 0.25], "com_velocity": [0.1, 0.2, 1.0],
+        "com_acceleration": [1.0, 2.0, 20.0], "angular_velocity": [0.0, -9.0, 0.0],
+        "angular_momentum": [0.0, 0.02, 0.0], "angular_momentum_rate": [0.0, 0.3, 0.0],
+    }  # fmt: skip
+    bench.set("phase", phase=Phase.THRUST)
+    bench.set("reference", orientation=about(1, 0.4), **values)
+    bench.step()
+    target = bench.get("target")
+    for name, value in values.items():
+        assert getattr(target, name) == pytest.approx(value, abs=1e-12)
+    assert target.orientation == pytest.approx(about(1, 0.4), abs=1e-12)
+
+
+def test_the_plan_moves_and_turns_with_the_measured_feet():
+    """Feet drifted by (0.3, -0.2, 0.01) and turned left by 0.5 rad carry the whole plan along."""
+    bench, turn = make(), matrix(about(2, 0.5))
+    feet = FEET @ turn.T + [0.3, -0.2, 0.01]
+    bench.set("terms", foot_position=feet, foot_rotation=np.stack([turn] * 2))
+    bench.set("phase", phase=Phase.SQUAT)
+    bench.set("reference", com=[0.02, 0.01, 0.3], com_velocity=[0.1, 0.0, 0.5])
+    bench.set("reference", orientation=about(1, 0.4))
+    bench.step()
+    target = bench.get("target")
+    assert target.com == pytest.approx(turn @ [0.02, 0.01, 0.3] + [0.3, -0.2, 0.01], abs=1e-12)
+    assert target.com_velocity == pytest.approx(turn @ [0.1, 0.0, 0.5], abs=1e-12)
+    assert matrix(target.orientation) == pytest.approx(turn @ matrix(about(1, 0.4)), abs=1e-12)
+
+
+def test_after_touchdown_it_holds_low_over_the_middle_of_the_feet():
+    bench = make(landing_depth=0.06, trim_rate=0.0)
+    turn = matrix(about(2, -0.3))
+    feet = np.array([[0.11, -0.06, 0.002], [0.09, 0.1, 0.0]])
+    bench.set("terms", foot_position=feet, foot_rotation=np.stack([turn] * 2))
+    bench.set("phase", phase=Phase.LANDING, time_in_phase=0.1)
+    bench.step()
+    target = bench.get("target")
+    assert target.com == pytest.approx([0.1, 0.02, 0.001 + STANDING - 0.06], abs=1e-12)
+    assert (target.com_velocity == 0.0).all()
+    assert target.orientation == pytest.approx(about(2, -0.3), abs=1e-12)
+    for name in ("angular_velocity", "angular_momentum", "angular_momentum_rate"):
+        assert (getattr(target, name) == 0.0).all()
+
+
+def test_recovery_rises_to_standing_height_with_consistent_derivatives():
+    bench, heights = make(landing_depth=0.06, rise_time=0.6), {}
+    for time in (0.0, 0.2 - 1e-4, 0.2, 0.2 + 1e-4, 0.6, 2.0):
+        bench.set("phase", phase=Phase.RECOVER, time_in_phase=time)
+        bench.step()
+        target = bench.get("target")
+        heights[time] = [
+            float(x[2]) for x in (target.com, target.com_velocity, target.com_acceleration)
+        ]
+    assert heights[0.0] == pytest.approx([STANDING - 0.06, 0.0, 0.0], abs=1e-12)
+    assert heights[0.6] == heights[2.0] == pytest.approx([STANDING, 0.0, 0.0], abs=1e-12)
+    below, here, above = (heights[t][0] for t in (0.2 - 1e-4, 0.2, 0.2 + 1e-4))
+    assert heights[0.2][1] == pytest.approx((above - below) / 2e-4, rel=1e-5)
+    assert heights[0.2][2] == pytest.approx((above - 2 * here + below) / 1e-8, rel=1e-2)
+
+
+def test_trim_integrates_a_steady_tilt_away_and_stops_at_its_limit():
+    bench = make(trim_rate=1.0, trim_limit=0.05)
+    bench.set("terms", base_rotation=matrix(about(1, 0.02)))
+    bench.set("phase", phase=Phase.RECOVER)
+    bench.step(250)
+    # Half a second of 0.02 rad/s, against the tilt.
+    assert bench.get("memory").trim == pytest.approx([0.0, -0.01, 0.0], abs=1e-9)
+    assert bench.get("target").orientation == pytest.approx(about(1, -0.01), abs=1e-9)
+    bench.step(2500)
+    assert bench.get("memory").trim == pytest.approx([0.0, -0.05, 0.0], abs=1e-12)
+
+
+def test_trim_leaves_the_heading_alone():
+    bench = make(trim_rate=5.0)
+    bench.set("terms", base_rotation=matrix(about(2, 0.1)))
+    bench.set("phase", phase=Phase.RECOVER)
+    bench.step(100)
+    assert bench.get("memory").trim == pytest.approx(np.zeros(3), abs=1e-12)
+    assert bench.get("target").orientation == pytest.approx(LEVEL, abs=1e-12)
