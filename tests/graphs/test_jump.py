@@ -1,0 +1,126 @@
+"""The whole jump: it succeeds under noise, repeats bit for bit, and is driven by estimates."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import aloft
+from aloft.blocks.signals import Phase
+from aloft.runtime.loading import check
+
+GRAPHS = Path(aloft.__file__).parent / "graphs"
+JUMP = GRAPHS / "jump.yaml"
+
+
+@pytest.fixture(scope="module")
+def jump():
+    return aloft.load(JUMP, {"robot.seed": 1000}).run()
+
+
+def variant(tmp_path, text):
+    """A graph that includes the jump, and changes it."""
+    path = tmp_path / "variant.yaml"
+    path.write_text(f"include: [{JUMP}]\n{text}")
+    return path
+
+
+def test_the_graph_has_no_problems():
+    assert check(JUMP).ok
+
+
+def test_it_jumps_lands_and_recovers(jump):
+    assert jump.success, jump.reason
+    assert jump.metrics["apex_above_standing_m"] >= 0.07
+    assert jump.metrics["apex_from_squat_m"] >= 0.15
+    assert jump.metrics["qp_failures"] == 0
+
+
+@pytest.mark.parametrize("seed", [1001, 1002])
+def test_other_noise_other_delays(seed):
+    result = aloft.load(JUMP, {"robot.seed": seed}).run(log=False)
+    assert result.success, result.reason
+    assert result.metrics["apex_above_standing_m"] >= 0.07
+
+
+def test_the_phases_follow_one_another(jump):
+    phases = jump.signal("phase.phase.phase")
+    changes = phases[np.flatnonzero(np.diff(phases, prepend=-1))]
+    assert changes.tolist() == [
+        Phase.STAND, Phase.SQUAT, Phase.THRUST, Phase.FLIGHT, Phase.LANDING, Phase.RECOVER,
+    ]  # fmt: skip
+
+
+def test_the_body_follows_its_plan_off_the_ground(jump):
+    """At the planned lift-off speed, height and angular momentum are the plan's."""
+    phases = jump.signal("phase.phase.phase")
+    last = int(np.argmax(phases == Phase.FLIGHT)) - 1
+    found = jump.signal("robot.truth.com_velocity")[last]
+    planned = jump.signal("plan.reference.com_velocity")[last]
+    assert found == pytest.approx(planned, abs=0.1)
+    height = jump.signal("robot.truth.com")[last, 2]
+    assert height == pytest.approx(jump.signal("plan.reference.com")[last, 2], abs=0.01)
+    assert np.abs(jump.signal("robot.truth.angular_momentum")[last]).max() < 0.03
+
+
+def test_the_same_seed_gives_the_same_bits_and_another_does_not(jump):
+    again = aloft.load(JUMP, {"robot.seed": 1000}).run(log=False)
+    other = aloft.load(JUMP, {"robot.seed": 1003}).run(duration=0.1, log=False)
+    assert again.run_hash == jump.run_hash
+    assert other.run_hash != jump.run_hash
+
+
+def test_no_controller_reads_the_truth():
+    graph = aloft.load(JUMP).checked
+    readers = {
+        spec.path
+        for spec in graph.blocks
+        if any(wire.source == "robot.truth" for wire in spec.wires.values())
+    }
+    assert readers == {"push", "score"}
+
+
+def test_a_higher_jump_is_one_number_away():
+    result = aloft.load(JUMP, {"robot.seed": 5, "plan.rise": 0.1}).run(log=False)
+    assert result.success, result.reason
+    assert result.metrics["apex_above_standing_m"] == pytest.approx(0.1, abs=0.008)
+
+
+def test_a_jump_forward():
+    settings = {"robot.seed": 6, "plan.rise": 0.06, "plan.distance": 0.1}
+    result = aloft.load(JUMP, settings).run(log=False)
+    assert result.success, result.reason
+    assert result.metrics["jump_distance_x_m"] == pytest.approx(0.1, abs=0.02)
+
+
+@pytest.mark.parametrize("trial", ["nominal", "standard", "robust"])
+def test_every_trial_sets_only_the_robot(trial, tmp_path):
+    path = variant(tmp_path, "")
+    path.write_text(f"include: [{JUMP}, {GRAPHS / 'trials' / trial}.yaml]\n")
+    assert check(path).ok
+    text = (GRAPHS / "trials" / f"{trial}.yaml").read_text()
+    settings = [line.strip() for line in text.splitlines() if line.startswith("  ")]
+    assert settings
+    assert all(line.startswith("robot.") for line in settings)
+
+
+def test_the_robust_trial(tmp_path):
+    path = variant(tmp_path, "")
+    path.write_text(f"include: [{JUMP}, {GRAPHS / 'trials' / 'robust'}.yaml]\n")
+    result = aloft.load(path, {"robot.seed": 8}).run(log=False)
+    assert result.metrics["robot_mass_kg"] != pytest.approx(5.118, abs=1e-3)
+    assert result.success, result.reason
+
+
+def test_another_solver_jumps_too():
+    result = aloft.load(JUMP, {"wbc.solver": "quadprog"}).run(log=False)
+    assert result.success, result.reason
+
+
+def test_without_the_plan_for_angular_momentum_it_falls():
+    """The paper's order of priorities, torso before angular momentum, spins the robot over."""
+    gains = {"torso_weight": [10.0] * 3, "angular_weight": [1.0] * 3}
+    result = aloft.load(JUMP, {"wbc.thrust": gains}).run(log=False)
+    assert not result.success
