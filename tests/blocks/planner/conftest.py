@@ -15,6 +15,8 @@ from aloft.blocks.squat_jump import SquatJumpTask, plan_squat_jump
 from aloft.blocks.squat_jump_reference import SquatJumpReference
 from aloft.runtime.description import find_robot
 
+RISE = 0.085
+"""m"""
 EVERY = 5
 """Knots every so many rows of the table, 10 ms."""
 
@@ -23,11 +25,13 @@ def squat_jump_plan() -> JumpPlan:
     """The squat jump as a plan. Its feet hit the ground with the speed of the fall."""
     robot = find_robot("bruce")
     dynamics = ExactDynamics(robot, "koala")
-    wanted = SquatJumpReference.Params()
     names = set(SquatJumpTask.__dataclass_fields__)
-    jump = SquatJumpTask(**{k: v for k, v in wanted.model_dump().items() if k in names})
+    defaults = {k: v for k, v in SquatJumpReference.Params().model_dump().items() if k in names}
+    jump = SquatJumpTask(
+        **defaults | {"rise": RISE, "touchdown_pitch": 0.0, "stand_time": 0.1, "pause_time": 0.05}
+    )
     table = plan_squat_jump(build_pinocchio_model(robot), robot, jump, "koala")
-    breaks = np.flatnonzero(np.diff(table.time) == 0.0).tolist()
+    breaks = np.flatnonzero(np.diff(table.time) < 1e-9).tolist()
     ends = [0, *[k + 1 for k in breaks], len(table.time)]
     rows = []
     for first, last in pairwise(ends):
@@ -39,6 +43,7 @@ def squat_jump_plan() -> JumpPlan:
         if k not in breaks or np.isclose(table.time[k], table.touchdown_time, atol=1e-9)
     ]
     time, columns = table.time[keep], {name: c[keep] for name, c in table.columns.items()}
+    time = np.round(time, 12)
     count, pin = len(time), dynamics.pin
     position, velocity = np.zeros((count, 17)), np.zeros((count, 16))
     for k in range(count):
@@ -61,7 +66,7 @@ def squat_jump_plan() -> JumpPlan:
     contact = np.repeat((phase != Phase.FLIGHT)[:, None], 4, axis=1)
     states = [dynamics.centroidal(q, v) for q, v in zip(position, velocity, strict=True)]
     plan = JumpPlan(
-        task=make_task({"name": "by_hand", "rise": wanted.rise, "impact": True}),
+        task=make_task({"name": "by_hand", "rise": RISE, "impact": True}),
         time=time,
         position=position,
         velocity=velocity,
