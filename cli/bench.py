@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..runtime.errors import AloftError, ExitCode
+from .completion import benchmark_names
 from .output import console, errors_reported, number, print_json, say, table
 
 if TYPE_CHECKING:
@@ -15,7 +16,9 @@ if TYPE_CHECKING:
 
 
 def bench(
-    name: Annotated[str, typer.Argument(help="One benchmark; by default all.")] = "",
+    name: Annotated[
+        str, typer.Argument(help="One benchmark; by default all.", autocompletion=benchmark_names)
+    ] = "",
     as_json: Annotated[bool, typer.Option("--json", help="End with one JSON object.")] = False,
 ) -> None:
     """Measure the runtime beside hand-written loops and peers; exit with 1 if a goal is missed."""

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from .completion import block_names
 from .output import console, errors_reported, print_json, table
 
 if TYPE_CHECKING:
@@ -16,7 +17,9 @@ if TYPE_CHECKING:
 
 
 def blocks(
-    name: Annotated[str, typer.Argument(help="One block, e.g. blocks.JointPD.")] = "",
+    name: Annotated[
+        str, typer.Argument(help="One block, e.g. blocks.JointPD.", autocompletion=block_names)
+    ] = "",
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
     markdown: Annotated[
         bool, typer.Option(help="Print the reference of ours as Markdown.")

@@ -7,14 +7,15 @@ from typing import Annotated
 
 import typer
 
-from .output import errors_reported, print_json
+from .completion import parameter_names
+from .output import SET_HELP, errors_reported, print_json
 
 
 def check(
     graph: Annotated[Path | None, typer.Argument(help="The graph file.")] = None,
     overrides: Annotated[
         list[str] | None,
-        typer.Option("--set", help="Set a parameter: block.parameter=value. Repeatable."),
+        typer.Option("--set", help=SET_HELP, autocompletion=parameter_names),
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
     schema: Annotated[

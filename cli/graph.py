@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from ..runtime.errors import AloftError
-from .output import console, errors_reported, print_json, say, table
+from .completion import parameter_names
+from .output import SET_HELP, console, errors_reported, print_json, say, table
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -20,7 +21,7 @@ def graph(
     graph: Annotated[Path, typer.Argument(help="The graph file.")],
     overrides: Annotated[
         list[str] | None,
-        typer.Option("--set", help="Set a parameter: block.parameter=value. Repeatable."),
+        typer.Option("--set", help=SET_HELP, autocompletion=parameter_names),
     ] = None,
     as_table: Annotated[bool, typer.Option("--table", help="As a table (the default).")] = False,
     mermaid: Annotated[bool, typer.Option("--mermaid", help="As a Mermaid diagram.")] = False,

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from rich.table import Table
 
 
+SET_HELP = "Set a parameter: block.parameter=value. Repeatable."
 WIDE = 200
 
 

@@ -9,7 +9,17 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..runtime.errors import ExitCode
-from .output import console, errors_reported, number, print_json, print_warning, say, table
+from .completion import parameter_names
+from .output import (
+    SET_HELP,
+    console,
+    errors_reported,
+    number,
+    print_json,
+    print_warning,
+    say,
+    table,
+)
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -25,7 +35,7 @@ def run(
     graph: Annotated[Path, typer.Argument(help="The graph file.")],
     overrides: Annotated[
         list[str] | None,
-        typer.Option("--set", help="Set a parameter: block.parameter=value. Repeatable."),
+        typer.Option("--set", help=SET_HELP, autocompletion=parameter_names),
     ] = None,
     seeds: Annotated[
         str, typer.Option(help="Run once a seed: 0:20 or 1,5,7. Sets every parameter 'seed'.")

@@ -3,6 +3,7 @@
 import io
 import json
 import os
+import resource
 import signal
 import subprocess
 import sys
@@ -15,6 +16,8 @@ import pytest
 
 import aloft.benchmarks
 from aloft.cli import main
+
+ROOT = Path(__file__).parent.parent
 
 COUNTER = '''
 """Blocks for tests of the command line."""
@@ -362,6 +365,22 @@ def test_bench_prints_rows_and_exits_by_the_goals(monkeypatch: pytest.MonkeyPatc
         assert "abacus" in text
 
 
+def complete(words: str) -> list[str]:
+    """What bash would be offered behind these words."""
+    position = str(len(words.split(" ")) - 1)
+    process = start(_ALOFT_COMPLETE="complete_bash", COMP_WORDS=words, COMP_CWORD=position,
+                    before="import sys; sys.argv = ['aloft']")  # fmt: skip
+    return process.communicate(timeout=60)[0].split()
+
+
+def test_the_tab_key_completes(folder: Path) -> None:
+    assert complete("aloft r") == ["run"]
+    assert "--seeds" in complete("aloft run --se")
+    assert complete("aloft blocks runtime.Ga") == ["runtime.Gain"]
+    assert complete("aloft run count.yaml --set counter.s") == ["counter.seed=", "counter.stop_at="]
+    assert complete("aloft run nowhere.yaml --set counter.s") == []
+
+
 def test_help_documents_the_exit_codes() -> None:
     for arguments in (("--help",), ("run", "--help")):
         text = call(*arguments).stdout
@@ -370,12 +389,14 @@ def test_help_documents_the_exit_codes() -> None:
     assert call("--version").stdout.startswith("aloft ")
 
 
-def test_check_answers_at_once(folder: Path) -> None:
-    # the promise is half a second; the best of three, as this machine may have other work
+def test_check_answers_at_once() -> None:
+    # The promise is half a second. Processor time, as other tests run beside this one, and the
+    # best of three.
     times = []
     for _ in range(3):
-        began = time.perf_counter()
-        output, _ = start("check", "count.yaml").communicate(timeout=60)
-        times.append(time.perf_counter() - began)
+        before = resource.getrusage(resource.RUSAGE_CHILDREN)
+        output, _ = start("check", str(ROOT / "graphs" / "jump.yaml")).communicate(timeout=60)
+        after = resource.getrusage(resource.RUSAGE_CHILDREN)
+        times.append(after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime)
         assert "no problems" in output
-    assert min(times) < 1.0
+    assert min(times) < 0.75
