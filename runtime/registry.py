@@ -107,7 +107,7 @@ def block_name(block_type: type[Block]) -> str:
     package = module.removeprefix(f"{_OURS}.").partition(".")[0]
     if module.startswith(f"{_OURS}.") and package in PACKAGES:
         return f"{package}.{block_type.__name__}"
-    return f"{module}:{block_type.__name__}"
+    return f"{module.partition('@')[0]}:{block_type.__name__}"
 
 
 def find_block(name: str, folder: Path | None = None) -> type[Block]:
@@ -156,17 +156,29 @@ def _user_module(module_name: str, folder: Path | None, name: str) -> ModuleType
     if file is None:
         return _import(module_name)
     present = sys.modules.get(module_name)
-    if present is None:
+    if present is None and folder is not None:
         # At the end, so that a file beside a graph never hides an installed package from others.
-        top = str(folder.resolve()) if folder is not None else ""
-        if top not in sys.path:
-            sys.path.append(top)
-        importlib.invalidate_caches()
-        if importlib.util.find_spec(module_name.partition(".")[0]) is not None:
-            present = _import(module_name)
+        if str(folder.resolve()) not in sys.path:
+            sys.path.append(str(folder.resolve()))
+            importlib.invalidate_caches()
+        if _is_importable(module_name.partition(".")[0], folder.resolve()):
+            return _import(module_name)
     if present is not None and _same_file(present, file):
         return present
     return _import_file(f"{module_name}@{file.parent}", file)
+
+
+def _is_importable(top: str, folder: Path) -> bool:
+    """Whether importing ``top`` gives the module or package in that folder, and no other."""
+    try:
+        spec = importlib.util.find_spec(top)
+    except ValueError:  # a module without a spec, such as __main__
+        return False
+    if spec is None:
+        return False
+    places = [*(spec.submodule_search_locations or ()), spec.origin or ""]
+    ours = (folder / top, folder / f"{top}.py")
+    return any(Path(place).resolve() in ours for place in places if place)
 
 
 def _same_file(module: ModuleType, file: Path) -> bool:

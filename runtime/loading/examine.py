@@ -163,6 +163,8 @@ def _read_values(
 
 
 def _machines(drafts: Mapping[str, Draft]) -> list[ScheduleBlock]:
+    """What ordering needs; wires whose ends do not exist are left out."""
+    outputs = {f"{path}.{name}" for path, draft in drafts.items() for name in draft.outputs}
     return [
         ScheduleBlock(
             path,
@@ -170,7 +172,7 @@ def _machines(drafts: Mapping[str, Draft]) -> list[ScheduleBlock]:
             {
                 name: wire.source
                 for name, wire in draft.flat.wires.items()
-                if not wire.delay and wire.constant is None and name in draft.inputs
+                if not wire.delay and wire.source in outputs and name in draft.inputs
             },
         )
         for path, draft in drafts.items()

@@ -1,0 +1,215 @@
+"""The checked graph: rates, durations, dimensions, delays, constants, order."""
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from aloft.runtime.graph import Graph
+from aloft.runtime.loading import LoadError, check, load, load_text
+from aloft.runtime.stages import CheckedGraph, ClockSpec, Position
+
+PATH = Path("graph.yaml")
+
+
+def graph_of(blocks: str, head: str = "rate: 100 Hz") -> CheckedGraph:
+    return load_text(f"{head}\nblocks:\n{blocks}", PATH)
+
+
+def problems_of(blocks: str, head: str = "rate: 100 Hz") -> list[str]:
+    with pytest.raises(LoadError) as caught:
+        graph_of(blocks, head)
+    return [f"{p.code}: {p.message}" for p in caught.value.report.problems]
+
+
+CONSTANT = "  one: {use: runtime.Constant, with: {value: [1.0, 2.0]}}\n"
+
+
+@pytest.mark.parametrize(
+    ("rate", "hertz"),
+    [("500 Hz", 500.0), ("500", 500.0), ("1 kHz", 1000.0), ("1e3", 1000.0), ("2.5", 2.5)],
+)
+def test_rate(rate: str, hertz: float) -> None:
+    assert graph_of(CONSTANT, f"rate: {rate}").base_rate == hertz
+
+
+@pytest.mark.parametrize(
+    ("duration", "ticks"),
+    [("4 s", 400), ("250 ms", 25), ("0.29", 29), ("1e-9", 1), ("2 min", 12000)],
+)
+def test_duration_in_ticks(duration: str, ticks: int) -> None:
+    assert graph_of(CONSTANT, f"rate: 100\nduration: {duration}").ticks == ticks
+
+
+def test_a_graph_without_a_duration_runs_until_stopped() -> None:
+    assert graph_of(CONSTANT).ticks is None
+
+
+def test_clock() -> None:
+    assert graph_of(CONSTANT).clock == ClockSpec()
+    head = "rate: 1\nclock: {kind: paced, overrun: stop, stop_after: 3}"
+    assert graph_of(CONSTANT, head).clock == ClockSpec("paced", "stop", 3)
+
+
+@pytest.mark.parametrize(
+    ("rate", "offset", "period"), [("100", 0, 1), ("50 Hz", 1, 2), ("33.3333333333 Hz", 2, 3)]
+)
+def test_block_rates(rate: str, offset: int, period: int) -> None:
+    graph = graph_of(
+        f"  one: {{use: runtime.Constant, with: {{value: [1]}}, rate: {rate}, offset: {offset}}}"
+    )
+    assert (graph.block("one").period_ticks, graph.block("one").offset_ticks) == (period, offset)
+
+
+def test_dimensions_of_robot_graph_and_block() -> None:
+    graph = graph_of(
+        "  one: {use: runtime.Gain, with: {n: 3}, in: {u: two.y}}\n"
+        "  two: {use: runtime.Constant, with: {value: [1, 2, 3]}}\n",
+        "rate: 1\nrobot: bruce\ndimensions: {n: 7, m: 5}",
+    )
+    assert graph.robot is not None and graph.robot.name == "bruce"
+    sizes = graph.block("one").dimensions
+    assert (sizes["n"], sizes["m"], sizes["n_joints"]) == (3, 5, 10)
+
+
+def test_a_robot_from_a_file_beside_the_graph(tmp_path: Path) -> None:
+    shipped = Path(__file__).parents[3] / "hal" / "bruce" / "bruce.yaml"
+    (tmp_path / "mine.yaml").write_text(shipped.read_text().replace("name: bruce", "name: mine", 1))
+    (tmp_path / "graph.yaml").write_text(f"rate: 1\nrobot: mine.yaml\nblocks:\n{CONSTANT}")
+    graph = load(tmp_path / "graph.yaml")
+    assert graph.robot is not None and graph.robot.name == "mine"
+
+
+@pytest.mark.parametrize("text", ["links: 3", "- 1", "[", "\x00"])
+def test_a_broken_robot_is_a_problem(tmp_path: Path, text: str) -> None:
+    (tmp_path / "mine.yaml").write_text(text)
+    (tmp_path / "graph.yaml").write_text(f"rate: 1\nrobot: mine.yaml\nblocks:\n{CONSTANT}")
+    (problem,) = check(tmp_path / "graph.yaml").problems
+    assert (problem.code, problem.where.line) == ("robot", 2)
+    assert "mine.yaml" in problem.message
+
+
+def test_a_delayed_wire_becomes_a_block_of_its_own() -> None:
+    graph = graph_of(
+        "  one: {use: runtime.SineWave, with: {n: 2}, rate: 50 Hz, offset: 1}\n"
+        "  gain:\n"
+        "    use: runtime.Gain\n"
+        "    with: {n: 2}\n"
+        "    in: {u: {from: one.y, delay: 3, initial: {value: [4, 5]}}}\n"
+    )
+    assert [block.path for block in graph.blocks] == ["one", "gain/u~delay", "gain"]
+    delay = graph.block("gain/u~delay")
+    assert delay.block_type.is_moore()
+    assert delay.wires["u"].source == "one.y"
+    assert (delay.period_ticks, delay.offset_ticks) == (2, 1)
+    assert delay.params.initial == {"value": [4, 5]}  # type: ignore[attr-defined]
+    wire = graph.block("gain").wires["u"]
+    assert (wire.source, wire.delay, wire.initial) == ("gain/u~delay.y", 3, {"value": [4, 5]})
+    assert wire.where == Position("graph.yaml", 7, 20)
+
+
+def test_a_ring_with_a_delay_runs() -> None:
+    graph = graph_of(
+        "  step: {use: runtime.Constant, with: {value: [1.0]}}\n"
+        "  sum: {use: runtime.Sum, in: {a: step.y, b: {from: sum.y, delay: 1}}}\n",
+        "rate: 10\nduration: 0.5",
+    )
+    values = Graph(graph).run().signal("sum.y.value")
+    assert values[:, 0].tolist() == [1.0, 2.0, 3.0, 4.0, 5.0]
+
+
+def test_a_constant_in_place_of_a_source_with_units(tmp_path: Path) -> None:
+    (tmp_path / "heights.py").write_text(
+        "from aloft.runtime.block import Block, Input, Output\n"
+        "from aloft.runtime.signals import Field, Signal\n"
+        "class Height(Signal):\n"
+        "    height = Field(unit='m')\n"
+        "    others = Field(2, unit='m')\n"
+        "class Relay(Block):\n"
+        "    u = Input(Height)\n"
+        "    y = Output(Height)\n"
+        "    def step(self):\n"
+        "        self.y.height[...] = self.u.height\n"
+        "        self.y.others[...] = self.u.others\n"
+    )
+    (tmp_path / "graph.yaml").write_text(
+        "rate: 1\nduration: 1\nblocks:\n"
+        "  a: {use: heights:Relay, in: {u: {value: {height: 12 cm}}}}\n"
+        "  b: {use: heights:Relay, in: {u: {value: {others: [1 mm, 2]}}}}\n"
+    )
+    result = Graph(load(tmp_path / "graph.yaml")).run()
+    assert result.signal("a.y.height")[0] == 0.12
+    assert result.signal("a.y.others")[0].tolist() == [0.0, 0.0]
+    assert result.signal("b.y.others")[0].tolist() == [0.001, 2.0]
+
+
+def test_order_is_the_schedules() -> None:
+    graph = graph_of(
+        "  last: {use: runtime.Gain, with: {n: 2}, in: {u: middle.y}}\n"
+        "  middle: {use: runtime.Gain, with: {n: 2}, in: {u: one.y}}\n" + CONSTANT
+    )
+    assert graph.order == ("one", "middle", "last")
+
+
+def test_text_numbers_and_truth_words() -> None:
+    graph = graph_of("  s: {use: runtime.SineWave, with: {frequency: 1e-3, phase: 180 deg}}")
+    params: Any = graph.block("s").params
+    assert params.frequency == 0.001
+    assert params.phase == pytest.approx(3.14159265358979)
+
+
+def test_follow_ups_of_one_mistake_are_left_out() -> None:
+    # no such block: nothing more about its ports, parameters or readers
+    blocks = "  one: {use: runtime.Nothing, with: {a: 1}, in: {b: two.c}}\n"
+    blocks += "  gain: {use: runtime.Gain, in: {u: one.y}}\n"
+    assert problems_of(blocks) == ["unknown-block: there is no block called 'runtime.Nothing'"]
+    # no robot: nothing about the dimensions it would have given
+    blocks = "  j: {use: blocks.JointPD}\n"
+    codes = [p.partition(":")[0] for p in problems_of(blocks, "rate: 1\nrobot: brute")]
+    assert codes[0] == "robot" and "dimension" not in codes
+
+
+def test_bad_parameters_do_not_hide_bad_wires() -> None:
+    found = problems_of("  gain: {use: runtime.Gain, with: {n: 0}, in: {u: gain.x}}")
+    assert [p.partition(":")[0] for p in found] == ["bad-parameter", "unknown-source"]
+
+
+def test_a_crash_in_a_users_own_check_is_a_problem(tmp_path: Path) -> None:
+    (tmp_path / "crashes.py").write_text(
+        "from aloft.runtime.block import Block, Output\n"
+        "from aloft.runtime.parameters import Parameters\n"
+        "from aloft.runtime.primitives import Vector\n"
+        "from pydantic import model_validator\n"
+        "class Validator(Block):\n"
+        "    class Params(Parameters):\n"
+        "        n: int = 1\n"
+        "        @model_validator(mode='after')\n"
+        "        def check(self):\n"
+        "            return {}['key']\n"
+        "    y = Output(Vector)\n"
+        "    def step(self): pass\n"
+        "class Dimensions(Block):\n"
+        "    y = Output(Vector)\n"
+        "    def step(self): pass\n"
+        "    @classmethod\n"
+        "    def local_dimensions(cls, params, robot):\n"
+        "        return {'n': robot.legs}\n"
+    )
+    (tmp_path / "graph.yaml").write_text(
+        "rate: 1\nblocks:\n  a: {use: crashes:Validator}\n  b: {use: crashes:Dimensions}\n"
+    )
+    found = [
+        f"{p.where.line} {p.code}: {p.message}" for p in check(tmp_path / "graph.yaml").problems
+    ]
+    assert found == [
+        "3 block-declaration: checking the parameters of a failed: KeyError: 'key'",
+        "4 dimension: the dimensions of b cannot be told: AttributeError: 'NoneType' object "
+        + "has no attribute 'legs'",
+    ]
+
+
+def test_a_missing_file_and_a_folder_are_problems(tmp_path: Path) -> None:
+    assert [p.code for p in check(tmp_path / "nowhere.yaml").problems] == ["file"]
+    assert [p.code for p in check(tmp_path).problems] == ["file"]
+    (tmp_path / "latin.yaml").write_bytes(b"rate: \xe9")
+    assert "not UTF-8" in check(tmp_path / "latin.yaml").problems[0].message

@@ -1,0 +1,88 @@
+"""The JSON Schema for editors: it takes what loads, and refuses what an editor should mark."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+from jsonschema import Draft7Validator
+
+from aloft.runtime.loading import graph_schema, schema_text
+from aloft.runtime.loading.document import read_file, read_value
+from aloft.runtime.loading.nodes import plain
+from aloft.runtime.loading.problems import Problems
+
+ROOT = Path(__file__).parents[3]
+SHIPPED = sorted((ROOT / "graphs").rglob("*.yaml"))
+
+
+@pytest.fixture(scope="module")
+def validator() -> Draft7Validator:
+    schema = graph_schema()
+    Draft7Validator.check_schema(schema)
+    return Draft7Validator(schema)
+
+
+def errors(validator: Draft7Validator, text: str) -> list[str]:
+    data: Any = plain(read_value(text, "f", Problems()))  # type: ignore[arg-type]
+    return sorted("/".join(map(str, e.absolute_path)) for e in validator.iter_errors(data))
+
+
+@pytest.mark.parametrize("path", SHIPPED, ids=lambda p: p.relative_to(ROOT).as_posix())
+def test_shipped_graphs_are_valid(validator: Draft7Validator, path: Path) -> None:
+    problems = Problems()
+    tree = read_file(path, str(path), problems)
+    assert tree is not None
+    assert [e.message for e in validator.iter_errors(plain(tree))] == []
+
+
+GOOD = """
+rate: 500 Hz
+duration: 4 s
+_x: 3
+clock: {kind: paced}
+include: a.yaml
+blocks:
+  _t: {}
+  wave: {use: runtime.SineWave, with: {frequency: 2 Hz, n: 3, phase: $phase}, rate: 250 Hz}
+  gain: {use: runtime.Gain, with: {n: 3}, in: {u: {from: wave.y, delay: 1, initial: {value: 0}}}}
+  mine: {use: my_module:Block, with: {anything: 1}, in: {whatever: left/leg.y}}
+  leg: {use: leg.yaml, in: {x: inputs.x}}
+  sum: {use: runtime.Sum, in: {a: {value: {value: 1.0}}}}
+wires: {gain.u: wave.y}
+set: {gain.gain: 3}
+"""
+
+
+def test_a_good_graph(validator: Draft7Validator) -> None:
+    assert errors(validator, GOOD) == []
+
+
+@pytest.mark.parametrize(
+    ("text", "places"),
+    [
+        ("raet: 3", [""]),
+        ("rate: -3", ["rate"]),
+        ("clock: {kind: fast}", ["clock/kind"]),
+        ("blocks: {a: {}}", ["blocks/a"]),
+        ("blocks: {a: {use: runtime.Gian}}", ["blocks/a/use"]),
+        ("blocks: {a: {use: runtime.Gain, with: {gian: 3}}}", ["blocks/a/with"]),
+        ("blocks: {a: {use: runtime.Gain, with: {n: 0}}}", ["blocks/a/with/n"]),
+        ("blocks: {a: {use: runtime.Gain, in: {v: b.y}}}", ["blocks/a/in"]),
+        ("blocks: {a: {use: runtime.Gain, in: {u: by}}}", ["blocks/a/in/u"]),
+        ("blocks: {a: {use: runtime.Gain, in: {u: {from: b.y, delay: 0}}}}", ["blocks/a/in/u"]),
+        ("set: {gain: 3}", ["set"]),
+    ],
+)
+def test_wrong_graphs(validator: Draft7Validator, text: str, places: list[str]) -> None:
+    assert sorted(dict.fromkeys(errors(validator, text))) == places
+
+
+def test_every_block_is_described(validator: Draft7Validator) -> None:
+    schema = json.loads(schema_text())
+    gain = schema["definitions"]["runtime.Gain"]
+    assert gain["description"] == "The input times a constant: y = gain u."
+    assert gain["properties"]["with"]["properties"]["gain"]["description"] == "the factor"
+    assert gain["properties"]["in"]["properties"]["u"]["description"] == "Vector: what is scaled"
+    frequency = schema["definitions"]["runtime.SineWave"]["properties"]["with"]["properties"]
+    assert frequency["frequency"]["description"] == "oscillations per second [Hz]"
