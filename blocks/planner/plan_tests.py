@@ -177,6 +177,19 @@ def interval_defects(e: Evidence) -> Iterator[Found]:
                     f"from {e.plan.time[k]:.3f} s")  # fmt: skip
 
 
+def discretisation(e: Evidence) -> Iterator[Found]:
+    """The planner's own equations, of the formulation that is built on them."""
+    if e.plan.task.formulation != "full":
+        return
+    gap, wrench = e.replay.gap, e.replay.wrench
+    for name, found, limit, unit, text in (
+        ("violation", gap, 1e-6, "m or rad", "what the states miss of a constant acceleration"),
+        ("force_balance", wrench, 1e-3, "N or N m", "what forces miss in an interval's middle"),
+    ):
+        k = int(found.argmax())
+        yield Found(name, found[k], limit, unit, text, f"from {e.plan.time[k]:.3f} s")
+
+
 def flight(e: Evidence) -> Iterator[Found]:
     """The whole flight by exact dynamics ends where the plan says."""
     position, rotation = e.replay.flight_error
@@ -306,7 +319,7 @@ def clearances(e: Evidence) -> Iterator[Found]:
 
 
 PLAN_TESTS: tuple[Callable[[Evidence], Iterator[Found]], ...] = (
-    start_and_end, states, interval_defects, flight, task_done, contacts, touchdown, machine,
+    start_and_end, states, interval_defects, discretisation, flight, task_done, contacts, touchdown, machine,
     clearances,
 )  # fmt: skip
 """All tests, in the order of the report."""

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from ...runtime.description import RobotDescription
 from ..signals import Phase
 from .exact_dynamics import ExactDynamics, joint_motion, rotation_between
+from .midpoint import midpoint_residuals
 from .plan import JumpPlan
 
 Array = NDArray[np.float64]
@@ -49,6 +50,7 @@ class Replay:
         samples: knots, middles of stance intervals and every step of the flight.
         defect: per interval how far exact dynamics from one knot misses the next: base position
             [m], rotation [rad], linear [m/s] and angular velocity [rad/s] of the base, (N-1, 4).
+        gap, wrench: what is left over of the planner's own equations, see ``midpoint``, (N-1,).
         flight_error: base position [m] and rotation [rad] missed at touchdown.
         com, com_velocity, angular_momentum: at the knots, by Pinocchio.
         soles, heading: sole centres [m] (N, n_feet, 3) and unwrapped headings [rad] (N, n_feet).
@@ -57,6 +59,8 @@ class Replay:
 
     samples: Samples
     defect: Array
+    gap: Array
+    wrench: Array
     flight_error: tuple[float, float]
     com: Array
     com_velocity: Array
@@ -77,12 +81,13 @@ def replay(plan: JumpPlan, robot: RobotDescription) -> Replay:
     lift_off, touchdown = flight_knots(plan)
     flight, flight_error = _fly(plan, dynamics, lift_off, touchdown)
     defect = np.array([_interval_defect(plan, dynamics, k) for k in range(len(plan.time) - 1)])
+    gap, wrench = midpoint_residuals(plan, dynamics)
     samples = _sample(plan, dynamics, flight)
     states = [dynamics.centroidal(q, v) for q, v in zip(plan.position, plan.velocity, strict=True)]
     placed = [dynamics.soles(q) for q in plan.position]
     turns = np.array([turn for _, turn in placed])
     return Replay(
-        samples, defect, flight_error,
+        samples, defect, gap, wrench, flight_error,
         np.array([s[0] for s in states]),
         np.array([s[1] for s in states]),
         np.array([s[2] for s in states]),

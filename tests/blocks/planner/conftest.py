@@ -66,7 +66,7 @@ def squat_jump_plan() -> JumpPlan:
     contact = np.repeat((phase != Phase.FLIGHT)[:, None], 4, axis=1)
     states = [dynamics.centroidal(q, v) for q, v in zip(position, velocity, strict=True)]
     plan = JumpPlan(
-        task=make_task({"name": "by_hand", "rise": RISE, "impact": True}),
+        task=make_task({"name": "by_hand", "formulation": "srbm", "rise": RISE, "impact": True}),
         time=time,
         position=position,
         velocity=velocity,

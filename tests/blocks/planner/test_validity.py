@@ -95,6 +95,8 @@ CHANGES: dict[str, Callable[[JumpPlan], JumpPlan]] = {
     "position_defect": in_flight("position", 0.01, 2),
     "rotation_defect": in_flight("velocity", 3.0, 4),
     "velocity_defect": in_flight("velocity", 0.2, 1),
+    "violation": asked(formulation="full"),
+    "force_balance": asked(formulation="full"),
     "flight_position": at_lift_off("velocity", 0.1, 1),
     "flight_rotation": at_lift_off("velocity", 0.2, 4),
     "flight_times": flying_later,
