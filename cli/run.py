@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from ..runtime.errors import ExitCode
+from ..runtime.errors import AloftError, ExitCode
 from .completion import parameter_names
 from .output import (
     SET_HELP,
@@ -58,6 +58,8 @@ def run(
     settings = [*(overrides or []), *([f"duration={duration}"] if duration else [])]
     out = console(to_stderr=as_json, quiet=quiet)
     with errors_reported(as_json):
+        if seeds and record is not None:
+            raise AloftError("--record is for one run; with --seeds nothing is recorded")
         if seeds:
             code = run_many(graph, settings, parse_seeds(seeds), out, as_json)
         else:

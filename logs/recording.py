@@ -128,6 +128,7 @@ def describe(graph: CheckedGraph, result: RunResult) -> dict[str, str]:
     }
     return {
         "name": graph.name,
+        "graph": graph.text,
         "base_rate_hz": repr(graph.base_rate),
         "overrides": json.dumps(dict(graph.overrides)),
         "seeds": json.dumps(seeds),

@@ -250,6 +250,13 @@ def test_seeds_need_a_parameter_called_seed(folder: Path) -> None:
     assert result["reason"] == "graph plain has no parameter called seed"
 
 
+def test_seeds_are_not_recorded(folder: Path) -> None:
+    result = call_json("run", "count.yaml", "--seeds", "0:2", "--record", "a.rrd", code=2)
+    assert result["reason"].startswith("--record is for one run")
+    call("run", "count.yaml", "--seeds", "0:2")
+    assert not (folder / "recordings").exists()
+
+
 def test_a_recording_that_cannot_be_written_is_a_warning(folder: Path) -> None:
     (folder / "file").write_text("")
     done = call("run", "count.yaml", "--record", "file/count.rrd")
