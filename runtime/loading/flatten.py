@@ -11,9 +11,9 @@ from .document import read_file, read_mapping
 from .files import FileTree, Stack
 from .flat import FlatBlock, FlatGraph, FlatWire
 from .links import Link, read_link
-from .nodes import Entry, MapNode, Node, ScalarNode, plain
+from .nodes import Entry, MapNode, Node, ScalarNode, plain, text_of
 from .overrides import Override, Overrides, read_overrides, read_sets
-from .problems import Code, Problems, listing, nearest
+from .problems import Code, Problems, instead, listing, nearest
 from .references import Bindings, report_unused
 from .subgraphs import Instance, Resolver
 from .written import WrittenBlock, WrittenGraph, read_graph, wrong_kind
@@ -313,7 +313,9 @@ class _Flattener:
                     expected=listing(declared),
                     found=entry.key,
                     nearest=similar,
-                    fix=similar[0] if similar else f"remove {entry.key!r}",
+                    fix=instead(entry.key, text_of(plain(entry.value)), entry.key_where, similar[0])
+                    if similar
+                    else f"remove {entry.key!r}",
                 )
         values: dict[str, Node] = {}
         complete = True

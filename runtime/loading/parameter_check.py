@@ -15,7 +15,7 @@ from ..stages import Position
 from ..units import parse_quantity
 from .flat import FlatBlock
 from .nodes import Entry, ListNode, MapNode, Node, ScalarNode, kind, plain, text_of
-from .problems import Code, Problems, listing, nearest
+from .problems import Code, Problems, instead, listing, nearest
 
 _WORDS: Mapping[str, str] = {
     "float": "a number",
@@ -117,7 +117,7 @@ def _report(
             near = nearest(entry.key, legal)
             mistakes[Code.UNKNOWN_PARAMETER, place] = _Mistake(
                 Code.UNKNOWN_PARAMETER, place, entry.key_where, None, entry.key,
-                [listing(legal)], [], near, near[0] if near else f"remove {entry.key!r}",
+                [listing(legal)], [], near, _right_name(entry, near),
             )  # fmt: skip
             continue
         where = node.where if steps and node is not None else _end(node, flat)
@@ -139,6 +139,12 @@ def _report(
         if mistake.code is Code.MISSING_PARAMETER and _is_meant(mistake, mistakes.values()):
             continue  # one mistake, one problem
         _add(flat, model, mistake, problems)
+
+
+def _right_name(entry: Entry, near: Sequence[str]) -> str:
+    if not near:
+        return f"remove {entry.key!r}"
+    return instead(entry.key, text_of(plain(entry.value)), entry.key_where, near[0])
 
 
 def _is_meant(missing: _Mistake, mistakes: Iterable[_Mistake]) -> bool:

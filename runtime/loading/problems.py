@@ -215,6 +215,14 @@ def nearest(name: str, legal: Iterable[str], count: int = 3) -> tuple[str, ...]:
     return tuple(lowered[match] for match in found)
 
 
+def instead(key: str, value: str, where: Position, right: str) -> str:
+    """What to paste for a misspelt key: the override again, or the key with its value."""
+    if not where.line:
+        start, dot, rest = where.file.rpartition(f".{key}")
+        return f"{start}.{right}{rest}" if dot else where.file
+    return f"{right}: {value if len(value) <= 60 else '...'}"
+
+
 def listing(names: Iterable[str], limit: int = 12) -> str:
     """Names in one line, cut off where there are many."""
     all_names = list(names)

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from ..stages import Position
 from .nodes import Entry, ListNode, MapNode, Node, ScalarNode, kind, plain, text_of
-from .problems import Code, Problems, listing, nearest
+from .problems import Code, Problems, instead, listing, nearest
 
 GRAPH_KEYS = ("rate", "duration", "robot", "dimensions", "clock")
 """Keys that only a graph that is run, or a file it includes, may have."""
@@ -115,7 +115,9 @@ def unknown_key(entry: Entry, legal: Iterable[str], of: str, problems: Problems)
         expected=listing(names),
         found=entry.key,
         nearest=similar,
-        fix=f"{similar[0]}: ..." if similar else f"remove {entry.key!r}",
+        fix=instead(entry.key, text_of(plain(entry.value)), entry.key_where, similar[0])
+        if similar
+        else f"remove {entry.key!r}",
     )
     return similar[0] if similar else ""
 
