@@ -36,7 +36,8 @@ class LegInverseKinematics(Block):
     the target's roll about the line is ignored. Positions are in closed form
     (``leg_kinematics.inverse``), exact where the leg reaches. Elsewhere the foot's pitch is given
     up first, then the distance, and every angle stays ``margin`` inside the joint limits; the
-    answer moves continuously. Velocities solve the 5 x 5 Jacobian by damped least squares::
+    answer moves continuously, and within ``softness`` of a full stretch the leg slows down. There
+    the foot is not quite where it should be, and ``reachable`` says so. Velocities solve the 5 x 5 Jacobian by damped least squares::
 
         q' = (A'A + damping^2 I)^-1 A'(p', u'),   u' = (u - u_last) / period
 
@@ -49,9 +50,13 @@ class LegInverseKinematics(Block):
     """
 
     class Params(Parameters):
-        margin: float = parameter(0.02, unit="rad", ge=0.0, le=0.2, text="kept from joint limits")
+        margin: float = parameter(0.05, unit="rad", ge=0.0, le=0.2, text="kept from joint limits")
         damping: float = parameter(3e-4, unit="m", gt=0.0, text="of the least squares for velocity")
         speed_limit: float = parameter(30.0, unit="rad/s", gt=0.0, text="largest joint velocity")
+
+        softness: float = parameter(
+            0.005, unit="m", ge=0.0, le=0.05, text="over which a stretching leg slows down"
+        )
 
     params: Params
 
@@ -89,14 +94,16 @@ class LegInverseKinematics(Block):
         limit = self.params.speed_limit
         for foot, leg in enumerate(self._legs):
             wanted = feet.rotation[foot, :, 0]
-            target.reachable[foot] = inverse(
+            inside, share = inverse(
                 leg.hip, leg.plane, leg.signs, leg.limits, feet.position[foot], wanted,
-                float(self.joints.position[leg.joints[0]]), angles,
+                self.params.softness, float(self.joints.position[leg.joints[0]]), angles,
             )  # fmt: skip
+            target.reachable[foot] = inside
             forward(leg.hip, leg.plane, leg.signs, angles, self._sole, turn)
             jacobian(leg.plane, leg.signs, angles, self._jacobian)
             line_rate(wanted, lines.direction[foot], self.period, known, self._rate)
             np.clip(feet.velocity[foot], -_FASTEST, _FASTEST, out=self._velocity)
+            slow_stretch(leg.hip, leg.plane, self._sole, turn, share, self._velocity)
             inverse_velocity(
                 self._jacobian, turn, self._velocity, self._rate, self.params.damping,
                 self._rows, self._turns, self._normal, speeds,
@@ -107,6 +114,33 @@ class LegInverseKinematics(Block):
                 target.position[joint] = angle
                 target.velocity[joint] = 0.0 if held else min(max(speed, -limit), limit)
         lines.known[()] = True
+
+
+def slow_stretch(
+    hip: Array, plane: Array, sole: Array, rotation: Array, share: float, velocity: Array
+) -> None:
+    """Keep only a ``share`` of the velocity [m/s] that leads the ankle away from the hip.
+
+    Args:
+        hip, plane: of the ``Leg``.
+        sole, rotation: of the foot, from ``leg_kinematics.forward``.
+    """
+    if share == 1.0:
+        return
+    square, along = 1e-9, 0.0
+    for i in range(3):
+        lever = float(plane[2, 0]) * float(rotation[i, 0]) + float(plane[2, 1]) * float(
+            rotation[i, 2]
+        )
+        reach = float(sole[i]) - lever - float(hip[i])
+        square += reach * reach
+        along += reach * float(velocity[i])
+    scale = (1.0 - share) * along / square
+    for i in range(3):
+        lever = float(plane[2, 0]) * float(rotation[i, 0]) + float(plane[2, 1]) * float(
+            rotation[i, 2]
+        )
+        velocity[i] -= scale * (float(sole[i]) - lever - float(hip[i]))
 
 
 def line_rate(line: Array, last: Array, period: float, known: bool, out: Array) -> None:

@@ -164,25 +164,31 @@ def inverse(
     limits: Array,
     sole: Array,
     line: Array,
+    softness: float,
     present_yaw: float,
     out: Array,
-) -> bool:
+) -> tuple[bool, float]:
     """The joint angles (5,) that bring the sole centre to ``sole`` and its line along ``line``.
 
     The leg plane contains the hip, the sole and the line; in it the knee follows from the law of
     cosines and the ankle from the line's slope. What cannot be reached is given up in this order:
-    the line's slope (the ankle stays at its limit, the sole still exact), then the sole's distance
-    from the hip (its direction still exact), then what the hip's limits cut off.
+    the line's slope (the ankle stays at its limit, the sole still exact), then the distance from
+    the hip (of the ankle, or of the sole; its direction still exact), then what the hip's limits
+    cut off. The knee of a leg
+    that stretches at a steady speed becomes ever faster; within ``softness`` of the full length d
+    the distance therefore approaches it as d - softness exp(-(x - d + softness) / softness).
 
     Args:
         hip, plane, signs, limits: of the ``Leg``; limits with any margin already taken off.
         sole: where the sole centre should be [m, base frame].
         line: the direction from heel to toe [base frame], of any length.
+        softness: of the full stretch [m]; zero: none.
         present_yaw: the robot's angle to stay near where the hip is in gimbal lock [rad].
         out: the robot's angles [rad].
 
     Returns:
-        Whether the target is met without touching a limit.
+        Whether the target is met without touching a limit, and how much the foot moves away from
+        the hip per movement of the target: one, or less where the leg is stretched.
     """
     px = min(max(float(sole[0]) - float(hip[0]), -_FAR), _FAR)
     py = min(max(float(sole[1]) - float(hip[1]), -_FAR), _FAR)
@@ -202,25 +208,24 @@ def inverse(
     x, z = px * fx + py * fy + pz * fz, px * ux + py * uy + pz * uz
 
     # In the plane, with the ankle as the target: knee, thigh, then the ankle's own angle.
-    knee, thigh, near = _two_links(
+    knee, thigh, share, near = _two_links(
         float(plane[0, 0]), float(plane[0, 1]), float(plane[1, 0]), float(plane[1, 1]),
         x - float(plane[2, 0]), z - float(plane[2, 1]), float(signs[3]),
-        float(limits[3, 0]), float(limits[3, 1]),
+        float(limits[3, 0]), float(limits[3, 1]), softness,
     )  # fmt: skip
     ankle = wrap(-thigh - knee)
     sign = float(signs[4])
     held = min(max(ankle * sign, float(limits[4, 0])), float(limits[4, 1])) * sign
-    if held != ankle or not near:
+    if held != ankle:
         # The ankle keeps its angle, calf and foot become one link, the sole is the target.
-        near = near and held == ankle
-        ankle = held
+        ankle, exact = held, False
         cos_n, sin_n = math.cos(ankle), math.sin(ankle)
         sole_x, sole_z = float(plane[2, 0]), float(plane[2, 1])
-        knee, thigh, _ = _two_links(
+        knee, thigh, share, near = _two_links(
             float(plane[0, 0]), float(plane[0, 1]),
             float(plane[1, 0]) + cos_n * sole_x - sin_n * sole_z,
             float(plane[1, 1]) + sin_n * sole_x + cos_n * sole_z,
-            x, z, float(signs[3]), float(limits[3, 0]), float(limits[3, 1]),
+            x, z, float(signs[3]), float(limits[3, 0]), float(limits[3, 1]), softness,
         )  # fmt: skip
     cos_t, sin_t = math.cos(thigh), math.sin(thigh)
     xx, xy, xz = cos_t * fx + sin_t * ux, cos_t * fy + sin_t * uy, cos_t * fz + sin_t * uz
@@ -247,7 +252,7 @@ def inverse(
         lower, upper = float(limits[i, 0]), float(limits[i, 1])
         inside = inside and lower <= angle <= upper
         out[i] = min(max(angle, lower), upper)
-    return inside
+    return inside, share
 
 
 def inverse_velocity(
@@ -364,21 +369,31 @@ def _two_links(
     sign: float,
     lower: float,
     upper: float,
-) -> tuple[float, float, bool]:
+    softness: float,
+) -> tuple[float, float, float, bool]:
     """The knee's and the first link's angle that bring the end of two links to (x, z).
 
-    Of the two answers the one on the side of the middle of the robot's limits. Also returns
-    whether the distance is within what the limits allow.
+    Of the two answers the one on the side of the middle of the robot's limits. Also returns how
+    much the distance follows the target's, and whether the target is met.
     """
     first = math.sqrt(first_x * first_x + first_z * first_z)
     second = math.sqrt(second_x * second_x + second_z * second_z)
     straight = wrap(math.atan2(first_z, first_x) - math.atan2(second_z, second_x))
-    cosine = (x * x + z * z - first * first - second * second) / (2.0 * first * second)
+    straightest = min(max(straight * sign, lower), upper) * sign
+    bent = math.cos(straightest - straight)
+    farthest = math.sqrt(first * first + second * second + 2.0 * first * second * bent)
+    distance, share = math.sqrt(x * x + z * z), 1.0
+    if softness > 0.0 and distance > farthest - softness:
+        share = math.exp((farthest - softness - distance) / softness)
+        distance = farthest - softness * share
+    elif distance > farthest:
+        distance, share = farthest, 0.0
+    cosine = (distance * distance - first * first - second * second) / (2.0 * first * second)
     bend = math.acos(min(max(cosine, -1.0), 1.0))
     knee = straight + bend if 0.5 * (lower + upper) * sign > straight else straight - bend
     held = min(max(knee * sign, lower), upper) * sign
-    near = held == knee and -1.0 <= cosine <= 1.0
+    near = share == 1.0 and abs(held - knee) < 1e-9 and cosine <= 1.0
     cos_k, sin_k = math.cos(held), math.sin(held)
     end_x = first_x + cos_k * second_x - sin_k * second_z
     end_z = first_z + sin_k * second_x + cos_k * second_z
-    return held, math.atan2(z, x) - math.atan2(end_z, end_x), near
+    return held, math.atan2(z, x) - math.atan2(end_z, end_x), share, near

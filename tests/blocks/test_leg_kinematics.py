@@ -29,11 +29,11 @@ def forward(leg, angles):
     return position, rotation
 
 
-def inverse(leg, sole, line, present_yaw=0.0):
+def inverse(leg, sole, line, present_yaw=0.0, softness=0.0):
     out = np.full(5, np.nan)
-    inside = legs.inverse(
+    inside, _ = legs.inverse(
         leg.hip, leg.plane, leg.signs, leg.limits, np.asarray(sole), np.asarray(line),
-        present_yaw, out,
+        softness, present_yaw, out,
     )  # fmt: skip
     return out, inside
 
@@ -93,10 +93,11 @@ def test_inverse_in_gimbal_lock_is_still_exact():
     arrays(np.float64, 3, elements=any_number),
     arrays(np.float64, 3, elements=any_number),
     any_number,
+    st.sampled_from([0.0, 0.005]),
 )
-def test_anything_finite_gives_finite_angles_within_limits(side, sole, line, yaw):
+def test_anything_finite_gives_finite_angles_within_limits(side, sole, line, yaw, softness):
     leg = LEGS[side]
-    out, _ = inverse(leg, sole, line, yaw)
+    out, _ = inverse(leg, sole, line, yaw, softness)
     assert np.isfinite(out).all()
     assert (out >= leg.limits[:, 0]).all() and (out <= leg.limits[:, 1]).all()
 
@@ -108,7 +109,7 @@ def test_what_is_called_reachable_is_reached(side, offset):
     out, inside = inverse(leg, sole, [1.0, 0.0, 0.0])
     reached, rotation = forward(leg, out)
     error = max(np.abs(reached - sole).max(), np.abs(rotation[:, 0] - [1.0, 0.0, 0.0]).max())
-    assert error < 1e-9 if inside else error > 1e-12
+    assert not inside or error < 1e-9
 
 
 def test_too_far_points_the_stretched_leg_at_the_target():
@@ -116,11 +117,43 @@ def test_too_far_points_the_stretched_leg_at_the_target():
     target = leg.hip + np.array([0.1, -0.05, -0.5])
     out, inside = inverse(leg, target, [1.0, 0.0, 0.0])
     assert not inside
-    assert out[3] == leg.limits[3, 1]  # as straight as it may be
-    reached = forward(leg, out)[0] - leg.hip
-    wanted = target - leg.hip
-    assert np.linalg.norm(np.cross(reached, wanted)) < 1e-9
-    assert reached @ wanted > 0
+    assert out[3] == pytest.approx(leg.limits[3, 1])  # as straight as it may be
+    reached, rotation = forward(leg, out)
+    assert rotation[:, 0] == pytest.approx([1.0, 0.0, 0.0])
+    lever = rotation @ np.array([leg.plane[2, 0], 0.0, leg.plane[2, 1]])
+    wanted, found = target - lever - leg.hip, reached - lever - leg.hip
+    assert np.linalg.norm(np.cross(found, wanted)) < 1e-9
+    assert found @ wanted > 0
+
+
+def test_a_soft_stretch_slows_the_knee_and_says_by_how_much():
+    """The knee of a stretching leg becomes ever faster, up to where it stops at once; the soft one
+    does not, and its foot moves by the share that is returned."""
+    leg, step = LEGS[0], 1e-5
+    distances = np.arange(0.33, 0.345, step)
+    for softness, fastest in ((0.0, 1000.0), (0.005, 45.0)):
+        knees, reached, shares = [], [], []
+        for distance in distances:
+            out = np.empty(5)
+            target = (
+                leg.hip + leg.plane[2, 0] * np.array([1.0, 0.0, 0.0]) + [0, 0, -distance - 0.024]
+            )
+            inside, share = legs.inverse(
+                leg.hip, leg.plane, leg.signs, leg.limits, target, np.array([1.0, 0.0, 0.0]),
+                softness, 0.0, out,
+            )  # fmt: skip
+            assert inside == (share == 1.0)
+            knees.append(out[3])
+            reached.append(-forward(leg, out)[0][2])
+            shares.append(share)
+        gain = np.abs(np.diff(knees)) / step
+        assert gain.max() < fastest
+        assert softness > 0.0 or gain.max() > 300.0
+        followed = np.diff(reached) / step
+        middle = 0.5 * (np.array(shares[1:]) + np.array(shares[:-1]))
+        if softness:
+            assert np.abs(followed - middle).max() < 0.1
+            assert shares[-1] < 0.5
 
 
 def test_an_ankle_at_its_limit_gives_up_the_slope_and_keeps_the_sole():

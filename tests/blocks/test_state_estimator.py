@@ -47,9 +47,10 @@ class Motion:
         for leg, foot in zip(LEGS, self.feet(time), strict=True):
             out = np.empty(5)
             sole = matrix.T @ (foot - self.position(time))
-            assert leg_kinematics.inverse(
-                leg.hip, leg.plane, leg.signs, leg.limits, sole, matrix[0], 0.0, out
+            inside, _ = leg_kinematics.inverse(
+                leg.hip, leg.plane, leg.signs, leg.limits, sole, matrix[0], 0.0, 0.0, out
             )
+            assert inside
             joints[list(leg.joints)] = out
         return joints
 
