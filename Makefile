@@ -48,6 +48,7 @@ bench: $(READY)  ## run all benchmarks
 docs: $(READY)  ## make what is generated under docs/
 	@$(BIN)/aloft blocks --markdown > docs/blocks.md
 	@$(BIN)/python docs/refresh_excerpts.py
+	@$(BIN)/python docs/refresh_results.py
 	@$(BIN)/python docs/make_pictures.py
 
 clean:  ## remove all that these targets made

@@ -28,7 +28,7 @@ def bench(
     with errors_reported(as_json):
         if name and name not in BENCHMARKS:
             raise AloftError(f"there is no benchmark {name!r}; there is {', '.join(BENCHMARKS)}")
-        with out.status("measuring, about a minute"):
+        with out.status("measuring"):
             results = run_benchmarks([name] if name else None)
     if as_json:
         print_json(results)

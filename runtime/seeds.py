@@ -64,7 +64,7 @@ def run_seeds(path: Path, overrides: Sequence[str], seeds: Sequence[int]) -> Ite
     """
     graph = load(path, overrides)
     jobs = [(path, overrides_for(graph, overrides, seed), seed) for seed in seeds]
-    workers = min(len(seeds), os.cpu_count() or 1)
+    workers = min(len(seeds), processors())
     # Spawned, not forked: no state of this process reaches a run.
     context = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(workers, context, initializer=_leave_signals_to_parent) as pool:
@@ -73,6 +73,13 @@ def run_seeds(path: Path, overrides: Sequence[str], seeds: Sequence[int]) -> Ite
         except BaseException:
             pool.shutdown(wait=False, cancel_futures=True)
             raise
+
+
+def processors() -> int:
+    """How many processors this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
 
 
 def _leave_signals_to_parent() -> None:
