@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..runtime.block import Block, Input, Output, State
+from ..runtime.errors import BlockError
 from ..runtime.parameters import Parameters, parameter
 from ..runtime.signals import Field, Signal
 from .signals import ContactState, DynamicsTerms, JumpReference, Phase, PhaseState
@@ -45,7 +46,10 @@ class JumpPhase(Block):
     by the plan.
 
     Stance: before lift-off all points; in flight none; after touchdown every point that had
-    contact within the last ``contact_hold``, and if that leaves none, those of the tick before.
+    contact within the last ``contact_hold``, and those of the same foot that are less than
+    ``flat_height`` above the lowest of these; if that leaves none, those of the tick before. A
+    controller that may push with a heel a hair above the ground brings it down by doing so; one
+    that may not lets the robot teeter on its toes.
 
     The time to touchdown is the ballistic fall of the measured centre of mass to the height it is
     planned to touch down at: z + v s - g s^2 / 2 = z_td.
@@ -69,6 +73,9 @@ class JumpPhase(Block):
         contact_hold: float = parameter(
             0.0, unit="s", ge=0.0, text="how long a point stays in stance after its contact ends"
         )
+        flat_height: float = parameter(
+            0.006, unit="m", ge=0.0, text="how far a foot's other points may be from the ground"
+        )
         lost_contact: float = parameter(
             0.2, unit="s", gt=0.0, text="how long without contact before it is a fault"
         )
@@ -79,6 +86,12 @@ class JumpPhase(Block):
     terms = Input(DynamicsTerms, text="the present state")
     phase = Output(PhaseState, text="the phase, its times and the stance points")
     memory = State(PhaseMemory, text="the phase, its times, and contacts lately lost")
+
+    def setup(self) -> None:
+        robot = self.context.robot
+        if robot is None:
+            raise BlockError("JumpPhase needs a robot: name one in the graph, e.g. robot: bruce")
+        self._foot_of_point = np.array(robot.foot_of_contact())
 
     def start(self) -> None:
         self.memory.touchdown[()] = -1.0
@@ -110,7 +123,10 @@ class JumpPhase(Block):
             memory.began[()] = now
             if phase == Phase.LANDING:
                 memory.touchdown[()] = now
-        choose_stance(phase, unloaded, p.contact_hold, memory.stance)
+        choose_stance(
+            phase, unloaded, p.contact_hold, self.terms.contact_position, self._foot_of_point,
+            p.flat_height, memory.stance,
+        )  # fmt: skip
         out.phase[()] = phase
         out.time_in_phase[()] = now - float(memory.began)
         out.time_to_touchdown[()] = remaining if phase == Phase.FLIGHT else 0.0
@@ -186,18 +202,37 @@ def next_phase(
 
 
 def choose_stance(
-    phase: int, unloaded: NDArray[np.float64], hold: float, stance: NDArray[np.bool_]
+    phase: int,
+    unloaded: NDArray[np.float64],
+    hold: float,
+    position: NDArray[np.float64],
+    foot: NDArray[np.int64],
+    flat_height: float,
+    stance: NDArray[np.bool_],
 ) -> None:
-    """The points in stance, written over those of the tick before."""
+    """The points in stance, written over those of the tick before; see the block's text.
+
+    Args:
+        unloaded: how long each point has been without contact [s].
+        position: of the points [m, world], (n, 3).
+        foot: the foot of each point.
+    """
     if phase < Phase.FLIGHT:
         stance[:] = True
         return
     if phase == Phase.FLIGHT:
         stance[:] = False
         return
-    found = False
+    ground = math.inf
     for i in range(unloaded.shape[0]):
-        found = found or unloaded[i] <= hold
-    if found:
-        for i in range(unloaded.shape[0]):
-            stance[i] = unloaded[i] <= hold
+        if unloaded[i] <= hold:
+            ground = min(ground, float(position[i, 2]))
+    if ground == math.inf:
+        return
+    for i in range(unloaded.shape[0]):
+        stance[i] = unloaded[i] <= hold
+        if float(position[i, 2]) >= ground + flat_height:
+            continue
+        for j in range(unloaded.shape[0]):
+            if foot[j] == foot[i] and unloaded[j] <= hold:
+                stance[i] = True

@@ -49,8 +49,8 @@ class TaskGains(Parameters):
     stance_weight: float = parameter(1e3, ge=0.0, text="rest of the points in stance, per m/s^2")
     stance_damping: float = parameter(0.0, unit="1/s", ge=0.0, text="damps what they move")
     swing_weight: float = parameter(10.0, ge=0.0, text="unloaded points to the ground, per m/s^2")
-    swing_stiffness: float = parameter(400.0, unit="1/s^2", ge=0.0, text="of that")
-    swing_damping: float = parameter(40.0, unit="1/s", ge=0.0, text="of that")
+    swing_stiffness: float = parameter(3000.0, unit="1/s^2", ge=0.0, text="of that")
+    swing_damping: float = parameter(110.0, unit="1/s", ge=0.0, text="of that")
     linear_weight: Vector = parameter((100.0, 100.0, 100.0), text="centre of mass, per m/s^2")
     linear_stiffness: Vector = parameter((100.0, 100.0, 100.0), unit="1/s^2", text="K_p of it")
     linear_damping: Vector = parameter((20.0, 20.0, 20.0), unit="1/s", text="K_d of it")
@@ -110,7 +110,7 @@ class WholeBodyController(Block):
     not installed or an unknown actuator profile.
     """
 
-    array_allocations = 64
+    array_allocations = 12
     allocation_reason = "qpsolvers and the solver behind it return new arrays for every problem"
 
     class Params(Parameters):

@@ -136,7 +136,7 @@ def test_losing_the_ground_after_landing_is_a_fault():
 
 
 def test_stance_points():
-    bench = make(contact_hold=0.01)
+    bench = make(contact_hold=0.01, flat_height=0.0)
     run(bench, 0.4, active=[True, False, True, True])
     assert bench.get("phase").stance.tolist() == [True] * 4
     run(bench, LIFT_OFF)
@@ -170,3 +170,18 @@ def test_state_is_all_there_is():
     bench.restore(snapshot)
     bench.now = now
     assert run(bench, 0.6) == first
+
+
+def test_a_foot_that_is_nearly_flat_stands_as_a_whole():
+    bench = make(flat_height=0.005)
+    run(bench, LIFT_OFF)
+    run(bench, 0.7, active=False)
+    place = np.zeros((4, 3))
+    place[:, 2] = [0.1, 0.104, 0.1, 0.101]
+    bench.set("terms", contact_position=place)
+    run(bench, 0.71, active=[True, False, False, False])
+    assert bench.get("phase").stance.tolist() == [True, True, False, False]
+    place[1, 2] = 0.106
+    bench.set("terms", contact_position=place)
+    run(bench, 0.72, active=[True, False, False, True])
+    assert bench.get("phase").stance.tolist() == [True, False, True, True]
