@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from ..runtime.description import RobotDescription
 from ..runtime.errors import BlockError
+from .least_squares import solve_damped
 from .rotations import wrap
 
 Array = NDArray[np.float64]
@@ -290,38 +291,13 @@ def inverse_velocity(
             rows[i, j] = sole_jacobian[i, j]
         rows[3, j] = length * float(turns[2, j])
         rows[4, j] = length * float(turns[1, j])
-    np.dot(rows.T, rows, normal)
+    # With the task (velocity, length * turn, length * nod), whose product with the rows is:
     for j in range(5):
         value = length * (float(rows[3, j]) * turn + float(rows[4, j]) * nod)
         for i in range(3):
             value += float(rows[i, j]) * float(velocity[i])
         out[j] = value
-        normal[j, j] += damping * damping
-    solve_positive(normal, out)
-
-
-def solve_positive(matrix: Array, vector: Array) -> None:
-    """Solve a symmetric positive definite system in place: ``vector`` becomes the solution.
-
-    By LDL'; ``matrix`` is overwritten. A pivot that rounding has made not positive is skipped.
-    """
-    n = vector.shape[0]
-    for j in range(n):
-        pivot = float(matrix[j, j])
-        inverse_pivot = 1.0 / pivot if pivot > 1e-300 else 0.0
-        for i in range(j + 1, n):
-            factor = float(matrix[i, j]) * inverse_pivot
-            for k in range(j + 1, i + 1):
-                matrix[i, k] -= factor * float(matrix[k, j])
-            vector[i] -= factor * float(vector[j])
-        vector[j] *= inverse_pivot
-        for i in range(j + 1, n):
-            matrix[j, i] = float(matrix[i, j]) * inverse_pivot
-    for j in range(n - 2, -1, -1):
-        value = float(vector[j])
-        for i in range(j + 1, n):
-            value -= float(matrix[j, i]) * float(vector[i])
-        vector[j] = value
+    solve_damped(rows, damping, normal, out)
 
 
 def _canonical(signs: Array, angles: Array) -> tuple[float, float, float, float, float]:

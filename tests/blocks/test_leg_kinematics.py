@@ -220,15 +220,6 @@ def test_inverse_velocity_undoes_the_jacobian(side, fraction, rate):
     assert np.abs(out - rate).max() < 1e-5
 
 
-@given(arrays(np.float64, (5, 5), elements=st.floats(-1.0, 1.0)))
-def test_solve_positive(a):
-    matrix = a @ a.T + 0.1 * np.eye(5)
-    solution = np.arange(1.0, 6.0)
-    vector = matrix @ solution
-    legs.solve_positive(matrix.copy(), vector)
-    assert np.abs(vector - solution).max() < 1e-9
-
-
 def test_a_leg_of_another_kind_is_refused_by_name():
     axes = tuple(
         joint.model_copy(update={"axis": (0.0, 1.0, 0.0)}) if i == 2 else joint
