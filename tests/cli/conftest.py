@@ -1,0 +1,82 @@
+"""What the tests of the command line share: a folder to work in, and ways to call it."""
+
+import io
+import json
+import os
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable
+from contextlib import redirect_stderr, redirect_stdout
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from aloft.cli import main
+
+HERE = Path(__file__).parent
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder with a graph and its block, which is where commands run."""
+    for name in ("counter.py", "count.yaml"):
+        shutil.copy(HERE / name, tmp_path)
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def run_here(*arguments: str, code: int = 0) -> subprocess.CompletedProcess[str]:
+    """Run the command line in this process and check how it would leave."""
+    output, errors = io.StringIO(), io.StringIO()
+    with (
+        pytest.MonkeyPatch.context() as patch,
+        redirect_stdout(output),
+        redirect_stderr(errors),
+        pytest.raises(SystemExit) as left,
+    ):
+        patch.setattr(sys, "argv", ["aloft", *arguments])
+        patch.setenv("COLUMNS", "160")
+        main()
+    assert left.value.code == code, output.getvalue() + errors.getvalue()
+    return subprocess.CompletedProcess(arguments, code, output.getvalue(), errors.getvalue())
+
+
+def run_for_json(*arguments: str, code: int = 0) -> dict[str, Any]:
+    """As ``run_here``; standard output must be one JSON object on one line and nothing else."""
+    lines = run_here(*arguments, "--json", code=code).stdout.splitlines()
+    assert len(lines) == 1
+    value = json.loads(lines[0])
+    assert isinstance(value, dict)
+    return value
+
+
+def run_elsewhere(*arguments: str, before: str = "", **environment: str) -> subprocess.Popen[str]:
+    """Start the command line in a process of its own, after the statement ``before``."""
+    code = f"{before}\nfrom aloft.cli import main\nmain()"
+    return subprocess.Popen(
+        [sys.executable, "-c", code, *arguments],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env={**os.environ, **environment},
+    )
+
+
+@pytest.fixture
+def call() -> Callable[..., subprocess.CompletedProcess[str]]:
+    """See ``run_here``."""
+    return run_here
+
+
+@pytest.fixture
+def call_json() -> Callable[..., dict[str, Any]]:
+    """See ``run_for_json``."""
+    return run_for_json
+
+
+@pytest.fixture
+def start() -> Callable[..., subprocess.Popen[str]]:
+    """See ``run_elsewhere``."""
+    return run_elsewhere

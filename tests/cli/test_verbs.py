@@ -1,0 +1,175 @@
+"""``aloft check``, ``graph``, ``blocks`` and ``bench``, help and completion."""
+
+import json
+import resource
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import aloft.benchmarks
+
+Call = Callable[..., subprocess.CompletedProcess[str]]
+CallJson = Callable[..., dict[str, Any]]
+Start = Callable[..., subprocess.Popen[str]]
+
+ROOT = Path(__file__).parent.parent.parent
+
+
+def test_a_wrong_graph_is_reported_whole(folder: Path, call: Call, call_json: CallJson) -> None:
+    graph = (folder / "count.yaml").read_text()
+    wrong = graph.replace("seed: 5", "sed: 5").replace("100 Hz", "100 m") + "extra: 1\n"
+    (folder / "wrong.yaml").write_text(wrong)
+    result = call_json("run", "wrong.yaml", code=2)
+    assert result["success"] is False
+    assert result["reason"] == "wrong.yaml: 3 problems"
+    assert [problem["line"] for problem in result["problems"]] == [1, 4, 6]
+    assert call_json("check", "wrong.yaml", code=2)["problems"] == result["problems"]
+    done = call("check", "wrong.yaml", code=2)
+    assert done.stdout == ""
+    assert "wrong.yaml:4:" in done.stderr
+    assert "wrong.yaml: 3 problems" in done.stderr
+
+
+def test_check_says_that_a_graph_may_run(folder: Path, call: Call, call_json: CallJson) -> None:
+    assert call("check", "count.yaml").stdout == "count.yaml: no problems; 2 blocks at 100 Hz\n"
+    assert call_json("check", "count.yaml")["ok"] is True
+    result = call_json("check", "count.yaml", "--set", "counter.seed=-1", code=2)
+    assert result["problems"][0]["at"] == "counter.seed"
+
+
+def test_a_missing_graph_is_an_input_error(folder: Path, call: Call, call_json: CallJson) -> None:
+    assert "cannot read nowhere.yaml" in call("run", "nowhere.yaml", code=2).stderr
+    assert call_json("run", "nowhere.yaml", code=2)["problems"][0]["code"] == "file"
+
+
+def test_a_wrong_command_line_is_an_input_error(
+    folder: Path, call: Call, call_json: CallJson
+) -> None:
+    assert "No such command 'rnu'" in call_json("rnu", code=2)["reason"]
+    assert "--sett" in call_json("run", "count.yaml", "--sett", "a=1", code=2)["reason"]
+    done = call("run", code=2)
+    assert "Missing argument" in done.stderr
+    assert done.stdout == ""
+
+
+def test_blocks_lists_and_describes(call: Call, call_json: CallJson) -> None:
+    listing = call("blocks").stdout
+    assert "runtime.Gain" in listing
+    gain = call("blocks", "runtime.Gain").stdout
+    for text in ("y = gain u", "Inputs", "gain times u", "Parameters", "the factor", "(Mealy)"):
+        assert text in gain
+    data = call_json("blocks", "runtime.Gain")
+    assert data["parameters"][1]["name"] == "gain"
+    assert data["parameters"][1]["default"] == "1.0"
+    assert len(call_json("blocks")["blocks"]) > 5
+
+
+def test_blocks_names_what_is_alike(call: Call) -> None:
+    done = call("blocks", "runtime.Gian", code=2)
+    assert "there is no block called 'runtime.Gian'; the nearest are runtime.Gain" in done.stderr
+
+
+def test_a_block_beside_the_graph_is_described(folder: Path, call: Call) -> None:
+    assert "Counts up from its seed" in call("blocks", "counter:Counter").stdout
+
+
+def test_graph_prints_order_rates_and_wires(folder: Path, call: Call, call_json: CallJson) -> None:
+    (folder / "ring.yaml").write_text("""
+rate: 100 Hz
+duration: 2 s
+blocks:
+  wish: {use: runtime.SineWave, rate: 50 Hz}
+  error: {use: runtime.Sum, with: {weights: [1, -1]}, in: {a: wish.y, b: position.y}}
+  position: {use: runtime.Integrator, in: {u: error.y}}
+""")
+    text = call("graph", "ring.yaml").stdout
+    assert text.startswith("ring: base rate 100 Hz, 200 ticks\n")
+    order = [text.index(f" {name} ") for name in ("position", "wish", "error")]
+    assert order == sorted(order)
+    assert "a <- wish.y (Vector, holds 50 Hz)" in text
+    data = call_json("graph", "ring.yaml")
+    assert [row["path"] for row in data["blocks"]] == ["position", "wish", "error"]
+    assert call("graph", "ring.yaml", "--mermaid").stdout.startswith("flowchart LR\n")
+    flat = call("graph", "ring.yaml", "--flat", "--set", "position.initial=0.5").stdout
+    (folder / "flat.yaml").write_text(flat)
+    assert "initial: 0.5" in flat
+    runs = [
+        call_json("run", *arguments, "--no-record")["run_hash"]
+        for arguments in (["flat.yaml"], ["ring.yaml", "--set", "position.initial=0.5"])
+    ]
+    assert runs[0] == runs[1]
+
+
+def test_graph_wants_one_form(folder: Path, call: Call) -> None:
+    assert "choose one of" in call("graph", "count.yaml", "--flat", "--mermaid", code=2).stderr
+
+
+def test_check_prints_the_schema(call: Call) -> None:
+    schema = json.loads(call("check", "--schema").stdout)
+    assert {"rate", "blocks"} <= set(schema["properties"])
+    assert "a graph file is needed" in call("check", code=2).stderr
+
+
+def test_bench_refuses_an_unknown_name(call_json: CallJson) -> None:
+    result = call_json("bench", "sheduler", code=2)
+    assert result["reason"].startswith("there is no benchmark 'sheduler'; there is scheduler")
+
+
+def test_bench_prints_rows_and_exits_by_the_goals(
+    monkeypatch: pytest.MonkeyPatch, call: Call, call_json: CallJson
+) -> None:
+    row = {"name": "tick", "value": 1.5, "unit": "us", "ratio": 1.2, "peer": "hand loop"}
+    machine = {"processor": "abacus", "cores": 2, "python": "3"}
+    results = {"machine": machine, "load": {"before": [0.1], "after": [0.2]}}
+    for met, code in ((True, 0), (None, 0), (False, 1)):
+        rows = [{**row, "goal": 1.1, "met": met, "note": ""}]
+        monkeypatch.setattr(
+            aloft.benchmarks, "run_benchmarks", lambda _, r=rows: {**results, "rows": r}
+        )
+        assert call_json("bench", "scheduler", code=code)["rows"] == rows
+        text = call("bench", code=code).stdout
+        assert "hand loop" in text
+        assert "abacus" in text
+
+
+def complete(start: Start, words: str) -> list[str]:
+    """What bash would be offered behind these words."""
+    position = str(len(words.split(" ")) - 1)
+    process = start(_ALOFT_COMPLETE="complete_bash", COMP_WORDS=words, COMP_CWORD=position,
+                    before="import sys; sys.argv = ['aloft']")  # fmt: skip
+    return process.communicate(timeout=60)[0].split()
+
+
+def test_the_tab_key_completes(folder: Path, start: Start) -> None:
+    assert complete(start, "aloft r") == ["run"]
+    assert "--seeds" in complete(start, "aloft run --se")
+    assert complete(start, "aloft blocks runtime.Ga") == ["runtime.Gain"]
+    assert complete(start, "aloft run count.yaml --set counter.s") == [
+        "counter.seed=",
+        "counter.stop_at=",
+    ]
+    assert complete(start, "aloft run nowhere.yaml --set counter.s") == []
+
+
+def test_help_documents_the_exit_codes(call: Call) -> None:
+    for arguments in (("--help",), ("run", "--help")):
+        text = call(*arguments).stdout
+        for code in (0, 1, 2, 3, 130, 143):
+            assert f"\n    {code} " in text
+    assert call("--version").stdout.startswith("aloft ")
+
+
+def test_check_answers_at_once(start: Start) -> None:
+    # The promise is half a second. Processor time, as other tests run beside this one, and the
+    # best of three.
+    times = []
+    for _ in range(3):
+        before = resource.getrusage(resource.RUSAGE_CHILDREN)
+        output, _ = start("check", str(ROOT / "graphs" / "jump.yaml")).communicate(timeout=60)
+        after = resource.getrusage(resource.RUSAGE_CHILDREN)
+        times.append(after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime)
+        assert "no problems" in output
+    assert min(times) < 0.75
