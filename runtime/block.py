@@ -28,6 +28,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any, ClassVar, Generic, Self, TypeVar, overload
 
 import numpy as np
@@ -127,7 +128,8 @@ class Context:
     """What the runtime tells a block about the graph it is in.
 
     ``period_ticks`` and ``offset_ticks`` say in which base ticks the block runs; ``dimensions``
-    holds every resolved dimension the block can see; ``wired`` names its wired inputs.
+    holds every resolved dimension the block can see; ``wired`` names its wired inputs;
+    ``folder`` is where the graph file lies, to which files that a parameter names are relative.
     """
 
     path: str
@@ -137,6 +139,7 @@ class Context:
     dimensions: Mapping[str, int] = field(default_factory=dict)
     robot: RobotDescription | None = None
     wired: tuple[str, ...] = ()
+    folder: Path = Path()
 
 
 class Block:

@@ -161,6 +161,7 @@ class BoundGraph:
                 dimensions=spec.dimensions,
                 robot=graph.robot,
                 wired=tuple(spec.wires),
+                folder=spec.folder,
             )
             try:
                 block = spec.block_type(spec.params, context)

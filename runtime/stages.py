@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any, Literal
 
 from .block import Block
@@ -69,6 +70,8 @@ class BlockSpec:
     period_ticks: int = 1
     offset_ticks: int = 0
     where: Position | None = None
+    folder: Path = Path()
+    """Where the file lies that the block is written in; files it names are relative to it."""
 
 
 @dataclass(frozen=True)

@@ -242,6 +242,7 @@ def _assemble(
                 draft.period_ticks,
                 draft.offset_ticks,
                 flat.where,
+                flat.folder,
             )
         )
     order = order_blocks(
