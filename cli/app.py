@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import traceback
 from typing import Annotated, Any, cast
 
 import typer
@@ -74,4 +75,9 @@ def main() -> None:
     except BrokenPipeError:  # `aloft ... | head`
         sys.stderr.close()
         code = ExitCode.SUCCESS
+    except Exception as bug:  # noqa: BLE001  # whatever it is, it must not look like a fall
+        traceback.print_exc()
+        if "--json" in sys.argv:
+            print_json({"success": False, "reason": f"bug: {type(bug).__name__}: {bug}"})
+        code = ExitCode.RUN_FAILED
     sys.exit(int(code or 0))

@@ -19,7 +19,9 @@ def bench(
     name: Annotated[
         str, typer.Argument(help="One benchmark; by default all.", autocompletion=benchmark_names)
     ] = "",
-    as_json: Annotated[bool, typer.Option("--json", help="End with one JSON object.")] = False,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Tables go to standard error, one JSON object to output.")
+    ] = False,
 ) -> None:
     """Measure the runtime beside hand-written loops and peers; exit with 1 if a goal is missed."""
     from ..benchmarks import BENCHMARKS, run_benchmarks
@@ -30,10 +32,9 @@ def bench(
             raise AloftError(f"there is no benchmark {name!r}; there is {', '.join(BENCHMARKS)}")
         with out.status("measuring"):
             results = run_benchmarks([name] if name else None)
+    print_results(out, results)
     if as_json:
         print_json(results)
-    else:
-        print_results(out, results)
     missed = any(row["met"] is False for row in results["rows"])
     raise typer.Exit(ExitCode.NOT_SUCCESSFUL if missed else ExitCode.SUCCESS)
 

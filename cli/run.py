@@ -48,7 +48,9 @@ def run(
         typer.Option(help="Where the recording goes; by default recordings/NAME.rrd."),
     ] = None,
     no_record: Annotated[bool, typer.Option("--no-record", help="Write no recording.")] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="End with one JSON object.")] = False,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Tables go to standard error, one JSON object to output.")
+    ] = False,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print the verdict only.")] = False,
 ) -> None:
     """Run a graph; print its metrics and the time each block took; write a recording."""
@@ -77,14 +79,16 @@ def run_once(graph: Graph, record: Path | None, out: Console, as_json: bool) -> 
     with progress_bar(out, f"running {name}", graph.checked.ticks) as (progress, task):
         result = graph.run(sinks=[TickCounter(progress, task)])
     recording = write_recording(record, result) if record is not None else None
+    print_result(out, name, result)
+    if recording is not None:
+        say(out, f"recording: {recording}; to see it: {viewer()} {recording}")
+    for problem in result.stop_problems:
+        print_warning(problem)
     if as_json:
         shown = str(recording) if recording else None
         overrides = dict(graph.checked.overrides)
         print_json({"graph": name, "overrides": overrides, **result.to_json(), "recording": shown})
     else:
-        print_result(out, name, result)
-        if recording is not None:
-            say(out, f"recording: {recording}; to see it: {viewer()} {recording}")
         print_verdict(result)
     return result.exit_code
 
@@ -132,8 +136,6 @@ def print_result(out: Console, name: str, result: RunResult) -> None:
 
 def print_verdict(result: RunResult) -> None:
     """Print whether the run succeeded and why, also when all else is quiet."""
-    for problem in result.stop_problems:
-        print_warning(problem)
     if result.success:
         typer.secho(f"success: {result.reason}", fg=typer.colors.GREEN)
     else:
@@ -155,13 +157,13 @@ def run_many(
     successes = sum(row.success for row in rows)
     reason = f"{successes} of {len(rows)} seeds succeeded"
     success = successes == len(rows)
+    print_rows(out, rows)
     if as_json:
         summary = {"n": len(rows), "successes": successes, "seeds": seeds}
         outcome: dict[str, Any] = {"success": success, "reason": reason, "recording": None}
         outcome |= {"overrides": overrides, "summary": summary}
         print_json({**outcome, "rows": [vars(row) for row in rows]})
     else:
-        print_rows(out, rows)
         typer.secho(reason, fg=typer.colors.GREEN if success else typer.colors.RED)
     return ExitCode.SUCCESS if success else ExitCode.NOT_SUCCESSFUL
 

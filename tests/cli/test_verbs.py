@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 
 import aloft.benchmarks
+import aloft.runtime.loading
 
 Call = Callable[..., subprocess.CompletedProcess[str]]
 CallJson = Callable[..., dict[str, Any]]
@@ -173,3 +174,15 @@ def test_check_answers_at_once(start: Start) -> None:
         times.append(after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime)
         assert "no problems" in output
     assert min(times) < 0.75
+
+
+def test_a_bug_does_not_look_like_a_fall(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, call: Call, call_json: CallJson
+) -> None:
+    def broken(*_: object) -> None:
+        raise ZeroDivisionError("by zero")
+
+    monkeypatch.setattr(aloft.runtime.loading, "load", broken)
+    result = call_json("check", "count.yaml", code=3)
+    assert result == {"success": False, "reason": "bug: ZeroDivisionError: by zero"}
+    assert "Traceback" in call("check", "count.yaml", code=3).stderr
