@@ -76,8 +76,8 @@ def write_recording(path: str | PathLike[str], result: RunResult) -> Recording:
         if len(run.ticks):
             write_signals(stream, run)
             write_states(stream, run)
-            if pose_port is not None:
-                write_robot(stream, run, pose_port)
+            if graph.robot is not None and pose_port is not None:
+                write_robot(stream, run, graph.robot, pose_port)
     finally:
         stream.flush(timeout_sec=30)
         stream.disconnect()

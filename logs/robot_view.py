@@ -40,16 +40,33 @@ def port_with_pose(graph: CheckedGraph) -> str | None:
     return None
 
 
-def write_robot(stream: Any, run: LoggedRun, port: str) -> None:
+def write_robot(stream: Any, run: LoggedRun, robot: RobotDescription, port: str) -> None:
     """Write the links' shapes once, then their poses, forces and centre of mass over time."""
     import rerun as rr
 
-    robot = run.graph.robot
-    assert robot is not None, "port_with_pose has found a robot"
+    stream.log("world", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
     rows = slice(None, None, max(1, round(run.graph.base_rate / POSE_RATE)))
     columns = time_columns(run.graph, run.ticks[rows])
-    stream.log("world", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
-    base, orientation, joints = (run.signal(f"{port}.{field}")[rows] for field in POSE_FIELDS)
+    write_links(stream, columns, robot, [run.signal(f"{port}.{f}")[rows] for f in POSE_FIELDS])
+    known = {name.removeprefix(f"{port}.") for name, _ in run.fields()}
+    if {"contact_position", "contact_force"} <= known:
+        force = run.signal(f"{port}.contact_force")
+        write_forces(stream, columns, run.signal(f"{port}.contact_position")[rows], force[rows])
+        write_flights(stream, run, force)
+    if "com" in known:
+        ball = rr.Points3D.from_fields(colors=[MASS_CENTRE], radii=[0.012])
+        stream.log("world/com", ball, static=True)
+        com = run.signal(f"{port}.com")[rows]
+        stream.send_columns("world/com", columns, rr.Points3D.columns(positions=com))
+
+
+def write_links(
+    stream: Any, columns: Sequence[Any], robot: RobotDescription, state: Sequence[Array]
+) -> None:
+    """Write every link's shape once and its pose over time; ``state`` as in ``POSE_FIELDS``."""
+    import rerun as rr
+
+    base, orientation, joints = state
     poses = link_poses(robot, base, orientation, joints)
     for link in robot.links:
         entity = f"world/robot/{link.name}"
@@ -58,33 +75,31 @@ def write_robot(stream: Any, run: LoggedRun, port: str) -> None:
         stream.send_columns(
             entity, columns, rr.Transform3D.columns(translation=position, mat3x3=rotation)
         )
-    known = {name.removeprefix(f"{port}.") for name, _ in run.fields()}
-    if {"contact_position", "contact_force"} <= known:
-        origins = run.signal(f"{port}.contact_position")[rows]
-        vectors = run.signal(f"{port}.contact_force")[rows] * FORCE_SCALE
-        stream.log("world/contact_forces", rr.Arrows3D.from_fields(colors=[FORCE]), static=True)
-        stream.send_columns(
-            "world/contact_forces",
-            columns,
-            rr.Arrows3D.columns(
-                origins=origins.reshape(-1, 3), vectors=vectors.reshape(-1, 3)
-            ).partition(np.full(len(origins), origins.shape[1])),
-        )
-        forces = run.signal(f"{port}.contact_force")
-        least = max(1, round(SHORTEST_FLIGHT * run.graph.base_rate))
-        flights = flight_events((forces != 0.0).any(axis=2), least)
-        if flights:
-            instants = time_columns(run.graph, run.ticks[[row for row, _ in flights]])
-            texts = [text for _, text in flights]
-            levels = ["INFO"] * len(texts)
-            stream.send_columns("events", instants, rr.TextLog.columns(text=texts, level=levels))
-    if "com" in known:
-        stream.log(
-            "world/com", rr.Points3D.from_fields(colors=[MASS_CENTRE], radii=[0.012]), static=True
-        )
-        stream.send_columns(
-            "world/com", columns, rr.Points3D.columns(positions=run.signal(f"{port}.com")[rows])
-        )
+
+
+def write_forces(stream: Any, columns: Sequence[Any], position: Array, force: Array) -> None:
+    """Write an arrow for every contact point (n, n_contacts, 3) over time."""
+    import rerun as rr
+
+    stream.log("world/contact_forces", rr.Arrows3D.from_fields(colors=[FORCE]), static=True)
+    arrows = rr.Arrows3D.columns(
+        origins=position.reshape(-1, 3), vectors=force.reshape(-1, 3) * FORCE_SCALE
+    )
+    points = np.full(len(position), position.shape[1])
+    stream.send_columns("world/contact_forces", columns, arrows.partition(points))
+
+
+def write_flights(stream: Any, run: LoggedRun, force: Array) -> None:
+    """Write lift-off and touchdown as lines of text; ``force`` (n, n_contacts, 3) of all ticks."""
+    import rerun as rr
+
+    least = max(1, round(SHORTEST_FLIGHT * run.graph.base_rate))
+    flights = flight_events((force != 0.0).any(axis=2), least)
+    if flights:
+        columns = time_columns(run.graph, run.ticks[[row for row, _ in flights]])
+        texts = [text for _, text in flights]
+        levels = ["INFO"] * len(texts)
+        stream.send_columns("events", columns, rr.TextLog.columns(text=texts, level=levels))
 
 
 def flight_events(loaded: NDArray[np.bool_], least: int) -> list[tuple[int, str]]:
