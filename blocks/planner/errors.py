@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from ...runtime.errors import AloftError
 
-class PlanError(Exception):
+
+class PlanError(AloftError):
     """A jump that cannot be planned. ``family`` names the constraint family that cannot be met,
     ``violation`` is how far the best attempt missed it, in that family's unit."""
 

@@ -1,0 +1,232 @@
+"""The pieces a jump's optimisation problem is made of, as CasADi functions of one knot.
+
+Every piece has variables ``z``, parameters ``w`` and gives a cost and constraint rows; its Jacobian
+and the Hessian of its Lagrangian come with it. With n coordinates ``q`` and m joints, all in the
+reduced coordinates of ``Coordinates``:
+
+``stance``  z = q, v, a, F.     Interval on the ground. Rows: gap (2n), base dynamics, motor torque,
+            torque-speed line and motor speed (m each), friction pyramid (4 a contact point, or 2).
+``flight``  z = q, v, h, a.     Interval of h seconds in the air. Rows: gap (2n + 1), base dynamics,
+            motor torque, torque-speed line, motor speed.
+``contact`` z = q, v.           Rows: velocity + 10/s x place error of every foot on the ground (5 a
+            foot: a line foot may turn about its own line), then the place errors (5 a foot; 3 in
+            the sagittal plane).
+``take_off`` z = q, v.          Rows: apex height, vertical speed, angular momentum (3).
+``air``     z = q.              Rows: height above the ground of feet and calves, leg clearance.
+
+Over an interval of h seconds accelerations are constant: v+ = v + h a, q+ = q + h v + h^2 a / 2, and
+the dynamics hold in its middle (second order). Gap rows hold minus the next state. ``w`` is named
+by ``Parameters``. Not modelled: friction in the joints and the rotors' gyroscopic moment.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from .coordinates import Coordinates, full_coordinates, sagittal_coordinates
+from .symbolic_model import GRAVITY, SymbolicModel, base_rotation
+
+DRIFT_RATE = 10.0
+"""1/s, how fast the place error of a foot on the ground dies out."""
+
+PIECES = ("stance", "flight", "contact", "take_off", "air")
+
+
+@dataclass(frozen=True)
+class Piece:
+    """The functions of one piece: ``value(z, w) -> f, g``; ``jacobian(z, w) -> g, grad f, jac g``;
+    ``hessian(z, w, lam_f, lam_g) -> gradient and Hessian of the Lagrangian``."""
+
+    value: Any
+    jacobian: Any
+    hessian: Any
+
+    @property
+    def rows(self) -> int:
+        """The number of constraint rows."""
+        return int(self.value.size1_out(1))
+
+
+def parameter_sizes(coordinates: Coordinates) -> dict[str, dict[str, int]]:
+    """The parameters ``w`` of every piece: name -> size, in order."""
+    n, joints = coordinates.size, len(coordinates.joints)
+    contacts = len(coordinates.contacts)
+    interval = {
+        "nominal": n, "posture": n, "velocity": n, "acceleration": n, "slope": joints,
+    }  # fmt: skip
+    return {
+        "stance": {"step": 1, "friction": 1, "force": 1, **interval},
+        "flight": interval,
+        "contact": {"place": 3 * contacts, "heading": 2},
+        "take_off": {},
+        "air": {"step": 1, "edge": 1, "width": 1, "direction": 2},
+    }
+
+
+def make_coordinates(model: SymbolicModel, name: str) -> Coordinates:
+    """The coordinates of that name. Raises ``ValueError`` where the robot has none."""
+    chosen = full_coordinates(model) if name == "full" else sagittal_coordinates(model)
+    if chosen is None:
+        raise ValueError(f"{model.robot.name} is not the same left and right")
+    return chosen
+
+
+def piece_expressions(
+    model: SymbolicModel, coordinates: Coordinates, name: str
+) -> tuple[Any, Any, Any, Any]:
+    """The symbols ``z`` and ``w`` of a piece, its cost and its rows."""
+    import casadi as ca
+
+    n = coordinates.size
+    sizes = parameter_sizes(coordinates)[name]
+    w = {key: ca.SX.sym(key, size) for key, size in sizes.items()}
+    q, v = ca.SX.sym("q", n), ca.SX.sym("v", n)
+    cost: Any = ca.SX(0)
+    rows: list[Any]
+    z: list[Any]
+    if name in ("stance", "flight"):
+        a = ca.SX.sym("a", n)
+        h = w["step"] if name == "stance" else ca.SX.sym("h")
+        forces = coordinates.forces if name == "stance" else 0
+        F = ca.SX.sym("F", forces)
+        z = [q, v, a, F] if name == "stance" else [q, v, h, a]
+        half_v = v + 0.5 * h * a
+        half_q = q + 0.5 * h * v + 0.125 * h * h * a
+        all_forces = ca.mtimes(ca.DM(coordinates.force_matrix), F) if forces else None
+        named = {
+            model.robot.contacts[c].name: all_forces[3 * c : 3 * c + 3]
+            for c in coordinates.contacts
+            if forces
+        }
+        base, limbs, torque = model.inverse_dynamics(
+            *(coordinates.expand(x) for x in (half_q, half_v, a)), named, coordinates.limbs
+        )
+        wrench = base + coordinates.share * sum(limbs.values())
+        to_motor = model.robot.torque_to_motor[np.ix_(coordinates.joints, coordinates.joints)]
+        geared = model.robot.joint_to_motor[np.ix_(coordinates.joints, coordinates.joints)]
+        motor = ca.mtimes(ca.DM(to_motor), torque[list(coordinates.joints)])
+        own = [6 + joint for joint in coordinates.joints]
+        speed = ca.mtimes(ca.DM(geared), coordinates.expand(v)[own])
+        half_speed = ca.mtimes(ca.DM(geared), coordinates.expand(half_v)[own])
+        gap = [-(q + h * v + 0.5 * h * h * a), -(v + h * a)]
+        rows = [
+            *gap,
+            *([-h] if name == "flight" else []),
+            wrench[list(coordinates.rows)],
+            motor,
+            motor + w["slope"] * half_speed,
+            speed,
+        ]
+        off = q - w["nominal"]
+        cost = (
+            ca.dot(w["posture"], off * off)
+            + ca.dot(w["velocity"], v * v)
+            + ca.dot(w["acceleration"], a * a)
+        )
+        if forces:
+            cost = cost + w["force"] * ca.dot(F, F)
+            for c in coordinates.contacts:
+                reach = w["friction"] * all_forces[3 * c + 2]
+                for axis in coordinates.axes[:-1]:
+                    pull = all_forces[3 * c + axis]
+                    rows += [reach - pull, reach + pull]
+        cost = h * cost
+    elif name == "contact":
+        z = [q, v]
+        errors = _place_errors(model, coordinates, q, w["place"], w["heading"])
+        rows = [ca.jtimes(errors, q, v) + DRIFT_RATE * errors, errors]
+    elif name == "take_off":
+        z = [q, v]
+        whole, speeds = coordinates.expand(q), coordinates.expand(v)
+        linear, angular = model.momentum(whole, speeds)
+        rise = linear[2] / model.robot.total_mass
+        rows = [model.com(whole)[2] + rise * rise / (2.0 * GRAVITY), rise, angular]
+    else:
+        z = [q]
+        rows = _air_rows(model, coordinates, q, w)
+    return ca.vertcat(*z), ca.vertcat(*w.values()), cost, ca.vertcat(*rows)
+
+
+def make_piece(model: SymbolicModel, coordinates: Coordinates, name: str) -> Piece:
+    """The functions of a piece with exact derivatives."""
+    import casadi as ca
+
+    z, w, cost, rows = piece_expressions(model, coordinates, name)
+    prefix = f"{coordinates.name}_{name}"
+    lam_f, lam_g = ca.SX.sym("lam_f"), ca.SX.sym("lam_g", rows.numel())
+    gradient = ca.densify(ca.gradient(cost, z))
+    hessian, slope = ca.hessian(lam_f * cost + ca.dot(lam_g, rows), z)
+    rows = ca.densify(rows)
+    options = {"cse": True}
+    return Piece(
+        ca.Function(f"{prefix}_value", [z, w], [cost, rows], options),
+        ca.Function(f"{prefix}_jacobian", [z, w], [rows, gradient, ca.jacobian(rows, z)], options),
+        ca.Function(
+            f"{prefix}_hessian", [z, w, lam_f, lam_g], [ca.densify(slope), hessian], options
+        ),
+    )
+
+
+def _place_errors(model: SymbolicModel, coordinates: Coordinates, q: Any, place: Any, heading: Any
+                  ) -> Any:  # fmt: skip
+    """Of every foot: the first point's error in x, y, z, the others' across the foot and in z, in
+    the heading the foot lands with."""
+    import casadi as ca
+
+    points = model.contact_points(coordinates.expand(q), coordinates.limbs)
+    errors, seen = [], set()
+    for i, c in enumerate(coordinates.contacts):
+        off = points[i] - place[3 * i : 3 * i + 3]
+        along = heading[0] * off[0] + heading[1] * off[1]
+        across = heading[0] * off[1] - heading[1] * off[0]
+        foot = model.robot.contacts[c].foot
+        sideways = [across] if 1 in coordinates.axes else []
+        errors += [*sideways, off[2]] if foot in seen else [along, *sideways, off[2]]
+        seen.add(foot)
+    return ca.vertcat(*errors)
+
+
+def _air_rows(model: SymbolicModel, coordinates: Coordinates, q: Any, w: dict[str, Any]
+              ) -> list[Any]:  # fmt: skip
+    """Heights of contact points and calves above the ground, then how far each of those points and
+    the knees is on its own leg's side of the torso's middle plane, both less its radius."""
+    import casadi as ca
+
+    whole = coordinates.expand(q)
+    frames = model.frames(whole, coordinates.limbs)
+    rotation = base_rotation(whole[3:6])
+    heights, sides = [], []
+    for point, radius, sign in body_points(model, coordinates):
+        place = model.point(frames, *point)
+        way = w["direction"][0] * place[0] + w["direction"][1] * place[1]
+        ground = w["step"] * 0.5 * (1.0 + ca.tanh((way - w["edge"]) / w["width"]))
+        heights.append(place[2] - ground - radius)
+        inward = ca.dot(rotation[:, 1], place - whole[0:3])
+        sides.append(sign * inward - max(radius, 0.0))
+    return [*heights, *sides]
+
+
+def body_points(model: SymbolicModel, coordinates: Coordinates
+                ) -> list[tuple[tuple[str, tuple[float, float, float]], float, float]]:  # fmt: skip
+    """The points of the legs that must not touch anything in flight: (link, place), radius and +1
+    for a left leg, -1 for a right one. Contact points first, with no radius."""
+    robot = model.robot
+    link_of = {foot.name: foot.link for foot in robot.feet}
+    found = []
+    for c in coordinates.contacts:
+        contact = robot.contacts[c]
+        found.append(((link_of[contact.foot], contact.position), 0.0))
+    for limb in coordinates.limbs:
+        for index in model.limbs[limb][-2:-1]:
+            link = robot.link(robot.joints[index].child)
+            for shape in link.shapes:
+                found += [((link.name, shape.start), shape.radius)]
+                found += [((link.name, shape.end), shape.radius)]
+    sides = {
+        limb: float(np.sign(robot.joints[model.limbs[limb][0]].origin[1]))
+        for limb in range(len(model.limbs))
+    }
+    return [(point, radius, sides[model.limb_of_link[point[0]]]) for point, radius in found]
