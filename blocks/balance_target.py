@@ -20,7 +20,8 @@ Array = NDArray[np.float64]
 class BalanceMemory(Signal):
     """What the balance remembers."""
 
-    standing_height = Field(unit="m", text="planned height of the centre of mass at the start")
+    standing_height = Field(unit="m", text="planned height of the centre of mass in the first tick")
+    started = Field(dtype="bool", text="whether that height is known")
     trim = Field(3, unit="rad", frame="body", text="rotation added to the level target")
 
 
@@ -72,8 +73,9 @@ class BalanceTarget(Block):
 
     def step(self) -> None:
         phase, reference = int(self.phase.phase), self.reference
-        if phase == Phase.STAND and float(self.memory.standing_height) == 0.0:
+        if not self.memory.started:
             self.memory.standing_height[()] = reference.com[2]
+            self.memory.started[()] = True
         middle_point(self.terms.foot_position, self._middle)
         heading = mean_heading(self.terms.foot_rotation)
         if phase < Phase.LANDING:
