@@ -283,15 +283,20 @@ def machine(e: Evidence) -> Iterator[Found]:
     yield Found("motor_speed", speed.max(), 1.01 * e.effort * profile.no_load_speed, "rad/s",
                 "the largest motor speed",
                 f"{robot.transmission.motors[motor]} {e.moment(sample)}")  # fmt: skip
-    # Braking torque is the peak at any speed; driving torque falls between corner and no load.
-    driving = np.sign(e.motor_torque) * e.motor_speed / e.effort
-    fall = (profile.no_load_speed - driving) / (profile.no_load_speed - profile.corner_speed)
-    allowed = e.effort * profile.peak_torque * np.clip(fall, 0.0, 1.0)
-    over = np.abs(e.motor_torque) - allowed
+    over = np.abs(e.motor_torque) - allowed_motor_torque(e, e.effort)
     sample, motor = worst(over)
     yield Found("motor_torque", over.max(), 0.03 * profile.peak_torque, "N m",
                 "how far a motor torque passes what its speed allows",
                 f"{robot.transmission.motors[motor]} {e.moment(sample)}")  # fmt: skip
+
+
+def allowed_motor_torque(e: Evidence, effort: float) -> Array:
+    """The torque [N m] that a share of the motors' abilities allows at the samples' speeds."""
+    profile = e.robot.profiles[e.plan.task.profile]
+    # Braking torque is the peak at any speed; driving torque falls between corner and no load.
+    driving = np.sign(e.motor_torque) * e.motor_speed / effort
+    fall = (profile.no_load_speed - driving) / (profile.no_load_speed - profile.corner_speed)
+    return np.asarray(effort * profile.peak_torque * np.clip(fall, 0.0, 1.0))
 
 
 def clearances(e: Evidence) -> Iterator[Found]:

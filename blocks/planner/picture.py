@@ -1,0 +1,172 @@
+"""A plan as a picture: the robot in its postures, and how hard its motors and feet work."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...runtime.description import RobotDescription
+from ...runtime.kinematics import link_poses
+from .clearance import legs
+from .line_chart import COLOURS, Chart, Line, page
+from .plan import JumpPlan
+from .plan_tests import Evidence, allowed_motor_torque
+from .replay import replay
+
+Array = NDArray[np.float64]
+
+WIDTH, STRIP, CHART = 1080.0, 210.0, 230.0
+"""The page's width and the heights of the postures and of a row of charts [px]."""
+POSTURES = 9
+
+
+def plan_picture(plan: JumpPlan, robot: RobotDescription) -> str:
+    """The picture as SVG text."""
+    evidence = Evidence(plan, robot, replay(plan, robot))
+    charts = [
+        com_chart(plan), momentum_chart(plan), force_chart(plan, robot),
+        torque_chart(evidence), speed_chart(evidence), feet_chart(evidence),
+    ]  # fmt: skip
+    each = WIDTH / 3.0
+    parts = [postures(plan, robot)]
+    for number, chart in enumerate(charts):
+        chart.shaded.append((plan.lift_off_time, plan.touchdown_time, "flight"))
+        row, column = divmod(number, 3)
+        parts.append(chart.svg(column * each, 36.0 + STRIP + row * CHART, each, CHART))
+    figures = evidence.figures()
+    title = (
+        f"{plan.task.name}: rise {100 * figures['rise_m']:.1f} cm, flight "
+        f"{1000 * plan.flight_time:.0f} ms, {figures['peak_motor_torque_N_m']:.1f} N m and "
+        f"{figures['peak_motor_speed_rad_s']:.1f} rad/s at most"
+    )
+    return page(title, parts, WIDTH, 36.0 + STRIP + 2.0 * CHART)
+
+
+def write_picture(path: str | Path, plan: JumpPlan, robot: RobotDescription) -> Path:
+    """Write the picture to an SVG file."""
+    path = Path(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(plan_picture(plan, robot), encoding="utf-8")
+    return path
+
+
+def postures(plan: JumpPlan, robot: RobotDescription) -> str:
+    """The robot from its right side at instants in the order of time, each in its own place."""
+    lift_off, touchdown = plan.lift_off_time, plan.touchdown_time
+    times = np.unique(
+        np.concatenate(
+            [
+                [0.0, plan.time[-1]],
+                np.linspace(0.5 * lift_off, lift_off, 3),
+                np.linspace(lift_off, touchdown, POSTURES - 5),
+                [0.5 * (touchdown + plan.time[-1])],
+            ]
+        )
+    )
+    knots = [plan.knot_at(float(time)) for time in times]
+    q = plan.position[knots]
+    poses = link_poses(robot, q[:, :3], q[:, 3:7], q[:, 7:])
+    low, high = -0.02, max(0.62, float(plan.position[:, 2].max()) + 0.25)
+    scale = (STRIP - 20.0) / (high - low + max(0.0, -plan.task.landing_height))
+    bottom = 30.0 + STRIP - 20.0
+    if plan.task.landing_height < 0.0:
+        bottom += scale * plan.task.landing_height
+    place = WIDTH / len(knots)
+    out = []
+    for number, knot in enumerate(knots):
+        centre = (number + 0.5) * place - scale * float(plan.com[knot, 0])
+
+        def point(p: Array, centre: float = centre) -> str:
+            return f"{centre + scale * float(p[0]):.1f},{bottom - scale * float(p[2]):.1f}"
+
+        ground = plan.task.landing_height if plan.time[knot] >= touchdown else 0.0
+        level = bottom - scale * ground
+        left = number * place + 6.0
+        out.append(
+            f'<line x1="{left:.1f}" y1="{level:.1f}" x2="{left + place - 12:.1f}" y2="{level:.1f}" '
+            'stroke="#999999"/>'
+        )
+        base, turn = (part[number] for part in poses.of(robot.base))
+        top = base + turn @ np.array([0.02, 0.0, 0.2])
+        for index, chain in reversed(list(enumerate(legs(robot)))):
+            joints = [poses.of(link)[0][number] for link in chain]
+            foot, rotation = (part[number] for part in poses.of(chain[-1]))
+            ends = [
+                foot + rotation @ np.array(contact.position)
+                for contact in robot.contacts
+                if robot.feet[index].name == contact.foot
+            ]
+            line = " ".join(map(point, [top, base, *joints, *ends, foot]))
+            out.append(
+                f'<polyline points="{line}" fill="none" stroke="{COLOURS[index]}" '
+                'stroke-width="2.5" stroke-linejoin="round"/>'
+            )
+        x, y = point(plan.com[knot]).split(",")
+        out.append(f'<circle cx="{x}" cy="{y}" r="3.5" fill="#fdd835" stroke="#444444"/>')
+        out.append(
+            f'<text x="{(number + 0.5) * place:.1f}" y="{30 + STRIP:.1f}" text-anchor="middle">'
+            f"{plan.time[knot]:.2f} s</text>"
+        )
+    return "\n".join(out)
+
+
+def com_chart(plan: JumpPlan) -> Chart:
+    """The way of the centre of mass."""
+    way = 100.0 * (plan.com - plan.com[0])
+    lines = [Line(name, plan.time, way[:, k]) for k, name in enumerate(("forward", "left", "up"))]
+    return Chart("centre of mass from standing [cm]", lines)
+
+
+def momentum_chart(plan: JumpPlan) -> Chart:
+    """The angular momentum."""
+    names = ("roll", "pitch", "yaw")
+    lines = [Line(n, plan.time, plan.angular_momentum[:, k]) for k, n in enumerate(names)]
+    return Chart("angular momentum about it [N m s]", lines)
+
+
+def force_chart(plan: JumpPlan, robot: RobotDescription) -> Chart:
+    """The vertical force on every contact, constant over each interval."""
+    lasting = np.diff(plan.time) > 0.0
+    time = np.repeat(plan.time, 2)[1:-1].reshape(-1, 2)[lasting].ravel()
+    lines = [
+        Line(contact.name, time, np.repeat(plan.contact_force[:-1, k, 2][lasting], 2))
+        for k, contact in enumerate(robot.contacts)
+    ]
+    return Chart("vertical force of the ground [N]", lines)
+
+
+def torque_chart(e: Evidence) -> Chart:
+    """Motor torques as shares of what the motors can do at their speed."""
+    share = np.abs(e.motor_torque) / np.maximum(allowed_motor_torque(e, 1.0), 1e-3)
+    return _motor_chart(e, "motor torque [% of what its speed allows]", 100.0 * share, 100.0)
+
+
+def speed_chart(e: Evidence) -> Chart:
+    """Motor speeds as shares of the speed without load."""
+    share = np.abs(e.motor_speed) / e.robot.profiles[e.plan.task.profile].no_load_speed
+    return _motor_chart(e, "motor speed [% of no-load speed]", 100.0 * share, 100.0)
+
+
+def _motor_chart(e: Evidence, title: str, shares: Array, limit: float) -> Chart:
+    time = e.replay.samples.time
+    shares = np.minimum(shares, 1.5 * limit)
+    busiest = set(np.argsort(shares.max(axis=0))[-3:].tolist())
+    lines = [
+        Line(name.removesuffix("_motor") if k in busiest else "", time, shares[:, k])
+        for k, name in enumerate(e.robot.transmission.motors)
+    ]
+    level = np.array([time[0], time[-1]])
+    lines.append(Line("", level, np.full(2, limit * e.effort), level=True))
+    return Chart(title, lines)
+
+
+def feet_chart(e: Evidence) -> Chart:
+    """The heights of the contact points above the ground at the start."""
+    samples = e.replay.samples
+    lines = [
+        Line(contact.name, samples.time, 100.0 * samples.points[:, k, 2])
+        for k, contact in enumerate(e.robot.contacts)
+    ]
+    return Chart("height of toes and heels [cm]", lines)

@@ -1,0 +1,186 @@
+"""A plan as the table of a reference: what the controller follows, every 2 ms or so.
+
+Between knots the motion is the planner's own: constant acceleration of base position, Euler angles
+and joints, which is the cubic through both knots. In flight the base moves as exact dynamics has
+it, so that what the controller follows is what a robot can do. The rate of change of momentum
+comes from the contact forces, which are taken to hold in the middle of their interval and to
+change linearly from there to the next, never across lift-off or touchdown.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...runtime.description import RobotDescription
+from ..jump_table import JumpTable
+from ..signals import Phase
+from .exact_dynamics import ExactDynamics, JointMotion, joint_motion
+from .midpoint import angular_motion, euler_angles, euler_rates, rotation
+from .plan import JumpPlan
+from .replay import flight_knots
+from .task import GRAVITY
+
+Array = NDArray[np.float64]
+State = tuple[float, int, Array, Array]
+"""Time, interval, q and v."""
+
+STEP = 0.002
+"""Longest time between two rows [s]."""
+
+
+def reference_table(plan: JumpPlan, robot: RobotDescription, stand_time: float) -> JumpTable:
+    """The plan as a table that begins with standing still for ``stand_time`` [s]."""
+    dynamics = ExactDynamics(robot, plan.task.profile)
+    lift_off, touchdown = flight_knots(plan)
+    forces = _MiddleForces(plan, lift_off, touchdown)
+    rows: dict[str, list[Array]] = {}
+    times: list[float] = []
+    for time, k, q, v in _states(plan, dynamics, lift_off, touchdown):
+        times.append(time)
+        for name, value in _row(dynamics, q, v, forces.at(time, k)).items():
+            rows.setdefault(name, []).append(value)
+    columns = {name: np.array(values) for name, values in rows.items()}
+    for foot in range(len(robot.feet)):
+        columns["foot_yaw"][:, foot] = np.unwrap(columns["foot_yaw"][:, foot])
+    _follow_one_sign(columns["orientation"])
+    for name in ("com_acceleration", "angular_momentum_rate"):
+        columns[name][-1] = 0.0  # the plan has come to rest, and the last row stays
+    standing = {name: values[:1] for name, values in columns.items()}
+    standing["com_acceleration"] = np.zeros((1, 3))
+    standing["angular_momentum_rate"] = np.zeros((1, 3))
+    start = {
+        phase: stand_time + float(plan.time[plan.phase == phase][0])
+        for phase in (Phase.SQUAT, Phase.THRUST, Phase.RECOVER)
+        if np.any(plan.phase == phase)
+    }
+    end = stand_time + float(plan.time[-1])
+    return JumpTable(
+        np.concatenate([[0.0, stand_time], stand_time + np.array(times)]),
+        {n: np.concatenate([standing[n], standing[n], c]) for n, c in columns.items()},
+        stand_time,
+        start.get(Phase.THRUST, start.get(Phase.SQUAT, stand_time)),
+        stand_time + plan.lift_off_time,
+        stand_time + plan.touchdown_time,
+        start.get(Phase.RECOVER, end),
+    )
+
+
+def _states(
+    plan: JumpPlan, dynamics: ExactDynamics, lift_off: int, touchdown: int
+) -> Iterator[State]:
+    """The motion, knots and what lies between them; two rows at an impact."""
+    angles = euler_angles(plan.position[:, 3:7])
+    nothing = np.zeros(plan.contact_force.shape[1:])
+    flying_q, flying_v = plan.position[lift_off], plan.velocity[lift_off]
+    for k in range(len(plan.time) - 1):
+        start, h = float(plan.time[k]), float(plan.time[k + 1] - plan.time[k])
+        yield start, k, plan.position[k], plan.velocity[k]
+        if h <= 0.0:
+            continue
+        joints = joint_motion(plan.position, plan.velocity, plan.time, k)
+        if lift_off <= k < touchdown:
+            q = np.concatenate([flying_q[:7], plan.position[k, 7:]])
+            v = np.concatenate([flying_v[:6], plan.velocity[k, 6:]])
+            steps = dynamics.integrate(q, v, joints, nothing, STEP)
+            _, flying_q, flying_v = steps[-1]
+            for t, there, moving in steps[:-1]:
+                yield start + t, k, there, moving
+        else:
+            base = _base_motion(plan, dynamics, angles, k, h)
+            count = math.ceil(h / STEP - 1e-9)
+            for i in range(1, count):
+                yield start + i * h / count, k, *_between(base, joints, i * h / count, dynamics)
+    last = len(plan.time) - 1
+    yield float(plan.time[last]), last - 1, plan.position[last], plan.velocity[last]
+
+
+def _base_motion(
+    plan: JumpPlan, dynamics: ExactDynamics, angles: Array, k: int, h: float
+) -> JointMotion:
+    """The cubic of base position and Euler angles between two knots."""
+    ends = []
+    for knot in (k, k + 1):
+        turn = dynamics.pin.Quaternion(plan.position[knot, 3:7]).toRotationMatrix()
+        v = plan.velocity[knot]
+        ends.append(np.concatenate([turn @ v[:3], euler_rates(angles[knot], v[3:6])]))
+    places = [np.concatenate([plan.position[i, :3], angles[i]]) for i in (k, k + 1)]
+    return JointMotion(places[0], places[1], ends[0], ends[1], h)
+
+
+def _between(
+    base: JointMotion, joints: JointMotion, time: float, dynamics: ExactDynamics
+) -> tuple[Array, Array]:
+    """Pinocchio's q and v of a stance between two knots."""
+    place, rate, bend = base.at(time)
+    position, velocity, _ = joints.at(time)
+    turn = rotation(place[3:])
+    spin, _ = angular_motion(place[3:], rate[3:], bend[3:])
+    quaternion = dynamics.pin.Quaternion(turn).coeffs()
+    return (
+        np.concatenate([place[:3], quaternion, position]),
+        np.concatenate([turn.T @ rate[:3], spin, velocity]),
+    )
+
+
+class _MiddleForces:
+    """Contact forces at any time, linear between the middles of intervals on the same side of the
+    flight."""
+
+    def __init__(self, plan: JumpPlan, lift_off: int, touchdown: int) -> None:
+        self._plan = plan
+        lasting = np.flatnonzero(np.diff(plan.time) > 0.0)
+        self._groups = [lasting[lasting < lift_off], lasting[lasting >= touchdown]]
+        self._flight = (lift_off, touchdown)
+
+    def at(self, time: float, interval: int) -> Array:
+        """The forces [N], (n_contacts, 3), at an instant of that interval."""
+        plan, (lift_off, touchdown) = self._plan, self._flight
+        if lift_off <= interval < touchdown:
+            return np.zeros(plan.contact_force.shape[1:])
+        group = self._groups[0] if interval < lift_off else self._groups[1]
+        middles = 0.5 * (plan.time[group] + plan.time[group + 1])
+        after = int(np.searchsorted(middles, time))
+        if after in (0, len(middles)):
+            return np.asarray(plan.contact_force[group[min(after, len(middles) - 1)]])
+        before = after - 1
+        share = (time - middles[before]) / (middles[after] - middles[before])
+        first, second = plan.contact_force[group[before]], plan.contact_force[group[after]]
+        return np.asarray(first + share * (second - first))
+
+
+def _row(dynamics: ExactDynamics, q: Array, v: Array, force: Array) -> dict[str, Array]:
+    """The reference's fields in one state under those forces."""
+    com, com_velocity, momentum = dynamics.centroidal(q, v)
+    pin, model, data = dynamics.pin, dynamics.model, dynamics.data
+    points, _ = dynamics.contact_jacobians(q)
+    axes = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+    soles, sole_velocities, yaws = [], [], []
+    for frame in dynamics.sole_frames:
+        place = data.oMf[frame]
+        soles.append(place.translation.copy())
+        sole_velocities.append(pin.getFrameJacobian(model, data, frame, axes)[:3] @ v)
+        yaws.append(math.atan2(place.rotation[1, 0], place.rotation[0, 0]))
+    return {
+        "com": com,
+        "com_velocity": com_velocity,
+        "com_acceleration": force.sum(axis=0) / dynamics.mass + np.array([0.0, 0.0, -GRAVITY]),
+        "orientation": q[3:7].copy(),
+        "angular_velocity": v[3:6].copy(),
+        "angular_momentum": momentum,
+        "angular_momentum_rate": np.cross(points - com, force).sum(axis=0),
+        "foot_position": np.array(soles),
+        "foot_velocity": np.array(sole_velocities),
+        "foot_yaw": np.array(yaws),
+        "joint_position": q[7:].copy(),
+        "joint_velocity": v[6:].copy(),
+    }
+
+
+def _follow_one_sign(quaternions: Array) -> None:
+    """Choose the sign of every quaternion that is nearest to the one before, in place."""
+    flips = np.where((quaternions[1:] * quaternions[:-1]).sum(axis=1) < 0.0, -1.0, 1.0)
+    quaternions[1:] *= np.cumprod(flips)[:, None]
