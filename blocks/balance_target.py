@@ -50,7 +50,7 @@ class BalanceTarget(Block):
         )
         rise_time: float = parameter(0.6, unit="s", gt=0.0, text="from there to standing height")
         trim_rate: float = parameter(
-            1.0, unit="1/s", ge=0.0, le=20.0, text="how fast a steady tilt is integrated away"
+            3.0, unit="1/s", ge=0.0, le=20.0, text="how fast a steady tilt is integrated away"
         )
         trim_limit: float = parameter(
             0.08, unit="rad", ge=0.0, le=0.5, text="largest trim about each axis"
