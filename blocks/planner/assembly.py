@@ -80,6 +80,24 @@ class Assembly:
                 self.parameters += size
         self._place()
 
+    @property
+    def interpreted(self) -> bool:
+        """Whether CasADi's virtual machine evaluates the pieces."""
+        return any(piece.value.class_name() != "GenericExternal" for piece in self.pieces.values())
+
+    @property
+    def signature(self) -> tuple[object, ...]:
+        """Equal for problems of the same structure and functions."""
+        shape = tuple(
+            (
+                knot.states, knot.controls, knot.gap, knot.hold, knot.fixed,
+                tuple((name, tuple(take), tuple(rows))
+                      for name, (take, rows) in knot.pieces.items()),
+            )
+            for knot in self.knots
+        )  # fmt: skip
+        return (shape, *(id(piece) for piece in self.pieces.values()))
+
     def rows_of(self, name: str, k: int) -> tuple[int, Indices]:
         """Where the kept rows of a piece on a knot begin, and which of its rows they are."""
         start = int(self.row_start[k])

@@ -1,0 +1,128 @@
+"""Compiles the pieces' functions to machine code once, and keeps the libraries.
+
+A library is kept under a hash of everything that decides its content: this planner's own sources,
+the robot, the rotors, CasADi's version and the compiler's flags. Without a C compiler, or where
+compilation fails, CasADi's own virtual machine evaluates the same functions some ten times slower.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import shutil
+import subprocess
+import tempfile
+from collections.abc import Callable
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+from ...runtime.description import RobotDescription
+from .coordinates import Coordinates
+from .stage_functions import PIECES, Piece, make_piece
+from .symbolic_model import SymbolicModel
+
+FLAGS = ("-O1", "-fPIC", "-shared", "-ffp-contract=off")
+"""No flags of one machine's: its libraries may be kept where other machines find them, and plans
+are the same everywhere. Higher optimisation takes twice as long to compile and gains nothing."""
+
+SOURCES = ("symbolic_model.py", "coordinates.py", "stage_functions.py")
+KINDS = ("value", "jacobian", "hessian")
+Progress = Callable[[str, int, int], None]
+"""Called with what is being done, steps done and steps in all."""
+
+
+def cache_folder() -> Path:
+    """Where compiled libraries are kept: the user's cache directory."""
+    root = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
+    return Path(root) / "aloft" / "planner"
+
+
+def content_hash(robot: RobotDescription, rotors: float, name: str) -> str:
+    """The name of a library: the same for the same content."""
+    import casadi as ca
+
+    digest = hashlib.sha256()
+    for source in SOURCES:
+        digest.update((Path(__file__).parent / source).read_bytes())
+    kept = robot.model_dump(mode="json", exclude={"profiles", "standing", "points", "text"})
+    digest.update(json.dumps(kept, sort_keys=True).encode())
+    digest.update(repr((rotors, name, ca.__version__, FLAGS)).encode())
+    return digest.hexdigest()[:20]
+
+
+def load_pieces(
+    model: SymbolicModel,
+    coordinates: Coordinates,
+    *,
+    profile: str,
+    compiled: bool = True,
+    progress: Progress | None = None,
+) -> dict[str, Piece]:
+    """The pieces' functions, compiled where there is a compiler and ``compiled`` asks for it."""
+    rotors = model.robot.profiles[profile].rotor_inertia
+    key = content_hash(model.robot, rotors, coordinates.name)
+    held = _held.get((key, compiled))
+    if held is None:
+        held = _held[key, compiled] = _load(model, coordinates, key, compiled, progress)
+    return held
+
+
+_held: dict[tuple[str, bool], dict[str, Piece]] = {}
+
+
+def _load(
+    model: SymbolicModel, coordinates: Coordinates, key: str, compiled: bool,
+    progress: Progress | None,
+) -> dict[str, Piece]:  # fmt: skip
+    compiler = _compiler() if compiled else None
+    pieces = {}
+    for done, name in enumerate(PIECES):
+        library = cache_folder() / key / f"{name}.so"
+        usable = compiled and library.is_file()
+        if not usable and progress is not None:
+            how = "compiling" if compiler else "building"
+            progress(f"{how} the {coordinates.name} {name} functions", done, len(PIECES))
+        piece = None if usable else make_piece(model, coordinates, name)
+        if piece is not None and compiler is not None:
+            usable = _compile(compiler, piece, library)
+        pieces[name] = _external(library, coordinates, name) if usable or piece is None else piece
+    if progress is not None:
+        progress(f"{coordinates.name} functions ready", len(PIECES), len(PIECES))
+    return pieces
+
+
+def _external(library: Path, coordinates: Coordinates, name: str) -> Piece:
+    import casadi as ca
+
+    found: list[Any] = [
+        ca.external(f"{coordinates.name}_{name}_{kind}", str(library)) for kind in KINDS
+    ]
+    return Piece(*found)
+
+
+@lru_cache(maxsize=1)
+def _compiler() -> str | None:
+    return next((path for name in ("cc", "gcc", "clang") if (path := shutil.which(name))), None)
+
+
+def _compile(compiler: str, piece: Piece, library: Path) -> bool:
+    """Compile a piece; whether that worked. Other processes see the whole library or none."""
+    import casadi as ca
+
+    try:
+        library.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(dir=library.parent) as folder:
+            generator = ca.CodeGenerator(f"{library.stem}.c")
+            for kind in KINDS:
+                generator.add(getattr(piece, kind))
+            generator.generate(f"{folder}/")
+            made = Path(folder) / library.name
+            source = Path(folder) / f"{library.stem}.c"
+            command = [compiler, *FLAGS, str(source), "-o", str(made), "-lm"]
+            subprocess.run(command, check=True, capture_output=True)
+            made.replace(library)
+    except (OSError, subprocess.CalledProcessError):
+        return False
+    return True

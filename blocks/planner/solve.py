@@ -1,0 +1,151 @@
+"""From a task to a plan."""
+
+from __future__ import annotations
+
+import time
+from functools import lru_cache
+
+import numpy as np
+
+from ...runtime.description import RobotDescription
+from .compilation import Progress, load_pieces
+from .coordinates import Coordinates
+from .errors import PlanError
+from .guess import ballistic_guess
+from .plan import JumpPlan
+from .problem import Problem, ProblemBuilder
+from .solver import Solution, solve
+from .stage_functions import make_coordinates
+from .stance import Stance, StanceFinder, start_and_end
+from .symbolic_model import SymbolicModel
+from .task import JumpTask
+from .unpacking import pack, unpack
+
+ADVICE = {
+    "motor torque": "ask for a smaller jump, a longer thrust_time or a stronger profile",
+    "motor torque at speed": "ask for a smaller jump, a longer thrust_time or a faster profile",
+    "motor speed": "ask for a smaller jump, a longer flight or a faster profile",
+    "friction": "ask for a shorter distance or more friction",
+    "ground clearance": "ask for a greater rise or less foot_clearance",
+    "leg clearance": "ask for less twist or less leg_clearance",
+    "joint limits": "ask for a smaller jump",
+    "footholds": "ask for a place within reach: a smaller distance, or a greater rise",
+    "apex": "ask for a smaller rise or a longer thrust_time",
+    "flight time": "leave flight_time to the planner",
+}
+
+
+def solve_jump(
+    task: JumpTask,
+    robot: RobotDescription,
+    *,
+    warm_start: JumpPlan | None = None,
+    progress: Progress | None = None,
+    compiled: bool = True,
+    solver: str = "",
+) -> JumpPlan:
+    """The plan of a task.
+
+    ``warm_start`` is a plan of a near task with the same numbers of knots; another one is not used.
+    ``progress`` is told when functions are compiled, once per robot. ``solver`` insists on
+    ``fatrop`` or ``ipopt``. The result does not depend on the number of threads.
+
+    Raises:
+        PlanError: no motion was found; ``family`` names the constraints that could not be met.
+        TaskError: the task names joints that the robot has not.
+    """
+    started = time.process_time()
+    problem = make_problem(task, robot, compiled=compiled, progress=progress)
+    guess = ballistic_guess(problem)
+    warm = warm_start is not None and len(warm_start.time) == problem.knots
+    solution = None
+    if warm and warm_start is not None:
+        solution = solve(problem, pack(problem, warm_start, guess), warm=True, solver="fatrop")
+    if solution is None or not solution.solved:
+        warm = False
+        solution = solve(problem, guess, solver=solver)
+    if not solution.solved:
+        raise _failure(task, solution)
+    statistics = {
+        "solver": solution.solver,
+        "iterations": solution.iterations,
+        "cpu_s": time.process_time() - started,
+        "solver_cpu_s": solution.cpu,
+        "violation": solution.violation,
+        "cost": solution.cost,
+        "warm": warm,
+        "coordinates": problem.coordinates.name,
+        "variables": problem.assembly.variables,
+        "constraints": problem.assembly.constraints,
+        "compiled": not problem.assembly.interpreted,
+    }
+    return JumpPlan(
+        task=task, statistics=statistics, versions=_versions(), **unpack(problem, solution.values)
+    )
+
+
+def make_problem(
+    task: JumpTask,
+    robot: RobotDescription,
+    *,
+    compiled: bool = True,
+    progress: Progress | None = None,
+    coordinates: str = "",
+) -> Problem:
+    """The problem of a task, in the sagittal plane where the task stays in it.
+
+    Raises ``PlanError`` and ``TaskError`` as ``solve_jump`` does.
+    """
+    if task.profile not in robot.profiles:
+        raise PlanError(
+            f"{robot.name} has no actuator profile {task.profile!r}; there is "
+            + ", ".join(robot.profiles),
+            family="motor torque",
+        )
+    model, finder = _model(robot.model_dump_json(), task.profile)
+    start, end = start_and_end(task, robot, finder)
+    chosen = _choose(model, task, start, end, coordinates)
+    pieces = load_pieces(model, chosen, profile=task.profile, compiled=compiled, progress=progress)
+    return ProblemBuilder(task, model, chosen, pieces, start, end).build()
+
+
+@lru_cache(maxsize=4)
+def _model(text: str, profile: str) -> tuple[SymbolicModel, StanceFinder]:
+    model = SymbolicModel(RobotDescription.model_validate_json(text), profile)
+    return model, StanceFinder(model)
+
+
+def _choose(
+    model: SymbolicModel, task: JumpTask, start: Stance, end: Stance, asked: str
+) -> Coordinates:
+    if asked:
+        return make_coordinates(model, asked)
+    if not task.distance_y and not task.twist:
+        try:
+            plane = make_coordinates(model, "sagittal")
+        except ValueError:
+            return make_coordinates(model, "full")
+        both = np.array([start.coordinates, end.coordinates])
+        if np.allclose(plane.reduce(both) @ plane.matrix.T, both, rtol=0.0, atol=1e-12):
+            return plane
+    return make_coordinates(model, "full")
+
+
+def _failure(task: JumpTask, solution: Solution) -> PlanError:
+    family = solution.family
+    advice = ADVICE.get(family, "ask for a smaller jump, or change the durations")
+    reason = (
+        f"{family} is missed by {solution.violation:.3g}"
+        if solution.violation > 1e-5
+        else "the solver found no optimum"
+    )
+    return PlanError(
+        f"no plan for {task.name!r} after {solution.iterations} iterations: {reason}; {advice}",
+        family=family, violation=solution.violation,
+    )  # fmt: skip
+
+
+def _versions() -> dict[str, str]:
+    import casadi as ca
+
+    return {"casadi": str(ca.__version__), "numpy": np.__version__}

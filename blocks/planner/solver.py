@@ -1,0 +1,155 @@
+"""Solves a problem: fatrop, which exploits its order in time, and IPOPT where fatrop fails."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import time
+from collections import OrderedDict
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .assembly import Assembly
+from .problem import Problem
+
+Array = NDArray[np.float64]
+
+VIOLATION = 1e-6
+"""What a solution may violate a constraint by, in the constraint's unit."""
+DUAL_TOLERANCE = 1e-4
+"""fatrop's dual infeasibility does not fall much further; the cost is then stable to 7 digits."""
+KEPT = 12
+"""Solvers kept for problems of the same structure."""
+
+
+@dataclass(frozen=True)
+class Solution:
+    """Values of the variables and what it took. ``violation`` is the largest of all constraints'
+    and bounds', ``family`` whose it is."""
+
+    values: Array
+    solver: str
+    iterations: int
+    cost: float
+    violation: float
+    family: str
+    solved: bool
+    cpu: float
+
+
+def solve(
+    problem: Problem, guess: Array, *, warm: bool = False, solver: str = "", limit: int = 250
+) -> Solution:
+    """The best solution found: fatrop's, or IPOPT's where that fails, or the less violated one.
+
+    ``warm`` says that the guess is near the solution; ``solver`` insists on one of them.
+    """
+    tries = [solver] if solver else ["fatrop", "ipopt"]
+    best: Solution | None = None
+    for name in tries:
+        found = _run(problem, guess, name, warm, limit)
+        if best is None or (not best.solved and found.violation < best.violation):
+            best = found
+        if best.solved:
+            break
+    assert best is not None
+    return best
+
+
+def _run(problem: Problem, guess: Array, name: str, warm: bool, limit: int) -> Solution:
+    started = time.process_time()
+    function, evaluate, constraint = _solver(problem.assembly, name, warm, limit)
+    with _quiet():
+        result = function(
+            x0=guess, p=problem.parameters, lbx=problem.lower, ubx=problem.upper,
+            lbg=problem.row_lower, ubg=problem.row_upper,
+        )  # fmt: skip
+    values = np.array(result["x"]).ravel()
+    stats = function.stats()
+    cost = float(evaluate(values, problem.parameters)) if np.isfinite(values).all() else np.inf
+    violation, family = violation_of(problem, values, constraint)
+    status = str(stats.get("unified_return_status", ""))
+    solved = bool(stats["success"]) or status == "SOLVER_RET_SUCCESS"
+    solved = solved and violation <= 2.0 * VIOLATION
+    return Solution(
+        values, name, int(stats["iter_count"]), cost, violation, family, solved,
+        time.process_time() - started,
+    )  # fmt: skip
+
+
+def violation_of(problem: Problem, values: Array, constraint: Any) -> tuple[float, str]:
+    """The largest violation of a constraint or bound, and the family it belongs to."""
+    if not np.isfinite(values).all():
+        return np.inf, "dynamics"
+    rows = np.array(constraint(values, problem.parameters)).ravel()
+    over = np.maximum(problem.row_lower - rows, rows - problem.row_upper)
+    outside = np.maximum(problem.lower - values, values - problem.upper)
+    worst = int(over.argmax())
+    if outside.max(initial=0.0) > over[worst]:
+        return float(outside.max()), "joint limits"
+    return max(float(over[worst]), 0.0), problem.families[worst]
+
+
+_solvers: OrderedDict[object, tuple[Any, Any, Any]] = OrderedDict()
+
+
+def _solver(assembly: Assembly, name: str, warm: bool, limit: int) -> tuple[Any, Any, Any]:
+    """A solver for problems of this structure, with the functions of cost and constraints."""
+    key = (assembly.signature, name, warm, limit)
+    if key in _solvers:
+        _solvers.move_to_end(key)
+        return _solvers[key]
+    made = _make_solver(assembly, name, warm, limit)
+    _solvers[key] = made
+    if len(_solvers) > KEPT:
+        _solvers.popitem(last=False)
+    return made
+
+
+def _make_solver(assembly: Assembly, name: str, warm: bool, limit: int) -> tuple[Any, Any, Any]:
+    import casadi as ca
+
+    functions = assembly.functions()
+    nlp = {key: functions[key] for key in ("x", "p", "f", "g")}
+    own: dict[str, object] = {"tol": DUAL_TOLERANCE, "constr_viol_tol": VIOLATION,
+                              "max_iter": limit, "print_level": 0}  # fmt: skip
+    options: dict[str, object] = {"print_time": False, "calc_lam_p": False, "error_on_fail": False}
+    if name == "fatrop":
+        if warm:
+            own |= {"mu_init": 1e-4, "bound_push": 1e-6, "bound_frac": 1e-6}
+        given = ("nlp_f", "nlp_g", "nlp_grad_f", "nlp_jac_g", "nlp_hess_l", "nlp_grad")
+        options |= {
+            "structure_detection": "manual", "nx": assembly.nx, "nu": assembly.nu,
+            "ng": assembly.ng, "N": len(assembly.nx) - 1,
+            "cache": {key: functions[key] for key in given}, "fatrop": own,
+        }  # fmt: skip
+    else:
+        own |= {"sb": "yes"}
+        if warm:
+            own |= {"mu_init": 1e-4, "bound_push": 1e-6, "bound_frac": 1e-6,
+                    "slack_bound_push": 1e-6, "slack_bound_frac": 1e-6}  # fmt: skip
+        options |= {
+            "hess_lag": functions["hess_lag"], "jac_g": functions["nlp_jac_g"],
+            "grad_f": functions["grad_f"], "no_nlp_grad": True, "ipopt": own,
+        }  # fmt: skip
+    with _quiet():
+        made = ca.nlpsol("jump", name, nlp, options)
+    return made, functions["nlp_f"], functions["nlp_g"]
+
+
+@contextlib.contextmanager
+def _quiet() -> Iterator[None]:
+    """The solvers write to the process's standard output, whatever they are told; not now."""
+    kept = os.dup(1)
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    try:
+        os.dup2(nowhere, 1)
+        yield
+    finally:
+        os.dup2(kept, 1)
+        os.close(kept)
+        os.close(nowhere)

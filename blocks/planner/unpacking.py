@@ -1,0 +1,158 @@
+"""From the problem's variables to a plan, and from a plan of a near task to variables."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..signals import Phase
+from .midpoint import angular_motion, euler_angles, euler_rates, rotation
+from .plan import JumpPlan
+from .problem import Problem
+from .symbolic_model import SymbolicModel
+
+Array = NDArray[np.float64]
+ORDER = [1, 0, 2]
+"""The planner's pitch, roll, yaw from angles about x, y, z, and back."""
+
+
+def knot_times(problem: Problem, values: Array) -> Array:
+    """The time of every knot [s]."""
+    n, assembly = problem.coordinates.size, problem.assembly
+    steps = problem.steps.copy()
+    for k in problem.flight:
+        steps[k] = values[assembly.state_start[k] + 2 * n]
+    return np.concatenate([[0.0], np.cumsum(steps)])
+
+
+def unpack(problem: Problem, values: Array) -> dict[str, Any]:
+    """The arrays of a plan, and its lift-off and touchdown times."""
+    assembly, coordinates, model = problem.assembly, problem.coordinates, problem.model
+    n, count = coordinates.size, problem.knots
+    times = knot_times(problem, values)
+    q = np.array([values[s : s + n] for s in assembly.state_start]) @ coordinates.matrix.T
+    v = np.array([values[s + n : s + 2 * n] for s in assembly.state_start]) @ coordinates.matrix.T
+    bend, force = np.zeros((count, model.size)), np.zeros((count, 3 * len(model.robot.contacts)))
+    grounded = np.zeros(count, dtype=bool)
+    for k, phase in enumerate(problem.phases):
+        control = assembly.control_start[k]
+        bend[k] = coordinates.matrix @ values[control : control + n]
+        grounded[k] = phase is not Phase.FLIGHT
+        if grounded[k]:
+            pushed = values[control + n : control + n + coordinates.forces]
+            force[k] = coordinates.force_matrix @ pushed
+    phases = [int(phase) for phase in problem.phases]
+    for array in (bend, force, grounded):
+        array[-1] = array[-2]
+    steps = np.diff(times, append=times[-1])
+    steps[-1] = steps[-2]
+    middle = q + 0.5 * steps[:, None] * v + 0.125 * steps[:, None] ** 2 * bend
+    moving = v + 0.5 * steps[:, None] * bend
+    middle[-1], moving[-1] = middle[-2], moving[-2]
+    com, speed, momentum, torque = _evaluate(model, q, v, middle, moving, bend, force)
+    generalised = [_twist(*row) for row in zip(q, v, bend, strict=True)]
+    halfway = [_twist(*row) for row in zip(middle, moving, bend, strict=True)]
+    return {
+        "time": times,
+        "position": np.array([_pose(row) for row in q]),
+        "velocity": np.array([row[0] for row in generalised]),
+        "acceleration": np.array([row[1] for row in halfway]),
+        "contact_force": force.reshape(count, -1, 3),
+        "contact": np.repeat(grounded[:, None], len(model.robot.contacts), axis=1),
+        "phase": np.array([*phases, phases[-1]], dtype=np.int64),
+        "joint_torque": torque,
+        "com": com,
+        "com_velocity": speed,
+        "angular_momentum": momentum,
+        "lift_off_time": float(times[problem.flight.start]),
+        "touchdown_time": float(times[problem.flight.stop]),
+    }
+
+
+def pack(problem: Problem, plan: JumpPlan, guess: Array) -> Array:
+    """Variables near a plan of a task like this one with as many knots; ``guess`` elsewhere."""
+    assembly, coordinates = problem.assembly, problem.coordinates
+    n = coordinates.size
+    angles = euler_angles(plan.position[:, 3:7])
+    q = np.hstack([plan.position[:, :3], angles[:, ORDER], plan.position[:, 7:]])
+    v = np.zeros_like(q)
+    for k, row in enumerate(plan.velocity):
+        v[k, :3] = rotation(angles[k]) @ row[:3]
+        v[k, 3:6] = euler_rates(angles[k], row[3:6])[ORDER]
+        v[k, 6:] = row[6:]
+    steps = np.diff(plan.time)
+    values = guess.copy()
+    for k in range(problem.knots):
+        start, control = assembly.state_start[k], assembly.control_start[k]
+        values[start : start + n] = coordinates.reduce(q[k])
+        values[start + n : start + 2 * n] = coordinates.reduce(v[k])
+        if k == problem.knots - 1:
+            break
+        bend = (v[k + 1] - v[k]) / steps[k]
+        values[control : control + n] = coordinates.reduce(bend)
+        if problem.phases[k] is Phase.FLIGHT:
+            values[start + 2 * n] = steps[k]
+        else:
+            pushed = coordinates.reduce_forces(plan.contact_force[k].ravel())
+            values[control + n : control + n + coordinates.forces] = pushed
+        hold = assembly.knots[k].hold
+        if hold is not None:
+            values[control + hold] = steps[k + 1]
+    return values
+
+
+def _pose(q: Array) -> Array:
+    """Base position, quaternion x, y, z, w with no jump of sign at rest, joints."""
+    pitch, roll, yaw = q[3:6]
+    half = np.array([[0.0, np.sin(pitch / 2), 0.0, np.cos(pitch / 2)],
+                     [np.sin(roll / 2), 0.0, 0.0, np.cos(roll / 2)],
+                     [0.0, 0.0, np.sin(yaw / 2), np.cos(yaw / 2)]])  # fmt: skip
+    return np.concatenate([q[:3], _product(_product(half[0], half[1]), half[2]), q[6:]])
+
+
+def _product(a: Array, b: Array) -> Array:
+    vector = a[3] * b[:3] + b[3] * a[:3] + np.cross(a[:3], b[:3])
+    return np.append(vector, a[3] * b[3] - a[:3] @ b[:3])
+
+
+def _twist(q: Array, v: Array, bend: Array) -> tuple[Array, Array]:
+    """Generalised velocity and its derivative with the base's part in the body frame."""
+    angles = q[3:6][ORDER]
+    spin, turn = angular_motion(angles, v[3:6][ORDER], bend[3:6][ORDER])
+    back = rotation(angles).T
+    speed = back @ v[:3]
+    pull = back @ bend[:3] - np.cross(spin, speed)
+    return np.concatenate([speed, spin, v[6:]]), np.concatenate([pull, turn, bend[6:]])
+
+
+_evaluators: dict[int, tuple[SymbolicModel, Any, Any]] = {}
+
+
+def _evaluate(
+    model: SymbolicModel, q: Array, v: Array, middle: Array, moving: Array, bend: Array,
+    force: Array,
+) -> tuple[Array, Array, Array, Array]:  # fmt: skip
+    """Centre of mass, its velocity and the angular momentum at the knots; joint torques in the
+    middle of the intervals."""
+    import casadi as ca
+
+    if id(model) not in _evaluators:
+        symbols = [ca.SX.sym(name, model.size) for name in ("q", "v", "a")]
+        pushes = ca.SX.sym("F", force.shape[1])
+        linear, angular = model.momentum(symbols[0], symbols[1])
+        named = {c.name: pushes[3 * i : 3 * i + 3] for i, c in enumerate(model.robot.contacts)}
+        torque = model.inverse_dynamics(*symbols, named)[2]
+        of_state = ca.vertcat(model.com(symbols[0]), linear / model.robot.total_mass, angular)
+        _evaluators[id(model)] = (
+            model,
+            ca.Function("states", symbols[:2], [of_state], {"cse": True}),
+            ca.Function("torques", [*symbols, pushes], [torque], {"cse": True}),
+        )
+    _, states, torques = _evaluators[id(model)]
+    found = np.array(states(q.T, v.T)).T
+    return (
+        found[:, :3].copy(), found[:, 3:6].copy(), found[:, 6:].copy(),
+        np.array(torques(middle.T, moving.T, bend.T, force.T)).T.copy(),
+    )  # fmt: skip
