@@ -124,3 +124,23 @@ def test_without_the_plan_for_angular_momentum_it_falls():
     gains = {"torso_weight": [10.0] * 3, "angular_weight": [1.0] * 3}
     result = aloft.load(JUMP, {"wbc.thrust": gains}).run(log=False)
     assert not result.success
+
+
+PUSHED = {
+    "robot.seed": 70, "plan.rise": 0.04, "push.force": 70.0, "score.peak_tilt": 0.785,
+    "score.foot_slip": 0.02, "score.distance_tolerance": 0.2,
+}  # fmt: skip
+"""The paper's push test, at about its flight time of 0.2 s."""
+
+
+@pytest.mark.parametrize("angle", [0.0, np.pi, np.pi / 2.0])
+def test_a_push_in_the_air_is_landed(angle):
+    result = aloft.load(JUMP, {**PUSHED, "push.angle": angle}).run(log=False)
+    assert result.success, result.reason
+
+
+def test_without_the_landing_heuristic_the_push_from_behind_ends_in_a_fall():
+    off = {"landing.w_l": [0.0, 0.0], "landing.w_c": 0.0}
+    result = aloft.load(JUMP, {**PUSHED, **off}).run(log=False)
+    assert not result.success
+    assert result.metrics["peak_tilt_deg"] > 60.0
