@@ -149,8 +149,8 @@ class Executor:
                 by_block[path] = dict(block.metrics())
             except Exception as failure:  # noqa: BLE001  # the other blocks' metrics still count
                 problems.append(f"block '{path}' failed in metrics: {describe(failure)}")
-        metrics, unmet = merge_metrics(by_block)
-        code, reason = self._verdict(error, problems, interrupts, unmet)
+        metrics, unmet, praise = merge_metrics(by_block)
+        code, reason = self._verdict(error, problems, interrupts, unmet, praise)
         for program in self.ticker.programs:
             program.fold()
         pacer = self.ticker.pacer
@@ -181,6 +181,7 @@ class Executor:
         problems: Sequence[str],
         interrupts: Interrupts,
         unmet: str | None,
+        praise: str | None,
     ) -> tuple[ExitCode, str]:
         """The exit code and the reason: the first that applies, gravest first."""
         stopped = self.bound.clock.stop_reason
@@ -195,7 +196,7 @@ class Executor:
             return ExitCode.RUN_FAILED, problems[0]
         if unmet is not None:
             return ExitCode.NOT_SUCCESSFUL, unmet
-        return ExitCode.SUCCESS, stopped or "ran to its end"
+        return ExitCode.SUCCESS, praise or stopped or "ran to its end"
 
 
 @contextmanager

@@ -113,22 +113,27 @@ def _plain(value: Any) -> Any:
 
 def merge_metrics(
     by_block: Mapping[str, Mapping[str, Metric]],
-) -> tuple[dict[str, Metric], str | None]:
-    """All blocks' metrics as one, and the reason if some block says ``success`` is false.
+) -> tuple[dict[str, Metric], str | None, str | None]:
+    """All blocks' metrics as one, and what the blocks that judge the run say.
 
-    Those of blocks that judge the run, by a metric ``success``, come first.
+    Returns:
+        The metrics, those of blocks with a metric ``success`` first; the ``reason`` of the first
+        of these that says no; and that of the first that says yes.
     """
     by_block = dict(sorted(by_block.items(), key=lambda item: "success" not in item[1]))
     owners: dict[str, list[str]] = {}
     failure: str | None = None
+    praise: str | None = None
     for path, metrics in by_block.items():
         for name in metrics:
             owners.setdefault(name, []).append(path)
         if failure is None and not metrics.get("success", True):
             failure = str(metrics.get("reason") or f"block '{path}' reports no success")
+        elif praise is None and metrics.get("success") and metrics.get("reason"):
+            praise = str(metrics["reason"])
     merged: dict[str, Metric] = {}
     for path, metrics in by_block.items():
         for name, value in metrics.items():
             if name not in ("success", "reason"):
                 merged[name if len(owners[name]) == 1 else f"{path}.{name}"] = value
-    return merged, failure
+    return merged, failure, praise

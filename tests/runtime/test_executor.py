@@ -68,7 +68,7 @@ class Stopper(Block):
 
     class Params(Parameters):
         at: int = 3
-        good: bool = True
+        good: bool | None = None
 
     y = Output(Vector, text="nothing")
 
@@ -82,7 +82,11 @@ class Stopper(Block):
             self.request_stop("a later reason")
 
     def metrics(self) -> dict[str, float | bool | str]:
-        verdict = {} if self.params.good else {"success": False, "reason": "it fell"}
+        verdict = {
+            None: {},
+            True: {"success": True, "reason": "it stands"},
+            False: {"success": False, "reason": "it fell"},
+        }[self.params.good]
         return {"height_m": 0.5, "stopper_only": np.float64(2.0), **verdict}
 
 
@@ -251,6 +255,15 @@ def test_metrics_that_say_so_make_a_run_unsuccessful() -> None:
     assert result.exit_code is ExitCode.NOT_SUCCESSFUL
     assert result.error is None
     assert "success" not in result.metrics
+
+
+def test_a_judge_that_is_content_gives_the_reason() -> None:
+    result = run(checked_graph({"s": Use(Stopper, {"good": True})}))
+    assert (result.success, result.reason) == (True, "it stands")
+    both = run(
+        checked_graph({"s": Use(Stopper, {"good": True}), "t": Use(Stopper, {"good": False})})
+    )
+    assert (both.success, both.reason) == (False, "it fell")
 
 
 def test_metrics_of_one_name_are_told_apart_by_block() -> None:

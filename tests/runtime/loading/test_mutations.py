@@ -103,7 +103,7 @@ def mutated(draw: st.DrawFn, text: str) -> str:
     return text
 
 
-@settings(max_examples=6000, deadline=None)
+@settings(max_examples=1000, deadline=None)
 @given(mutated(GRAPH), mutated(without_spare(LEG)), mutated(MORE))
 def test_mutated_files(graph: str, leg: str, more: str) -> None:
     survives(graph, leg, more, [])
