@@ -15,6 +15,7 @@ from .blocks import blocks
 from .check import check
 from .graph import graph
 from .output import print_json
+from .plan import plan
 from .run import run
 
 EXIT_CODES = """\b
@@ -35,7 +36,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
-for _verb in (run, check, graph, blocks, bench):
+for _verb in (run, check, graph, blocks, plan, bench):
     app.command(epilog=EXIT_CODES if _verb is run else None)(_verb)
 
 

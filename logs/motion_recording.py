@@ -1,7 +1,7 @@
 """A motion that nothing has run yet, such as a plan, as one Rerun file: the robot in 3D and series.
 
 In the file: ``world``, the robot posed at 100 Hz with contact forces and centre of mass, as in the
-recording of a run; and ``series/<name>``, each with its legend, on the timeline ``t``.
+recording of a run; and ``series/<title>``, each with its legend, on the timeline ``t``.
 """
 
 from __future__ import annotations
@@ -31,7 +31,8 @@ class RecordedMotion:
         base_position, base_orientation, joint_position: where the links are.
         com: centre of mass [m], (n, 3).
         contact_position, contact_force: [m] and [N], (n, n_contacts, 3).
-        series: by name what else to plot, (n, m), and the names of its m lines.
+        series: by title with unit, e.g. ``foot height [m]``, what else to plot, (n, m), and the
+            names of its m lines.
         events: (time [s], text).
         properties: what the file is about, as texts.
     """
@@ -68,7 +69,7 @@ def write_motion(path: str | Path, motion: RecordedMotion, name: str) -> Path:
         stream.send_property("aloft", rr.AnyValues(**motion.properties))
         _write_world(stream, motion)
         for title, (values, names) in motion.series.items():
-            entity = f"series/{title}"
+            entity = series_entity(title)
             stream.log(entity, rr.SeriesLines(names=list(names)), static=True)
             stream.send_columns(
                 entity, _times(motion.time), rr.Scalars.columns(scalars=values)
@@ -83,6 +84,11 @@ def write_motion(path: str | Path, motion: RecordedMotion, name: str) -> Path:
     return path
 
 
+def series_entity(title: str) -> str:
+    """The entity of a series: ``foot height [m]`` is in ``series/foot_height``."""
+    return f"series/{title.partition(' [')[0].replace(' ', '_')}"
+
+
 def motion_blueprint(motion: RecordedMotion) -> Any:
     """The robot on the left, every series on the right."""
     import rerun.blueprint as rrb
@@ -93,7 +99,7 @@ def motion_blueprint(motion: RecordedMotion) -> Any:
         eye_controls=rrb.EyeControls3D(position=(1.1, -1.1, 0.6), look_target=(0.0, 0.0, 0.3)),
         line_grid=rrb.LineGrid3D(visible=True, spacing=0.1),
     )
-    plots = [rrb.TimeSeriesView(origin=f"series/{title}", name=title) for title in motion.series]
+    plots = [rrb.TimeSeriesView(origin=series_entity(title), name=title) for title in motion.series]
     column = rrb.Vertical(*plots, rrb.TextLogView(origin="events", name="Events"))
     return rrb.Blueprint(
         rrb.Horizontal(scene, column, column_shares=[2, 3]),

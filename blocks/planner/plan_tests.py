@@ -63,6 +63,18 @@ class Evidence:
         return np.asarray(self.replay.samples.velocity[:, 6:] @ self.robot.joint_to_motor.T)
 
     @cached_property
+    def middles(self) -> NDArray[np.int64]:
+        """The sample nearest to the middle of every interval that lasts."""
+        time, samples = self.plan.time, self.replay.samples
+        lasting = np.flatnonzero(np.diff(time) > 0.0)
+        found = []
+        for k in lasting:
+            rows = np.flatnonzero(samples.knot == k)
+            middle = 0.5 * (time[k] + time[k + 1])
+            found.append(int(rows[np.abs(samples.time[rows] - middle).argmin()]))
+        return np.array(found, np.int64)
+
+    @cached_property
     def poses(self) -> LinkPoses:
         """The links at the samples."""
         q = self.replay.samples.position
@@ -152,13 +164,11 @@ def states(e: Evidence) -> Iterator[Found]:
         ("angular_momentum", plan.angular_momentum, r.angular_momentum, 1e-5, "N m s"),
     ):
         yield Found(name, np.abs(planned - exact).max(), limit, unit, "its error at the knots")
-    times, s = np.diff(plan.time) > 0.0, r.samples
-    middle = np.array([k for k in range(len(times)) if times[k]])
-    exact = np.array([s.torque[s.knot == k][(s.knot == k).sum() // 2] for k in middle])
-    missed = np.abs(exact - plan.joint_torque[middle])
+    s = r.samples
+    missed = np.abs(s.torque[e.middles] - plan.joint_torque[s.knot[e.middles]])
     k, joint = worst(missed)
     yield Found("joint_torque", missed.max(), 0.2, "N m", "its error in the middle of an interval",
-                f"{e.robot.joints[joint].name} at {plan.time[middle[k]]:.3f} s")  # fmt: skip
+                f"{e.robot.joints[joint].name} {e.moment(int(e.middles[k]))}")  # fmt: skip
 
 
 def interval_defects(e: Evidence) -> Iterator[Found]:
@@ -283,11 +293,18 @@ def machine(e: Evidence) -> Iterator[Found]:
     yield Found("motor_speed", speed.max(), 1.01 * e.effort * profile.no_load_speed, "rad/s",
                 "the largest motor speed",
                 f"{robot.transmission.motors[motor]} {e.moment(sample)}")  # fmt: skip
-    over = np.abs(e.motor_torque) - allowed_motor_torque(e, e.effort)
+    over = np.abs(e.motor_torque) - allowed_motor_torque(e, 1.0)
     sample, motor = worst(over)
     yield Found("motor_torque", over.max(), 0.03 * profile.peak_torque, "N m",
                 "how far a motor torque passes what its speed allows",
                 f"{robot.transmission.motors[motor]} {e.moment(sample)}")  # fmt: skip
+    # The share that is kept for feedback is a matter of whole intervals, not of their ends.
+    middle = e.middles
+    over = np.abs(e.motor_torque[middle]) - allowed_motor_torque(e, e.effort)[middle]
+    sample, motor = worst(over)
+    yield Found("effort", over.max(), 0.01 * profile.peak_torque, "N m",
+                "how far a motor torque passes the share of it that the task allows",
+                f"{robot.transmission.motors[motor]} {e.moment(int(middle[sample]))}")  # fmt: skip
 
 
 def allowed_motor_torque(e: Evidence, effort: float) -> Array:

@@ -24,7 +24,12 @@ Array = NDArray[np.float64]
 
 
 class InvalidPlanError(AloftError):
-    """A plan failed the validity check; the message names the tests that failed."""
+    """A plan failed the validity check; the message names the tests that failed. ``plan`` is that
+    plan with its report, to look at and not to run."""
+
+    def __init__(self, message: str, plan: JumpPlan) -> None:
+        super().__init__(message)
+        self.plan = plan
 
 
 @dataclass(frozen=True)
@@ -114,7 +119,10 @@ def require_valid(plan: JumpPlan, robot: RobotDescription) -> None:
     """
     report = check_plan(plan, robot)
     if not report.valid:
-        raise InvalidPlanError(f"the plan {plan.task.name!r} is not valid:\n{report.explain()}")
+        raise InvalidPlanError(
+            f"the plan {plan.task.name!r} is not valid:\n{report.explain()}",
+            plan.with_report(report.as_json()),
+        )
 
 
 def broken_array(plan: JumpPlan, robot: RobotDescription) -> str:

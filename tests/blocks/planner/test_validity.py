@@ -116,6 +116,7 @@ CHANGES: dict[str, Callable[[JumpPlan], JumpPlan]] = {
     "joint_limits": in_flight("position", 1.3, 10),
     "motor_speed": asked(effort=0.8),
     "motor_torque": scaled_force,
+    "effort": asked(effort=0.7),
     "foot_clearance": asked(foot_clearance=0.2),
     "leg_clearance": asked(leg_clearance=0.15),
     "body_on_ground": shifted("position", -0.1, 2),

@@ -1,0 +1,103 @@
+"""A planned jump, played back: the whole-body plan of a task from the library or the planner."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ..runtime.block import Block, Output
+from ..runtime.errors import BlockError
+from ..runtime.parameters import Parameters, parameter
+from .jump_table import JumpTableReader
+from .signals import JumpReference
+
+if TYPE_CHECKING:
+    from ..runtime.description import RobotDescription
+    from .planner.task import JumpTask
+
+SHIPPED = Path(__file__).parents[1] / "graphs"
+"""Where tasks are looked for that are not beside the graph."""
+
+
+class JumpPlan(Block):
+    """The motion of a jump that the kino-dynamic planner found (section III): what to follow.
+
+    The task is a file (``tasks/in_situ.yaml``; looked for beside the graph, then among the shipped
+    graphs) or the task itself (``{rise: 12 cm, distance_x: 5 cm}``). Its plan comes from the plan
+    library under the task's hash: the shipped plans need no solver. Where there is none it is
+    solved while the graph loads, from the nearest plan of the library, and kept.
+
+    Every plan, also a kept one, first passes the validity check (``blocks/planner/validity``) with
+    exact dynamics. At the start the robot stands still for ``stand_time``; at the end it stays
+    where the plan ended. Between the plan's knots the reference is read from a table of 2 ms steps
+    (``blocks/planner/reference_table``).
+
+    It follows time alone and knows nothing of what the robot really does. Raises ``BlockError`` at
+    load where the task cannot be read or is for another robot, cannot be planned, or its plan is
+    not valid; the message says which constraint or which test.
+    """
+
+    class Params(Parameters):
+        task: str | Mapping[str, Any] = parameter(
+            "tasks/in_situ.yaml", text="a task's file, or the task's parameters"
+        )
+        stand_time: float = parameter(
+            0.4, unit="s", gt=0.0, text="standing before the plan, for the estimator to settle"
+        )
+        library: str = parameter(
+            "", text="folder where new plans are kept; the user's cache if empty"
+        )
+        solve: bool = parameter(True, text="whether a plan that is not there may be solved")
+
+    params: Params
+    reference = Output(JumpReference, text="the plan at the present instant")
+
+    def setup(self) -> None:
+        robot = self.context.robot
+        if robot is None:
+            raise BlockError("JumpPlan needs a robot: name one, e.g. robot: bruce")
+        from .planner.reference_table import reference_table
+
+        task = self._task()
+        if task.robot != robot.name:
+            raise BlockError(
+                f"the task {task.name!r} is for {task.robot}, but the graph's robot is {robot.name}"
+            )
+        plan = self._plan(task, robot)
+        self._reader = JumpTableReader(reference_table(plan, robot, self.params.stand_time))
+
+    def step(self) -> None:
+        self._reader.read(self.time, self.reference)
+
+    def _task(self) -> JumpTask:
+        from .planner.task import TaskError, make_task, read_task
+
+        wanted = self.params.task
+        try:
+            if not isinstance(wanted, str):
+                return make_task({"name": self.context.path, **wanted})
+            places = [folder / wanted for folder in (self.context.folder, Path(), SHIPPED)]
+            found = [place for place in places if place.is_file()]
+            if not found:
+                there = sorted(path.stem for path in (SHIPPED / "tasks").glob("*.yaml"))
+                raise BlockError(
+                    f"there is no task {wanted!r} beside the graph or among the shipped ones: "
+                    + ", ".join(f"tasks/{name}.yaml" for name in there)
+                )
+            return read_task(found[0])
+        except TaskError as error:
+            raise BlockError(str(error)) from error
+
+    def _plan(self, task: JumpTask, robot: RobotDescription) -> Any:
+        from .planner.library import PlanLibrary
+
+        folder = Path(self.params.library) if self.params.library else None
+        library = PlanLibrary(robot, folder)
+        if not self.params.solve and library.path_of(task) is None:
+            raise BlockError(
+                f"there is no plan for the task {task.name!r}; make one with 'aloft plan', or set "
+                "solve: true"
+            )
+        plan, _ = library.plan(task)
+        return plan
