@@ -36,7 +36,7 @@ def ballistic_guess(problem: Problem) -> Array:
     for k in range(problem.knots):
         whole, speed = (start, np.zeros(len(start))) if k < problem.flight.start else (end, 0 * end)
         if k in problem.flight:
-            time = (k - problem.flight.start) * step
+            time = step * float(problem.steps[problem.flight.start : k].sum())
             whole, speed = start + time * travel, travel.copy()
             whole[2] = start[2] + up * time - 0.5 * GRAVITY * time * time
             speed[2] = up - GRAVITY * time

@@ -15,13 +15,18 @@ from numpy.typing import NDArray
 
 from ..signals import Phase
 from .assembly import Assembly, Knot
+from .clearance import step_edge
 from .coordinates import Coordinates
-from .stage_functions import DRIFT_RATE, Piece, body_points, parameter_sizes
+from .knot_spacing import spacing
+from .stage_functions import Piece, body_points, parameter_sizes
 from .stance import Stance
 from .symbolic_model import SymbolicModel
 from .task import JumpTask
 
 Array = NDArray[np.float64]
+STEP_UP_SHARE, STEP_DOWN_SHARE = 0.45, 0.75
+LIMIT_MARGIN = 0.005
+"""rad; between two knots a joint at its limit would pass it by about as much."""
 SHORTEST_FLIGHT, LONGEST_FLIGHT = 0.04, 1.5
 """s; bounds of a flight time that is left to the planner."""
 
@@ -37,7 +42,7 @@ class Problem:
         parameters: their values.
         families: of every constraint row the name of what it asks for.
         phases: of every interval.
-        steps: the interval lengths [s], zero where they are variables.
+        steps: the interval lengths [s]; in flight by their mean, which is a variable.
         flight: the range of flight knots, lift-off to the one before touchdown.
     """
 
@@ -86,11 +91,13 @@ class ProblemBuilder:
         )  # fmt: skip
         before = knots.squat + knots.thrust
         self.flight = range(before, before + knots.flight)
-        self.steps = np.array(
-            [task.squat_time / knots.squat] * knots.squat
-            + [task.thrust_time / knots.thrust] * knots.thrust
-            + [0.0] * knots.flight
-            + [task.landing_time / knots.landing] * knots.landing
+        self.steps = np.concatenate(
+            [
+                task.squat_time / knots.squat * spacing(Phase.SQUAT, knots.squat),
+                task.thrust_time / knots.thrust * spacing(Phase.THRUST, knots.thrust),
+                spacing(Phase.FLIGHT, knots.flight),
+                task.landing_time / knots.landing * spacing(Phase.LANDING, knots.landing),
+            ]
         )
         self.pieces = pieces
 
@@ -124,7 +131,7 @@ class ProblemBuilder:
                 rows = np.arange(2 * n + 1, self.pieces["flight"].rows)
                 knot.pieces["flight"] = (np.arange(3 * n + 1), rows)
                 if k > self.flight.start:
-                    air = np.arange(self.pieces["air"].rows)
+                    air = self._air_rows(k)
                     knot.pieces["air"] = (np.arange(n), air)
             else:
                 last = k == self.flight.start - 1
@@ -145,6 +152,17 @@ class ProblemBuilder:
         base = len(self.coordinates.free_base)
         return [*knots, Knot(2 * n, 0, fixed=(*range(base), *range(n, 2 * n)))]
 
+    def _air_rows(self, k: int) -> NDArray[np.int64]:
+        """Which rows are needed: how far ahead only where there is an edge."""
+        points = self.pieces["air"].rows // 3
+        feet = len(self.coordinates.contacts)
+        ahead = np.arange(points, points + feet)
+        if step_edge(self.task) is None or (self.task.landing_height > 0.0) is (
+            self._flight_share(k) > (STEP_UP_SHARE if self.task.landing_height > 0.0
+                                     else STEP_DOWN_SHARE)):  # fmt: skip
+            ahead = ahead[:0]
+        return np.concatenate([np.arange(points), ahead, np.arange(2 * points, 3 * points)])
+
     def _take_off_rows(self) -> NDArray[np.int64]:
         task = self.task
         kept = [0] if task.rise is not None else [1] if task.take_off_speed is not None else []
@@ -155,8 +173,8 @@ class ProblemBuilder:
         n, start = self.n, int(self.assembly.state_start[k])
         base = len(self.coordinates.free_base)
         limits = self.model.robot.joint_limits[list(self.coordinates.moving)]
-        self.lower[start + base : start + n] = limits[:, 0]
-        self.upper[start + base : start + n] = limits[:, 1]
+        self.lower[start + base : start + n] = limits[:, 0] + LIMIT_MARGIN
+        self.upper[start + base : start + n] = limits[:, 1] - LIMIT_MARGIN
         if k in (0, len(self.phases)):
             stance = self.start if k == 0 else self.end
             given = np.concatenate([self.coordinates.reduce(stance.coordinates), np.zeros(n)])
@@ -212,7 +230,7 @@ class ProblemBuilder:
         line = self._slope() * top
         return [
             ("motor torque", self.m, -peak, peak),
-            ("motor torque at speed", self.m, -line, line),
+            ("motor torque at speed", 2 * self.m, -line, line),
             ("motor speed", self.m, -top, top),
         ]
 
@@ -250,7 +268,7 @@ class ProblemBuilder:
         self._rows("stance", k, [base, *self._motor_rows(), ("friction", cones, 0.0, np.inf)])
 
     def _fill_flight(self, k: int) -> None:
-        self._set("flight", k, **self._interval(k))
+        self._set("flight", k, share=self.steps[k], **self._interval(k))
         base = ("dynamics", len(self.coordinates.rows), 0.0, 0.0)
         self._rows("flight", k, [base, *self._motor_rows()])
 
@@ -271,29 +289,35 @@ class ProblemBuilder:
         ])  # fmt: skip
 
     def _fill_air(self, k: int) -> None:
-        share = (k - self.flight.start) / len(self.flight)
-        floor = self.task.foot_clearance * np.sin(np.pi * share)
-        step = self.task.landing_height
-        way = np.array([self.task.distance_x, self.task.distance_y])
-        distance = float(np.hypot(*way))
-        direction = way / distance if distance else np.array([1.0, 0.0])
-        reach = float((self.start.points[:, :2] @ direction).max())
-        back = float((self.end.points[:, :2] @ direction).min())
-        edge = 0.5 * (reach + back)
-        if self.task.step_edge is not None:
-            edge = self.task.step_edge * float(direction[0])
-        width = max(0.003, min(edge - reach, back - edge) / 2.5)
-        if back - reach < 0.005 and step:  # no room for an edge: the ground moves in time
-            floor += step * share * share * (3.0 - 2.0 * share)
-            step = 0.0
-        self._set("air", k, step=step, edge=edge, width=width, direction=direction)
-        points = body_points(self.model, self.coordinates)
-        heights = [
-            ("ground clearance", 1, floor if not radius else min(floor, 0.0), np.inf)
-            for _, radius, _ in points
-        ]
-        half = 0.5 * self.task.leg_clearance
-        self._rows("air", k, [*heights, ("leg clearance", len(points), half, np.inf)])
+        """Feet and calves are above the ground. At a step they are above the higher ground while
+        it is under them: until ``STEP_DOWN_SHARE`` of the flight's time, or from ``STEP_UP_SHARE``
+        on, and at that instant they are still, or already, on the lower side of the edge."""
+        task, points = self.task, body_points(self.model, self.coordinates)
+        share = self._flight_share(k)
+        step, edge = task.landing_height, step_edge(task)
+        switch = 0.5 if edge is None else STEP_UP_SHARE if step > 0.0 else STEP_DOWN_SHARE
+        ground = step if share > switch else 0.0
+        floor = ground + task.foot_clearance * np.sin(np.pi * share)
+        if self._flight_share(k - 1) < switch <= share:
+            floor = max(floor, step)
+        ahead = (-np.inf, np.inf)
+        if edge is not None:
+            before = (share <= switch) if step > 0.0 else False
+            beyond = (share > switch) if step < 0.0 else False
+            forward = task.distance_x > 0.0
+            if before or beyond:
+                ahead = (-np.inf, edge) if before is forward else (edge, np.inf)
+        n_feet = len(self.coordinates.contacts)
+        free = ("ground clearance", len(points) - n_feet, -np.inf, np.inf)
+        self._rows("air", k, [
+            ("ground clearance", n_feet, floor, np.inf),
+            ("ground clearance", len(points) - n_feet, ground, np.inf),
+            ("ground clearance", n_feet, *ahead),
+            free,
+            ("leg clearance", len(points), 0.5 * task.leg_clearance, np.inf),
+        ])  # fmt: skip
 
-
-__all__ = ["DRIFT_RATE", "Problem", "ProblemBuilder"]
+    def _flight_share(self, k: int) -> float:
+        """How much of the flight's time is past at a knot."""
+        first = self.flight.start
+        return float(self.steps[first:k].sum() / len(self.flight))

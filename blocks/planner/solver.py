@@ -119,6 +119,8 @@ def _make_solver(assembly: Assembly, name: str, warm: bool, limit: int) -> tuple
                               "max_iter": limit, "print_level": 0}  # fmt: skip
     options: dict[str, object] = {"print_time": False, "calc_lam_p": False, "error_on_fail": False}
     if name == "fatrop":
+        # Its own tolerance takes the short intervals' small coefficients for a lack of rank.
+        own |= {"linsol_lu_fact_tol": 1e-7, "mu_init": 10.0}
         if warm:
             own |= {"mu_init": 1e-4, "bound_push": 1e-6, "bound_frac": 1e-6}
         given = ("nlp_f", "nlp_g", "nlp_grad_f", "nlp_jac_g", "nlp_hess_l", "nlp_grad")

@@ -6,13 +6,15 @@ reduced coordinates of ``Coordinates``:
 
 ``stance``  z = q, v, a, F.     Interval on the ground. Rows: gap (2n), base dynamics, motor torque,
             torque-speed line and motor speed (m each), friction pyramid (4 a contact point, or 2).
-``flight``  z = q, v, h, a.     Interval of h seconds in the air. Rows: gap (2n + 1), base dynamics,
-            motor torque, torque-speed line, motor speed.
+``flight``  z = q, v, h, a.     Interval of ``share`` h seconds in the air. Rows: gap (2n + 1), base dynamics,
+            motor torque, torque-speed line at begin and end, motor speed.
 ``contact`` z = q, v.           Rows: velocity + 10/s x place error of every foot on the ground (5 a
             foot: a line foot may turn about its own line), then the place errors (5 a foot; 3 in
             the sagittal plane).
 ``take_off`` z = q, v.          Rows: apex height, vertical speed, angular momentum (3).
-``air``     z = q.              Rows: height above the ground of feet and calves, leg clearance.
+``air``     z = q.              Rows: height of the points of feet and calves, how far ahead they
+            are, and how far on their own leg's side of the torso's middle plane, each point's
+            height and side less its radius.
 
 Over an interval of h seconds accelerations are constant: v+ = v + h a, q+ = q + h v + h^2 a / 2, and
 the dynamics hold in its middle (second order). Gap rows hold minus the next state. ``w`` is named
@@ -59,10 +61,10 @@ def parameter_sizes(coordinates: Coordinates) -> dict[str, dict[str, int]]:
     }  # fmt: skip
     return {
         "stance": {"step": 1, "friction": 1, "force": 1, **interval},
-        "flight": interval,
+        "flight": {"share": 1, **interval},
         "contact": {"place": 3 * contacts, "heading": 2},
         "take_off": {},
-        "air": {"step": 1, "edge": 1, "width": 1, "direction": 2},
+        "air": {},
     }
 
 
@@ -89,10 +91,11 @@ def piece_expressions(
     z: list[Any]
     if name in ("stance", "flight"):
         a = ca.SX.sym("a", n)
-        h = w["step"] if name == "stance" else ca.SX.sym("h")
+        state = ca.SX.sym("h")
+        h = w["step"] if name == "stance" else w["share"] * state
         forces = coordinates.forces if name == "stance" else 0
         F = ca.SX.sym("F", forces)
-        z = [q, v, a, F] if name == "stance" else [q, v, h, a]
+        z = [q, v, a, F] if name == "stance" else [q, v, state, a]
         half_v = v + 0.5 * h * a
         half_q = q + 0.5 * h * v + 0.125 * h * h * a
         all_forces = ca.mtimes(ca.DM(coordinates.force_matrix), F) if forces else None
@@ -110,14 +113,15 @@ def piece_expressions(
         motor = ca.mtimes(ca.DM(to_motor), torque[list(coordinates.joints)])
         own = [6 + joint for joint in coordinates.joints]
         speed = ca.mtimes(ca.DM(geared), coordinates.expand(v)[own])
-        half_speed = ca.mtimes(ca.DM(geared), coordinates.expand(half_v)[own])
+        end_speed = ca.mtimes(ca.DM(geared), coordinates.expand(v + h * a)[own])
         gap = [-(q + h * v + 0.5 * h * h * a), -(v + h * a)]
         rows = [
             *gap,
-            *([-h] if name == "flight" else []),
+            *([-state] if name == "flight" else []),
             wrench[list(coordinates.rows)],
             motor,
-            motor + w["slope"] * half_speed,
+            motor + w["slope"] * speed,
+            motor + w["slope"] * end_speed,
             speed,
         ]
         off = q - w["nominal"]
@@ -146,7 +150,7 @@ def piece_expressions(
         rows = [model.com(whole)[2] + rise * rise / (2.0 * GRAVITY), rise, angular]
     else:
         z = [q]
-        rows = _air_rows(model, coordinates, q, w)
+        rows = _air_rows(model, coordinates, q)
     return ca.vertcat(*z), ca.vertcat(*w.values()), cost, ca.vertcat(*rows)
 
 
@@ -189,24 +193,21 @@ def _place_errors(model: SymbolicModel, coordinates: Coordinates, q: Any, place:
     return ca.vertcat(*errors)
 
 
-def _air_rows(model: SymbolicModel, coordinates: Coordinates, q: Any, w: dict[str, Any]
-              ) -> list[Any]:  # fmt: skip
-    """Heights of contact points and calves above the ground, then how far each of those points and
-    the knees is on its own leg's side of the torso's middle plane, both less its radius."""
+def _air_rows(model: SymbolicModel, coordinates: Coordinates, q: Any) -> list[Any]:
+    """Heights, distances ahead and sides of the points."""
     import casadi as ca
 
     whole = coordinates.expand(q)
     frames = model.frames(whole, coordinates.limbs)
-    rotation = base_rotation(whole[3:6])
-    heights, sides = [], []
-    for point, radius, sign in body_points(model, coordinates):
-        place = model.point(frames, *point)
-        way = w["direction"][0] * place[0] + w["direction"][1] * place[1]
-        ground = w["step"] * 0.5 * (1.0 + ca.tanh((way - w["edge"]) / w["width"]))
-        heights.append(place[2] - ground - radius)
-        inward = ca.dot(rotation[:, 1], place - whole[0:3])
-        sides.append(sign * inward - max(radius, 0.0))
-    return [*heights, *sides]
+    left = base_rotation(whole[3:6])[:, 1]
+    points = body_points(model, coordinates)
+    places = [model.point(frames, *point) for point, _, _ in points]
+    heights = [place[2] - radius for place, (_, radius, _) in zip(places, points, strict=True)]
+    sides = [
+        sign * ca.dot(left, place - whole[0:3]) - radius
+        for place, (_, radius, sign) in zip(places, points, strict=True)
+    ]
+    return [*heights, *(place[0] for place in places), *sides]
 
 
 def body_points(model: SymbolicModel, coordinates: Coordinates

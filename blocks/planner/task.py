@@ -35,10 +35,10 @@ class TaskError(AloftError, ValueError):
 class Knots(Parameters):
     """How many intervals each phase is divided into; about 60 in all is enough for BRUCE."""
 
-    squat: int = parameter(12, ge=2, le=200, text="going down")
+    squat: int = parameter(8, ge=2, le=200, text="going down")
     thrust: int = parameter(16, ge=4, le=200, text="pushing off")
-    flight: int = parameter(18, ge=4, le=400, text="in the air")
-    landing: int = parameter(14, ge=4, le=200, text="absorbing the touchdown and coming to rest")
+    flight: int = parameter(28, ge=4, le=400, text="in the air")
+    landing: int = parameter(12, ge=4, le=200, text="absorbing the touchdown and coming to rest")
 
     @property
     def total(self) -> int:
@@ -51,8 +51,8 @@ class Weights(Parameters):
 
     posture: float = parameter(1.0, ge=0.0, text="joint angles away from the standing pose")
     orientation: float = parameter(1.0, ge=0.0, text="the torso's rotation away from the nominal")
-    joint_velocity: float = parameter(1e-2, ge=0.0, text="joint velocities")
-    acceleration: float = parameter(2e-5, ge=0.0, text="generalised accelerations")
+    joint_velocity: float = parameter(1e-1, ge=0.0, text="joint velocities")
+    acceleration: float = parameter(5e-4, ge=0.0, text="generalised accelerations")
     com_acceleration: float = parameter(1e-3, ge=0.0, text="of the centre of mass")
     momentum_rate: float = parameter(1e-2, ge=0.0, text="of the angular momentum")
     force: float = parameter(1e-4, ge=0.0, text="contact forces")

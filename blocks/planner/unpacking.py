@@ -23,7 +23,7 @@ def knot_times(problem: Problem, values: Array) -> Array:
     n, assembly = problem.coordinates.size, problem.assembly
     steps = problem.steps.copy()
     for k in problem.flight:
-        steps[k] = values[assembly.state_start[k] + 2 * n]
+        steps[k] *= values[assembly.state_start[k] + 2 * n]
     return np.concatenate([[0.0], np.cumsum(steps)])
 
 
@@ -83,6 +83,7 @@ def pack(problem: Problem, plan: JumpPlan, guess: Array) -> Array:
         v[k, 3:6] = euler_rates(angles[k], row[3:6])[ORDER]
         v[k, 6:] = row[6:]
     steps = np.diff(plan.time)
+    mean = plan.flight_time / len(problem.flight)
     values = guess.copy()
     for k in range(problem.knots):
         start, control = assembly.state_start[k], assembly.control_start[k]
@@ -93,13 +94,13 @@ def pack(problem: Problem, plan: JumpPlan, guess: Array) -> Array:
         bend = (v[k + 1] - v[k]) / steps[k]
         values[control : control + n] = coordinates.reduce(bend)
         if problem.phases[k] is Phase.FLIGHT:
-            values[start + 2 * n] = steps[k]
+            values[start + 2 * n] = mean
         else:
             pushed = coordinates.reduce_forces(plan.contact_force[k].ravel())
             values[control + n : control + n + coordinates.forces] = pushed
         hold = assembly.knots[k].hold
         if hold is not None:
-            values[control + hold] = steps[k + 1]
+            values[control + hold] = mean
     return values
 
 

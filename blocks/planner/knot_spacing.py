@@ -1,0 +1,30 @@
+"""How the knots of a phase are spread over its time.
+
+Where forces and legs move fast, at lift-off and around touchdown, intervals are short; where the
+robot squats or comes to rest they are long. Each function gives the intervals' lengths as multiples
+of the phase's mean.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..signals import Phase
+
+Array = NDArray[np.float64]
+
+GROWTH = {Phase.SQUAT: 0.5, Phase.THRUST: 0.4, Phase.LANDING: 8.0}
+"""The last interval's length by the first's."""
+FLIGHT_MIDDLE = 4.0
+"""The length of an interval in the middle of the flight by one at its ends."""
+
+
+def spacing(phase: Phase, count: int) -> Array:
+    """Interval lengths (count,) with a mean of one."""
+    place = (np.arange(count) + 0.5) / count
+    if phase is Phase.FLIGHT:
+        lengths = 1.0 + (FLIGHT_MIDDLE - 1.0) * np.sin(np.pi * place)
+    else:
+        lengths = GROWTH[phase] ** place
+    return np.asarray(lengths * count / lengths.sum())
