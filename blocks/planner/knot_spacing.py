@@ -14,7 +14,7 @@ from ..signals import Phase
 
 Array = NDArray[np.float64]
 
-GROWTH = {Phase.SQUAT: 0.5, Phase.THRUST: 0.4, Phase.LANDING: 8.0}
+GROWTH = {Phase.SQUAT: 0.5, Phase.THRUST: 0.4, Phase.LANDING: 5.0}
 """The last interval's length by the first's."""
 FLIGHT_MIDDLE = 4.0
 """The length of an interval in the middle of the flight by one at its ends."""

@@ -38,7 +38,7 @@ class Knots(Parameters):
     squat: int = parameter(8, ge=2, le=200, text="going down")
     thrust: int = parameter(16, ge=4, le=200, text="pushing off")
     flight: int = parameter(28, ge=4, le=400, text="in the air")
-    landing: int = parameter(12, ge=4, le=200, text="absorbing the touchdown and coming to rest")
+    landing: int = parameter(14, ge=4, le=200, text="absorbing the touchdown and coming to rest")
 
     @property
     def total(self) -> int:
