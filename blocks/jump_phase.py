@@ -19,7 +19,7 @@ _GRAVITY = 9.81
 class PhaseMemory(Signal):
     """What the phase machine remembers."""
 
-    phase = Field(dtype="int64", text="see Phase")
+    phase = Field(dtype="int64", values=Phase, text="see Phase")
     began = Field(unit="s", text="plan time at which the phase began")
     touchdown = Field(unit="s", text="plan time of the first touchdown, negative before it")
     unloaded = Field("n_contacts", unit="s", text="how long each point has been without contact")

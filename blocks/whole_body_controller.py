@@ -75,6 +75,9 @@ class WholeBodyController(Block):
     ``motor`` bounds the torque of every motor through the transmission by what it can give at
     its present speed, which is the truth of a robot with differential joints.
 
+    The default thrust gains put lateral motion above roll and yaw momentum: where a thigh is level
+    the hip's yaw and roll axes are in line, both cannot be had, and a jump should go straight up.
+
     ``stand`` gains hold in STAND and SQUAT, ``thrust`` in THRUST, ``landing`` after. Without a
     point in stance there is nothing to solve: torque, force and acceleration are zero, and the
     command counts as solved.
@@ -106,10 +109,11 @@ class WholeBodyController(Block):
         stand: TaskGains = parameter(TaskGains(), text="gains while standing and squatting")
         thrust: TaskGains = parameter(
             TaskGains(
-                linear_stiffness=(100.0, 100.0, 500.0),
-                linear_damping=(20.0, 20.0, 45.0),
+                linear_weight=(100.0, 600.0, 100.0),
+                linear_stiffness=(100.0, 200.0, 500.0),
+                linear_damping=(20.0, 30.0, 45.0),
                 torso_weight=(1.0, 0.003, 1.0),
-                angular_weight=(1.5e3, 1.5e4, 1.5e3),
+                angular_weight=(1e3, 1.5e4, 1e3),
                 angular_damping=(30.0, 30.0, 30.0),
                 track_angular_momentum=True,
             ),
