@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import signal
 import sys
+from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -150,13 +152,33 @@ def run_many(
     from .progress import progress_bar
 
     rows: list[SeedRow] = []
-    with progress_bar(out, f"running {len(seeds)} seeds", len(seeds)) as (progress, task):
-        for row in run_seeds(path, overrides, seeds):
-            rows.append(row)
-            progress.advance(task)
+    received: list[signal.Signals] = []
+
+    def stop(number: int, _: object) -> None:
+        received.append(signal.Signals(number))
+        raise KeyboardInterrupt
+
+    before = {number: signal.signal(number, stop) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        with (
+            progress_bar(out, f"running {len(seeds)} seeds", len(seeds)) as (progress, task),
+            closing(run_seeds(path, overrides, seeds)) as results,
+        ):
+            for row in results:
+                rows.append(row)
+                progress.advance(task)
+    except KeyboardInterrupt:
+        pass  # the rows there are, are still worth printing
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
     successes = sum(row.success for row in rows)
     reason = f"{successes} of {len(rows)} seeds succeeded"
-    success = successes == len(rows)
+    success = successes == len(seeds)
+    code = ExitCode.SUCCESS if success else ExitCode.NOT_SUCCESSFUL
+    if received:
+        success, code = False, ExitCode(128 + received[0])
+        reason = f"stopped by {received[0].name} after {len(rows)} of {len(seeds)} seeds"
     print_rows(out, rows)
     if as_json:
         summary = {"n": len(rows), "successes": successes, "seeds": seeds}
@@ -165,7 +187,7 @@ def run_many(
         print_json({**outcome, "rows": [vars(row) for row in rows]})
     else:
         typer.secho(reason, fg=typer.colors.GREEN if success else typer.colors.RED)
-    return ExitCode.SUCCESS if success else ExitCode.NOT_SUCCESSFUL
+    return code
 
 
 def print_rows(out: Console, rows: list[SeedRow]) -> None:

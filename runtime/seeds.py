@@ -5,13 +5,13 @@ from __future__ import annotations
 import multiprocessing
 import os
 import signal
-from collections.abc import Iterator, Sequence
+from collections.abc import Generator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from .errors import AloftError
+from .errors import AloftError, ExitCode
 from .graph import Graph, load
 
 
@@ -55,7 +55,9 @@ def overrides_for(graph: Graph, overrides: Sequence[str], seed: int) -> list[str
     return [*overrides, *(f"{name}={seed}" for name in graph.seed_parameters)]
 
 
-def run_seeds(path: Path, overrides: Sequence[str], seeds: Sequence[int]) -> Iterator[SeedRow]:
+def run_seeds(
+    path: Path, overrides: Sequence[str], seeds: Sequence[int]
+) -> Generator[SeedRow, None, None]:
     """Run the graph once a seed, on all processors; each run is what it would be by itself.
 
     Raises:
@@ -67,11 +69,15 @@ def run_seeds(path: Path, overrides: Sequence[str], seeds: Sequence[int]) -> Ite
     workers = min(len(seeds), processors())
     # Spawned, not forked: no state of this process reaches a run.
     context = multiprocessing.get_context("spawn")
+    others = set(multiprocessing.active_children())
     with ProcessPoolExecutor(workers, context, initializer=_leave_signals_to_parent) as pool:
         try:
             yield from pool.map(_run_one, jobs)
         except BaseException:
+            # The robots of runs that are under way come to rest before their process ends.
             pool.shutdown(wait=False, cancel_futures=True)
+            for worker in set(multiprocessing.active_children()) - others:
+                worker.terminate()
             raise
 
 
@@ -86,11 +92,19 @@ def _leave_signals_to_parent() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
+_stopped_by_signal = False
+"""In a worker: its run was told to stop, so what is still queued is not begun."""
+
+
 def _run_one(job: tuple[Path, Sequence[str], int]) -> SeedRow:
+    global _stopped_by_signal
     path, overrides, seed = job
+    if _stopped_by_signal:
+        return SeedRow(seed, False, "not begun", {}, "")
     try:
         result = load(path, overrides).run(log=False)
     except AloftError as error:
         return SeedRow(seed, False, str(error), {}, "")
+    _stopped_by_signal = result.exit_code in (ExitCode.INTERRUPTED, ExitCode.TERMINATED)
     data = result.to_json()
     return SeedRow(seed, result.success, result.reason, data["metrics"], result.run_hash)

@@ -166,3 +166,20 @@ def test_signals_stop_a_run_cleanly(
     assert result["reason"] == f"stopped by {number.name}"
     assert result["ticks"] > 0
     assert (folder / result["recording"]).is_file()
+
+
+def test_a_signal_stops_all_seeds(folder: Path, start: Start) -> None:
+    graph = (folder / "count.yaml").read_text()
+    graph = graph.replace("duration: 1 s\n", "clock: {kind: paced}\n")
+    (folder / "endless.yaml").write_text(graph)
+    block = (folder / "counter.py").read_text()
+    sign = "        open('running', 'w').close()\n        self.count.value += 1.0"
+    (folder / "counter.py").write_text(block.replace("        self.count.value += 1.0", sign))
+    process = start("run", "endless.yaml", "--seeds", "0:4", "--json")
+    deadline = time.monotonic() + 30.0
+    while not (folder / "running").exists() and time.monotonic() < deadline:
+        time.sleep(0.01)
+    process.send_signal(signal.SIGTERM)
+    output, errors = process.communicate(timeout=30)  # also ends only when the workers have
+    assert process.returncode == 143, output + errors
+    assert json.loads(output)["reason"] == "stopped by SIGTERM after 0 of 4 seeds"
