@@ -227,7 +227,7 @@ def task_done(e: Evidence) -> Iterator[Found]:
         yield Found("flight_time", missed, MILLIMETRE, "s", "its error")
     goal = np.array([task.distance_x, task.distance_y, task.landing_height])
     missed_by = np.abs(r.soles[-1].mean(axis=0) - goal)
-    yield Found("landing_place", missed_by.max(), 2 * MILLIMETRE, "m", "the feet's distance from it",
+    yield Found("landing_place", missed_by.max(), 3 * MILLIMETRE, "m", "the feet's distance from it",
                 "xyz"[int(missed_by.argmax())])  # fmt: skip
     pitch, yaw = e.turn
     turned = float((r.heading[-1] - r.heading[0]).mean())
@@ -254,10 +254,10 @@ def contacts(e: Evidence) -> Iterator[Found]:
             places = s.points[before[:, number] & period, number]
             if len(places):
                 slip[number] = max(slip[number], float(np.ptp(places, axis=0).max()))
-    yield Found("foot_slip", slip.max(), 2 * MILLIMETRE, "m", "how far a loaded point moves",
+    yield Found("foot_slip", slip.max(), 3 * MILLIMETRE, "m", "how far a loaded point moves",
                 names[int(slip.argmax())])  # fmt: skip
     height = np.where(before, np.abs(e.point_height), 0.0)
-    yield Found("foot_on_ground", height.max(), MILLIMETRE, "m",
+    yield Found("foot_on_ground", height.max(), 2 * MILLIMETRE, "m",
                 "how far a loaded point is off the ground")  # fmt: skip
     force = plan.contact_force
     idle = np.where(plan.contact[:, :, None], 0.0, np.abs(force)).max()
@@ -285,7 +285,7 @@ def machine(e: Evidence) -> Iterator[Found]:
     angles, limits = s.position[:, 7:], robot.joint_limits
     excess = np.maximum(angles - limits[:, 1], limits[:, 0] - angles)
     sample, joint = worst(excess)
-    yield Found("joint_limits", excess.max(), 2e-3, "rad", "how far a joint passes its limit",
+    yield Found("joint_limits", excess.max(), 5e-3, "rad", "how far a joint passes its limit",
                 f"{robot.joints[joint].name} {e.moment(sample)}")  # fmt: skip
     profile = robot.profiles[task.profile]
     speed = np.abs(e.motor_speed)
