@@ -1,8 +1,8 @@
 """A plan as the table of a reference: what the controller follows, every 2 ms or so.
 
 Between knots the motion is the planner's own: constant acceleration of base position, Euler angles
-and joints, which is the cubic through both knots. In flight the base moves as exact dynamics has
-it, so that what the controller follows is what a robot can do. The rate of change of momentum
+and joints, which is the cubic through both knots. In flight it is within a millimetre of what exact
+dynamics has, or the plan would not be valid. The rate of change of momentum
 comes from the contact forces, which are taken to hold in the middle of their interval and to
 change linearly from there to the next, never across lift-off or touchdown.
 """
@@ -39,7 +39,7 @@ def reference_table(plan: JumpPlan, robot: RobotDescription, stand_time: float) 
     forces = _MiddleForces(plan, lift_off, touchdown)
     rows: dict[str, list[Array]] = {}
     times: list[float] = []
-    for time, k, q, v in _states(plan, dynamics, lift_off, touchdown):
+    for time, k, q, v in _states(plan, dynamics):
         times.append(time)
         for name, value in _row(dynamics, q, v, forces.at(time, k)).items():
             rows.setdefault(name, []).append(value)
@@ -69,32 +69,20 @@ def reference_table(plan: JumpPlan, robot: RobotDescription, stand_time: float) 
     )
 
 
-def _states(
-    plan: JumpPlan, dynamics: ExactDynamics, lift_off: int, touchdown: int
-) -> Iterator[State]:
+def _states(plan: JumpPlan, dynamics: ExactDynamics) -> Iterator[State]:
     """The motion, knots and what lies between them; two rows at an impact."""
     angles = euler_angles(plan.position[:, 3:7])
-    nothing = np.zeros(plan.contact_force.shape[1:])
-    flying_q, flying_v = plan.position[lift_off], plan.velocity[lift_off]
-    for k in range(len(plan.time) - 1):
+    last = len(plan.time) - 1
+    for k in range(last):
         start, h = float(plan.time[k]), float(plan.time[k + 1] - plan.time[k])
         yield start, k, plan.position[k], plan.velocity[k]
         if h <= 0.0:
             continue
         joints = joint_motion(plan.position, plan.velocity, plan.time, k)
-        if lift_off <= k < touchdown:
-            q = np.concatenate([flying_q[:7], plan.position[k, 7:]])
-            v = np.concatenate([flying_v[:6], plan.velocity[k, 6:]])
-            steps = dynamics.integrate(q, v, joints, nothing, STEP)
-            _, flying_q, flying_v = steps[-1]
-            for t, there, moving in steps[:-1]:
-                yield start + t, k, there, moving
-        else:
-            base = _base_motion(plan, dynamics, angles, k, h)
-            count = math.ceil(h / STEP - 1e-9)
-            for i in range(1, count):
-                yield start + i * h / count, k, *_between(base, joints, i * h / count, dynamics)
-    last = len(plan.time) - 1
+        base = _base_motion(plan, dynamics, angles, k, h)
+        count = math.ceil(h / STEP - 1e-9)
+        for i in range(1, count):
+            yield start + i * h / count, k, *_between(base, joints, i * h / count, dynamics)
     yield float(plan.time[last]), last - 1, plan.position[last], plan.velocity[last]
 
 

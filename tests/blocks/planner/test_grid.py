@@ -1,0 +1,139 @@
+"""Filling a library: the grid's tasks, what is kept at once, and what a second run skips."""
+
+from collections.abc import Callable
+from concurrent.futures import Executor, Future
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from aloft.blocks.planner import grid, library
+from aloft.blocks.planner.errors import PlanError
+from aloft.blocks.planner.grid import fill, read_grid, robot_of
+from aloft.blocks.planner.library import SHIPPED, PlanLibrary
+from aloft.blocks.planner.plan import JumpPlan
+from aloft.blocks.planner.task import JumpTask, TaskError, make_task, read_task
+from aloft.runtime.description import RobotDescription, find_robot
+
+ROBOT = find_robot("bruce")
+
+
+class Here(Executor):
+    """Works in this process, task after task."""
+
+    def __init__(self) -> None:
+        self.done = 0
+
+    def submit(self, work: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
+        future: Future[Any] = Future()
+        future.set_result(work(*args, **kwargs))
+        self.done += 1
+        return future
+
+
+@pytest.fixture
+def solver(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """Plans of 15 cm in place stand in for the solver; lists the names it was asked for."""
+    asked: list[str] = []
+    kept = PlanLibrary(ROBOT, Path("nowhere")).find(
+        read_task(SHIPPED.parent / "tasks/in_situ.yaml")
+    )
+    assert kept is not None
+
+    def solve(task: JumpTask, robot: RobotDescription, warm_start: JumpPlan | None) -> JumpPlan:
+        asked.append(task.name)
+        assert warm_start is None, "what is in a library must not depend on the order"
+        if task.rise is not None and task.rise > 0.2:
+            raise PlanError("no plan: apex is missed", family="apex")
+        return replace(kept, task=task)
+
+    monkeypatch.setattr(library, "solve_task", solve)
+    return asked
+
+
+def write(tmp_path: Path, text: str) -> Path:
+    path = tmp_path / "hops.yaml"
+    path.write_text(text)
+    return path
+
+
+def test_the_tasks_of_a_grid(tmp_path: Path) -> None:
+    path = write(
+        tmp_path,
+        "task: {friction: 0.6}\n"
+        "grid:\n  distance_x: [0 cm, 5 cm]\n  rise: {from: 8 cm, to: 0.12, count: 3}\n",
+    )
+    tasks = read_grid(path)
+    assert [(t.distance_x, t.rise) for t in tasks] == [
+        (0.0, 0.08), (0.0, 0.1), (0.0, 0.12), (0.05, 0.08), (0.05, 0.1), (0.05, 0.12),
+    ]  # fmt: skip
+    assert {t.friction for t in tasks} == {0.6}
+    assert len({t.name for t in tasks}) == 6
+    assert robot_of(tasks) == ROBOT
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("rise: 3", "expected the keys name, task and grid"),
+        ("grid: {rise: 0.1}", r"grid\.rise: expected a list of values or \{from"),
+        ("grid: {rise: [0.1]}\nextra: 1", "extra: expected only name, task and grid"),
+        ("grid: {rise: [0.1, -1]}", "rise_-1: rise: Input should be greater than 0"),
+        ("grid: {hight: [1]}", "hight: is no parameter of a task"),
+    ],
+)
+def test_what_is_no_grid(tmp_path: Path, text: str, words: str) -> None:
+    with pytest.raises(TaskError, match=words):
+        read_grid(write(tmp_path, text))
+
+
+def test_a_grid_is_for_one_robot() -> None:
+    tasks = [
+        make_task({"name": "a", "rise": 0.1}),
+        make_task({"name": "b", "rise": 0.1, "robot": "x"}),
+    ]
+    with pytest.raises(TaskError, match="a grid is for one robot, found bruce, x"):
+        robot_of(tasks)
+
+
+def test_plans_are_kept_failures_are_remembered_and_a_second_run_skips_both(
+    tmp_path: Path, solver: list[str]
+) -> None:
+    rises = {"a": 0.1501, "b": 0.1502, "high": 0.3, "wrong": 0.16}
+    tasks = [make_task({"name": name, "rise": rise}) for name, rise in rises.items()]
+    kept = PlanLibrary(ROBOT, tmp_path, others=())
+    first = {row.task.name: row for row in fill(tasks, kept, Here())}
+    assert {name: row.outcome for name, row in first.items()} == {
+        "a": "planned", "b": "planned", "high": "failed", "wrong": "failed",
+    }  # fmt: skip
+    assert "apex is missed" in first["high"].reason
+    assert "rise: how far the apex" in first["wrong"].reason, "invalid plans are not kept"
+    assert len(list(tmp_path.glob("*.npz"))) == 2
+    executor = Here()
+    second = {row.task.name: row.outcome for row in fill(tasks, kept, executor)}
+    assert second == {"a": "kept", "b": "kept", "high": "known", "wrong": "known"}
+    assert executor.done == 0
+    assert {row.outcome for row in fill(tasks, kept, executor, again=True)} == {"kept", "failed"}
+    assert executor.done == 2
+
+
+def test_a_run_that_is_cut_off_has_kept_what_was_done(tmp_path: Path, solver: list[str]) -> None:
+    tasks = [make_task({"name": f"t{k}", "rise": 0.1501 + k * 1e-5}) for k in range(4)]
+    kept = PlanLibrary(ROBOT, tmp_path, others=())
+    rows = fill(tasks, kept, Here())
+    next(rows)
+    next(rows)
+    rows.close()
+    assert len(list(tmp_path.glob("*.npz"))) == 2
+    outcomes = sorted(row.outcome for row in fill(tasks, kept, Here()))
+    assert outcomes == ["kept", "kept", "planned", "planned"]
+    assert not list(tmp_path.glob(".*")), "no half-written file is left"
+
+
+def test_a_worker_uses_one_thread(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("OMP_NUM_THREADS", "8")
+    grid.prepare_worker()
+    import os
+
+    assert os.environ["OMP_NUM_THREADS"] == "1"

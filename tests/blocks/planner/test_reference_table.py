@@ -1,0 +1,88 @@
+"""The reference's table of a plan: its derivatives agree, it begins and ends at rest."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from aloft.blocks.jump_table import JumpTable
+from aloft.blocks.planner.library import SHIPPED, PlanLibrary
+from aloft.blocks.planner.plan import JumpPlan
+from aloft.blocks.planner.reference_table import reference_table
+from aloft.blocks.planner.task import read_task
+from aloft.runtime.description import find_robot
+
+ROBOT = find_robot("bruce")
+STAND = 0.3
+
+
+@pytest.fixture(scope="module", params=["forward_10cm", "twist_30deg"])
+def plan(request: pytest.FixtureRequest) -> JumpPlan:
+    task = read_task(SHIPPED.parent / "tasks" / f"{request.param}.yaml")
+    found = PlanLibrary(ROBOT, Path("nowhere")).find(task)
+    assert found is not None
+    return found
+
+
+@pytest.fixture(scope="module")
+def table(plan: JumpPlan) -> JumpTable:
+    return reference_table(plan, ROBOT, STAND)
+
+
+@pytest.mark.parametrize(
+    ("place", "rate", "tolerance"),
+    [
+        ("com", "com_velocity", 0.01),
+        ("joint_position", "joint_velocity", 0.05),
+        ("foot_position", "foot_velocity", 0.02),
+    ],
+)
+def test_rates_are_those_of_the_places(
+    table: JumpTable, place: str, rate: str, tolerance: float
+) -> None:
+    steps = np.diff(table.time)
+    lasting = steps > 1e-6
+    change = np.diff(table.columns[place], axis=0)[lasting]
+    change /= steps[lasting].reshape((-1,) + (1,) * (change.ndim - 1))
+    mean = 0.5 * (table.columns[rate][1:] + table.columns[rate][:-1])[lasting]
+    assert np.quantile(np.abs(change - mean), 0.99) < tolerance
+
+
+def test_forces_change_the_momentum(table: JumpTable, plan: JumpPlan) -> None:
+    for start, end in ((STAND, table.lift_off_time), (table.touchdown_time, table.time[-1])):
+        rows = (table.time >= start - 1e-9) & (table.time <= end + 1e-9)
+        time = table.time[rows]
+        for rate, total in (("com_acceleration", "com_velocity"),
+                            ("angular_momentum_rate", "angular_momentum")):  # fmt: skip
+            values = table.columns[rate][rows]
+            gained = np.trapezoid(values, time, axis=0)
+            change = table.columns[total][rows][-1] - table.columns[total][rows][0]
+            np.testing.assert_allclose(gained, change, atol=0.06)
+
+
+def test_the_knots_are_in_it(table: JumpTable, plan: JumpPlan) -> None:
+    for knot in (0, len(plan.time) // 3, len(plan.time) - 1):
+        row = int(np.abs(table.time - STAND - plan.time[knot]).argmin())
+        np.testing.assert_allclose(
+            table.columns["joint_position"][row], plan.position[knot, 7:], atol=1e-9
+        )
+    assert np.diff(table.time).min() >= 0.0
+    assert np.diff(table.time)[1:].max() <= 0.002 + 1e-9
+
+
+def test_it_begins_and_ends_at_rest(table: JumpTable, plan: JumpPlan) -> None:
+    for row in (0, 1, -1):
+        for name in ("com_velocity", "com_acceleration", "angular_momentum_rate"):
+            np.testing.assert_allclose(table.columns[name][row], 0.0, atol=1e-2)
+    assert table.squat_time == STAND
+    assert STAND < table.thrust_time < table.lift_off_time < table.touchdown_time
+    assert table.touchdown_time < table.recover_time <= table.time[-1]
+    assert table.lift_off_time == pytest.approx(STAND + plan.lift_off_time)
+
+
+def test_the_flight_keeps_its_momentum(table: JumpTable) -> None:
+    flying = (table.time > table.lift_off_time) & (table.time < table.touchdown_time)
+    assert np.ptp(table.columns["angular_momentum"][flying], axis=0).max() < 0.02
+    np.testing.assert_allclose(
+        table.columns["com_acceleration"][flying], [[0, 0, -9.81]] * flying.sum()
+    )

@@ -1,0 +1,45 @@
+"""The plans that come with aloft: one for every shipped task, of that very task, and valid."""
+
+from pathlib import Path
+
+import pytest
+
+from aloft.blocks.planner.library import SHIPPED, PlanLibrary
+from aloft.blocks.planner.plan import read_plan
+from aloft.blocks.planner.task import read_task
+from aloft.blocks.planner.validity import check_plan
+from aloft.runtime.description import find_robot
+
+TASKS = sorted((SHIPPED.parent / "tasks").glob("*.yaml"))
+REMEDY = "make it anew: aloft plan graphs/tasks/*.yaml --anew --keep graphs/plans --no-pictures"
+
+
+def test_there_are_the_basic_tasks() -> None:
+    names = {path.stem for path in TASKS}
+    assert {"in_situ", "forward_10cm", "back_10cm", "side_10cm", "twist_30deg"} <= names
+    assert {"step_up_5cm", "step_down_5cm"} <= names
+
+
+@pytest.mark.parametrize("path", TASKS, ids=[path.stem for path in TASKS])
+def test_every_task_has_its_valid_plan(path: Path, tmp_path: Path) -> None:
+    task = read_task(path)
+    robot = find_robot(task.robot)
+    plan = PlanLibrary(robot, tmp_path).find(task)
+    assert plan is not None, REMEDY
+    report = check_plan(plan, robot)
+    assert report.valid, f"{report.explain()}\n{REMEDY}"
+    assert plan.valid, "the file says so itself"
+
+
+def test_no_plan_is_there_without_its_task() -> None:
+    robot = find_robot("bruce")
+    wanted = {read_task(path).hash(robot) for path in TASKS}
+    kept = {path.stem.rpartition("-")[2] for path in SHIPPED.glob("*.npz")}
+    assert kept == wanted, REMEDY
+
+
+def test_every_plan_names_what_made_it() -> None:
+    for path in SHIPPED.glob("*.npz"):
+        plan = read_plan(path)
+        assert plan.statistics["violation"] <= 1e-6
+        assert "casadi" in plan.versions
