@@ -160,7 +160,8 @@ def plan_grid(
 
     tasks = read_grid(grid)
     library = PlanLibrary(robot_of(tasks), keep)
-    compile_once(library, tasks[0], screen)
+    if any(library.path_of(task) is None for task in tasks):
+        compile_once(library, tasks[0], screen)
     counts = dict.fromkeys(("planned", "kept", "failed", "known"), 0)
     rows = []
     with (

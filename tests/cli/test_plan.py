@@ -1,0 +1,81 @@
+"""``aloft plan``: table, picture and recording of a kept plan, grids, and what it refuses."""
+
+import json
+import subprocess
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from aloft.blocks.planner.library import SHIPPED, PlanLibrary
+from aloft.blocks.planner.task import make_task, read_task
+from aloft.runtime.description import find_robot
+
+Call = Callable[..., subprocess.CompletedProcess[str]]
+CallJson = Callable[..., dict[str, Any]]
+
+TASKS = SHIPPED.parent / "tasks"
+
+
+def test_a_kept_plan_is_shown_pictured_and_recorded(folder: Path, call: Call) -> None:
+    done = call("plan", str(TASKS / "forward_10cm.yaml"), "--out", "pictures")
+    for words in ("forward_10cm: the plan", "take_off_speed_m_s", "flight_position", "solver"):
+        assert words in done.stdout
+    assert (folder / "pictures" / "forward_10cm.svg").read_text().startswith("<svg")
+    assert (folder / "pictures" / "forward_10cm.rrd").stat().st_size > 10_000
+
+
+def test_many_tasks_as_json(folder: Path, call_json: CallJson) -> None:
+    paths = [str(TASKS / f"{name}.yaml") for name in ("in_situ", "twist_30deg")]
+    result = call_json("plan", *paths, "--no-pictures")
+    assert result["success"] is True
+    assert result["reason"] == "2 planned and valid"
+    assert [row["task"] for row in result["plans"]] == ["in_situ", "twist_30deg"]
+    first = result["plans"][0]
+    assert first["kept"] is True and first["valid"] is True
+    assert first["figures"]["rise_m"] == pytest.approx(0.15, abs=1e-3)
+    assert {"name", "passed", "value", "limit", "unit", "where", "text"} <= set(first["tests"][0])
+    assert not (folder / "plans").exists()
+
+
+def test_a_plan_that_is_not_valid_says_which_test_failed(
+    folder: Path, call_json: CallJson, call: Call
+) -> None:
+    robot = find_robot("bruce")
+    kept = PlanLibrary(robot, Path("nowhere")).find(read_task(TASKS / "in_situ.yaml"))
+    assert kept is not None
+    higher = make_task({"name": "higher", "rise": 0.16})
+    PlanLibrary(robot, folder / "library").add(replace(kept, task=higher))
+    (folder / "higher.yaml").write_text("rise: 16 cm\n")
+    arguments = ("plan", "higher.yaml", "--keep", "library", "--no-pictures")
+    result = call_json(*arguments, code=1)
+    assert result["reason"] == "not planned: higher"
+    failed = [test["name"] for test in result["plans"][0]["tests"] if not test["passed"]]
+    assert failed == ["rise"]
+    assert "rise: how far the apex" in call(*arguments, code=1).stderr
+
+
+def test_a_wrong_task_is_refused(folder: Path, call_json: CallJson, call: Call) -> None:
+    (folder / "wrong.yaml").write_text("rise: 3 kg\n")
+    result = call_json("plan", "wrong.yaml", code=2)
+    assert result["reason"] == "wrong.yaml: rise: expected a number in m, found '3 kg'"
+    assert "give task files, or --library" in call("plan", code=2).stderr
+
+
+def test_a_grid_takes_what_is_kept(folder: Path, call_json: CallJson) -> None:
+    (folder / "grid.yaml").write_text("task: {rise: 15 cm}\ngrid: {distance_x: [0 cm, 10 cm]}\n")
+    result = call_json("plan", "--library", "grid.yaml")
+    assert result["counts"] == {"planned": 0, "kept": 2, "failed": 0, "known": 0}
+    assert [row["outcome"] for row in result["rows"]] == ["kept", "kept"]
+
+
+def test_the_shipped_file_can_be_read_without_aloft() -> None:
+    for path in SHIPPED.glob("in_situ-*.npz"):
+        with np.load(path) as file:
+            header = json.loads(str(file["header"]))
+            assert file["joint_torque"].shape == (len(file["time"]), 10)
+        assert header["task"]["rise"] == 0.15
+        assert header["names"]["joints"][0] == "right_hip_yaw"
