@@ -174,7 +174,8 @@ def plan_grid(
             text = ", ".join(f"{n} {what}" for what, n in counts.items() if n)
             bar.update(bar_task, advance=1, description=text)
     failed = [row for row in rows if row.outcome in ("failed", "known")]
-    screen.print(table("", ("task", "why there is no plan"), failure_rows(failed)))
+    if failed:
+        screen.print(table("", ("task", "why there is no plan"), failure_rows(failed)))
     reason = ", ".join(f"{n} {what}" for what, n in counts.items())
     say(screen, f"{reason}; library: {library.folder}")
     if as_json:
