@@ -83,7 +83,7 @@ class Assembly:
     @property
     def interpreted(self) -> bool:
         """Whether CasADi's virtual machine evaluates the pieces."""
-        return any(piece.value.class_name() != "GenericExternal" for piece in self.pieces.values())
+        return any(piece.value.class_name() != "External" for piece in self.pieces.values())
 
     @property
     def signature(self) -> tuple[object, ...]:
@@ -328,4 +328,4 @@ def _positions(pattern: Any, rows: Indices, columns: Indices) -> Indices:
     """Which non-zero of the pattern each entry is."""
     height = pattern.size1()
     own_rows, own_columns = (np.array(x, dtype=np.int64) for x in pattern.get_triplet())
-    return np.searchsorted(own_columns * height + own_rows, columns * height + rows)
+    return np.asarray(np.searchsorted(own_columns * height + own_rows, columns * height + rows))

@@ -48,7 +48,7 @@ def content_hash(robot: RobotDescription, rotors: float, name: str) -> str:
         digest.update((Path(__file__).parent / source).read_bytes())
     kept = robot.model_dump(mode="json", exclude={"profiles", "standing", "points", "text"})
     digest.update(json.dumps(kept, sort_keys=True).encode())
-    digest.update(repr((rotors, name, ca.__version__, FLAGS)).encode())
+    digest.update(repr((rotors, name, ca.CasadiMeta.version(), FLAGS)).encode())
     return digest.hexdigest()[:20]
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -181,6 +182,11 @@ class ProblemBuilder:
             self._fix(k, given[list(self.assembly.knots[k].fixed)])
             self.lower[start : start + n] = -np.inf
             self.upper[start : start + n] = np.inf
+        lean = self.task.touchdown_lean
+        if k == self.flight.stop and lean is not None:
+            pitch = start + self.coordinates.free_base.index(4)
+            nominal = float(self.nominal(k)[pitch - start])
+            self.lower[pitch], self.upper[pitch] = nominal - lean, nominal + lean
         if k == len(self.phases):
             return
         if self.phases[k] is not Phase.FLIGHT:
@@ -217,7 +223,7 @@ class ProblemBuilder:
                 row
             ]
 
-    def _set(self, name: str, k: int, **values: object) -> None:
+    def _set(self, name: str, k: int, **values: Any) -> None:
         start = self.assembly.parameter_start[name, k]
         for key, size in parameter_sizes(self.coordinates)[name].items():
             if key in values:
@@ -238,7 +244,7 @@ class ProblemBuilder:
         profile = self.model.robot.profiles[self.task.profile]
         return profile.peak_torque / (profile.no_load_speed - profile.corner_speed)
 
-    def _interval(self, k: int) -> dict[str, object]:
+    def _interval(self, k: int) -> dict[str, Any]:
         weights, base = self.task.weights, self.coordinates.free_base
         share, moving = float(self.coordinates.share), len(self.coordinates.moving)
         posture = [weights.orientation if i >= 3 else 0.0 for i in base]

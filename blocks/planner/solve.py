@@ -6,12 +6,13 @@ import time
 from functools import lru_cache
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...runtime.description import RobotDescription
 from .compilation import Progress, load_pieces
 from .coordinates import Coordinates
 from .errors import PlanError
-from .guess import ballistic_guess
+from .guess import ballistic_guess, displaced_guess
 from .plan import JumpPlan
 from .problem import Problem, ProblemBuilder
 from .solver import Solution, solve
@@ -21,6 +22,7 @@ from .symbolic_model import SymbolicModel
 from .task import JumpTask
 from .unpacking import pack, unpack
 
+Array = NDArray[np.float64]
 ADVICE = {
     "motor torque": "ask for a smaller jump, a longer thrust_time or a stronger profile",
     "motor torque at speed": "ask for a smaller jump, a longer thrust_time or a faster profile",
@@ -57,13 +59,15 @@ def solve_jump(
     started = time.process_time()
     problem = make_problem(task, robot, compiled=compiled, progress=progress)
     guess = ballistic_guess(problem)
-    warm = warm_start is not None and len(warm_start.time) == problem.knots
+    warm = warm_start is not None and warm_start.task.knots == task.knots
     solution = None
     if warm and warm_start is not None:
         solution = solve(problem, pack(problem, warm_start, guess), warm=True, solver="fatrop")
     if solution is None or not solution.solved:
         warm = False
-        solution = solve(problem, guess, solver=solver)
+        solution = solve(
+            problem, guess, solver=solver, other_guess=lambda: _displaced(problem, robot)
+        )
     if not solution.solved:
         raise _failure(task, solution)
     statistics = {
@@ -96,6 +100,17 @@ def make_problem(
 
     Raises ``PlanError`` and ``TaskError`` as ``solve_jump`` does.
     """
+    if task.formulation != "full":
+        raise PlanError(
+            f"{task.name}: the formulation {task.formulation!r} cannot be solved yet; "
+            "use formulation: full",
+            family="formulation",
+        )
+    if task.impact:
+        raise PlanError(
+            f"{task.name}: impacts at touchdown cannot be planned yet; use impact: false",
+            family="footholds",
+        )
     if task.profile not in robot.profiles:
         raise PlanError(
             f"{robot.name} has no actuator profile {task.profile!r}; there is "
@@ -131,6 +146,18 @@ def _choose(
     return make_coordinates(model, "full")
 
 
+def _displaced(problem: Problem, robot: RobotDescription) -> Array | None:
+    """A guess from the same jump straight ahead, where there is one and it can be solved."""
+    if problem.coordinates.name == "sagittal":
+        return None
+    task = problem.task.model_copy(update={"distance_y": 0.0, "twist": 0.0})
+    straight = make_problem(task, robot, compiled=not problem.assembly.interpreted)
+    if straight.coordinates.name != "sagittal":
+        return None
+    solution = solve(straight, ballistic_guess(straight), solver="fatrop")
+    return displaced_guess(problem, straight, solution.values) if solution.solved else None
+
+
 def _failure(task: JumpTask, solution: Solution) -> PlanError:
     family = solution.family
     advice = ADVICE.get(family, "ask for a smaller jump, or change the durations")
@@ -148,4 +175,4 @@ def _failure(task: JumpTask, solution: Solution) -> PlanError:
 def _versions() -> dict[str, str]:
     import casadi as ca
 
-    return {"casadi": str(ca.__version__), "numpy": np.__version__}
+    return {"casadi": str(ca.CasadiMeta.version()), "numpy": np.__version__}

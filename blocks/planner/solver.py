@@ -6,7 +6,7 @@ import contextlib
 import os
 import time
 from collections import OrderedDict
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -42,16 +42,26 @@ class Solution:
 
 
 def solve(
-    problem: Problem, guess: Array, *, warm: bool = False, solver: str = "", limit: int = 250
+    problem: Problem,
+    guess: Array,
+    *,
+    warm: bool = False,
+    solver: str = "",
+    limit: int = 250,
+    other_guess: Callable[[], Array | None] = lambda: None,
 ) -> Solution:
-    """The best solution found: fatrop's, or IPOPT's where that fails, or the less violated one.
+    """The first solution found, or the least violated attempt: fatrop from the guess, fatrop from
+    the other guess, IPOPT from the guess.
 
     ``warm`` says that the guess is near the solution; ``solver`` insists on one of them.
     """
-    tries = [solver] if solver else ["fatrop", "ipopt"]
+    tries = [solver] if solver else ["fatrop", "other", "ipopt"]
     best: Solution | None = None
     for name in tries:
-        found = _run(problem, guess, name, warm, limit)
+        start = other_guess() if name == "other" else guess
+        if start is None:
+            continue
+        found = _run(problem, start, "fatrop" if name == "other" else name, warm, limit)
         if best is None or (not best.solved and found.violation < best.violation):
             best = found
         if best.solved:
@@ -115,9 +125,9 @@ def _make_solver(assembly: Assembly, name: str, warm: bool, limit: int) -> tuple
 
     functions = assembly.functions()
     nlp = {key: functions[key] for key in ("x", "p", "f", "g")}
-    own: dict[str, object] = {"tol": DUAL_TOLERANCE, "constr_viol_tol": VIOLATION,
+    own: dict[str, Any] = {"tol": DUAL_TOLERANCE, "constr_viol_tol": VIOLATION,
                               "max_iter": limit, "print_level": 0}  # fmt: skip
-    options: dict[str, object] = {"print_time": False, "calc_lam_p": False, "error_on_fail": False}
+    options: dict[str, Any] = {"print_time": False, "calc_lam_p": False, "error_on_fail": False}
     if name == "fatrop":
         # Its own tolerance takes the short intervals' small coefficients for a lack of rank.
         own |= {"linsol_lu_fact_tol": 1e-7, "mu_init": 10.0}
@@ -130,7 +140,7 @@ def _make_solver(assembly: Assembly, name: str, warm: bool, limit: int) -> tuple
             "cache": {key: functions[key] for key in given}, "fatrop": own,
         }  # fmt: skip
     else:
-        own |= {"sb": "yes"}
+        own |= {"sb": "yes", "mu_init": 10.0}
         if warm:
             own |= {"mu_init": 1e-4, "bound_push": 1e-6, "bound_frac": 1e-6,
                     "slack_bound_push": 1e-6, "slack_bound_frac": 1e-6}  # fmt: skip

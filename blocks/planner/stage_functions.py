@@ -98,14 +98,18 @@ def piece_expressions(
         z = [q, v, a, F] if name == "stance" else [q, v, state, a]
         half_v = v + 0.5 * h * a
         half_q = q + 0.5 * h * v + 0.125 * h * h * a
-        all_forces = ca.mtimes(ca.DM(coordinates.force_matrix), F) if forces else None
+        all_forces: Any = ca.mtimes(ca.DM(coordinates.force_matrix), F) if forces else None
         named = {
             model.robot.contacts[c].name: all_forces[3 * c : 3 * c + 3]
             for c in coordinates.contacts
             if forces
         }
         base, limbs, torque = model.inverse_dynamics(
-            *(coordinates.expand(x) for x in (half_q, half_v, a)), named, coordinates.limbs
+            coordinates.expand(half_q),
+            coordinates.expand(half_v),
+            coordinates.expand(a),
+            named,
+            coordinates.limbs,
         )
         wrench = base + coordinates.share * sum(limbs.values())
         to_motor = model.robot.torque_to_motor[np.ix_(coordinates.joints, coordinates.joints)]

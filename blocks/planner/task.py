@@ -55,7 +55,7 @@ class Weights(Parameters):
     acceleration: float = parameter(5e-4, ge=0.0, text="generalised accelerations")
     com_acceleration: float = parameter(1e-3, ge=0.0, text="of the centre of mass")
     momentum_rate: float = parameter(1e-2, ge=0.0, text="of the angular momentum")
-    force: float = parameter(1e-4, ge=0.0, text="contact forces")
+    force: float = parameter(1e-3, ge=0.0, text="contact forces")
     torque: float = parameter(1e-3, ge=0.0, text="motor torques")
     impulse: float = parameter(1.0, ge=0.0, text="contact impulses at touchdown")
 
@@ -106,6 +106,10 @@ class JumpTask(Parameters):
         None, unit="s", gt=0.0, le=3.0, text="in the air; None: found by the planner"
     )
     landing_time: float = parameter(0.5, unit="s", gt=0.0, le=5.0, text="touchdown to rest")
+    touchdown_lean: float | None = parameter(
+        None, unit="rad", ge=0.0, le=1.5,
+        text="most the torso may lean forwards or backwards at touchdown; None: any",
+    )  # fmt: skip
     impact: bool = parameter(
         False, text="feet may hit the ground with speed and stop by an impulse; else they arrive "
         "at rest"
@@ -156,7 +160,8 @@ class JumpTask(Parameters):
 
     def content(self) -> dict[str, Any]:
         """All that decides the plan, as plain data: everything but the name."""
-        return self.model_dump(mode="json", exclude={"name"})
+        # What is not given is left out, so that a parameter added later changes no hash.
+        return self.model_dump(mode="json", exclude={"name"}, exclude_none=True)
 
     def hash(self, robot: RobotDescription) -> str:
         """What a plan of this task is kept under: the same for the same task, robot and format."""

@@ -140,16 +140,16 @@ def _evaluate(
     import casadi as ca
 
     if id(model) not in _evaluators:
-        symbols = [ca.SX.sym(name, model.size) for name in ("q", "v", "a")]
+        place, rate, bend_of = (ca.SX.sym(name, model.size) for name in ("q", "v", "a"))
         pushes = ca.SX.sym("F", force.shape[1])
-        linear, angular = model.momentum(symbols[0], symbols[1])
+        linear, angular = model.momentum(place, rate)
         named = {c.name: pushes[3 * i : 3 * i + 3] for i, c in enumerate(model.robot.contacts)}
-        torque = model.inverse_dynamics(*symbols, named)[2]
-        of_state = ca.vertcat(model.com(symbols[0]), linear / model.robot.total_mass, angular)
+        torque = model.inverse_dynamics(place, rate, bend_of, named)[2]
+        of_state = ca.vertcat(model.com(place), linear / model.robot.total_mass, angular)
         _evaluators[id(model)] = (
             model,
-            ca.Function("states", symbols[:2], [of_state], {"cse": True}),
-            ca.Function("torques", [*symbols, pushes], [torque], {"cse": True}),
+            ca.Function("states", [place, rate], [of_state], {"cse": True}),
+            ca.Function("torques", [place, rate, bend_of, pushes], [torque], {"cse": True}),
         )
     _, states, torques = _evaluators[id(model)]
     found = np.array(states(q.T, v.T)).T
