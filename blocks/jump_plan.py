@@ -31,7 +31,7 @@ class JumpPlan(Block):
     Every plan, also a kept one, first passes the validity check (``blocks/planner/validity``) with
     exact dynamics. At the start the robot stands still for ``stand_time``; at the end it stays
     where the plan ended. Between the plan's knots the reference is read from a table of 2 ms steps
-    (``blocks/planner/reference_table``).
+    (``blocks/planner/reference_table``), what is fed forward ``lead`` ahead of time.
 
     It follows time alone and knows nothing of what the robot really does. Raises ``BlockError`` at
     load where the task cannot be read or is for another robot, cannot be planned, or its plan is
@@ -44,6 +44,13 @@ class JumpPlan(Block):
         )
         stand_time: float = parameter(
             0.4, unit="s", gt=0.0, text="standing before the plan, for the estimator to settle"
+        )
+        lead: float = parameter(
+            0.002,
+            unit="s",
+            ge=0.0,
+            le=0.02,
+            text="delay from sensing to torque that is made up for",
         )
         library: str = parameter(
             "", text="folder where new plans are kept; the user's cache if empty"
@@ -68,7 +75,7 @@ class JumpPlan(Block):
         self._reader = JumpTableReader(reference_table(plan, robot, self.params.stand_time))
 
     def step(self) -> None:
-        self._reader.read(self.time, self.reference)
+        self._reader.read(self.time, self.reference, self.params.lead)
 
     def _task(self) -> JumpTask:
         from .planner.task import TaskError, make_task, read_task

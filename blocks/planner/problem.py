@@ -184,7 +184,7 @@ class ProblemBuilder:
             self.upper[start : start + n] = np.inf
         lean = self.task.touchdown_lean
         if k == self.flight.stop and lean is not None:
-            pitch = start + self.coordinates.free_base.index(4)
+            pitch = start + self.coordinates.free_base.index(3)
             nominal = float(self.nominal(k)[pitch - start])
             self.lower[pitch], self.upper[pitch] = nominal - lean, nominal + lean
         if k == len(self.phases):

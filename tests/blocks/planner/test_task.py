@@ -83,5 +83,7 @@ def test_the_hash_follows_what_decides_the_plan() -> None:
     base = JumpTask(name="a", rise=0.15)
     assert base.hash(robot) == JumpTask(name="b", rise=0.15).hash(robot), "a name decides nothing"
     assert base.hash(robot) != JumpTask(name="a", rise=0.16).hash(robot)
+    assert base.hash(robot) != JumpTask(name="a", rise=0.15, touchdown_lean=0.2).hash(robot)
+    assert "touchdown_lean" not in base.content(), "what is not given decides nothing"
     heavier = robot.model_copy(update={"text": "another robot"})
     assert base.hash(robot) != base.hash(heavier)
