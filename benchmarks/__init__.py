@@ -13,10 +13,14 @@ from typing import Any
 
 import numpy as np
 
+from .planner import planner
 from .rows import Row
 from .scheduler import scheduler
 
-BENCHMARKS: Mapping[str, Callable[[], list[Row]]] = {"scheduler": scheduler}
+BENCHMARKS: Mapping[str, Callable[[], list[Row]]] = {
+    "scheduler": scheduler,
+    "planner": planner,
+}
 """All benchmarks by name; each returns its rows."""
 
 
