@@ -53,11 +53,7 @@ class Weights(Parameters):
     orientation: float = parameter(1.0, ge=0.0, text="the torso's rotation away from the nominal")
     joint_velocity: float = parameter(1e-1, ge=0.0, text="joint velocities")
     acceleration: float = parameter(5e-4, ge=0.0, text="generalised accelerations")
-    com_acceleration: float = parameter(1e-3, ge=0.0, text="of the centre of mass")
-    momentum_rate: float = parameter(1e-2, ge=0.0, text="of the angular momentum")
     force: float = parameter(1e-3, ge=0.0, text="contact forces")
-    torque: float = parameter(1e-3, ge=0.0, text="motor torques")
-    impulse: float = parameter(1.0, ge=0.0, text="contact impulses at touchdown")
 
 
 class JumpTask(Parameters):
@@ -76,7 +72,7 @@ class JumpTask(Parameters):
     formulation: Literal["full", "paper", "srbm"] = parameter(
         "full",
         text="full: whole-body dynamics; paper: centroidal momentum and kinematics as in the "
-        "paper; srbm: a single rigid body, for comparison",
+        "paper; srbm: a single rigid body. Only full can be solved so far",
     )
     rise: float | None = parameter(
         None, unit="m", gt=0.0, le=2.0, text="apex of the centre of mass above standing"
@@ -111,8 +107,8 @@ class JumpTask(Parameters):
         text="most the torso may lean forwards or backwards at touchdown; None: any",
     )  # fmt: skip
     impact: bool = parameter(
-        False, text="feet may hit the ground with speed and stop by an impulse; else they arrive "
-        "at rest"
+        False, text="feet may hit the ground with speed and stop by an impulse (not solved so "
+        "far); else they arrive at rest"
     )  # fmt: skip
     knots: Knots = parameter(Knots(), text="intervals in each phase")
     profile: str = parameter("koala", text="actuator profile of the robot")

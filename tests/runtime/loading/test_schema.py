@@ -13,7 +13,8 @@ from aloft.runtime.loading.nodes import plain
 from aloft.runtime.loading.problems import Problems
 
 ROOT = Path(__file__).parents[3]
-SHIPPED = sorted((ROOT / "graphs").rglob("*.yaml"))
+TASKS = ROOT / "graphs" / "tasks"  # what jumps are asked for: not graph files
+SHIPPED = sorted(p for p in (ROOT / "graphs").rglob("*.yaml") if p.parent != TASKS)
 
 
 @pytest.fixture(scope="module")
