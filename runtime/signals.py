@@ -17,7 +17,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import Any, ClassVar, Self, overload
+from typing import TYPE_CHECKING, Any, ClassVar, Self, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -122,8 +122,26 @@ class Signal:
         """An instance whose fields are the given arrays, themselves not copied."""
         signal = cls.__new__(cls)
         for name, view in views.items():  # not through __dict__, which would slow every access
-            setattr(signal, name, view)
+            object.__setattr__(signal, name, view)
         return signal
+
+    if not TYPE_CHECKING:  # a type checker would take it for leave to assign any name
+
+        def __setattr__(self, name: str, value: Any) -> None:
+            """Refuse to replace a field, which would leave the graph's memory as it was, unnoticed.
+
+            Raises:
+                AttributeError: always, but for what ``signal.field += x`` assigns: the view itself.
+            """
+            if name in type(self).fields and getattr(self, name, None) is value:
+                return
+            raise AttributeError(
+                f"{type(self).__name__}.{name} cannot be assigned: a field is a view of the graph's "
+                f"memory; write into it, as in .{name}[...] = value"
+                if name in type(self).fields
+                else f"{type(self).__name__} has no field {name!r}; it has "
+                + ", ".join(type(self).fields)
+            )
 
     @classmethod
     def allocate(cls, dimensions: Mapping[str, int] | None = None) -> Self:

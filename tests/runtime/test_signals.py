@@ -46,6 +46,22 @@ def test_bind_copies_nothing() -> None:
     assert pose.position is memory
 
 
+def test_a_field_is_written_into_and_never_replaced() -> None:
+    pose = Pose.allocate({"n_joints": 2})
+    view = pose.count
+    pose.position += 1.0
+    pose.count += 2
+    assert pose.position.tolist() == [1.0, 1.0, 1.0] and pose.count is view and int(view) == 2
+    with pytest.raises(
+        AttributeError,
+        match=r"Pose\.angles cannot be assigned: .* write into it, as in \.angles\[\.\.\.\] = value",
+    ):
+        pose.angles = np.ones(2)  # type: ignore[assignment]
+    with pytest.raises(AttributeError, match="Pose has no field 'angels'; it has position, angles"):
+        pose.angels = 1.0  # type: ignore[attr-defined]
+    assert pose.angles.tolist() == [0.0, 0.0]
+
+
 def test_unbound_field_says_so() -> None:
     with pytest.raises(AttributeError, match=r"Pose\.position is not bound to memory"):
         _ = Pose().position
