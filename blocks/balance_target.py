@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..runtime.block import Block, Input, Output, State
+from ..runtime.kernel import kernel
 from ..runtime.parameters import Parameters, parameter
 from ..runtime.signals import Field, Signal
 from .polynomials import minimum_jerk
@@ -133,6 +134,7 @@ class BalanceTarget(Block):
         self._turn[2], self._turn[3] = math.sin(0.5 * angle), math.cos(0.5 * angle)
 
 
+@kernel
 def middle_point(points: Array, out: Array) -> None:
     """The mean of points (n, 3)."""
     out[:] = 0.0
@@ -141,6 +143,7 @@ def middle_point(points: Array, out: Array) -> None:
             out[k] += float(points[i, k]) / points.shape[0]
 
 
+@kernel
 def mean_heading(rotations: Array) -> float:
     """The heading [rad] of the mean of the x axes of rotations (n, 3, 3)."""
     x = y = 0.0
@@ -150,6 +153,7 @@ def mean_heading(rotations: Array) -> float:
     return math.atan2(y, x)
 
 
+@kernel
 def turn_about_vertical(vector: Array, angle: float, out: Array) -> None:
     """A vector (3,) turned about the world's z axis."""
     cosine, sine = math.cos(angle), math.sin(angle)
@@ -157,6 +161,7 @@ def turn_about_vertical(vector: Array, angle: float, out: Array) -> None:
     out[0], out[1], out[2] = cosine * x - sine * y, sine * x + cosine * y, vector[2]
 
 
+@kernel
 def integrate_trim(error: Array, gain: float, limit: float, trim: Array) -> None:
     """One step of the integral about x and y, kept within the limit; none about z."""
     for k in range(2):

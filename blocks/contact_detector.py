@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..runtime.block import Block, Input, Output, State
+from ..runtime.kernel import kernel
 from ..runtime.parameters import Parameters, parameter
 from ..runtime.signals import Field, Signal
 from .signals import ContactState, ContactSwitches
@@ -58,6 +59,7 @@ class ContactDetector(Block):
         self.state.active[...] = timers.active
 
 
+@kernel
 def latch(
     switches: NDArray[np.bool_],
     close_samples: int,

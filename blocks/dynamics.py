@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from ..runtime.block import Block, Input, Output
 from ..runtime.errors import BlockError
+from ..runtime.kernel import kernel
 from ..runtime.parameters import Parameters, parameter
 from .pinocchio_model import build_pinocchio_model
 from .rotations import normalise, rotate_back, to_matrix
@@ -145,6 +146,7 @@ class Dynamics(Block):
             np.dot(turn, self._local[1], terms.contact_drift[point])
 
 
+@kernel
 def move_jacobian(origin_jacobian: Array, point: Array, shift: Array, out: Array) -> None:
     """The linear velocity of a body's point per v, (3, n), from the body's at the world's origin.
 
@@ -162,6 +164,7 @@ def move_jacobian(origin_jacobian: Array, point: Array, shift: Array, out: Array
     np.dot(shift, origin_jacobian, out)
 
 
+@kernel
 def point_motion(
     linear: Array,
     angular: Array,

@@ -12,6 +12,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from ..runtime.kernel import kernel
 from .rotations import integrate, normalise, rotate
 
 Array = NDArray[np.float64]
@@ -20,6 +21,7 @@ Flags = NDArray[np.bool_]
 GRAVITY = 9.81
 
 
+@kernel
 def propagate(
     orientation: Array,
     position: Array,
@@ -54,6 +56,7 @@ def propagate(
         velocity[i] += gained
 
 
+@kernel
 def turn(orientation: Array, x: float, y: float, z: float) -> None:
     """Turn by a small rotation vector [rad, world], to second order and normalised."""
     qx, qy, qz, qw = (
@@ -71,6 +74,7 @@ def turn(orientation: Array, x: float, y: float, z: float) -> None:
     normalise(orientation, orientation)
 
 
+@kernel
 def right_up(orientation: Array, specific_force: Array, gain: float, up: Array) -> None:
     """Turn a share ``gain`` of the way to where the specific force points straight up.
 
@@ -85,6 +89,7 @@ def right_up(orientation: Array, specific_force: Array, gain: float, up: Array) 
     turn(orientation, gain * y / size, -gain * x / size, 0.0)
 
 
+@kernel
 def upright(specific_force: Array, orientation: Array) -> None:
     """The orientation without heading in which the specific force points straight up."""
     x, y, z = float(specific_force[0]), float(specific_force[1]), float(specific_force[2])
@@ -100,6 +105,7 @@ def upright(specific_force: Array, orientation: Array) -> None:
     normalise(orientation, orientation)
 
 
+@kernel
 def misalignment(
     orientation: Array, points: Array, forward: Array, out: Array, place: Array
 ) -> bool:
@@ -135,6 +141,7 @@ def misalignment(
     return True
 
 
+@kernel
 def weigh(world_rates: Array, active: Flags, velocity: Array, gate: float, weights: Array) -> float:
     """How far to trust that each active point stands still; returns the largest weight.
 
@@ -154,6 +161,7 @@ def weigh(world_rates: Array, active: Flags, velocity: Array, gate: float, weigh
     return largest
 
 
+@kernel
 def stand_on(
     world_points: Array,
     world_rates: Array,

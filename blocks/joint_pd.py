@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from ..runtime.block import Block, Input, Output, State
 from ..runtime.description import RobotDescription
 from ..runtime.errors import BlockError
+from ..runtime.kernel import kernel
 from ..runtime.parameters import Parameters, parameter
 from ..runtime.signals import Field, Signal
 from .signals import (
@@ -182,6 +183,7 @@ def leg_joints(robot: RobotDescription, foot: int) -> tuple[int, ...]:
     return tuple(chain)
 
 
+@kernel
 def superpose(
     weight: Array,
     first_gain: Array,
@@ -208,6 +210,7 @@ def superpose(
             target[i] = measured[i]
 
 
+@kernel
 def follow(
     period: float,
     leak: float,

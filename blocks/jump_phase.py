@@ -9,11 +9,13 @@ from numpy.typing import NDArray
 
 from ..runtime.block import Block, Input, Output, State
 from ..runtime.errors import BlockError
+from ..runtime.kernel import kernel
 from ..runtime.parameters import Parameters, parameter
 from ..runtime.signals import Field, Signal
 from .signals import ContactState, DynamicsTerms, JumpReference, Phase, PhaseState
 
 _GRAVITY = 9.81
+_THRUST = int(Phase.THRUST)
 
 
 class PhaseMemory(Signal):
@@ -135,6 +137,7 @@ class JumpPhase(Block):
         out.stance[...] = memory.stance
 
 
+@kernel
 def count_unloaded(
     active: NDArray[np.bool_], period: float, unloaded: NDArray[np.float64]
 ) -> float:
@@ -146,17 +149,20 @@ def count_unloaded(
     return shortest
 
 
+@kernel
 def planned_touchdown_height(height: float, velocity: float, remaining: float) -> float:
     """Where a body at ``height`` with ``velocity`` will be after falling for ``remaining``."""
     return height + remaining * (velocity - 0.5 * _GRAVITY * remaining)
 
 
+@kernel
 def time_to_height(height: float, velocity: float, goal: float) -> float:
     """The time [s] until a falling body comes down to ``goal``; its apex where it is below that."""
     square = velocity * velocity + 2.0 * _GRAVITY * (height - goal)
     return max(0.0, (velocity + math.sqrt(max(square, 0.0))) / _GRAVITY)
 
 
+@kernel
 def next_phase(
     phase: int,
     planned: int,
@@ -198,9 +204,10 @@ def next_phase(
     second_half = phase == Phase.THRUST and now + time_in_phase >= lift_off_time
     if second_half and unloaded >= early_lift_off:
         return Phase.FLIGHT
-    return max(phase, min(planned, int(Phase.THRUST)))
+    return max(phase, min(planned, _THRUST))
 
 
+@kernel
 def choose_stance(
     phase: int,
     unloaded: NDArray[np.float64],

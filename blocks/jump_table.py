@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..runtime.kernel import kernel
 from .rotations import normalise
 from .signals import JumpReference, Phase
 
@@ -71,6 +72,7 @@ class JumpTableReader:
         reference.contact[...] = phase != Phase.FLIGHT
 
 
+@kernel
 def locate(times: Array, time: float) -> tuple[int, float]:
     """The row before ``time`` and the share of the way from it to the next, from 0 to 1."""
     low, high = 0, times.shape[0] - 1
@@ -87,6 +89,7 @@ def locate(times: Array, time: float) -> tuple[int, float]:
     return low, (time - float(times[low])) / (float(times[high]) - float(times[low]))
 
 
+@kernel
 def planned_phase(
     time: float,
     squat_time: float,

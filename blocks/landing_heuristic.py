@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ..runtime.block import Block, Input, Output, State
 from ..runtime.description import RobotDescription
 from ..runtime.errors import BlockError
+from ..runtime.kernel import kernel
 from ..runtime.parameters import Parameters, parameter
 from ..runtime.signals import Field, Signal
 from .polynomials import minimum_jerk
@@ -226,6 +227,7 @@ def foot_sides(robot: RobotDescription) -> tuple[float, ...]:
     return tuple(sides)
 
 
+@kernel
 def landing_place(
     nominal: Array,
     side: float,
@@ -252,6 +254,7 @@ def landing_place(
     out[2] = nominal[2]
 
 
+@kernel
 def lowest_height(points: Array) -> float:
     """The least z of points (n, 3)."""
     lowest = float(points[0, 2])
@@ -260,6 +263,7 @@ def lowest_height(points: Array) -> float:
     return lowest
 
 
+@kernel
 def swing(
     planned: Array, place: Array, offset: Array, share: float, rate: float, out: Array, speed: Array
 ) -> None:
@@ -277,6 +281,7 @@ def swing(
         speed[k] += rate * (goal - start)
 
 
+@kernel
 def retraction(left: float, speed: float, duration: float) -> tuple[float, float]:
     """Height added to the foot and its rate, ``left`` seconds before touchdown.
 
@@ -286,6 +291,7 @@ def retraction(left: float, speed: float, duration: float) -> tuple[float, float
     return -speed * duration * x * (1.0 - x) ** 2, speed * (1.0 - x) * (1.0 - 3.0 * x)
 
 
+@kernel
 def heading_matrix(yaw: float, out: Array) -> None:
     """The rotation about the vertical by ``yaw`` (3, 3)."""
     cosine, sine = math.cos(yaw), math.sin(yaw)

@@ -5,9 +5,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ..runtime.kernel import kernel
+
 Array = NDArray[np.float64]
 
 
+@kernel
 def solve_damped(rows: Array, damping: float, normal: Array, vector: Array) -> None:
     """Solve (A'A + damping^2 I) x = A'b in place: ``vector`` is A'b and becomes x.
 
@@ -22,6 +25,7 @@ def solve_damped(rows: Array, damping: float, normal: Array, vector: Array) -> N
     solve_positive(normal, vector)
 
 
+@kernel
 def solve_positive(matrix: Array, vector: Array) -> None:
     """Solve a symmetric positive definite system in place: ``vector`` becomes the solution.
 

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from ..runtime.block import Block, Input, Output, State
 from ..runtime.errors import BlockError
+from ..runtime.kernel import kernel
 from ..runtime.parameters import Parameters, parameter
 from ..runtime.signals import Field, Signal
 from .leg_kinematics import forward, inverse, inverse_velocity, jacobian, read_leg
@@ -116,6 +117,7 @@ class LegInverseKinematics(Block):
         lines.known[()] = True
 
 
+@kernel
 def slow_stretch(
     hip: Array, plane: Array, sole: Array, rotation: Array, share: float, velocity: Array
 ) -> None:
@@ -143,6 +145,7 @@ def slow_stretch(
         velocity[i] -= scale * (float(sole[i]) - lever - float(hip[i]))
 
 
+@kernel
 def line_rate(line: Array, last: Array, period: float, known: bool, out: Array) -> None:
     """How fast the direction of ``line`` turns [1/s]; ``last`` becomes its direction now."""
     x, y, z = float(line[0]), float(line[1]), float(line[2])

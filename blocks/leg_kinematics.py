@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from ..runtime.description import RobotDescription
 from ..runtime.errors import BlockError
+from ..runtime.kernel import kernel
 from .least_squares import solve_damped
 from .rotations import wrap
 
@@ -99,6 +100,7 @@ def read_leg(robot: RobotDescription, foot: int) -> Leg:
     )
 
 
+@kernel
 def forward(
     hip: Array, plane: Array, signs: Array, angles: Array, position: Array, rotation: Array
 ) -> None:
@@ -117,6 +119,7 @@ def forward(
         rotation[i, 2] = cos_f * thigh_z - sin_f * thigh_x
 
 
+@kernel
 def jacobian(plane: Array, signs: Array, angles: Array, out: Array) -> None:
     """The sole's linear (rows 0-2) and angular (rows 3-5) velocity per joint velocity, (6, 5)."""
     a, b, c, k, n = _canonical(signs, angles)
@@ -158,6 +161,7 @@ def jacobian(plane: Array, signs: Array, angles: Array, out: Array) -> None:
             out[i, j] *= sign
 
 
+@kernel
 def inverse(
     hip: Array,
     plane: Array,
@@ -256,6 +260,7 @@ def inverse(
     return inside, share
 
 
+@kernel
 def inverse_velocity(
     sole_jacobian: Array,
     rotation: Array,
@@ -300,6 +305,7 @@ def inverse_velocity(
     solve_damped(rows, damping, normal, out)
 
 
+@kernel
 def _canonical(signs: Array, angles: Array) -> tuple[float, float, float, float, float]:
     return (
         float(signs[0]) * float(angles[0]),
@@ -310,6 +316,7 @@ def _canonical(signs: Array, angles: Array) -> tuple[float, float, float, float,
     )
 
 
+@kernel
 def _thigh_rotation(a: float, b: float, c: float, out: Array) -> None:
     """Yaw ``a`` about z, then pitch ``b`` about -y, then roll ``c`` about x."""
     cos_a, sin_a, cos_b, sin_b = math.cos(a), math.sin(a), math.cos(b), math.sin(b)
@@ -323,6 +330,7 @@ def _thigh_rotation(a: float, b: float, c: float, out: Array) -> None:
     out[2, 2] = cos_b * cos_c
 
 
+@kernel
 def _direction(
     x: float, y: float, z: float, default_x: float, default_y: float, default_z: float
 ) -> tuple[float, float, float]:
@@ -335,6 +343,7 @@ def _direction(
     return x / size, y / size, z / size
 
 
+@kernel
 def _two_links(
     first_x: float,
     first_z: float,

@@ -6,6 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..runtime.kernel import kernel
+
 
 @dataclass(frozen=True)
 class Quintic:
@@ -47,6 +49,7 @@ def quintic(
     return Quintic((p, v, 0.5 * a, d, e, f))
 
 
+@kernel
 def minimum_jerk(share: float) -> tuple[float, float, float]:
     """The way from 0 to 1 of least jerk: its value and two derivatives over ``share`` of the time.
 

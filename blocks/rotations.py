@@ -12,12 +12,15 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from ..runtime.kernel import kernel
+
 Array = NDArray[np.float64]
 
 _SMALL = 1e-8
 """Below this angle [rad] the series to second order is exact to the last bit."""
 
 
+@kernel
 def cross(a: Array, b: Array, out: Array) -> None:
     """The cross product of two three-vectors."""
     ax, ay, az = float(a[0]), float(a[1]), float(a[2])
@@ -27,6 +30,7 @@ def cross(a: Array, b: Array, out: Array) -> None:
     out[2] = ax * by - ay * bx
 
 
+@kernel
 def skew(vector: Array, out: Array) -> None:
     """The matrix (3, 3) whose product with b is the cross product of ``vector`` and b."""
     x, y, z = float(vector[0]), float(vector[1]), float(vector[2])
@@ -35,6 +39,7 @@ def skew(vector: Array, out: Array) -> None:
     out[1, 0], out[2, 0], out[2, 1] = z, -y, x
 
 
+@kernel
 def normalise(quaternion: Array, out: Array) -> None:
     """The unit quaternion of the same direction; the identity where there is no direction."""
     x, y, z, w = (
@@ -54,6 +59,7 @@ def normalise(quaternion: Array, out: Array) -> None:
     out[0], out[1], out[2], out[3] = x / norm, y / norm, z / norm, w / norm
 
 
+@kernel
 def conjugate(quaternion: Array, out: Array) -> None:
     """The inverse of a unit quaternion."""
     w = float(quaternion[3])
@@ -61,6 +67,7 @@ def conjugate(quaternion: Array, out: Array) -> None:
     out[3] = w
 
 
+@kernel
 def multiply(a: Array, b: Array, out: Array) -> None:
     """The quaternion product: first the rotation ``b``, then ``a``."""
     ax, ay, az, aw = float(a[0]), float(a[1]), float(a[2]), float(a[3])
@@ -71,6 +78,7 @@ def multiply(a: Array, b: Array, out: Array) -> None:
     out[3] = aw * bw - ax * bx - ay * by - az * bz
 
 
+@kernel
 def rotate(quaternion: Array, vector: Array, out: Array) -> None:
     """``vector`` turned by a unit quaternion: from body to world."""
     x, y, z, w = (
@@ -86,6 +94,7 @@ def rotate(quaternion: Array, vector: Array, out: Array) -> None:
     out[2] = c + w * tz + x * ty - y * tx
 
 
+@kernel
 def rotate_back(quaternion: Array, vector: Array, out: Array) -> None:
     """``vector`` turned by the inverse of a unit quaternion: from world to body."""
     x, y, z, w = (
@@ -101,6 +110,7 @@ def rotate_back(quaternion: Array, vector: Array, out: Array) -> None:
     out[2] = c + w * tz + x * ty - y * tx
 
 
+@kernel
 def to_matrix(quaternion: Array, out: Array) -> None:
     """The rotation matrix (3, 3) of a unit quaternion."""
     x, y, z, w = (
@@ -120,6 +130,7 @@ def to_matrix(quaternion: Array, out: Array) -> None:
     out[2, 2] = 1.0 - 2.0 * (x * x + y * y)
 
 
+@kernel
 def from_matrix(matrix: Array, out: Array) -> None:
     """The unit quaternion of a rotation matrix, with w >= 0 where w is not tiny.
 
@@ -146,6 +157,7 @@ def from_matrix(matrix: Array, out: Array) -> None:
     out[3] = sign * w
 
 
+@kernel
 def exponential(vector: Array, out: Array) -> None:
     """The unit quaternion of a rotation vector [rad]: axis times angle."""
     x, y, z = float(vector[0]), float(vector[1]), float(vector[2])
@@ -155,6 +167,7 @@ def exponential(vector: Array, out: Array) -> None:
     out[3] = math.cos(0.5 * angle)
 
 
+@kernel
 def logarithm(quaternion: Array, out: Array) -> None:
     """The rotation vector [rad] of a unit quaternion, of length at most pi."""
     x, y, z, w = (
@@ -170,6 +183,7 @@ def logarithm(quaternion: Array, out: Array) -> None:
     out[0], out[1], out[2] = scale * x, scale * y, scale * z
 
 
+@kernel
 def integrate(quaternion: Array, angular_velocity: Array, duration: float, out: Array) -> None:
     """The orientation after turning at a constant body rate [rad/s] for ``duration`` [s]."""
     wx, wy, wz = (
@@ -194,6 +208,7 @@ def integrate(quaternion: Array, angular_velocity: Array, duration: float, out: 
     normalise(out, out)
 
 
+@kernel
 def yaw(quaternion: Array) -> float:
     """The heading [rad]: the angle about the world's z of the body's x axis."""
     x, y, z, w = (
@@ -205,6 +220,7 @@ def yaw(quaternion: Array) -> float:
     return math.atan2(2.0 * (x * y + w * z), 1.0 - 2.0 * (y * y + z * z))
 
 
+@kernel
 def tilt(quaternion: Array) -> float:
     """The angle [rad] between the body's z axis and the world's, from 0 to pi."""
     x, y, z, w = (
@@ -217,6 +233,7 @@ def tilt(quaternion: Array) -> float:
     return 2.0 * math.atan2(math.sqrt(x * x + y * y), math.sqrt(z * z + w * w))
 
 
+@kernel
 def wrap(angle: float) -> float:
     """The same angle [rad] from -pi to pi."""
     return angle - 2.0 * math.pi * math.floor(angle / (2.0 * math.pi) + 0.5)

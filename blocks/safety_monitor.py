@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ..runtime.block import Block, Input, Metric, Output, State
 from ..runtime.errors import BlockError
+from ..runtime.kernel import kernel
 from ..runtime.parameters import Parameters, parameter
 from ..runtime.signals import Field, Signal
 from .rotations import tilt
@@ -196,6 +197,7 @@ class SafetyMonitor(Block):
         return Fault.NONE
 
 
+@kernel
 def within(values: Array, limit: float) -> bool:
     """Whether all values are finite and of no greater magnitude; NaN is not."""
     inside = True
@@ -204,6 +206,7 @@ def within(values: Array, limit: float) -> bool:
     return inside
 
 
+@kernel
 def count_beyond(values: Array, lower: Array, upper: Array, counts: NDArray[np.int64]) -> int:
     """Count for each value how many times in a row it was out of bounds; the largest count."""
     largest = 0
@@ -214,6 +217,7 @@ def count_beyond(values: Array, lower: Array, upper: Array, counts: NDArray[np.i
     return largest
 
 
+@kernel
 def count_faster(values: Array, limit: float, counts: NDArray[np.int64]) -> int:
     """Count for each value how many times in a row its magnitude was above; the largest count."""
     largest = 0

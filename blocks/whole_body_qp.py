@@ -16,6 +16,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ..runtime.kernel import kernel
 from .rotations import conjugate, logarithm, multiply
 
 Array = NDArray[np.float64]
@@ -25,6 +26,7 @@ PYRAMID_ROWS = 6
 """Inequality rows of a point in stance: four of its pyramid, two bounds of its normal force."""
 
 
+@kernel
 def contact_tasks(
     jacobian: Array,
     drift: Array,
@@ -73,6 +75,7 @@ def contact_tasks(
                 desired[row] = wanted - float(drift[i, k])
 
 
+@kernel
 def linear_task(
     matrix: Array,
     drift: Array,
@@ -104,6 +107,7 @@ def linear_task(
         )
 
 
+@kernel
 def torso_task(
     orientation: Array,
     angular_velocity: Array,
@@ -135,6 +139,7 @@ def torso_task(
         )
 
 
+@kernel
 def angular_task(
     matrix: Array,
     drift: Array,
@@ -158,6 +163,7 @@ def angular_task(
         desired[i] = wanted - float(drift[3 + i])
 
 
+@kernel
 def assemble_cost(
     rows: Array,
     desired: Array,
@@ -190,6 +196,7 @@ def assemble_cost(
         hessian[i, i] = force_weight
 
 
+@kernel
 def base_dynamics(
     mass_matrix: Array,
     nonlinear: Array,
@@ -212,6 +219,7 @@ def base_dynamics(
             np.negative(jacobian[point, k, 0:6], matrix[:, n + 3 * j + k])
 
 
+@kernel
 def friction_pyramids(
     count: int,
     first: int,
@@ -237,6 +245,7 @@ def friction_pyramids(
         matrix[row + 5, column + 2], bound[row + 5] = -1.0, -force_min
 
 
+@kernel
 def torque_limits(
     mass_matrix: Array,
     nonlinear: Array,
@@ -274,6 +283,7 @@ def torque_limits(
     np.subtract(torque_offset, lower, bound[joints:])
 
 
+@kernel
 def motor_limits(
     speed: Array, peak: float, corner: float, no_load: float, lower: Array, upper: Array
 ) -> None:
@@ -287,6 +297,7 @@ def motor_limits(
         lower[i] = -driving if value < 0.0 else -peak
 
 
+@kernel
 def joint_torque(
     mass_matrix: Array,
     nonlinear: Array,
@@ -310,6 +321,7 @@ def joint_torque(
             np.subtract(torque, product, torque)
 
 
+@kernel
 def share_weight(stance: NDArray[np.bool_], weight: float, force: Array) -> None:
     """The robot's weight [N] shared equally, straight up, by the points in stance."""
     force[:, :] = 0.0

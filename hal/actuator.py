@@ -12,9 +12,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ..runtime.kernel import kernel
+
 Array = NDArray[np.float64]
 
 
+@kernel
 def motor_torque_limits(
     speed: Array, peak: float, corner: float, no_load: float, lower: Array, upper: Array
 ) -> None:
@@ -24,17 +27,19 @@ def motor_torque_limits(
     above that the motor cannot drive at all. Against the motion (braking) ``peak`` is available
     at any speed.
     """
+    # fmin and fmax: NumPy wants the output of minimum and maximum as a keyword, which no kernel has.
     slope = peak / (no_load - corner)
-    np.subtract(no_load, speed, out=upper)
-    np.multiply(upper, slope, out=upper)
-    np.minimum(upper, peak, out=upper)
-    np.maximum(upper, 0.0, out=upper)
-    np.add(no_load, speed, out=lower)
-    np.multiply(lower, -slope, out=lower)
-    np.maximum(lower, -peak, out=lower)
-    np.minimum(lower, 0.0, out=lower)
+    np.subtract(no_load, speed, upper)
+    np.multiply(upper, slope, upper)
+    np.fmin(upper, peak, upper)
+    np.fmax(upper, 0.0, upper)
+    np.add(no_load, speed, lower)
+    np.multiply(lower, -slope, lower)
+    np.fmax(lower, -peak, lower)
+    np.fmin(lower, 0.0, lower)
 
 
+@kernel
 def joint_feedback_torque(
     feedforward: Array,
     stiffness: Array,
@@ -48,14 +53,15 @@ def joint_feedback_torque(
 ) -> None:
     """Feedforward plus joint feedback [N m] into ``out``: the first equation of section V,
     ``tau_ff + Kp (q_d - q) + Kd (qd_d - qd)``."""
-    np.subtract(position_target, position, out=out)
-    np.multiply(out, stiffness, out=out)
-    np.add(out, feedforward, out=out)
-    np.subtract(velocity_target, velocity, out=scratch)
-    np.multiply(scratch, damping, out=scratch)
-    np.add(out, scratch, out=out)
+    np.subtract(position_target, position, out)
+    np.multiply(out, stiffness, out)
+    np.add(out, feedforward, out)
+    np.subtract(velocity_target, velocity, scratch)
+    np.multiply(scratch, damping, scratch)
+    np.add(out, scratch, out)
 
 
+@kernel
 def clip_joint_torque(
     torque: Array,
     torque_to_motor: Array,
@@ -70,7 +76,6 @@ def clip_joint_torque(
     ``motor_wanted`` receives the motor torques asked for and ``motor_torque`` those produced,
     within ``lower`` and ``upper``. ``motor_to_torque`` is the transpose of ``joint_to_motor``.
     """
-    np.dot(torque_to_motor, torque, out=motor_wanted)
-    np.minimum(motor_wanted, upper, out=motor_torque)
-    np.maximum(motor_torque, lower, out=motor_torque)
-    np.dot(motor_to_torque, motor_torque, out=torque)
+    np.dot(torque_to_motor, torque, motor_wanted)
+    np.clip(motor_wanted, lower, upper, motor_torque)  # what is not a number stays so
+    np.dot(motor_to_torque, motor_torque, torque)

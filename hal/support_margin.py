@@ -7,7 +7,10 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from ..runtime.kernel import kernel
 
+
+@kernel
 def support_margin(
     points: NDArray[np.float64], loaded: NDArray[np.bool_], x: float, y: float
 ) -> float:
@@ -18,24 +21,27 @@ def support_margin(
     distance to the left of an edge. Outside a corner that understates how far away the place is.
     With one point it is minus the distance to it, with none minus one metre.
     """
-    used = [k for k in range(len(points)) if loaded[k]]
-    if not used:
-        return -1.0
-    margin = math.inf
-    for i in used:
-        ax, ay = points[i].item(0), points[i].item(1)
-        for j in used:
-            dx, dy = points[j].item(0) - ax, points[j].item(1) - ay
+    count, first, margin = points.shape[0], -1, math.inf
+    for i in range(count):
+        if not loaded[i]:
+            continue
+        first = i if first < 0 else first
+        ax, ay = float(points[i, 0]), float(points[i, 1])
+        for j in range(count):
+            if not loaded[j]:
+                continue
+            dx, dy = float(points[j, 0]) - ax, float(points[j, 1]) - ay
             length = math.hypot(dx, dy)
             if length < 1e-9:
                 continue
-            leftmost = all(
-                dx * (points[k].item(1) - ay) - dy * (points[k].item(0) - ax) >= -1e-12
-                for k in used
-            )
+            leftmost = True
+            for k in range(count):
+                side = dx * (float(points[k, 1]) - ay) - dy * (float(points[k, 0]) - ax)
+                leftmost = leftmost and (side >= -1e-12 or not loaded[k])
             if leftmost:
                 margin = min(margin, (dx * (y - ay) - dy * (x - ax)) / length)
+    if first < 0:
+        return -1.0
     if margin == math.inf:
-        first = points[used[0]]
-        return -math.hypot(first.item(0) - x, first.item(1) - y)
+        return -math.hypot(float(points[first, 0]) - x, float(points[first, 1]) - y)
     return margin

@@ -1,0 +1,217 @@
+"""Every kernel compiles in Numba's nopython mode as it stands and computes the same.
+
+The arguments are those of a real jump, as the blocks give them, and the same again with all numbers
+of the arrays replaced at random, which takes other branches. Where a kernel only adds, multiplies,
+divides and takes roots, results are equal to the last bit.
+"""
+
+import ast
+import importlib
+import math
+import subprocess
+import sys
+import types
+from pathlib import Path
+
+import numba
+import numpy as np
+import pytest
+
+import aloft
+from aloft.runtime.kernel import kernel, kernels
+
+ROOT = Path(__file__).parent.parent
+HOT = [path for folder in ("blocks", "hal") for path in sorted((ROOT / folder).glob("*.py"))]
+PLAIN = {"Array", "Flags", "Indices", "float", "int", "bool"}
+NOT_HOT = {
+    "hal.random_streams._signed": "of exact integers, when a run is restored",
+    "hal.scenes.step": "makes a scene, when a run is loaded",
+    "hal.scenes.platform": "makes a scene, when a run is loaded",
+    "hal.stance._solve_normal": "before a run, by MuJoCo's linear algebra",
+}
+"""Functions of numbers and arrays only that need not compile, and why."""
+
+INEXACT = {"sin", "cos", "atan2", "acos", "exp", "hypot", "dot"}
+"""What another library, or another order of sums, may round differently."""
+
+UNUSED = {
+    "aloft.blocks.rotations.skew": (np.ones(3), np.zeros((3, 3))),
+    "aloft.blocks.rotations.yaw": (np.array([0.1, 0.2, 0.3, 0.9]),),
+    "aloft.blocks.joint_pd.follow": (0.002, 0.02, *(np.ones(10) for _ in range(5))),
+    "aloft.blocks.inertial_filter.right_up": (
+        np.array([0.0, 0.0, 0.0, 1.0]), np.array([0.3, 0.2, 9.8]), 0.01, np.zeros(3),
+    ),
+    "aloft.blocks.whole_body_qp.share_weight": (
+        np.array([True, False, True, True]), 50.0, np.zeros((4, 3)),
+    ),
+}  # fmt: skip
+"""Arguments of kernels that ``graphs/jump.yaml`` does not call."""
+
+SAMPLES = 6
+EVERY = 211
+"""Of a kernel's calls the first and then every so many are kept, up to so many samples."""
+
+
+PYTHON = {bool, int, float}
+"""Other numbers, such as those of an enumeration, are made plain ones."""
+
+
+def copy(arguments):
+    """The same arguments in arrays of the same memory order; named numbers as plain ones."""
+    return tuple(
+        a.copy(order="K") if isinstance(a, np.ndarray) else int(a) if type(a) not in PYTHON else a
+        for a in arguments
+    )
+
+
+def load_all():
+    for path in HOT:
+        importlib.import_module(".".join(("aloft", *path.relative_to(ROOT).with_suffix("").parts)))
+
+
+@pytest.fixture(scope="module")
+def calls():
+    """For every kernel the arguments of some of its calls during a jump."""
+    load_all()
+    functions = kernels()
+    samples = {name: [] for name in functions}
+    name_of = {id(function): name for name, function in functions.items()}
+
+    def recorder(name, function):
+        count = 0
+
+        def record(*arguments):
+            nonlocal count
+            if count % EVERY == 0 and len(samples[name]) < SAMPLES:
+                samples[name].append(copy(arguments))
+            count += 1
+            return function(*arguments)
+
+        return record
+
+    with pytest.MonkeyPatch.context() as patch:
+        for module in [m for name, m in sys.modules.items() if name.startswith("aloft.")]:
+            for key, value in list(vars(module).items()):
+                if id(value) in name_of:
+                    patch.setattr(module, key, recorder(name_of[id(value)], value))
+        aloft.load(ROOT / "graphs/jump.yaml").run()
+    for name, arguments in UNUSED.items():
+        samples[name].append(arguments)
+    return samples
+
+
+@pytest.fixture(scope="module")
+def compiler():
+    """Compiles a kernel, and before it the kernels it calls."""
+    known = {id(function): name for name, function in kernels().items()}
+    compiled = {}
+
+    def build(function):
+        name = known[id(function)]
+        if name not in compiled:
+            scope = dict(function.__globals__)
+            for used in function.__code__.co_names:
+                if id(scope.get(used)) in known:
+                    scope[used] = build(scope[used])
+            plain = types.FunctionType(function.__code__, scope, function.__name__)
+            compiled[name] = numba.njit(plain, fastmath=False)
+        return compiled[name]
+
+    return build
+
+
+def is_exact(function):
+    """Whether neither the kernel nor one it calls uses what may be rounded differently."""
+    names = function.__code__.co_names
+    callees = [function.__globals__.get(name) for name in names]
+    marked = {id(f) for f in kernels().values()}
+    return not INEXACT & set(names) and all(is_exact(f) for f in callees if id(f) in marked)
+
+
+def replaced(arguments, random):
+    """The arguments with other numbers of about the same size in every array of floats."""
+    new = copy(arguments)
+    for a in new:
+        if isinstance(a, np.ndarray) and a.dtype == np.float64:
+            a += (0.1 * np.abs(a) + 1e-3) * random.standard_normal(a.shape)
+        elif isinstance(a, np.ndarray) and a.dtype == np.bool_:
+            a[:] = random.random(a.shape) < 0.5
+    return new
+
+
+def flat(arguments, result):
+    """All that a call has written and returned, as arrays."""
+    returned = result if isinstance(result, tuple) else () if result is None else (result,)
+    return [np.asarray(a) for a in (*arguments, *returned)]
+
+
+@pytest.mark.filterwarnings("ignore::numba.core.errors.NumbaPerformanceWarning")
+def test_all_kernels_compile_and_compute_the_same(calls, compiler):
+    missing = [name for name, samples in calls.items() if not samples]
+    assert not missing, f"not called by the jump; add arguments to UNUSED: {missing}"
+    random = np.random.default_rng(1)
+    for name, function in kernels().items():
+        if not name.startswith("aloft."):
+            continue
+        machine, exact = compiler(function), is_exact(function)
+        for sample in calls[name]:
+            for arguments in (sample, *(replaced(sample, random) for _ in range(4))):
+                ours, theirs = copy(arguments), copy(arguments)
+                expected = flat(ours, function(*ours))
+                found = flat(theirs, machine(*theirs))
+                assert len(found) == len(expected), name
+                for a, b in zip(expected, found, strict=True):
+                    if exact:
+                        np.testing.assert_array_equal(b, a, err_msg=name)
+                    else:
+                        scale = max(1.0, float(np.abs(a).max(initial=0.0)))
+                        np.testing.assert_allclose(
+                            b, a, rtol=1e-12, atol=1e-12 * scale, err_msg=name
+                        )
+        assert machine.nopython_signatures, name
+
+
+def test_every_function_of_numbers_and_arrays_is_a_kernel():
+    load_all()
+    marked = set(kernels())
+    found = set()
+    for path in HOT:
+        module = ".".join(path.relative_to(ROOT).with_suffix("").parts)
+        for node in ast.parse(path.read_text(encoding="utf-8")).body:
+            if not isinstance(node, ast.FunctionDef) or not node.args.args:
+                continue
+            texts = [ast.unparse(a.annotation) for a in node.args.args if a.annotation]
+            if all(text in PLAIN or text.startswith("NDArray[") for text in texts):
+                found.add(f"{module}.{node.name}")
+    assert not {n for n in found if f"aloft.{n}" not in marked} - set(NOT_HOT)
+    assert set(NOT_HOT) <= found, "functions that are gone"
+    assert len(found) > 60
+
+
+def test_a_mark_leaves_the_function_alone():
+    def double(value: float) -> float:
+        return 2.0 * value
+
+    assert kernel(double) is double
+    assert double in kernels().values()
+
+
+def test_nothing_of_ours_needs_numba_to_run():
+    modules = [".".join(("aloft", *p.relative_to(ROOT).with_suffix("").parts)) for p in HOT]
+    modules = [name.removesuffix(".__init__") for name in modules]
+    code = "import importlib, sys\nsys.modules['numba'] = None\n" + "".join(
+        f"importlib.import_module({name!r})\n" for name in modules
+    )
+    code += (
+        "import aloft\n"
+        f"aloft.load({str(ROOT / 'graphs/jump.yaml')!r}).run(duration=0.02)\n"
+        "assert sys.modules['numba'] is None\n"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True, timeout=60)
+
+
+def test_a_difference_would_be_seen(compiler):
+    """The comparison is of the compiled code, not of the function with itself."""
+    wrap = kernels()["aloft.blocks.rotations.wrap"]
+    assert compiler(wrap) is not wrap
+    assert compiler(wrap)(7.0) == pytest.approx(7.0 - 2.0 * math.pi)
