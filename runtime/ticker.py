@@ -151,6 +151,8 @@ class Ticker:
         if isinstance(owner, Block) or not isinstance(error, NotFiniteError):
             who = f"block '{block}'" if block else f"the runtime ({type(owner).__name__})"
             text = f"{who} failed at {self._instant(tick)}: {describe(error)}"
+            if isinstance(error, ValueError) and "read-only" in str(error):
+                text += "; an input cannot be written: copy it into an array made in setup()"
         else:
             block = error.place.rpartition(".")[0].rpartition(".")[0]
             text = f"block '{block}' wrote a value that is not finite at {self._instant(tick)}: "

@@ -4,6 +4,7 @@ import gc
 import itertools
 import json
 import threading
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ import pytest
 from aloft.runtime.block import Block, Input, Output, State
 from aloft.runtime.errors import AloftError, ExitCode
 from aloft.runtime.executor import Executor, run
+from aloft.runtime.graph import load
 from aloft.runtime.memory import BoundGraph
 from aloft.runtime.parameters import Parameters
 from aloft.runtime.primitives import Constant, Gain, Integrator, SineWave, Sum, UnitDelay, Vector
@@ -366,3 +368,18 @@ def test_it_runs_in_another_thread() -> None:
 def test_an_empty_graph_runs() -> None:
     result = run(checked_graph({}, ticks=3))
     assert (result.success, result.ticks, result.signals()) == (True, 3, ())
+
+
+def test_a_block_that_writes_its_input_is_told_so(tmp_path: Path) -> None:
+    (tmp_path / "writes_input.py").write_text(
+        "from aloft.runtime.primitives import Gain\n\n\n"
+        "class WritesInput(Gain):\n"
+        "    def step(self):\n"
+        "        self.u.value[0] = 1.0\n"
+    )
+    (tmp_path / "g.yaml").write_text(
+        "rate: 100 Hz\nduration: 1 s\nblocks:\n  wave: {use: runtime.SineWave}\n"
+        "  bad: {use: 'writes_input:WritesInput', in: {u: wave.y}}\n"
+    )
+    reason = load(tmp_path / "g.yaml").run().reason
+    assert reason.startswith("block 'bad' failed at tick 0 ") and "read-only; an input" in reason
