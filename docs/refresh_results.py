@@ -40,7 +40,8 @@ def results_table(rows: list[SeedRow]) -> str:
         cells = (min(values), median(values), max(values))
         numbers = " | ".join(f"{cell:.3g}" for cell in cells)
         lines.append(f"| {text} | {numbers} | {unit} | {goal} |")
-    lines += ["", "`aloft run graphs/jump.yaml --seeds 1000:1020` repeats it."]
+    seeds = f"{SEEDS.start}:{SEEDS.stop}"
+    lines += ["", f"`aloft run graphs/jump.yaml --seeds {seeds}` repeats it."]
     return "\n".join(lines) + "\n"
 
 

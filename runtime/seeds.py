@@ -70,12 +70,15 @@ def run_seeds(
     # Spawned, not forked: no state of this process reaches a run.
     context = multiprocessing.get_context("spawn")
     others = set(multiprocessing.active_children())
-    with ProcessPoolExecutor(workers, context, initializer=_leave_signals_to_parent) as pool:
+    with ProcessPoolExecutor(workers, context, initializer=_take_signals) as pool:
+        runs = [pool.submit(_run_one, job) for job in jobs]
         try:
-            yield from pool.map(_run_one, jobs)
+            for run in runs:
+                yield run.result()
         except BaseException:
-            # The robots of runs that are under way come to rest before their process ends.
-            pool.shutdown(wait=False, cancel_futures=True)
+            # The robots of runs that are under way come to rest before their process ends. What
+            # is queued is not cancelled but let go by the workers: a pool that breaks because a
+            # worker is stopped while it starts cannot cope with cancelled work, and hangs.
             for worker in set(multiprocessing.active_children()) - others:
                 worker.terminate()
             raise
@@ -88,23 +91,45 @@ def processors() -> int:
     return os.cpu_count() or 1
 
 
-def _leave_signals_to_parent() -> None:
+class _StoppedError(BaseException):
+    """In a worker: told to stop before its run could take the signal itself."""
+
+
+_told_to_stop = False
+"""In a worker: what is still queued is not begun."""
+_preparing = False
+"""In a worker: a run is being loaded and set up."""
+
+
+def _take_signals() -> None:
+    """In a worker: SIGINT is the parent's, and SIGTERM never kills a worker that waits for work,
+    which would break the pool. A run that is under way takes SIGTERM itself and stops cleanly."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, _stop)
 
 
-_stopped_by_signal = False
-"""In a worker: its run was told to stop, so what is still queued is not begun."""
+def _stop(number: int, frame: object) -> None:
+    global _told_to_stop
+    _told_to_stop = True
+    if _preparing:
+        raise _StoppedError
 
 
 def _run_one(job: tuple[Path, Sequence[str], int]) -> SeedRow:
-    global _stopped_by_signal
+    global _told_to_stop, _preparing
     path, overrides, seed = job
-    if _stopped_by_signal:
-        return SeedRow(seed, False, "not begun", {}, "")
     try:
+        _preparing = True
+        if _told_to_stop:
+            raise _StoppedError
         result = load(path, overrides).run(log=False)
+        _preparing = False
+    except _StoppedError:
+        return SeedRow(seed, False, "not begun", {}, "")
     except AloftError as error:
         return SeedRow(seed, False, str(error), {}, "")
-    _stopped_by_signal = result.exit_code in (ExitCode.INTERRUPTED, ExitCode.TERMINATED)
+    finally:
+        _preparing = False
+    _told_to_stop |= result.exit_code in (ExitCode.INTERRUPTED, ExitCode.TERMINATED)
     data = result.to_json()
     return SeedRow(seed, result.success, result.reason, data["metrics"], result.run_hash)

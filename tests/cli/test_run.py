@@ -168,18 +168,41 @@ def test_signals_stop_a_run_cleanly(
     assert (folder / result["recording"]).is_file()
 
 
+def leave_a_sign(folder: Path) -> None:
+    """Let the counter write a file when it runs."""
+    block = (folder / "counter.py").read_text()
+    sign = "        open('running', 'w').close()\n        self.count.value += 1.0"
+    (folder / "counter.py").write_text(block.replace("        self.count.value += 1.0", sign))
+
+
+def wait_for_the_sign(folder: Path) -> None:
+    deadline = time.monotonic() + 30.0
+    while not (folder / "running").exists() and time.monotonic() < deadline:
+        time.sleep(0.01)
+
+
 def test_a_signal_stops_all_seeds(folder: Path, start: Start) -> None:
     graph = (folder / "count.yaml").read_text()
     graph = graph.replace("duration: 1 s\n", "clock: {kind: paced}\n")
     (folder / "endless.yaml").write_text(graph)
-    block = (folder / "counter.py").read_text()
-    sign = "        open('running', 'w').close()\n        self.count.value += 1.0"
-    (folder / "counter.py").write_text(block.replace("        self.count.value += 1.0", sign))
+    leave_a_sign(folder)
     process = start("run", "endless.yaml", "--seeds", "0:4", "--json")
-    deadline = time.monotonic() + 30.0
-    while not (folder / "running").exists() and time.monotonic() < deadline:
-        time.sleep(0.01)
+    wait_for_the_sign(folder)
     process.send_signal(signal.SIGTERM)
     output, errors = process.communicate(timeout=30)  # also ends only when the workers have
     assert process.returncode == 143, output + errors
     assert json.loads(output)["reason"] == "stopped by SIGTERM after 0 of 4 seeds"
+    assert "Traceback" not in errors
+
+
+def test_a_signal_between_two_runs_stops_all_seeds(folder: Path, start: Start) -> None:
+    """Short runs: a worker is then most of the time waiting for work, loading or setting up."""
+    leave_a_sign(folder)
+    process = start("run", "count.yaml", "--seeds", "0:4000", "--json")
+    wait_for_the_sign(folder)
+    time.sleep(0.5)
+    process.send_signal(signal.SIGINT)
+    output, errors = process.communicate(timeout=60)
+    assert process.returncode == 130, output + errors
+    assert json.loads(output)["reason"].startswith("stopped by SIGINT after ")
+    assert "Traceback" not in errors
