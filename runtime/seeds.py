@@ -123,7 +123,6 @@ def _run_one(job: tuple[Path, Sequence[str], int]) -> SeedRow:
         if _told_to_stop:
             raise _StoppedError
         result = load(path, overrides).run(log=False)
-        _preparing = False
     except _StoppedError:
         return SeedRow(seed, False, "not begun", {}, "")
     except AloftError as error:

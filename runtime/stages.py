@@ -32,8 +32,24 @@ class Position:
         return f"{self.file}:{self.line}:{self.column}" if self.line else self.file
 
 
+class HasSource:
+    """What every stage's wire has: the output it comes from, ``source``, as ``block.port``."""
+
+    source: str
+
+    @property
+    def source_block(self) -> str:
+        """The path of the block that writes."""
+        return self.source.rpartition(".")[0]
+
+    @property
+    def source_port(self) -> str:
+        """The name of the output."""
+        return self.source.rpartition(".")[2]
+
+
 @dataclass(frozen=True)
-class Wire:
+class Wire(HasSource):
     """One wire: the ``source`` output and the ``target`` input, both as ``block.port``.
 
     ``delay`` counts periods of the source's block. A delayed wire has been replaced by a delay
@@ -46,16 +62,6 @@ class Wire:
     initial: Mapping[str, Any] = field(default_factory=dict)
     truth_allowed: bool = False
     where: Position | None = None
-
-    @property
-    def source_block(self) -> str:
-        """The path of the block that writes."""
-        return self.source.rpartition(".")[0]
-
-    @property
-    def source_port(self) -> str:
-        """The name of the output."""
-        return self.source.rpartition(".")[2]
 
 
 @dataclass(frozen=True)

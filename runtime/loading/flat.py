@@ -8,14 +8,14 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from ..stages import Position
+from ..stages import HasSource, Position
 from .nodes import Entry, MapNode, Node, plain, text_of
 
 _WIDTH = 100
 
 
 @dataclass(frozen=True)
-class FlatWire:
+class FlatWire(HasSource):
     """What one input reads: the output ``source`` (``block.port``), or a ``constant``."""
 
     source: str
@@ -24,16 +24,6 @@ class FlatWire:
     initial: MapNode | None = None
     truth: bool = False
     constant: MapNode | None = None
-
-    @property
-    def source_block(self) -> str:
-        """The path of the block that writes."""
-        return self.source.rpartition(".")[0]
-
-    @property
-    def source_port(self) -> str:
-        """The name of the output."""
-        return self.source.rpartition(".")[2]
 
     def plain(self) -> Any:
         """The wire as a graph file says it."""
