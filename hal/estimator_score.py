@@ -8,7 +8,6 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from ..blocks.rotations import conjugate, logarithm, multiply
 from ..blocks.signals import BaseState, RobotTruth
 from ..runtime.block import Block, Input, Metric, State
 from ..runtime.parameters import Parameters, parameter
@@ -73,8 +72,7 @@ class EstimatorScore(Block):
 
     def setup(self) -> None:
         """Scratch memory."""
-        self._turn, self._spare, self._error = np.zeros(4), np.zeros(4), np.zeros(3)
-        self._squares = np.zeros(KINDS)
+        self._error, self._squares = np.zeros(3), np.zeros(KINDS)
 
     def step(self) -> None:
         """Compare one tick."""
@@ -130,9 +128,8 @@ class EstimatorScore(Block):
 
     def _confirmed(self) -> bool:
         """Whether the robot has been unloaded for long enough that this is a flight."""
-        return self.record.unloaded_ticks.item() * self.period >= (
-            self.params.flight_confirmation - 1e-9
-        )
+        ticks = int(self.record.unloaded_ticks)
+        return ticks * self.period >= self.params.flight_confirmation - 1e-9
 
     def _land(self) -> None:
         record = self.record
@@ -150,8 +147,14 @@ class EstimatorScore(Block):
         ):
             np.subtract(estimated, true, out=self._error)
             last[kind] = math.hypot(*self._error.tolist())
-        conjugate(truth.base_orientation, self._spare)
-        multiply(base.orientation, self._spare, self._turn)
-        logarithm(self._turn, self._error)
-        x, y, z = self._error.tolist()
-        last[2], last[3], last[4] = math.hypot(x, y, z), math.hypot(x, y), abs(z)
+        # The product of the estimated quaternion and the true one's inverse.
+        ax, ay, az, aw = base.orientation.tolist()
+        bx, by, bz, bw = truth.base_orientation.tolist()
+        x = ax * bw - aw * bx - ay * bz + az * by
+        y = ay * bw - aw * by - az * bx + ax * bz
+        z = az * bw - aw * bz - ax * by + ay * bx
+        w = aw * bw + ax * bx + ay * by + az * bz
+        sine = math.hypot(x, y, z)
+        angle = 2.0 * math.atan2(sine, abs(w))
+        scale = angle / sine if sine > 0.0 else 0.0
+        last[2], last[3], last[4] = angle, scale * math.hypot(x, y), scale * abs(z)
