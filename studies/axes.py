@@ -107,8 +107,9 @@ def read_sets(entry: Entry, problems: Problems) -> tuple[Entry, ...] | None:
 def _listed(entry: Entry, node: MapNode, problems: Problems) -> Axis | None:
     """An axis of parameters with lists of values, which go side by side."""
     name = entry.key
-    shown: list[Node] | None = None
+    shown: list[Node] = []
     lists: list[tuple[Entry, list[Node]]] = []
+    sizes: list[tuple[Entry, int]] = []
     for item in node:
         values = _values(item, problems)
         if values is None:
@@ -117,6 +118,7 @@ def _listed(entry: Entry, node: MapNode, problems: Problems) -> Axis | None:
             shown = values
         else:
             lists.append((item, values))
+        sizes.append((item, len(values)))
     if not lists:
         problems.add(
             Code.MISSING_KEY,
@@ -128,16 +130,15 @@ def _listed(entry: Entry, node: MapNode, problems: Problems) -> Axis | None:
         )
         return None
     count = len(lists[0][1])
-    for item, values in [*lists[1:], *([(node.get("shown"), shown)] if shown else [])]:
-        if len(values) != count:
-            assert item is not None
+    for item, size in sizes:
+        if size != count:
             problems.add(
                 Code.BAD_VALUE,
                 f"the values of axis {name!r} do not go side by side",
                 item.key_where,
                 at=f"{name}.{item.key}",
                 expected=f"{count} values, as {lists[0][0].key} has",
-                found=f"{len(values)} values",
+                found=f"{size} values",
             )
             return None
     return _make(entry, lists, shown or lists[0][1], problems)

@@ -72,7 +72,7 @@ def _bounds(
     return Range(entry.key, entry.key_where, tuple(bounds), scalar, unit, log)
 
 
-def _refuse(entry: Entry, node: Node, problems: Problems, log: bool = False) -> None:
+def _refuse(entry: Entry, node: Node, problems: Problems, log: bool = False) -> Range | None:
     low = "numbers above zero, low before high" if log else "low before high"
     problems.add(
         Code.BAD_VALUE,
@@ -81,6 +81,7 @@ def _refuse(entry: Entry, node: Node, problems: Problems, log: bool = False) -> 
         at=entry.key,
         expected=f"{EXPECTED}, {low}",
     )
+    return None
 
 
 def draw(found: Range, generator: np.random.Generator) -> Any:

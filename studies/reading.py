@@ -136,7 +136,8 @@ def _read_tasks(keys: dict[str, Entry], path: Path, problems: Problems) -> tuple
 
 def _read_task(entry: Entry, path: Path, problems: Problems) -> Task | None:
     """``name: FILE`` or ``name: {graph: FILE, set: {...}}``."""
-    file, sets = entry, ()
+    file = entry
+    sets: tuple[Entry, ...] = ()
     if isinstance(entry.value, MapNode):
         for item in entry.value:
             if item.key not in TASK_KEYS:
@@ -189,7 +190,7 @@ def _read_ranges(entry: Entry | None, problems: Problems) -> tuple[Range, ...]:
 def _read_arm(entry: Entry, common: tuple[Range, ...], problems: Problems) -> Arm:
     """``name: {block.parameter: value}``, or ``name: {set: {...}, tune: {...}}``."""
     node = entry.value
-    if isinstance(node, MapNode) and any(key in ARM_KEYS for key in node.keys()):
+    if isinstance(node, MapNode) and any(node.get(key) for key in ARM_KEYS):
         for item in node:
             if item.key not in ARM_KEYS:
                 unknown_key(item, ARM_KEYS, f"of arm {entry.key!r}", problems)

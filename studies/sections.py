@@ -245,7 +245,9 @@ def _read_plot(entry: Entry, labels: Labels, problems: Problems) -> Plot | None:
                 entry.key_where, expected=f"an axis: {listing(labels.axes)}",
             )  # fmt: skip
             return None
-    numeric = [n for n, a in labels.axes.items() if all(isinstance(c.value, float) for c in a.cases)]
+    numeric = [
+        n for n, a in labels.axes.items() if all(isinstance(c.value, float) for c in a.cases)
+    ]
     level, title, y = node.get("level"), node.get("title"), node.get("y")
     share = _share(level.value, "level", problems) if level else None
     return Plot(
