@@ -11,6 +11,7 @@ from ..signals import Phase
 from .midpoint import angular_motion, euler_angles, euler_rates, rotation
 from .plan import JumpPlan
 from .problem import Problem
+from .resampling import matching_times, means_over, states_at
 from .symbolic_model import SymbolicModel
 
 Array = NDArray[np.float64]
@@ -72,7 +73,11 @@ def unpack(problem: Problem, values: Array) -> dict[str, Any]:
 
 
 def pack(problem: Problem, plan: JumpPlan, guess: Array) -> Array:
-    """Variables near a plan of a task like this one with as many knots; ``guess`` elsewhere."""
+    """Variables near a plan of a task like this one; ``guess`` elsewhere.
+
+    The plan may have other numbers of knots: it is followed phase by phase, and must go through
+    the same phases.
+    """
     assembly, coordinates = problem.assembly, problem.coordinates
     n = coordinates.size
     angles = euler_angles(plan.position[:, 3:7])
@@ -82,7 +87,11 @@ def pack(problem: Problem, plan: JumpPlan, guess: Array) -> Array:
         v[k, :3] = rotation(angles[k]) @ row[:3]
         v[k, 3:6] = euler_rates(angles[k], row[3:6])[ORDER]
         v[k, 6:] = row[6:]
-    steps = np.diff(plan.time)
+    phases = [int(phase) for phase in problem.phases]
+    instants = matching_times(plan.time, plan.phase[:-1].tolist(), problem.steps, phases)
+    q, v = states_at(instants, plan.time, q, v)
+    force = means_over(instants, plan.time, plan.contact_force.reshape(len(plan.time), -1))
+    steps = np.diff(instants)
     mean = plan.flight_time / len(problem.flight)
     values = guess.copy()
     for k in range(problem.knots):
@@ -96,7 +105,7 @@ def pack(problem: Problem, plan: JumpPlan, guess: Array) -> Array:
         if problem.phases[k] is Phase.FLIGHT:
             values[start + 2 * n] = mean
         else:
-            pushed = coordinates.reduce_forces(plan.contact_force[k].ravel())
+            pushed = coordinates.reduce_forces(force[k])
             values[control + n : control + n + coordinates.forces] = pushed
         hold = assembly.knots[k].hold
         if hold is not None:
