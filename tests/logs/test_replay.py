@@ -15,7 +15,7 @@ from aloft.runtime.executor import Executor
 from aloft.runtime.loading.adjust import adjust
 from aloft.runtime.memory import BoundGraph
 from aloft.runtime.parameters import Parameters, parameter
-from aloft.runtime.primitives import Gain, UnitDelay, SineWave, Vector
+from aloft.runtime.primitives import Gain, SineWave, UnitDelay, Vector
 from aloft.runtime.stages import CheckedGraph
 from aloft.runtime.testing import Use, checked_graph
 
