@@ -124,8 +124,9 @@ def read_goals(node: Node, labels: Labels, problems: Problems) -> tuple[Goal, ..
             )  # fmt: skip
             continue
         rate = _share(found.value, "rate", problems)
+        where = labels.read_filter(item.get("where"), problems)
         if rate is not None:
-            goals.append(Goal(rate, labels.read_filter(item.get("where"), problems)))
+            goals.append(Goal(rate, where))
     return tuple(goals)
 
 
