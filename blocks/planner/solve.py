@@ -145,9 +145,9 @@ def _choose(
         except ValueError:
             return make_coordinates(model, "full")
         every = np.array([stance.coordinates for stance in stances])
-        if np.allclose(
-            plane.reduce(every) @ plane.matrix.T, every, rtol=0.0, atol=1e-12
-        ) and all(is_mirrored(plane, stretch.contacts) for stretch in stretches):
+        if np.allclose(plane.reduce(every) @ plane.matrix.T, every, rtol=0.0, atol=1e-12) and all(
+            is_mirrored(plane, stretch.contacts) for stretch in stretches
+        ):
             return plane
     return make_coordinates(model, "full")
 
