@@ -255,6 +255,15 @@ class Block:
     def setup(self) -> None:
         """Build models and scratch arrays, once, after the ports are bound."""
 
+    def on_parameters(self) -> None:
+        """Take over live parameters that have changed in ``self.params``, between two ticks.
+
+        Recompute what ``setup`` derived from them; ``setup`` may well call this. After it the
+        block must go on exactly as one that had these parameters from the start and is in the
+        same state, so it writes neither state nor outputs. It runs on the control thread. Should
+        it raise, the old parameters come back and the change is refused with the error's text.
+        """
+
     def start(self) -> None:
         """Open what the run needs; called once before the first tick."""
 

@@ -171,6 +171,7 @@ class Executor:
             skipped_periods=pacer.skipped_periods if pacer is not None else 0,
             error=error,
             stop_problems=tuple(problems),
+            parameter_changes=tuple(self.bound.parameters.changes),
             log=self._log,
             graph=self.bound.graph,
         )
