@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import json
 import time
+from collections.abc import Callable
 from dataclasses import asdict
 from importlib.util import find_spec
 from os import PathLike
@@ -43,6 +44,7 @@ class Recorder:
             process that is killed loses no more than that.
         sync_period: seconds after which it is put on the disk; a power cut takes no more than that.
         ring_time: seconds of the run that fit into the ring.
+        on_warning: called with each warning at once, where ``warnings`` is looked at in the end.
 
     Attributes:
         warnings: what went wrong, one text each.
@@ -59,6 +61,7 @@ class Recorder:
         flush_period: float = 0.5,
         sync_period: float = 5.0,
         ring_time: float = 4.0,
+        on_warning: Callable[[str], object] | None = None,
     ) -> None:
         self.path = Path(path)
         self.warnings: list[str] = []
@@ -69,6 +72,7 @@ class Recorder:
         self._keyframe_period = keyframe_period
         self._periods = flush_period, sync_period
         self._ring_time = ring_time
+        self._on_warning = on_warning
         self._gap: tuple[int, int, int] | None = None
 
     @property
@@ -86,14 +90,19 @@ class Recorder:
         self._waits = (self._when_full or ("wait" if free else "drop")) == "wait"
         problem = self._start()
         if self.link is None:
-            self.warnings.append(f"no recording: {problem}")
+            self._warn(f"no recording: {problem}")
             return
         self._write = self.link.ring.write
         bound.parameters.listeners.append(self._note_change)
         if not free and not self.link.wait_until_ready():
-            self.warnings.append("the recorder was not ready when the run began")
+            self._warn("the recorder was not ready when the run began")
         if self._every and bound.clock.tick:
             self._keep_keyframe(bound.clock.tick)  # a run that goes on from a snapshot
+
+    def _warn(self, text: str) -> None:
+        self.warnings.append(text)
+        if self._on_warning is not None:
+            self._on_warning(text)
 
     def _start(self) -> str:
         """Start the process, or say why it cannot be, before anything moves."""
@@ -158,7 +167,7 @@ class Recorder:
             for block in self._bound.blocks.values():
                 block.freeze()
         except Exception as error:  # noqa: BLE001  # a recorder must not end the run
-            self.warnings.append(f"no keyframes from tick {tick} on: a freeze failed ({error})")
+            self._warn(f"no keyframes from tick {tick} on: a freeze failed ({error})")
             self._every = 0
             return
         size = len(self._bus)
@@ -187,14 +196,14 @@ class Recorder:
                 time.sleep(1e-3)
         self.report, problem = self.link.finish(result.to_json())
         if self.dropped:
-            self.warnings.append(f"{self.dropped} ticks were run but not recorded")
+            self._warn(f"{self.dropped} ticks were run but not recorded")
         if self.report is None:
-            self.warnings.append(
+            self._warn(
                 f"the recording is not whole: {problem}; what was written before can be read after "
                 f"'aloft log repair {self.path}'"
             )
         elif self.report.problem:
-            self.warnings.append(
+            self._warn(
                 f"the recording is not whole: {self.report.problem}; {self.report.rows} ticks were "
                 f"written, {self.report.lost} were not"
             )

@@ -43,7 +43,7 @@ class RecorderLink:
         self, path: Path, header: str, capacity: int, flush_period: float, sync_period: float
     ) -> None:
         text = header.encode()
-        capacity = max(1 << 20, capacity + space_of(len(text)))
+        capacity = max(1 << 16, capacity + space_of(len(text)))
         capacity += -capacity % ALIGNMENT
         descriptor = make_memory(capacity)
         try:

@@ -16,6 +16,7 @@ import signal
 import sys
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -26,6 +27,7 @@ from ..runtime.life_cycle import describe
 from ..runtime.memory import Snapshot
 from ..runtime.notes import Note
 from .format import Header
+from .repair import RepairError, repair
 from .ring import Record, RingReader
 from .writer import RecordingWriter, warm_up
 
@@ -154,7 +156,8 @@ class RecorderProcess:
         if not count:
             return
         self._last_tick = int(self._ticks[count - 1])
-        ticks, rows = self._ticks[:count], self._rows[:count]
+        # copies, as Rerun keeps what it is given until it has written it
+        ticks, rows = self._ticks[:count].copy(), self._rows[:count].copy()
         self._write(lambda writer: writer.write_rows(ticks, rows))
         if self._writer is not None:
             self.report.rows += count
@@ -174,6 +177,8 @@ class RecorderProcess:
         except Exception as error:  # noqa: BLE001  # whatever it is, the robot goes on
             self.report.problem = describe(error)
             self._writer = None
+            with suppress(OSError, RepairError):
+                repair(self._task.path)  # so that what was written before can be read
 
 
 def _memory() -> int:

@@ -89,7 +89,7 @@ class RingWriter(_Ring):
         self._bytes[:] = bytes(capacity)  # touch every page now, not while the robot moves
         self._head = self._known_tail = self._sequence = 0
 
-    def write(self, kind: int, tick: int, data: memoryview | bytes) -> bool:
+    def write(self, kind: int, tick: int, data: memoryview | bytes | bytearray) -> bool:
         """Write a record of a ``kind`` from one on, or, if there is no room, do nothing.
 
         Returns:
