@@ -11,9 +11,8 @@ from __future__ import annotations
 
 import itertools
 import json
-import os
-from collections.abc import Iterator, Mapping
-from concurrent.futures import Executor, as_completed
+from collections.abc import Generator, Mapping, Sequence
+from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -23,9 +22,11 @@ import yaml
 
 from ...runtime.description import RobotDescription, find_robot
 from ...runtime.errors import AloftError
+from ...runtime.jobs import job_results
 from .library import PlanLibrary, solve_and_check
-from .plan import plan_bytes, read_plan
+from .plan import JumpPlan
 from .task import JumpTask, TaskError, make_task
+from .whole_file import remove_abandoned, write_whole
 
 
 @dataclass(frozen=True)
@@ -92,48 +93,51 @@ def _number(path: Path, key: str, value: Any) -> float:
 
 
 def fill(
-    tasks: list[JumpTask], library: PlanLibrary, executor: Executor, *, again: bool = False
-) -> Iterator[GridRow]:
+    tasks: Sequence[JumpTask],
+    library: PlanLibrary,
+    *,
+    workers: int = 0,
+    cluster: str | None = None,
+    again: bool = False,
+) -> Generator[GridRow, None, None]:
     """Plan every task that has no plan yet; rows come in the order in which they are done.
 
-    Each task is planned from nothing, so what is in the library does not depend on the order. A
-    plan is kept at once when it is done, so a run that is killed loses only what it was working
-    on; a task that cannot be planned leaves a ``.failed`` file with the reason and is not tried
-    ``again`` unless that is asked for.
+    ``workers`` and ``cluster`` are those of ``runtime.jobs``. Each task is planned from nothing,
+    so a plan's file has the same bytes whatever was planned before it, by whom and by how many. It
+    is kept at once when it is done, so a run that is killed loses only what it was working on. A
+    task that cannot be planned leaves a ``.failed`` file with the reason and is not tried
+    ``again`` unless that is asked for; one whose process died does not, and is tried next time.
     """
-    pending = {}
+    remove_abandoned(library.folder)
+    there, pending = library.hashes(), []
     for task in tasks:
-        kept = library.find(task)
-        mark = failure_mark(library, task)
+        key = task.hash(library.robot)
+        kept = library.find(task) if key in there else None
+        known = None if again else read_failure(failure_mark(library, task))
         if kept is not None and kept.valid:
             yield GridRow(task, "kept", path=library.path_of(task))
-        elif mark.is_file() and not again:
-            yield GridRow(task, "known", json.loads(mark.read_text())["reason"])
+        elif known is not None:
+            yield GridRow(task, "known", known)
         else:
-            robot = library.robot
-            pending[executor.submit(plan_one, task.model_dump(mode="json"), robot)] = task
-    try:
-        for future in as_completed(pending):
-            yield _keep(library, pending[future], *future.result())
-    finally:
-        for future in pending:
-            future.cancel()
+            pending.append(task)
+    jobs = [(task, library.robot) for task in pending]
+    with closing(job_results(plan_one, jobs, workers=workers, cluster=cluster)) as results:
+        for result in results:
+            task = pending[result.index]
+            if result.error:
+                yield GridRow(task, "failed", result.error)
+            else:
+                yield _keep(library, task, *result.value)
 
 
-def _keep(library: PlanLibrary, task: JumpTask, made: bytes, reason: str) -> GridRow:
+def _keep(library: PlanLibrary, task: JumpTask, plan: JumpPlan | None, reason: str) -> GridRow:
     """Write down what came of a task."""
     mark = failure_mark(library, task)
-    library.folder.mkdir(parents=True, exist_ok=True)
-    part = mark.with_name(f".{mark.name}.{os.getpid()}.part")
-    if not made:
-        part.write_text(json.dumps({"task": task.model_dump(mode="json"), "reason": reason}))
-        part.replace(mark)
+    if plan is None:
+        data = {"task": task.model_dump(mode="json"), "reason": reason}
+        write_whole(mark, json.dumps(data).encode())
         return GridRow(task, "failed", reason)
-    try:
-        part.write_bytes(made)
-        path = library.add(read_plan(part))
-    finally:
-        part.unlink(missing_ok=True)
+    path = library.add(plan)
     mark.unlink(missing_ok=True)
     return GridRow(task, "planned", path=path)
 
@@ -143,21 +147,23 @@ def failure_mark(library: PlanLibrary, task: JumpTask) -> Path:
     return library.folder / f"{task.hash(library.robot)}.failed"
 
 
-def plan_one(task: dict[str, Any], robot: RobotDescription) -> tuple[bytes, str]:
-    """Plan one task in a worker: the plan's file, or nothing and why."""
+def read_failure(mark: Path) -> str | None:
+    """Why a task could not be planned; ``None`` where nothing is written, or not readably."""
     try:
-        return plan_bytes(solve_and_check(make_task(task), robot)), ""
+        return str(json.loads(mark.read_text(encoding="utf-8"))["reason"])
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
+
+
+def plan_one(job: tuple[JumpTask, RobotDescription]) -> tuple[JumpPlan | None, str]:
+    """Plan one task in a worker: the plan, or nothing and why."""
+    try:
+        return solve_and_check(*job), ""
     except AloftError as error:
-        return b"", str(error)
+        return None, str(error)
 
 
-def prepare_worker() -> None:
-    """One thread a worker: as many as there are cores would otherwise fight each other."""
-    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
-        os.environ[name] = "1"
-
-
-def robot_of(tasks: list[JumpTask]) -> RobotDescription:
+def robot_of(tasks: Sequence[JumpTask]) -> RobotDescription:
     """The robot of all tasks. Raises ``TaskError`` where they name several."""
     names = sorted({task.robot for task in tasks})
     if len(names) != 1:

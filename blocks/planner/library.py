@@ -97,6 +97,11 @@ class PlanLibrary:
                 return found[0]
         return None
 
+    def hashes(self) -> frozenset[str]:
+        """The hashes of all tasks that have a file, in one look at the folders."""
+        files = (path for folder in self._folders for path in folder.glob("*-*.npz"))
+        return frozenset(path.stem.rpartition("-")[2] for path in files)
+
     def find(self, task: JumpTask) -> JumpPlan | None:
         """The plan of that very task, or ``None``. A file that cannot be read counts as none."""
         path = self.path_of(task)
