@@ -15,6 +15,7 @@ from .blocks import blocks
 from .check import check
 from .graph import graph
 from .output import print_json
+from .params import params
 from .plan import plan
 from .run import run
 
@@ -38,6 +39,7 @@ app = typer.Typer(
 )
 for _verb in (run, check, graph, blocks, plan, bench):
     app.command(epilog=EXIT_CODES if _verb is run else None)(_verb)
+app.add_typer(params)
 
 
 def _print_version(wanted: bool) -> None:
