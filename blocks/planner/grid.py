@@ -18,15 +18,18 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yaml
 
 from ...runtime.description import RobotDescription, find_robot
 from ...runtime.errors import AloftError
 from ...runtime.jobs import job_results
 from .library import PlanLibrary, solve_and_check
+from .placed_file import Key, PlacedFile, read_placed
 from .plan import JumpPlan
 from .task import JumpTask, TaskError, make_task
 from .whole_file import remove_abandoned, write_whole
+
+MOST = 10_000
+"""Values on one axis of a grid."""
 
 
 @dataclass(frozen=True)
@@ -47,49 +50,71 @@ def read_grid(path: str | Path) -> list[JumpTask]:
         TaskError: the file cannot be read, or one of its tasks is wrong.
     """
     path = Path(path)
-    try:
-        data = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise TaskError(f"cannot read {path}: {error.strerror or error}") from error
-    except yaml.YAMLError as error:
-        raise TaskError(f"{path} is not YAML: {error}") from error
-    if not isinstance(data, Mapping) or not isinstance(data.get("grid"), Mapping):
+    source = read_placed(path, "grid: {rise: [10 cm, 15 cm]}")
+    data, axes = source.values, source.values.get("grid")
+    for key in data:
+        if key not in ("name", "task", "grid"):
+            place = source.place([key], key=True)
+            raise TaskError(f"{place}: {key}: expected only name, task and grid")
+    if not isinstance(axes, Mapping) or not axes:
         raise TaskError(
-            f"{path}: expected the keys name, task and grid, e.g. 'grid: {{rise: ...}}'"
+            f"{source.place(['grid'])}: expected the keys name, task and grid, e.g. "
+            "'grid: {rise: [10 cm, 15 cm]}'"
         )
-    extra = sorted(set(data) - {"name", "task", "grid"})
-    if extra:
-        raise TaskError(f"{path}: {', '.join(extra)}: expected only name, task and grid")
-    common = dict(data.get("task") or {})
-    axes = {key: _values(path, key, given) for key, given in data["grid"].items()}
+    common = data.get("task") or {}
+    if not isinstance(common, Mapping):
+        raise TaskError(f"{source.place(['task'])}: task: expected a mapping, found {common!r}")
+    values = [_values(source, key, given) for key, given in axes.items()]
     tasks = []
-    for point in itertools.product(*axes.values()):
-        given = dict(zip(axes, point, strict=True))
+    for numbers in itertools.product(*(range(len(column)) for column in values)):
+        given = {key: values[k][n] for k, (key, n) in enumerate(zip(axes, numbers, strict=True))}
         label = "_".join(f"{key}_{value}" for key, value in given.items())
+        point = _Point(
+            source.file, source.values, source.tree, dict(zip(axes, numbers, strict=True))
+        )
         name = f"{data.get('name', path.stem)}_{label}"
-        tasks.append(make_task({**common, **given, "name": name}, where=f"{path}: {label}"))
+        tasks.append(make_task({**common, **given, "name": name}, source=point))
     return tasks
 
 
-def _values(path: Path, key: str, given: Any) -> list[Any]:
+@dataclass(frozen=True)
+class _Point(PlacedFile):
+    """Where the values of one task of a grid are: in its list on an axis, or under ``task``."""
+
+    numbers: Mapping[str, int]
+
+    def place(self, keys: Sequence[Key], *, key: bool = False) -> str:
+        number = self.numbers.get(str(keys[0]))
+        inside = ("task", *keys) if number is None else ("grid", keys[0])
+        if number is not None and not key:
+            inside = (*inside, number)
+        return super().place(inside, key=key)
+
+
+def _values(source: PlacedFile, key: str, given: Any) -> list[Any]:
     """The values of one parameter of a grid."""
     if isinstance(given, list) and given:
         return given
     if isinstance(given, Mapping) and set(given) == {"from", "to", "count"}:
-        start, end = (_number(path, key, given[which]) for which in ("from", "to"))
-        if isinstance(given["count"], int) and given["count"] >= 2:
+        start, end = (_number(source, key, given, which) for which in ("from", "to"))
+        if isinstance(given["count"], int) and 2 <= given["count"] <= MOST:
             # Rounded, so that the hash of a task does not hang on the last bit of a step.
             return [round(float(x), 9) for x in np.linspace(start, end, given["count"])]
     raise TaskError(
-        f"{path}: grid.{key}: expected a list of values or {{from: .., to: .., count: ..}}, "
-        f"found {given!r}"
+        f"{source.place(['grid', key])}: grid.{key}: expected a list of values or "
+        f"{{from: .., to: .., count: ..}} with a count of 2 to {MOST}, found {given!r}"
     )
 
 
-def _number(path: Path, key: str, value: Any) -> float:
-    """A quantity in the unit of the task's parameter of that name."""
-    task = make_task({"name": "grid", "flight_time": 0.3, key: value}, where=f"{path}: grid")
-    return float(getattr(task, key))
+def _number(source: PlacedFile, key: str, given: Mapping[str, Any], which: str) -> float:
+    """An end of an axis in the unit of the task's parameter of that name."""
+    others = {} if key in ("rise", "take_off_speed") else {"rise": 0.1}
+    where = f"{source.place(['grid', key, which])}: {which}"
+    task = make_task({"name": "grid", **others, key: given[which]}, where=where)
+    value = getattr(task, key)
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise TaskError(f"{where}: {key}: no number, so give a list of values")
+    return float(value)
 
 
 def fill(

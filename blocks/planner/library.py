@@ -159,6 +159,7 @@ class PlanLibrary:
         from nothing if that fails, checked, and kept. ``anew`` looks for no kept plan.
 
         Raises:
+            TaskError: what is asked for contradicts itself or the robot.
             PlanError: the task cannot be planned.
             InvalidPlanError: it can, but the plan fails the validity check; it is not kept.
         """
@@ -183,8 +184,11 @@ def solve_and_check(
     A plan that fails the check because its intervals are too long is solved again on finer ones.
 
     Raises:
-        PlanError, InvalidPlanError: as ``PlanLibrary.plan``.
+        TaskError, PlanError, InvalidPlanError: as ``PlanLibrary.plan``.
     """
+    from .task_checks import require_consistent
+
+    require_consistent(task, robot)
     make = solve or solve_task
     if warm_start is not None:
         try:

@@ -81,21 +81,6 @@ def test_the_tasks_of_a_grid(tmp_path: Path) -> None:
     assert robot_of(tasks) == ROBOT
 
 
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [
-        ("rise: 3", "expected the keys name, task and grid"),
-        ("grid: {rise: 0.1}", r"grid\.rise: expected a list of values or \{from"),
-        ("grid: {rise: [0.1]}\nextra: 1", "extra: expected only name, task and grid"),
-        ("grid: {rise: [0.1, -1]}", "rise_-1: rise: Input should be greater than 0"),
-        ("grid: {hight: [1]}", "hight: is no parameter of a task"),
-    ],
-)
-def test_what_is_no_grid(tmp_path: Path, text: str, words: str) -> None:
-    with pytest.raises(TaskError, match=words):
-        read_grid(write(tmp_path, text))
-
-
 def test_a_grid_is_for_one_robot() -> None:
     tasks = [
         make_task({"name": "a", "rise": 0.1}),
