@@ -33,8 +33,8 @@ class PlacedFile:
         for step in keys:
             if isinstance(node, MapNode) and (entry := node.get(str(step))) is not None:
                 node, where = entry.value, entry.key_where if key else entry.value.where
-            elif isinstance(node, ListNode) and isinstance(step, int) and step < len(node.items):
-                node = node.items[step]
+            elif isinstance(node, ListNode) and str(step).isdigit() and int(step) < len(node.items):
+                node = node.items[int(step)]
                 where = node.where
         return str(where)
 

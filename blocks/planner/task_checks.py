@@ -13,8 +13,8 @@ import numpy as np
 
 from ...runtime.description import RobotDescription
 from ...runtime.kinematics import link_poses
-from .clearance import step_edge
 from .errors import TaskError
+from .sequence import Hop, Place, edge_of
 from .task import GRAVITY, JumpTask
 
 LENIENCE = 0.03
@@ -60,33 +60,39 @@ def _unknown_names(task: JumpTask, robot: RobotDescription) -> Iterator[Contradi
                 )
 
 
+def _jumps(task: JumpTask) -> Iterator[tuple[str, Hop, Place, Place]]:
+    """Every jump that is written down, with its path in the task and where it begins and ends."""
+    places = task.places()
+    for number, hop in enumerate(task.hops()[: len(task.jumps or "1")]):
+        path = f"jumps.{number}." if task.jumps else ""
+        yield path, hop, places[number], places[number + 1]
+
+
 def _flight(task: JumpTask, robot: RobotDescription) -> Iterator[Contradiction]:
     """Height and time of a flight follow from one another, but for where the legs let the centre
     of mass be at lift-off and touchdown."""
-    several = getattr(task, "jumps", None) or getattr(task, "repeat", None)
-    if task.flight_time is None or several:
-        return
     low, high = leg_travel(robot)
-    asked = task.flight_time
-    if task.rise is not None:
-        # Each half of the flight is a fall from the apex.
-        drop = task.rise - task.landing_height
-        times = [_fall(task.rise - level) + _fall(drop - level) for level in (low, high)]
-        what = f"a rise of {task.rise:g} m"
-    elif task.take_off_speed is not None:
-        up = task.take_off_speed
-        falls = [up**2 / (2.0 * GRAVITY) + a - b - task.landing_height
-                 for a, b in ((low, high), (high, low))]  # fmt: skip
-        times = [up / GRAVITY + _fall(height) for height in falls]
-        what = f"a take_off_speed of {up:g} m/s"
-    else:
-        return
-    if not min(times) <= asked <= max(times):
-        yield (
-            "flight_time",
-            f"{what} takes {min(times):.3f} to {max(times):.3f} s in the air, not {asked:g} s; leave "
-            + "flight_time to the planner, or ask for another height",
-        )
+    for path, hop, _, _ in _jumps(task):
+        asked, up = hop.flight_time, hop.landing_height or 0.0
+        if asked is not None and hop.rise is not None:
+            # Each half of the flight is a fall to or from the apex.
+            times = [
+                _fall(hop.rise - level) + _fall(hop.rise - up - level) for level in (low, high)
+            ]
+            what = f"a rise of {hop.rise:g} m"
+        elif asked is not None and hop.take_off_speed is not None:
+            speed = hop.take_off_speed
+            most = speed**2 / (2.0 * GRAVITY) - up
+            times = [speed / GRAVITY + _fall(most + way) for way in (low - high, high - low)]
+            what = f"a take_off_speed of {speed:g} m/s"
+        else:
+            continue
+        if not min(times) <= asked <= max(times):
+            yield (
+                f"{path}flight_time",
+                f"{what} takes {min(times):.3f} to {max(times):.3f} s in the air, not {asked:g} s; "
+                + "leave flight_time to the planner, or ask for another height",
+            )
 
 
 def _fall(height: float) -> float:
@@ -106,17 +112,16 @@ def leg_travel(robot: RobotDescription) -> tuple[float, float]:
 
 def _edge(task: JumpTask, robot: RobotDescription) -> Iterator[Contradiction]:
     """A step's edge is under no foot."""
-    edge = step_edge(task)
-    if edge is None or getattr(task, "jumps", None):
-        return
     reach = [contact.position[0] for contact in robot.contacts]
-    cosine = abs(math.cos(task.twist))
-    for where, middle, turn in (("start", 0.0, 1.0), ("landing", task.distance_x, cosine)):
-        back, front = middle + turn * min(reach), middle + turn * max(reach)
-        if back < edge < front:
-            yield (
-                "step_edge",
-                f"the step's edge at x = {edge:g} m is under the feet at the {where}, which reach "
-                + f"from {back:.3f} to {front:.3f} m; give a step_edge between start and landing, "
-                + "or jump farther",
-            )
+    for path, hop, start, end in _jumps(task):
+        edge = edge_of(hop, start)
+        for where, place in (("start", start), ("landing", end)) if edge is not None else ():
+            ends = [place.x + math.cos(place.heading) * x for x in (min(reach), max(reach))]
+            back, front = min(ends), max(ends)
+            if edge is not None and back < edge < front:
+                yield (
+                    f"{path}step_edge",
+                    f"the step's edge at x = {edge:g} m is under the feet at the {where}, which "
+                    + f"reach from {back:.3f} to {front:.3f} m; give a step_edge between start and "
+                    + "landing, or jump farther",
+                )

@@ -62,6 +62,17 @@ def test_what_can_be_is_let_through(values: dict[str, Any]) -> None:
     assert found(**values) == []
 
 
+def test_each_of_several_jumps_is_looked_at() -> None:
+    jumps = [{"landing_height": 0.05}, {"landing_height": -0.05, "flight_time": 0.9}]
+    problems = found(rise=0.12, distance_x=0.1, jumps=jumps, repeat=2)
+    assert [key for key, _ in problems] == ["jumps.1.flight_time"]
+    problems = found(
+        rise=0.12, distance_x=0.1, jumps=[{}, {"landing_height": 0.05, "step_edge": 0}]
+    )
+    assert [key for key, _ in problems] == ["jumps.1.step_edge"]
+    assert "x = 0.1 m is under the feet at the start" in problems[0][1]
+
+
 def test_legs_can_bend_more_than_they_can_stretch() -> None:
     low, high = leg_travel(ROBOT)
     assert -0.5 < low < -0.2
