@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import signal
 import sys
 from collections.abc import Sequence
 from contextlib import closing
@@ -23,6 +22,7 @@ from .output import (
     say,
     table,
 )
+from .stopping import stopped_by_signals
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -172,26 +172,14 @@ def run_many(
     from .progress import progress_bar
 
     rows: list[SeedRow] = []
-    received: list[signal.Signals] = []
-
-    def stop(number: int, _: object) -> None:
-        received.append(signal.Signals(number))
-        raise KeyboardInterrupt
-
-    before = {number: signal.signal(number, stop) for number in (signal.SIGINT, signal.SIGTERM)}
-    try:
-        with (
-            progress_bar(out, f"running {len(seeds)} seeds", len(seeds)) as (progress, task),
-            closing(run_seeds(path, overrides, seeds)) as results,
-        ):
-            for row in results:
-                rows.append(row)
-                progress.advance(task)
-    except KeyboardInterrupt:
-        pass  # the rows there are, are still worth printing
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
+    with (
+        stopped_by_signals() as received,
+        progress_bar(out, f"running {len(seeds)} seeds", len(seeds)) as (progress, task),
+        closing(run_seeds(path, overrides, seeds)) as results,
+    ):
+        for row in results:
+            rows.append(row)
+            progress.advance(task)
     successes = sum(row.success for row in rows)
     reason = f"{successes} of {len(rows)} seeds succeeded"
     success = successes == len(seeds)
