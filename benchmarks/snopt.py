@@ -34,7 +34,7 @@ OPTIONS: dict[str, float | int] = {
 @dataclass(frozen=True)
 class SnoptResult:
     """What SNOPT found and what it took; CPU times in seconds. ``info`` is its exit code: 1 optimal,
-    34 out of time."""
+    13 no feasible point found, 34 out of time."""
 
     values: Array
     cost: float
@@ -47,6 +47,10 @@ class SnoptResult:
     def solved(self) -> bool:
         """Whether SNOPT says that it found an optimum, to its tolerances."""
         return self.info in (1, 2, 3)
+
+
+class _OutOfTime(Exception):
+    """SNOPT has used the time it was given."""
 
 
 class _Callback:
@@ -74,7 +78,7 @@ class _Callback:
         """Values, with derivatives where they are asked for."""
         from pydrake.autodiffutils import ExtractValue, InitializeAutoDiff
 
-        started = time.process_time()
+        started = self.owner.on_time()
         differentiated = variables.dtype == object
         x = ExtractValue(variables).ravel() if differentiated else variables
         if differentiated:
@@ -96,7 +100,7 @@ class _Callback:
         """The piece's cost, with its gradient where it is asked for."""
         from pydrake.autodiffutils import ExtractValue, InitializeAutoDiff
 
-        started = time.process_time()
+        started = self.owner.on_time()
         result: Any
         if variables.dtype == object:
             x = ExtractValue(variables).ravel()
@@ -118,7 +122,7 @@ class SnoptProgram:
     def __init__(self, problem: Problem) -> None:
         from pydrake.solvers import MathematicalProgram
 
-        self.problem, self.callback_cpu = problem, 0.0
+        self.problem, self.callback_cpu, self.until = problem, 0.0, np.inf
         self.program: Any = MathematicalProgram()
         assembly = problem.assembly
         self.x = self.program.NewContinuousVariables(assembly.variables, "x")
@@ -180,16 +184,31 @@ class SnoptProgram:
         if piece.jacobian.sparsity_out(1).nnz() and knot.gap == name:
             self.program.AddCost(callback.cost, self.x[variables])
 
-    def solve(self, guess: Array, *, time_limit: float = 600.0) -> SnoptResult:
-        """SNOPT from the guess, with ``OPTIONS``; it gives up after ``time_limit`` seconds."""
+    def on_time(self) -> float:
+        """The CPU time now. Raises ``_OutOfTime`` where the limit is past."""
+        now = time.process_time()
+        if now > self.until:
+            raise _OutOfTime
+        return now
+
+    def solve(self, guess: Array, *, time_limit: float = 300.0) -> SnoptResult:
+        """SNOPT from the guess, with ``OPTIONS``, for at most so many CPU seconds.
+
+        Its own time limit is not obeyed through Drake, so a callback ends it.
+        """
         from pydrake.solvers import SnoptSolver, SolverOptions
 
         options, solver = SolverOptions(), SnoptSolver()
-        for key, value in (OPTIONS | {"Time limit": time_limit}).items():
+        for key, value in OPTIONS.items():
             options.SetOption(solver.solver_id(), key, value)
         self.callback_cpu = 0.0
         started = time.process_time()
-        result = solver.Solve(self.program, guess, options)
+        self.until = started + time_limit
+        try:
+            result = solver.Solve(self.program, guess, options)
+        except _OutOfTime:
+            cpu = time.process_time() - started
+            return SnoptResult(guess, np.nan, np.inf, 34, cpu, self.callback_cpu)
         cpu = time.process_time() - started
         values = np.array(result.GetSolution(self.x))
         functions: dict[str, Callable[..., Any]] = self.problem.assembly.functions()

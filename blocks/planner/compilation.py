@@ -46,7 +46,7 @@ class FunctionSet:
 
     Attributes:
         name: what the functions' names begin with.
-        pieces: the names of the pieces.
+        pieces: the names of the pieces that are wanted.
         sources: the files of this folder that decide what the functions compute.
         make: the piece of a name.
     """
@@ -76,12 +76,14 @@ def load_pieces(
     coordinates: Coordinates,
     *,
     profile: str,
+    names: tuple[str, ...] = PIECES,
     compiled: bool = True,
     progress: Progress | None = None,
 ) -> dict[str, Piece]:
-    """The pieces' functions, compiled where there is a compiler and ``compiled`` asks for it."""
+    """The named pieces' functions, compiled where there is a compiler and ``compiled`` asks for
+    it."""
     functions = FunctionSet(
-        coordinates.name, PIECES, SOURCES, lambda name: make_piece(model, coordinates, name)
+        coordinates.name, names, SOURCES, lambda name: make_piece(model, coordinates, name)
     )
     return load_functions(functions, model, profile, compiled=compiled, progress=progress)
 
@@ -97,34 +99,35 @@ def load_functions(
     """The same for any set of pieces."""
     rotors = model.robot.profiles[profile].rotor_inertia
     key = content_hash(model.robot, rotors, functions.name, functions.sources)
-    held = _held.get((key, compiled))
-    if held is None:
-        held = _held[key, compiled] = _load(functions, key, compiled, progress)
-    return held
+    held = _held.setdefault((key, compiled), {})
+    missing = tuple(name for name in functions.pieces if name not in held)
+    if missing:
+        held |= _load(functions, key, missing, compiled, progress)
+    return {name: held[name] for name in functions.pieces}
 
 
 _held: dict[tuple[str, bool], dict[str, Piece]] = {}
 
 
 def _load(
-    functions: FunctionSet, key: str, compiled: bool, progress: Progress | None
-) -> dict[str, Piece]:
+    functions: FunctionSet, key: str, names: tuple[str, ...], compiled: bool,
+    progress: Progress | None,
+) -> dict[str, Piece]:  # fmt: skip
     compiler = _compiler() if compiled else None
     pieces = {}
-    for done, name in enumerate(functions.pieces):
+    for done, name in enumerate(names):
         library = cache_folder() / key / f"{name}.so"
         usable = compiled and library.is_file()
         if not usable and progress is not None:
             how = "compiling" if compiler else "building"
-            progress(f"{how} the {functions.name} {name} functions", done, len(functions.pieces))
+            progress(f"{how} the {functions.name} {name} functions", done, len(names))
         piece = None if usable else functions.make(name)
         if piece is not None and compiler is not None:
             usable = _compile(compiler, piece, library)
         prefix = f"{functions.name}_{name}"
         pieces[name] = _external(library, prefix) if usable or piece is None else piece
     if progress is not None:
-        count = len(functions.pieces)
-        progress(f"{functions.name} functions ready", count, count)
+        progress(f"{functions.name} functions ready", len(names), len(names))
     return pieces
 
 

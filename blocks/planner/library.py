@@ -14,6 +14,7 @@ import numpy as np
 from ...runtime.description import RobotDescription
 from .errors import PlanError
 from .plan import JumpPlan, PlanFileError, read_plan, write_plan
+from .refinement import ROUNDS, curable
 from .task import JumpTask, TaskError, make_task
 from .validity import InvalidPlanError, checked, require_valid
 
@@ -96,6 +97,11 @@ class PlanLibrary:
                 return found[0]
         return None
 
+    def hashes(self) -> frozenset[str]:
+        """The hashes of all tasks that have a file, in one look at the folders."""
+        files = (path for folder in self._folders for path in folder.glob("*-*.npz"))
+        return frozenset(path.stem.rpartition("-")[2] for path in files)
+
     def find(self, task: JumpTask) -> JumpPlan | None:
         """The plan of that very task, or ``None``. A file that cannot be read counts as none."""
         path = self.path_of(task)
@@ -153,6 +159,7 @@ class PlanLibrary:
         from nothing if that fails, checked, and kept. ``anew`` looks for no kept plan.
 
         Raises:
+            TaskError: what is asked for contradicts itself or the robot.
             PlanError: the task cannot be planned.
             InvalidPlanError: it can, but the plan fails the validity check; it is not kept.
         """
@@ -174,9 +181,14 @@ def solve_and_check(
 ) -> JumpPlan:
     """A valid plan of a task with its report; a warm start that leads nowhere is tried without.
 
+    A plan that fails the check because its intervals are too long is solved again on finer ones.
+
     Raises:
-        PlanError, InvalidPlanError: as ``PlanLibrary.plan``.
+        TaskError, PlanError, InvalidPlanError: as ``PlanLibrary.plan``.
     """
+    from .task_checks import require_consistent
+
+    require_consistent(task, robot)
     make = solve or solve_task
     if warm_start is not None:
         try:
@@ -186,11 +198,17 @@ def solve_and_check(
         else:
             if plan.valid:
                 return plan
-    plan = make(task, robot, None)
-    with_report = checked(plan, robot)
-    if not with_report.valid:
+    plan = checked(make(task, robot, None), robot)
+    for _ in range(ROUNDS):
+        if plan.valid or not curable(plan):
+            break
+        try:
+            plan = checked(make(task, robot, plan), robot)
+        except PlanError:
+            break
+    if not plan.valid:
         require_valid(plan, robot)
-    return with_report
+    return plan
 
 
 def solve_task(task: JumpTask, robot: RobotDescription, warm_start: JumpPlan | None) -> JumpPlan:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ..signals import Phase
 from .errors import PlanError
+from .exact_dynamics import ExactDynamics, joint_motion
 from .task import GRAVITY, JumpTask
 
 Array = NDArray[np.float64]
@@ -44,10 +45,10 @@ def uniform_grid(task: JumpTask, flight_time: float) -> Grid:
     refuse_what_only_full_can(task)
     knots = task.knots
     parts = (
-        (Phase.SQUAT, knots.squat, task.squat_time),
-        (Phase.THRUST, knots.thrust, task.thrust_time),
+        (Phase.SQUAT, knots.squat, task.squat_time or 0.0),
+        (Phase.THRUST, knots.thrust, task.thrust_time or 0.0),
         (Phase.FLIGHT, knots.flight, flight_time),
-        (Phase.LANDING, knots.landing, task.landing_time),
+        (Phase.LANDING, knots.landing, task.landing_time or 0.0),
     )
     phases = [phase for phase, count, _ in parts for _ in range(count)]
     steps = np.concatenate([np.full(count, time / count) for _, count, time in parts])
@@ -63,7 +64,7 @@ def refuse_what_only_full_can(task: JumpTask) -> None:
     for name in ("squat_time", "thrust_time", "landing_time"):
         if getattr(task, name) is None:
             asked.append(f"{name}: free")
-    asked += [name for name in ("jumps", "phases") if getattr(task, name, ())]
+    asked += [name for name in ("jumps", "repeat", "phases") if getattr(task, name) is not None]
     if asked:
         raise PlanError(
             f"{task.name}: formulation {task.formulation!r} plans one flight with given times and "
@@ -97,3 +98,18 @@ def ballistic_flight(task: JumpTask, *, backward_steps: int = 0) -> tuple[float,
             )
         time = (up + math.sqrt(inside)) / (2.0 * fall)
     return up, time
+
+
+def joint_torques(
+    dynamics: ExactDynamics, time: Array, position: Array, velocity: Array, force: Array
+) -> Array:
+    """The torques [N m] that a planned motion needs in the middle of its intervals, (N, n_joints),
+    by exact inverse dynamics under the planned contact forces (N, n_contacts, 3)."""
+    torque = np.zeros((len(time), velocity.shape[1] - 6))
+    for k in range(len(time) - 1):
+        motion = joint_motion(position, velocity, time, k)
+        half = 0.5 * motion.duration
+        _, q, v = dynamics.integrate(position[k], velocity[k], motion, force[k], half)[0]
+        torque[k] = dynamics.joint_torque(q, v, motion.at(half)[2], force[k])
+    torque[-1] = torque[-2]
+    return torque

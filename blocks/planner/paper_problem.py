@@ -8,7 +8,8 @@ section; ``centroidal_stages`` has them. What the paper leaves open is chosen so
 - dt is fixed, the same within every phase. The flight lasts as long as the ballistic flight of the
   asked rise from standing height to standing height takes.
 - The friction cone, printed with a squared F_z, is sqrt(F_x^2 + F_y^2) <= mu F_z.
-- The weights are the task's; the centre of mass's acceleration has the weight one, as in the paper.
+- The weights are the task's, those of forces and of h's rate scaled up, because the acceleration of
+  the centre of mass has the weight one, as in the paper.
 
 There are no motor limits, no clearance of feet, calves and legs, no velocity of the feet at
 touchdown, and the integration is of first order: the validity check says what that costs.
@@ -33,6 +34,10 @@ from .symbolic_model import GRAVITY, SymbolicModel
 from .task import JumpTask
 
 Array = NDArray[np.float64]
+
+
+FORCE_SCALE, RATE_SCALE = 100.0, 1e4
+"""Q_f and Q_h by the task's weight of forces: of the size of the acceleration's term."""
 
 
 class PaperProblemBuilder:
@@ -137,13 +142,13 @@ class PaperProblemBuilder:
         common = {
             "step": self.grid.steps[k],
             "q_nom": self._nominal(k + 1),
-            "Q_q": [0.0] * 3 + [weights.orientation] * 4 + [weights.posture] * joints,
-            "Q_v": [0.0] * 6 + [weights.joint_velocity] * joints,
-            "Q_h": weights.force,
+            "Q_q": [0.0] * 3 + [4.0 * weights.orientation] * 4 + [weights.posture] * joints,
+            "Q_v": [0.0] * 3 + [weights.joint_velocity] * (3 + joints),
+            "Q_h": RATE_SCALE * weights.force,
         }
         rates = [("dynamics", 3, 0.0, 0.0), ("momentum", 3, 0.0, 0.0)]
         if name == "stance":
-            common |= {"Q_f": weights.force, "friction": self.task.friction,
+            common |= {"Q_f": FORCE_SCALE * weights.force, "friction": self.task.friction,
                        "place": self._stance_at(k + 1).points.ravel()}  # fmt: skip
             rates.append(("friction", self.forces // 3, 0.0, np.inf))
             force = int(self.fill.assembly.control_start[k]) + self.nv + 3

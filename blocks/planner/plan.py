@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import io
 import json
-import os
 import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
@@ -24,6 +23,7 @@ from numpy.typing import NDArray
 
 from ...runtime.errors import AloftError
 from .task import JumpTask, TaskError, make_task
+from .whole_file import write_whole
 
 Array = NDArray[np.float64]
 
@@ -59,7 +59,8 @@ class JumpPlan:
         joint_torque: [N m], (N, n).
         com, com_velocity: centre of mass in the world [m, m/s], (N, 3).
         angular_momentum: about it, world axes [N m s], (N, 3).
-        lift_off_time, touchdown_time: [s].
+        lift_off_time, touchdown_time: of the first flight [s].
+        later_flights: lift-off and touchdown times of the flights after it [s].
         statistics: how it was solved: solver, iterations, cpu_s, violation, cost and the like.
         versions: of the packages that made it.
         report: the validity report as plain data; empty until the plan is checked.
@@ -79,6 +80,7 @@ class JumpPlan:
     angular_momentum: Array
     lift_off_time: float
     touchdown_time: float
+    later_flights: tuple[tuple[float, float], ...] = ()
     statistics: Mapping[str, Any] = field(default_factory=dict)
     versions: Mapping[str, str] = field(default_factory=dict)
     report: Mapping[str, Any] = field(default_factory=dict)
@@ -99,8 +101,23 @@ class JumpPlan:
         return float(self.time[-1] - self.time[0])
 
     @property
+    def flights(self) -> tuple[tuple[float, float], ...]:
+        """Lift-off and touchdown times of all flights [s]."""
+        return ((self.lift_off_time, self.touchdown_time), *self.later_flights)
+
+    @property
+    def lift_off_times(self) -> tuple[float, ...]:
+        """When the flights begin [s]."""
+        return tuple(start for start, _ in self.flights)
+
+    @property
+    def touchdown_times(self) -> tuple[float, ...]:
+        """When they end [s]."""
+        return tuple(end for _, end in self.flights)
+
+    @property
     def flight_time(self) -> float:
-        """From lift-off to touchdown [s]."""
+        """From lift-off to touchdown of the first flight [s]."""
         return self.touchdown_time - self.lift_off_time
 
     @property
@@ -136,11 +153,19 @@ _SCALARS = tuple(f.name for f in fields(JumpPlan) if f.name not in ARRAYS and f.
 
 
 def plan_bytes(plan: JumpPlan, names: Mapping[str, list[str]] | None = None) -> bytes:
-    """The plan's file. Equal plans give equal bytes: it holds no time and no machine's name."""
+    """The plan's file.
+
+    The same task gives the same bytes, also from another process: no time of day, no processor
+    time and no machine's name is in it.
+    """
+    statistics = {name: x for name, x in plan.statistics.items() if not name.endswith("cpu_s")}
     header = {
         "format": FILE_FORMAT,
         "task": plan.task.model_dump(mode="json"),
         **{name: getattr(plan, name) for name in _SCALARS},
+        "statistics": statistics,
+        "lift_off_times": list(plan.lift_off_times),
+        "touchdown_times": list(plan.touchdown_times),
         "units": ARRAYS,
         "names": dict(names or {}),
     }
@@ -165,18 +190,7 @@ def write_plan(
     ``names`` may hold the names of ``joints``, ``feet`` and ``contacts``, for readers without the
     robot's description.
     """
-    path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    part = path.with_name(f".{path.name}.{os.getpid()}.part")
-    try:
-        with part.open("wb") as file:
-            file.write(plan_bytes(plan, names))
-            file.flush()
-            os.fsync(file.fileno())
-        part.replace(path)
-    finally:
-        part.unlink(missing_ok=True)
-    return path
+    return write_whole(Path(path), plan_bytes(plan, names))
 
 
 def read_plan(path: str | Path) -> JumpPlan:
@@ -201,6 +215,8 @@ def read_plan(path: str | Path) -> JumpPlan:
         )
     try:
         task = make_task(header["task"], where=f"{path}: task")
-        return JumpPlan(task=task, **arrays, **{name: header[name] for name in _SCALARS})
+        values = {name: header[name] for name in _SCALARS if name != "later_flights"}
+        times = [(float(start), float(end)) for start, end in header.get("later_flights", [])]
+        return JumpPlan(task=task, **arrays, **values, later_flights=tuple(times))
     except (KeyError, ValueError, TaskError) as error:
         raise PlanFileError(f"{path} is no plan file: {error}") from error

@@ -3,38 +3,51 @@
 from __future__ import annotations
 
 import time
-from functools import lru_cache
+from collections.abc import Mapping
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...runtime.description import RobotDescription
 from .compilation import Progress, load_pieces
+from .contact_rows import is_mirrored
 from .coordinates import Coordinates
-from .errors import PlanError
 from .guess import ballistic_guess, displaced_guess
+from .layout import Stretch, layout
+from .outcome import failure, versions
+from .paper_plan import solve_paper
 from .plan import JumpPlan
 from .problem import Problem, ProblemBuilder
-from .solver import Solution, solve
-from .stage_functions import make_coordinates
-from .stance import Stance, StanceFinder, start_and_end
+from .refinement import asks_for_finer, finer_knots, with_knots
+from .rigid_body_plan import solve_rigid_body
+from .robot_model import model_of
+from .solver import solve
+from .stage_functions import PIECES, make_coordinates
+from .stance import Stance, stances_of
 from .symbolic_model import SymbolicModel
-from .task import JumpTask
-from .unpacking import pack, unpack
+from .task import JumpTask, Knots
+from .unpacking import can_start, pack, unpack
 
 Array = NDArray[np.float64]
-ADVICE = {
-    "motor torque": "ask for a smaller jump, a longer thrust_time or a stronger profile",
-    "motor torque at speed": "ask for a smaller jump, a longer thrust_time or a faster profile",
-    "motor speed": "ask for a smaller jump, a longer flight or a faster profile",
-    "friction": "ask for a shorter distance or more friction",
-    "ground clearance": "ask for a greater rise or less foot_clearance",
-    "leg clearance": "ask for less twist or less leg_clearance",
-    "joint limits": "ask for a smaller jump",
-    "footholds": "ask for a place within reach: a smaller distance, or a greater rise",
-    "apex": "ask for a smaller rise or a longer thrust_time",
-    "flight time": "leave flight_time to the planner",
-}
+
+
+class Formulation(Protocol):
+    """Makes a plan of a task with one set of decision variables, cost and constraints."""
+
+    def __call__(
+        self,
+        task: JumpTask,
+        robot: RobotDescription,
+        *,
+        warm_start: JumpPlan | None = None,
+        progress: Progress | None = None,
+        compiled: bool = True,
+        solver: str = "",
+        knots: Knots | None = None,
+    ) -> JumpPlan:
+        """As ``solve_jump``."""
+        ...
 
 
 def solve_jump(
@@ -45,10 +58,13 @@ def solve_jump(
     progress: Progress | None = None,
     compiled: bool = True,
     solver: str = "",
+    knots: Knots | None = None,
 ) -> JumpPlan:
-    """The plan of a task.
+    """The plan of a task, in the formulation that it names.
 
-    ``warm_start`` is a plan of a near task with the same numbers of knots; another one is not used.
+    ``warm_start`` is a plan of a near task, on any grid; one that goes through other phases is not
+    used. A plan of this very task that failed the validity check is solved again on finer
+    intervals (see ``refinement``). ``knots`` are numbers of intervals to use in place of both.
     ``progress`` is told when functions are compiled, once per robot. ``solver`` insists on
     ``fatrop`` or ``ipopt``. The result does not depend on the number of threads.
 
@@ -56,12 +72,33 @@ def solve_jump(
         PlanError: no motion was found; ``family`` names the constraints that could not be met.
         TaskError: the task names joints that the robot has not.
     """
+    return FORMULATIONS[task.formulation](
+        task, robot, warm_start=warm_start, progress=progress, compiled=compiled, solver=solver,
+        knots=knots,
+    )  # fmt: skip
+
+
+def solve_full(
+    task: JumpTask,
+    robot: RobotDescription,
+    *,
+    warm_start: JumpPlan | None = None,
+    progress: Progress | None = None,
+    compiled: bool = True,
+    solver: str = "",
+    knots: Knots | None = None,
+) -> JumpPlan:
+    """The ``full`` formulation: the whole body's dynamics with its motors' limits; see ``problem``."""
     started = time.process_time()
-    problem = make_problem(task, robot, compiled=compiled, progress=progress)
+    if knots is None:
+        again = warm_start is not None and asks_for_finer(task, warm_start)
+        knots = finer_knots(warm_start) if again and warm_start is not None else task.knots
+    gridded = with_knots(task, knots)
+    problem = make_problem(gridded, robot, compiled=compiled, progress=progress)
     guess = ballistic_guess(problem)
-    warm = warm_start is not None and warm_start.task.knots == task.knots
-    solution = None
-    if warm and warm_start is not None:
+    solution, warm = None, False
+    if warm_start is not None and can_start(problem, warm_start):
+        warm = True
         solution = solve(problem, pack(problem, warm_start, guess), warm=True, solver="fatrop")
     if solution is None or not solution.solved:
         warm = False
@@ -69,7 +106,7 @@ def solve_jump(
             problem, guess, solver=solver, other_guess=lambda: _displaced(problem, robot)
         )
     if not solution.solved:
-        raise _failure(task, solution)
+        raise failure(task, solution)
     statistics = {
         "solver": solution.solver,
         "iterations": solution.iterations,
@@ -78,14 +115,23 @@ def solve_jump(
         "violation": solution.violation,
         "cost": solution.cost,
         "warm": warm,
+        "knots": problem.knots,
         "coordinates": problem.coordinates.name,
         "variables": problem.assembly.variables,
         "constraints": problem.assembly.constraints,
         "compiled": not problem.assembly.interpreted,
     }
     return JumpPlan(
-        task=task, statistics=statistics, versions=_versions(), **unpack(problem, solution.values)
+        task=task, statistics=statistics, versions=versions(), **unpack(problem, solution.values)
     )
+
+
+FORMULATIONS: Mapping[str, Formulation] = {
+    "full": solve_full,
+    "paper": solve_paper,
+    "srbm": solve_rigid_body,
+}
+"""By the name a task gives."""
 
 
 def make_problem(
@@ -96,52 +142,38 @@ def make_problem(
     progress: Progress | None = None,
     coordinates: str = "",
 ) -> Problem:
-    """The problem of a task, in the sagittal plane where the task stays in it.
+    """The problem of a task in the ``full`` formulation, in the sagittal plane where the task stays in it.
 
     Raises ``PlanError`` and ``TaskError`` as ``solve_jump`` does.
     """
-    if task.formulation != "full":
-        raise PlanError(
-            f"{task.name}: the formulation {task.formulation!r} cannot be solved yet; "
-            "use formulation: full",
-            family="formulation",
-        )
-    if task.impact:
-        raise PlanError(
-            f"{task.name}: impacts at touchdown cannot be planned yet; use impact: false",
-            family="footholds",
-        )
-    if task.profile not in robot.profiles:
-        raise PlanError(
-            f"{robot.name} has no actuator profile {task.profile!r}; there is "
-            + ", ".join(robot.profiles),
-            family="motor torque",
-        )
-    model, finder = _model(robot.model_dump_json(), task.profile)
-    start, end = start_and_end(task, robot, finder)
-    chosen = _choose(model, task, start, end, coordinates)
-    pieces = load_pieces(model, chosen, profile=task.profile, compiled=compiled, progress=progress)
-    return ProblemBuilder(task, model, chosen, pieces, start, end).build()
-
-
-@lru_cache(maxsize=4)
-def _model(text: str, profile: str) -> tuple[SymbolicModel, StanceFinder]:
-    model = SymbolicModel(RobotDescription.model_validate_json(text), profile)
-    return model, StanceFinder(model)
+    model, finder = model_of(robot, task.profile)
+    stances = stances_of(task, robot, finder)
+    stretches = layout(task, robot)
+    chosen = _choose(model, task, stances, stretches, coordinates)
+    used = {"contact", "take_off", "air", *(stretch.piece for stretch in stretches)}
+    names = tuple(name for name in PIECES if name in used)
+    pieces = load_pieces(
+        model, chosen, profile=task.profile, names=names, compiled=compiled, progress=progress
+    )
+    return ProblemBuilder(task, model, chosen, pieces, stances).build()
 
 
 def _choose(
-    model: SymbolicModel, task: JumpTask, start: Stance, end: Stance, asked: str
-) -> Coordinates:
+    model: SymbolicModel, task: JumpTask, stances: tuple[Stance, ...],
+    stretches: tuple[Stretch, ...], asked: str,
+) -> Coordinates:  # fmt: skip
     if asked:
         return make_coordinates(model, asked)
-    if not task.distance_y and not task.twist:
+    # An impact leaves the roll and yaw motors without an impulse, which a plane cannot tell.
+    if not task.impact and all(not hop.distance_y and not hop.twist for hop in task.hops()):
         try:
             plane = make_coordinates(model, "sagittal")
         except ValueError:
             return make_coordinates(model, "full")
-        both = np.array([start.coordinates, end.coordinates])
-        if np.allclose(plane.reduce(both) @ plane.matrix.T, both, rtol=0.0, atol=1e-12):
+        every = np.array([stance.coordinates for stance in stances])
+        if np.allclose(plane.reduce(every) @ plane.matrix.T, every, rtol=0.0, atol=1e-12) and all(
+            is_mirrored(plane, stretch.contacts) for stretch in stretches
+        ):
             return plane
     return make_coordinates(model, "full")
 
@@ -150,29 +182,13 @@ def _displaced(problem: Problem, robot: RobotDescription) -> Array | None:
     """A guess from the same jump straight ahead, where there is one and it can be solved."""
     if problem.coordinates.name == "sagittal":
         return None
-    task = problem.task.model_copy(update={"distance_y": 0.0, "twist": 0.0})
+    ahead = {"distance_y": 0.0, "twist": 0.0}
+    task = problem.task.model_copy(update=ahead)
+    if task.jumps is not None:
+        jumps = tuple(hop.model_copy(update=ahead) for hop in task.jumps)
+        task = task.model_copy(update={"jumps": jumps})
     straight = make_problem(task, robot, compiled=not problem.assembly.interpreted)
     if straight.coordinates.name != "sagittal":
         return None
     solution = solve(straight, ballistic_guess(straight), solver="fatrop")
     return displaced_guess(problem, straight, solution.values) if solution.solved else None
-
-
-def _failure(task: JumpTask, solution: Solution) -> PlanError:
-    family = solution.family
-    advice = ADVICE.get(family, "ask for a smaller jump, or change the durations")
-    reason = (
-        f"{family} is missed by {solution.violation:.3g}"
-        if solution.violation > 1e-5
-        else "the solver found no optimum"
-    )
-    return PlanError(
-        f"no plan for {task.name!r} after {solution.iterations} iterations: {reason}; {advice}",
-        family=family, violation=solution.violation,
-    )  # fmt: skip
-
-
-def _versions() -> dict[str, str]:
-    import casadi as ca
-
-    return {"casadi": str(ca.CasadiMeta.version()), "numpy": np.__version__}
