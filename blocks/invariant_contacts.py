@@ -16,6 +16,8 @@ from ..runtime.kernel import kernel
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
+Indices = NDArray[np.int64]
+Flags = NDArray[np.bool_]
 
 
 @kernel
@@ -111,3 +113,50 @@ def level(
         sensitivity[row, 9 + 3 * reference + 2] = -1.0
     sensitivity[row, 0], sensitivity[row, 1] = y, -x
     residual[row] = height - z
+
+
+@kernel
+def centre(levers: Array, vectors: Array, sensitivity: Array) -> None:
+    """H (3, n) of where the world is by the feet: its origin in the points' middle, x and y, and
+    its x axis where the feet point on average.
+
+    Args:
+        levers: how far every point lies ahead of its foot's middle [m], (N,).
+    """
+    n, total = levers.shape[0], 0.0
+    for row in range(3):
+        for k in range(sensitivity.shape[1]):
+            sensitivity[row, k] = 0.0
+    for point in range(n):
+        total += float(levers[point]) * float(levers[point])
+    for point in range(n):
+        column, share = 9 + 3 * point, float(levers[point]) / total
+        x, y = float(vectors[2 + point, 0]), float(vectors[2 + point, 1])
+        # The error of a place is xi_d and what the error of rotation about z makes of it.
+        sensitivity[0, column] = 1.0 / n
+        sensitivity[0, 2] -= y / n
+        sensitivity[1, column + 1] = 1.0 / n
+        sensitivity[1, 2] += x / n
+        sensitivity[2, column + 1] = share
+        sensitivity[2, 2] += x * share
+
+
+@kernel
+def creep(
+    feet: Indices, present: Flags, own: float, shared: float, period: float, covariance: Array
+) -> None:
+    """What stands moves a little in a period: the points of a foot together, each by itself.
+
+    Args:
+        feet: the foot of every point, (N,).
+        own, shared: standard deviations after a second, per axis [m].
+    """
+    for point in range(feet.shape[0]):
+        for other in range(feet.shape[0]):
+            if not present[point] or not present[other] or feet[point] != feet[other]:
+                continue
+            variance = shared * shared * period
+            if point == other:
+                variance += own * own * period
+            for k in range(3):
+                covariance[9 + 3 * point + k, 9 + 3 * other + k] += variance

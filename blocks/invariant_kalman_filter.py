@@ -15,9 +15,9 @@ from ..runtime.parameters import Parameters
 from .contact_kinematics import ContactKinematics
 from .extended_pose import retract
 from .inertial_filter import GRAVITY, misalignment, propagate, turn, upright
-from .invariant_contacts import admit, forget, innovation, level, look, watch
+from .invariant_contacts import admit, centre, creep, forget, innovation, level, look, watch
 from .invariant_estimate import InvariantEstimate, InvariantFilterParameters
-from .invariant_propagation import deviation, drift, grow, spread
+from .invariant_propagation import deviation, drift, grow, inflate, spread
 from .kalman_update import correct, weigh
 from .rotations import rotate, to_matrix
 from .signals import BaseState, ContactState, EstimatorHealth, ImuReading, JointState
@@ -104,8 +104,8 @@ class InvariantKalmanFilter(Block):
         self._kinematics = ContactKinematics(robot)
         self._points, n_joints = len(robot.contacts), len(robot.joints)
         self._radius = [contact.radius for contact in robot.contacts]
-        self._foot_of_point = robot.foot_of_contact()
-        self._levers = _levers(robot)
+        self._foot_of_point = np.array(robot.foot_of_contact(), dtype=np.int64)
+        self._levers = np.array(_levers(robot))
         self._bias = 9 + 3 * self._points
         self._offsets = self._bias + 6
         n = self._offsets + n_joints
@@ -152,28 +152,16 @@ class InvariantKalmanFilter(Block):
         self._publish()
 
     def _watch_saturation(self) -> None:
-        """The noise of this tick's samples, axis by axis.
-
-        What a saturated sample is off by lasts, so the n-th in a row does not add to the others'
-        errors like new noise, as a root of n, but like one error: as n.
-        """
+        """The noise of this tick's samples, axis by axis."""
         params, health, run = self.params, self.health, self.estimate.saturated_run
-        for first, reading, noise, limit, doubt, flag in (
-            (0, self._gyro, params.gyro_noise, params.gyro_range, params.saturated_rate,
-             health.gyro_saturated),
-            (3, self._force, params.accelerometer_noise, params.accelerometer_range,
-             params.saturated_force, health.accelerometer_saturated),
-        ):  # fmt: skip
-            flag[()] = False
-            for axis in range(3):
-                k, deviation_now = first + axis, noise
-                if limit is not None and abs(float(reading[axis])) >= 0.999 * limit:
-                    run[k] += 1
-                    deviation_now = doubt * math.sqrt(2.0 * int(run[k]) - 1.0)
-                    flag[()] = True
-                else:
-                    run[k] = 0
-                self._noise[k] = deviation_now
+        health.gyro_saturated[()] = inflate(
+            self._gyro, params.gyro_range or math.inf, params.gyro_noise, params.saturated_rate,
+            run[:3], self._noise[:3],
+        )  # fmt: skip
+        health.accelerometer_saturated[()] = inflate(
+            self._force, params.accelerometer_range or math.inf, params.accelerometer_noise,
+            params.saturated_force, run[3:], self._noise[3:],
+        )  # fmt: skip
         if health.gyro_saturated[()] or health.accelerometer_saturated[()]:
             self.estimate.saturated_ticks += 1
         health.saturated_ticks[()] = self.estimate.saturated_ticks
@@ -197,25 +185,15 @@ class InvariantKalmanFilter(Block):
             self._transition, self._reach, self._bias, self._noise, covariance,
             self._scaled, self._product,
         )  # fmt: skip
-        self._creep()
+        creep(
+            self._foot_of_point, estimate.present, params.contact_noise, params.slide_noise, period,
+            covariance,
+        )  # fmt: skip
         for first, walk in (
             (self._bias, params.gyro_bias_walk), (self._bias + 3, params.accelerometer_bias_walk),
         ):  # fmt: skip
             for k in range(first, first + 3):
                 covariance[k, k] += walk * walk * period
-
-    def _creep(self) -> None:
-        """What stands moves a little: the points of a foot together, and each by itself."""
-        params, covariance = self.params, self.estimate.covariance
-        own, shared = params.contact_noise, params.slide_noise
-        for point, foot in enumerate(self._foot_of_point):
-            for other in range(self._points):
-                if self._foot_of_point[other] != foot:
-                    continue
-                variance = shared * shared + (own * own if other == point else 0.0)
-                both = self.estimate.present[point] and self.estimate.present[other]
-                for k in range(3) if both else ():
-                    covariance[9 + 3 * point + k, 9 + 3 * other + k] += variance * self.period
 
     def _see(self) -> None:
         """Leg kinematics with what is known of the encoders' offsets."""
@@ -276,18 +254,8 @@ class InvariantKalmanFilter(Block):
         n, vectors = self._points, self.estimate.vectors
         for first in range(0, n, 3):
             self._level(range(first, min(first + 3, n)), -1, self.params.ground_noise**2)
-        sensitivity = self._sensitivity
-        sensitivity.fill(0.0)
+        centre(self._levers, vectors, self._sensitivity)
         self._residual.fill(0.0)
-        total = sum(lever * lever for lever in self._levers)
-        for point, lever in enumerate(self._levers):
-            column, (x, y, _) = 9 + 3 * point, vectors[2 + point].tolist()
-            # The error of a place is xi_d and what the error of rotation makes of it: z x d here.
-            for row, turned in enumerate((-y, x)):
-                sensitivity[row, column + row] = 1.0 / n
-                sensitivity[row, 2] += turned / n
-            sensitivity[2, column + 1] = lever / total
-            sensitivity[2, 2] += x * lever / total
         np.multiply(self._identity, _EXACT * _EXACT, out=self._row_noise)
         self._weigh(self._row_noise)
         self._correct(self._row_noise)

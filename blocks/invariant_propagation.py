@@ -22,6 +22,7 @@ from ..runtime.kernel import kernel
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
+Indices = NDArray[np.int64]
 
 
 @kernel
@@ -117,3 +118,29 @@ def deviation(covariance: Array, first: int, vector: Array) -> float:
         total += a * a * float(covariance[j, j]) + b * b * float(covariance[k, k])
         total += 2.0 * a * b * float(covariance[j, k])
     return math.sqrt(total) if total > 0.0 else 0.0
+
+
+@kernel
+def inflate(
+    reading: Array, limit: float, noise: float, doubt: float, run: Indices, out: Array
+) -> bool:
+    """The standard deviation of a sample's axes; whether one of them is at the end of its range.
+
+    What a saturated sample is off by lasts, so the n-th in a row does not add to the errors before
+    it like new noise, as the root of n, but like one error, as n.
+
+    Args:
+        reading: a sample, (3,). limit: of its range.
+        noise, doubt: the deviations of an axis inside the range and at its end.
+        run: for how many samples in a row every axis has been there; brought up to date.
+    """
+    any_full = False
+    for axis in range(3):
+        out[axis] = noise
+        if abs(float(reading[axis])) >= 0.999 * limit:
+            run[axis] += 1
+            out[axis] = doubt * math.sqrt(2.0 * int(run[axis]) - 1.0)
+            any_full = True
+        else:
+            run[axis] = 0
+    return any_full
