@@ -17,7 +17,6 @@ from ..runtime.kernel import kernel
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 Indices = NDArray[np.int64]
-Flags = NDArray[np.bool_]
 
 
 @kernel
