@@ -13,6 +13,8 @@ from .output import console, errors_reported, print_error, print_json, say
 from .plan_grid import plan_grid
 from .plan_output import (
     failure,
+    listed_row,
+    listing,
     nearest_json,
     plan_json,
     print_plan,
@@ -46,6 +48,11 @@ def plan(
             help="Solve also what is kept, from nothing; in a grid: try again what failed before.",
         ),
     ] = False,
+    listed: Annotated[bool, typer.Option("--list", help="List the plans that are kept.")] = False,
+    prune: Annotated[
+        bool,
+        typer.Option("--prune", help="Remove from --keep the plans of all tasks but these."),
+    ] = False,
     workers: Annotated[int, typer.Option(help="Processes for a grid; 0: one a core.", min=0)] = 0,
     cluster: Annotated[
         str, typer.Option(help="Plan a grid on the Dask scheduler at this address.")
@@ -62,15 +69,19 @@ def plan(
     ] = False,
 ) -> None:
     """Plan jumps, check each with exact dynamics, and keep the valid ones in the plan library."""
-    if bool(tasks) == (grid is not None):
-        raise typer.BadParameter("give task files, or --library with a grid file")
+    if bool(tasks) + (grid is not None) + listed != 1:
+        raise typer.BadParameter("give task files, or --library with a grid file, or --list")
+    if prune and (keep is None or not tasks):
+        raise typer.BadParameter("--prune goes with task files and --keep")
     screen = console(to_stderr=as_json)
     with errors_reported(as_json):
-        if grid is not None:
+        if listed:
+            code = list_plans(keep, screen, as_json)
+        elif grid is not None:
             code = plan_grid(grid, keep, anew, workers, cluster, screen, as_json)
         else:
             folder = None if no_pictures else out
-            code = plan_tasks(tasks or [], keep, anew, folder, nearest, screen, as_json)
+            code = plan_tasks(tasks or [], keep, anew, folder, nearest, prune, screen, as_json)
     raise typer.Exit(code)
 
 
@@ -80,6 +91,7 @@ def plan_tasks(
     anew: bool,
     out: Path | None,
     nearest: bool,
+    prune: bool,
     screen: Console,
     as_json: bool,
 ) -> ExitCode:
@@ -106,6 +118,9 @@ def plan_tasks(
         library = PlanLibrary(find_robot(task.robot, path.parent), keep)
         rows.append(plan_task(task, library, anew, out, nearest, screen))
     failed = [row["task"] for row in rows if not row["success"]]
+    if prune and not failed:
+        for path in PlanLibrary(find_robot(tasks[0].robot), keep).prune(tasks):
+            say(screen, f"removed: {path}")
     reason = f"not planned: {', '.join(failed)}" if failed else f"{len(rows)} planned and valid"
     if len(rows) > 1:
         screen.print(summary(rows))
@@ -146,6 +161,19 @@ def plan_task(
     if not found.valid and nearest:
         row |= search_nearest(task, library, "", screen)
     return row
+
+
+def list_plans(keep: Path | None, screen: Console, as_json: bool) -> ExitCode:
+    """Every plan of the library: its task, what it does, and where it is."""
+    from ..blocks.planner.library import PlanLibrary
+    from ..runtime.description import find_robot
+
+    library = PlanLibrary(find_robot("bruce"), keep)
+    rows = [listed_row(path, header) for path, header in library.headers()]
+    screen.print(listing(rows))
+    if as_json:
+        print_json({"success": True, "reason": f"{len(rows)} plans", "plans": rows})
+    return ExitCode.SUCCESS
 
 
 def search_nearest(

@@ -112,6 +112,37 @@ def summary(rows: Sequence[Mapping[str, Any]]) -> Table:
     return table("", columns, cells)
 
 
+def listed_row(path: Path, header: Mapping[str, Any]) -> dict[str, Any]:
+    """A kept plan as an entry of the JSON output, from its file's header."""
+    report = header.get("report") or {}
+    return {
+        "task": header.get("task", {}).get("name", ""),
+        "hash": path.stem.rpartition("-")[2],
+        "path": str(path),
+        "valid": bool(report.get("valid", False)),
+        "asked": header.get("task", {}),
+        "figures": report.get("figures", {}),
+    }
+
+
+def listing(rows: Sequence[Mapping[str, Any]]) -> Table:
+    """One line for every kept plan."""
+    cells = []
+    for row in rows:
+        asked = [f"{100 * (row['asked'].get(name) or 0.0):.4g}" for name in
+                 ("rise", "distance_x", "distance_y", "landing_height")]  # fmt: skip
+        twist = f"{np.degrees(row['asked'].get('twist') or 0.0):.4g}"
+        folder = str(Path(row["path"]).parent)
+        cells.append(
+            (row["task"], "yes" if row["valid"] else "NO", *asked, twist, row["hash"], folder)
+        )
+    columns = (
+        "task", "valid", ">rise [cm]", ">ahead [cm]", ">left [cm]", ">up [cm]", ">twist [deg]",
+        "hash", "folder",
+    )  # fmt: skip
+    return table("", columns, cells)
+
+
 def failure_rows(rows: Sequence[GridRow]) -> list[tuple[str, str]]:
     """A line for every task of a grid that has no plan."""
     return [(row.task.name, row.reason.partition("\n")[0]) for row in rows]

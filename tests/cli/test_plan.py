@@ -1,6 +1,7 @@
 """``aloft plan``: table, picture and recording of a kept plan, grids, and what it refuses."""
 
 import json
+import shutil
 import subprocess
 from collections.abc import Callable
 from dataclasses import replace
@@ -100,6 +101,26 @@ def test_all_files_are_read_before_anything_is_planned(folder: Path, call_json: 
     assert [line.partition(": ")[0] for line in reason.splitlines()] == [
         "one.yaml:1:7", "two.yaml:1:1",
     ]  # fmt: skip
+
+
+def test_the_library_is_listed(folder: Path, call_json: CallJson, call: Call) -> None:
+    rows = {row["task"]: row for row in call_json("plan", "--list")["plans"]}
+    assert {"in_situ", "twist_30deg", "step_up_5cm"} <= set(rows)
+    assert rows["in_situ"]["valid"] is True
+    assert rows["in_situ"]["figures"]["rise_m"] == pytest.approx(0.15, abs=1e-3)
+    assert rows["step_up_5cm"]["asked"]["landing_height"] == 0.05
+    assert "twist [deg]" in call("plan", "--list").stdout
+    assert "or --list" in call("plan", "--list", "a.yaml", code=2).stderr
+
+
+def test_pruning_keeps_the_tasks_that_are_given(
+    folder: Path, call_json: CallJson, call: Call
+) -> None:
+    shutil.copytree(SHIPPED, folder / "kept")
+    one = str(TASKS / "in_situ.yaml")
+    call_json("plan", one, "--keep", "kept", "--prune", "--no-pictures")
+    assert [path.name.partition("-")[0] for path in (folder / "kept").iterdir()] == ["in_situ"]
+    assert "--prune goes with" in call("plan", one, "--prune", code=2).stderr
 
 
 def test_a_wrong_task_is_refused(folder: Path, call_json: CallJson, call: Call) -> None:
