@@ -10,7 +10,7 @@ Three ways, which differ only in which blocks run; all others are fed from the r
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -29,6 +29,7 @@ from ..runtime.stages import CheckedGraph, ClockSpec
 from .recorded_run import RecordedRun, RowCursor, nearest_keyframe
 
 Inputs = Literal["seed", "recorded"]
+BeforeTick = Callable[[BoundGraph, int], None]
 PIECE = 256
 """Ticks compared at once."""
 
@@ -82,6 +83,7 @@ def replay(
     first_tick: int | None = None,
     last_tick: int | None = None,
     keep: bool = False,
+    before_tick: BeforeTick | None = None,
     sinks: Sequence[Sink] = (),
 ) -> Replayed:
     """Execute a recorded run again.
@@ -95,6 +97,7 @@ def replay(
         first_tick: begin at the last keyframe at or before it; by default at the beginning.
         last_tick: end before it; by default with the recording.
         keep: whether to keep the replayed rows.
+        before_tick: called with the graph before every tick, and once after the last.
         sinks: what else looks on.
 
     Raises:
@@ -117,7 +120,7 @@ def replay(
     _expect_no_gap(recorded, fed, start, end)
     bound = BoundGraph(fed_graph(graph, fed))
     bound.clock.tick = start
-    follower = Follower(recorded, bound, start, keep)
+    follower = Follower(recorded, bound, start, keep, before_tick)
     result = Executor(
         bound, clock=ClockSpec("free"), sinks=[follower, *sinks], log=False,
         on_ready=follower.ready,
@@ -193,10 +196,11 @@ class Follower:
     """A sink that feeds what does not run, applies recorded parameter changes, and compares."""
 
     def __init__(
-        self, recorded: RecordedRun, bound: BoundGraph, first_tick: int, keep: bool
-    ) -> None:
+        self, recorded: RecordedRun, bound: BoundGraph, first_tick: int, keep: bool,
+        before_tick: BeforeTick | None = None,
+    ) -> None:  # fmt: skip
         self._recorded, self._bound = recorded, bound
-        self._first, self._keep = first_tick, keep
+        self._first, self._keep, self._before_tick = first_tick, keep, before_tick
         memory, order = bound.memory, bound.graph.order
         try:
             self._feed = Feed(bound, recorded.bus)
@@ -280,6 +284,8 @@ class Follower:
             row = self._cursor.at(tick)
             if row is not None:
                 self._feed.show(row)
+        if self._before_tick is not None:
+            self._before_tick(self._bound, tick)
 
     def _restore(self, keyframe: Snapshot) -> None:
         """Bus and state of a keyframe, as far as this graph has the same."""
