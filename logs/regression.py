@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import pprint
+import json
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -21,8 +21,8 @@ from ..runtime.registry import block_name
 from ..runtime.schedule import runs_at
 from ..runtime.stages import BlockSpec, CheckedGraph
 from ..runtime.testing.stretch import Setting, Stretch
-from .recorded_run import RecordedRun
 from .replay import ReplayError, replay
+from .replayable import Replayable
 
 _OURS = __name__.rpartition(".logs.")[0]
 
@@ -67,7 +67,7 @@ class _Watch:
 
 
 def capture(
-    recorded: RecordedRun, path: str, first: int, last: int
+    recorded: Replayable, path: str, first: int, last: int
 ) -> tuple[Stretch, dict[str, Any], Difference | None]:
     """The block at ``path`` in the ticks from ``first`` up to, without, ``last``.
 
@@ -122,7 +122,7 @@ def _spec(graph: CheckedGraph, path: str) -> BlockSpec:
     return graph.block(path)
 
 
-def _setting(recorded: RecordedRun, spec: BlockSpec, first: int, last: int) -> Setting:
+def _setting(recorded: Replayable, spec: BlockSpec, first: int, last: int) -> Setting:
     graph = recorded.graph
     prefix = f"{spec.path}."
     return Setting(
@@ -148,7 +148,7 @@ def _columns(
 
 
 def write_test(
-    recorded: RecordedRun,
+    recorded: Replayable,
     path: str,
     first: int,
     last: int,
@@ -180,15 +180,16 @@ def write_test(
     robot = recorded.graph.robot
     options = [f'robot="{robot.name}"'] if robot is not None and _is_ours(robot) else []
     imports, block = _import_of(spec, output.parent)
-    if "HERE" in block or _names_files(parameters):
+    if _names_files(parameters, spec.folder):
         options.append(f'folder=HERE / "{_relative(spec.folder, output.parent)}"')
     options += [f"rtol={rtol!r}", f"atol={atol!r}"]
     output.write_text(
         _TEMPLATE.format(
             path=path, kind=block_name(spec.block_type), first=first, last=last - 1, end=last,
-            source=source, imports=imports, block=block, options=", ".join(options),
+            source=source, imports=imports, block=block, options="".join(f"        {option},\n" for option in options),
             name=re.sub(r"\W+", "_", path).strip("_"),
-            parameters=pprint.pformat(parameters, width=96, sort_dicts=False),
+            here="HERE = Path(__file__).parent\n" if "HERE" in f"{block}{options}" else "",
+            parameters=_as_code(parameters),
         ),
         encoding="utf-8",
     )  # fmt: skip
@@ -203,9 +204,19 @@ def _is_ours(robot: RobotDescription) -> bool:
         return False
 
 
-def _names_files(parameters: Mapping[str, Any]) -> bool:
-    """Whether any parameter is text, and so may name a file."""
-    return any(isinstance(value, str) for value in parameters.values())
+def _names_files(parameters: Mapping[str, Any], folder: Path) -> bool:
+    """Whether any parameter is the name of a file relative to the graph's folder."""
+    texts = [value for value in parameters.values() if isinstance(value, str) and value]
+    return any((folder / text).exists() for text in texts)
+
+
+def _as_code(value: Any, indent: str = "") -> str:
+    """Plain data as Python that reads well: one entry of a mapping a line."""
+    if not isinstance(value, dict) or not value:
+        return json.dumps(value) if isinstance(value, str) else repr(value)
+    inner = f"{indent}    "
+    lines = [f'{inner}"{key}": {_as_code(item, inner)},' for key, item in value.items()]
+    return "\n".join(["{", *lines, f"{indent}}}"])
 
 
 def _relative(folder: Path, start: Path) -> str:
@@ -232,11 +243,13 @@ from pathlib import Path
 
 {imports}from aloft.runtime.testing import Stretch
 
-HERE = Path(__file__).parent
-PARAMETERS = {parameters}
+{here}PARAMETERS = {parameters}
 
 
 def test_{name}_in_ticks_{first}_to_{last}() -> None:
     stretch = Stretch.read(Path(__file__).with_suffix(".npz"))
-    stretch.check({block}, PARAMETERS, {options})
+    stretch.check(
+        {block},
+        PARAMETERS,
+{options}    )
 '''

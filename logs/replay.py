@@ -26,7 +26,7 @@ from ..runtime.memory import BoundGraph, Snapshot
 from ..runtime.run_result import RunResult
 from ..runtime.sinks import Sink
 from ..runtime.stages import CheckedGraph, ClockSpec
-from .recorded_run import RecordedRun, RowCursor, nearest_keyframe
+from .replayable import Replayable, RowCursor, nearest_keyframe
 
 Inputs = Literal["seed", "recorded"]
 BeforeTick = Callable[[BoundGraph, int], None]
@@ -75,7 +75,7 @@ class Replayed:
 
 
 def replay(
-    recorded: RecordedRun,
+    recorded: Replayable,
     *,
     graph: CheckedGraph | None = None,
     inputs: Inputs | None = None,
@@ -154,7 +154,7 @@ def _fed(graph: CheckedGraph, inputs: Inputs, run: Sequence[str] | None) -> list
     return [spec.path for spec in graph.blocks if spec.block_type.outside != "no"]
 
 
-def _start(recorded: RecordedRun, first_tick: int | None) -> int:
+def _start(recorded: Replayable, first_tick: int | None) -> int:
     """The tick to begin with: the recording's first, or a keyframe."""
     first = int(recorded.ticks[0])
     if first_tick is None:
@@ -167,7 +167,7 @@ def _start(recorded: RecordedRun, first_tick: int | None) -> int:
     return first if keyframe is None else keyframe
 
 
-def _expect_beginning(recorded: RecordedRun, start: int) -> None:
+def _expect_beginning(recorded: Replayable, start: int) -> None:
     """What is not the beginning of a run needs a keyframe."""
     if start > 0 and start not in recorded.keyframes:
         raise ReplayError(
@@ -177,7 +177,7 @@ def _expect_beginning(recorded: RecordedRun, start: int) -> None:
         )
 
 
-def _expect_no_gap(recorded: RecordedRun, fed: Sequence[str], start: int, end: int) -> None:
+def _expect_no_gap(recorded: Replayable, fed: Sequence[str], start: int, end: int) -> None:
     """Blocks can be fed only where every tick was recorded."""
     ticks = recorded.ticks
     if int(ticks[0]) == start == 0 and len(ticks) == ticks[-1] + 1:
@@ -196,7 +196,7 @@ class Follower:
     """A sink that feeds what does not run, applies recorded parameter changes, and compares."""
 
     def __init__(
-        self, recorded: RecordedRun, bound: BoundGraph, first_tick: int, keep: bool,
+        self, recorded: Replayable, bound: BoundGraph, first_tick: int, keep: bool,
         before_tick: BeforeTick | None = None,
     ) -> None:  # fmt: skip
         self._recorded, self._bound = recorded, bound
@@ -214,9 +214,9 @@ class Follower:
         if first_tick > 0:
             self._expect_state()
         ran = dict.fromkeys(self.ran)
-        self.notes = [
-            note for note in (*self._bus.notes, *self._state.notes) if _block(note) in ran
-        ]
+        # a recording without keyframes says nothing of state
+        states = self._state.notes if recorded.keyframes else []
+        self.notes = [note for note in (*self._bus.notes, *states) if _block(note) in ran]
         whole = self._bus.identical and not self._feed.paths
         names = [name for name in self._bus.names if _block(name) in ran]
         self.signals = Comparison(memory.bus.layout, order, None if whole else names)
