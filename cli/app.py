@@ -19,6 +19,7 @@ from .params import params
 from .plan import plan
 from .replay import replay
 from .run import run
+from .study import study
 from .test import test
 
 EXIT_CODES = """\b
@@ -39,7 +40,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
-for _verb in (run, replay, check, graph, blocks, plan, bench, test):
+for _verb in (run, replay, check, graph, blocks, plan, bench, study, test):
     app.command(epilog=EXIT_CODES if _verb is run else None)(_verb)
 app.add_typer(params)
 

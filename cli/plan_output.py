@@ -85,7 +85,8 @@ def failure_rows(rows: Sequence[GridRow]) -> list[tuple[str, str]]:
 
 def recorded_motion(plan: JumpPlan, robot: RobotDescription) -> RecordedMotion:
     """The plan with its series, every 10 ms or so."""
-    from ..blocks.planner.plan_tests import Evidence, allowed_motor_torque
+    from ..blocks.planner.evidence import Evidence
+    from ..blocks.planner.plan_tests import allowed_motor_torque
     from ..blocks.planner.reference_table import reference_table
     from ..blocks.planner.replay import replay
     from ..logs.motion_recording import RecordedMotion
@@ -119,7 +120,11 @@ def recorded_motion(plan: JumpPlan, robot: RobotDescription) -> RecordedMotion:
             "motor speed [rad per s]": (evidence.motor_speed, motors),
             "foot height [m]": (samples.points[:, :, 2], contacts),
         },
-        events=[(plan.lift_off_time, "lift-off"), (plan.touchdown_time, "touchdown")],
+        events=[
+            (time, what)
+            for flight in plan.flights
+            for time, what in zip(flight, ("lift-off", "touchdown"), strict=True)
+        ],
         properties={
             "task": json.dumps(plan.task.model_dump(mode="json")),
             "statistics": json.dumps(dict(plan.statistics), default=str),

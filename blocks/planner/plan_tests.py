@@ -8,136 +8,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...runtime.description import RobotDescription
-from ...runtime.kinematics import LinkPoses, link_poses, matrices_of_quaternions
 from ..signals import Phase
-from .clearance import body_heights, ground_height, leg_gap
-from .plan import JumpPlan
-from .replay import Replay
-from .task import GRAVITY
+from .clearance import body_heights, leg_gap
+from .evidence import DEGREE, MILLIMETRE, Evidence, Found, worst
+from .exact_dynamics import ExactDynamics
 
 Array = NDArray[np.float64]
-DEGREE = math.pi / 180.0
-MILLIMETRE = 1e-3
-
-
-@dataclass(frozen=True)
-class Found:
-    """What a test found: it passes where ``value`` is at most ``limit``."""
-
-    name: str
-    value: float
-    limit: float
-    unit: str
-    text: str
-    where: str = ""
-
-
-@dataclass(frozen=True)
-class Evidence:
-    """A plan, its replay, and what several tests need of them."""
-
-    plan: JumpPlan
-    robot: RobotDescription
-    replay: Replay
-
-    @property
-    def effort(self) -> float:
-        """The share of the motors' limits the plan may use."""
-        return self.plan.task.effort
-
-    @cached_property
-    def motor_torque(self) -> Array:
-        """Motor torques at the samples [N m], by exact dynamics, (n, n_joints)."""
-        return np.asarray(self.replay.samples.torque @ self.robot.torque_to_motor.T)
-
-    @cached_property
-    def motor_speed(self) -> Array:
-        """Motor speeds at the samples [rad/s], (n, n_joints)."""
-        return np.asarray(self.replay.samples.velocity[:, 6:] @ self.robot.joint_to_motor.T)
-
-    @cached_property
-    def middles(self) -> NDArray[np.int64]:
-        """The sample nearest to the middle of every interval that lasts."""
-        time, samples = self.plan.time, self.replay.samples
-        lasting = np.flatnonzero(np.diff(time) > 0.0)
-        found = []
-        for k in lasting:
-            rows = np.flatnonzero(samples.knot == k)
-            middle = 0.5 * (time[k] + time[k + 1])
-            found.append(int(rows[np.abs(samples.time[rows] - middle).argmin()]))
-        return np.array(found, np.int64)
-
-    @cached_property
-    def poses(self) -> LinkPoses:
-        """The links at the samples."""
-        q = self.replay.samples.position
-        return link_poses(self.robot, q[:, :3], q[:, 3:7], q[:, 7:])
-
-    @cached_property
-    def flight_share(self) -> Array:
-        """How much of the flight's time is past at the samples, (n,)."""
-        start, end = self.plan.lift_off_time, self.plan.touchdown_time
-        return np.asarray((self.replay.samples.time - start) / (end - start))
-
-    @cached_property
-    def point_height(self) -> Array:
-        """The contact points' height above the ground at the samples [m], (n, n_contacts)."""
-        points = self.replay.samples.points
-        share = np.repeat(self.flight_share[:, None], points.shape[1], axis=1)
-        return np.asarray(points[:, :, 2] - ground_height(self.plan.task, points[:, :, 0], share))
-
-    @cached_property
-    def rise(self) -> float:
-        """The apex above standing that the exact state at lift-off leads to [m]."""
-        r, k = self.replay, self.replay.lift_off
-        up = float(r.com_velocity[k, 2])
-        return float(r.com[k, 2] - r.com[0, 2]) + max(up, 0.0) ** 2 / (2.0 * GRAVITY)
-
-    @cached_property
-    def turn(self) -> tuple[float, float]:
-        """How far the base has turned in pitch and in yaw from first knot to last [rad].
-
-        The angles are those of R = Ry Rx Rz, followed through full turns.
-        """
-        matrix = matrices_of_quaternions(self.replay.samples.position[:, 3:7])
-        pitch = np.unwrap(np.arctan2(matrix[:, 0, 2], matrix[:, 2, 2]))
-        yaw = np.unwrap(np.arctan2(matrix[:, 1, 0], matrix[:, 1, 1]))
-        return float(pitch[-1] - pitch[0]), float(yaw[-1] - yaw[0])
-
-    def moment(self, sample: int) -> str:
-        """The time of a sample as text."""
-        return f"at {self.replay.samples.time[sample]:.3f} s"
-
-    def figures(self) -> dict[str, float]:
-        """What the plan does and how hard, by name with unit."""
-        r, lasting = self.replay, np.diff(self.plan.time) > 0.0
-        force = self.plan.contact_force[:-1][lasting].sum(axis=1)[:, 2]
-        k = r.lift_off
-        return {
-            "rise_m": self.rise,
-            "take_off_speed_m_s": float(r.com_velocity[k, 2]),
-            "flight_time_s": self.plan.flight_time,
-            "duration_s": self.plan.duration,
-            "peak_motor_torque_N_m": float(np.abs(self.motor_torque).max()),
-            "peak_motor_speed_rad_s": float(np.abs(self.motor_speed).max()),
-            "peak_vertical_force_N": float(force.max()),
-            "pitch_momentum_at_lift_off_N_m_s": float(r.angular_momentum[k, 1]),
-            "flight_error_mm": r.flight_error[0] / MILLIMETRE,
-            "flight_error_deg": r.flight_error[1] / DEGREE,
-        }
-
-
-def worst(array: Array) -> tuple[int, int]:
-    """The row and column of the largest number."""
-    row, column = np.unravel_index(int(array.argmax()), array.shape)
-    return int(row), int(column)
 
 
 def start_and_end(e: Evidence) -> Iterator[Found]:
@@ -202,43 +82,54 @@ def discretisation(e: Evidence) -> Iterator[Found]:
 
 def flight(e: Evidence) -> Iterator[Found]:
     """The whole flight by exact dynamics ends where the plan says."""
-    position, rotation = e.replay.flight_error
+    plan, r = e.plan, e.replay
+    position, rotation = (max(errors) for errors in zip(*r.flight_errors, strict=True))
     yield Found("flight_position", position, MILLIMETRE, "m", "the base's error at touchdown")
     yield Found("flight_rotation", rotation, 0.5 * DEGREE, "rad", "the base's error at touchdown")
-    plan, r = e.plan, e.replay
-    missed = max(
-        abs(plan.lift_off_time - plan.time[r.lift_off]),
-        abs(plan.touchdown_time - plan.time[r.touchdown]),
-    )
+    knots = plan.time[np.array(r.flights)]
+    missed = np.abs(knots - plan.flights).max() if knots.shape == np.shape(plan.flights) else np.inf
     yield Found("flight_times", float(missed), 1e-9, "s", "lift-off and touchdown from their knots")
 
 
 def task_done(e: Evidence) -> Iterator[Found]:
-    """The jump is the one that was asked for."""
+    """Every jump is the one that was asked for."""
     task, r = e.plan.task, e.replay
-    if task.rise is not None:
-        yield Found("rise", abs(e.rise - task.rise), MILLIMETRE, "m",
-                    "how far the apex, from the state at lift-off, misses the one asked for")  # fmt: skip
-    if task.take_off_speed is not None:
-        up = float(r.com_velocity[r.lift_off, 2])
-        yield Found("take_off_speed", abs(up - task.take_off_speed), 5e-3, "m/s", "its error")
-    if task.flight_time is not None:
-        missed = abs(e.plan.flight_time - task.flight_time)
-        yield Found("flight_time", missed, MILLIMETRE, "s", "its error")
-    goal = np.array([task.distance_x, task.distance_y, task.landing_height])
-    missed_by = np.abs(r.soles[-1].mean(axis=0) - goal)
+    hops, places = task.hops(), task.places()
+    for name, missed, limit, unit, text in (
+        ("rise", [(e.rises[i], hop.rise) for i, hop in enumerate(hops)], MILLIMETRE, "m",
+         "how far the apex, from the state at lift-off, misses the one asked for"),
+        ("take_off_speed", [(float(r.com_velocity[r.flights[i][0], 2]), hop.take_off_speed)
+                            for i, hop in enumerate(hops)], 5e-3, "m/s", "its error"),
+        ("flight_time", [(end - start, hop.flight_time) for (start, end), hop
+                         in zip(e.plan.flights, hops, strict=True)], MILLIMETRE, "s", "its error"),
+    ):  # fmt: skip
+        errors = [abs(found - wanted) for found, wanted in missed if wanted is not None]
+        if errors:
+            yield Found(name, max(errors), limit, unit, text, _which(e, int(np.argmax(errors))))
+    standing = [*(start for start, _ in r.flights[1:]), -1]
+    goals = np.array([(place.x, place.y, place.z) for place in places[1:]])
+    missed_by = np.abs(r.soles[standing].mean(axis=1) - goals)
+    jump, axis = worst(missed_by)
     yield Found("landing_place", missed_by.max(), 3 * MILLIMETRE, "m", "the feet's distance from it",
-                "xyz"[int(missed_by.argmax())])  # fmt: skip
+                "xyz"[axis] + _which(e, jump))  # fmt: skip
     pitch, yaw = e.turn
-    turned = float((r.heading[-1] - r.heading[0]).mean())
+    turned = (r.heading[standing] - r.heading[0]).mean(axis=1)
     # Through a somersault a heading is not defined, so it counts as it is at the end.
-    missed = math.remainder(turned - task.twist, math.tau)
-    yield Found("twist", abs(missed), 0.5 * DEGREE, "rad", "the feet's error in heading")
-    if task.rotation:
-        yield Found("rotation", abs(pitch - task.rotation), 5 * DEGREE, "rad", "the body's error")
+    twists = [math.remainder(t - place.heading, math.tau)
+              for t, place in zip(turned, places[1:], strict=True)]  # fmt: skip
+    yield Found("twist", float(np.abs(twists).max()), 0.5 * DEGREE, "rad",
+                "the feet's error in heading")  # fmt: skip
+    rotation = places[-1].turned
+    if any(hop.rotation for hop in hops):
+        yield Found("rotation", abs(pitch - rotation), 5 * DEGREE, "rad", "the body's error")
     else:
-        yield Found("whole_turn", abs(yaw - task.twist), 20 * DEGREE, "rad",
+        yield Found("whole_turn", abs(yaw - places[-1].heading), 20 * DEGREE, "rad",
                     "how far the torso's turn differs from the feet's")  # fmt: skip
+
+
+def _which(e: Evidence, jump: int) -> str:
+    """Which of several jumps."""
+    return f" jump {jump + 1}" if len(e.replay.flights) > 1 else ""
 
 
 def contacts(e: Evidence) -> Iterator[Found]:
@@ -247,16 +138,16 @@ def contacts(e: Evidence) -> Iterator[Found]:
     names = [contact.name for contact in e.robot.contacts]
     loaded = plan.contact[s.knot]
     flying = plan.phase[s.knot] == Phase.FLIGHT
-    before, after = loaded & ~flying[:, None], s.time >= plan.touchdown_time
+    standing = loaded & ~flying[:, None]
     slip = np.zeros(len(names))
-    for period in (~after, after):
+    for place in range(len(plan.flights) + 1):
         for number in range(len(names)):
-            places = s.points[before[:, number] & period, number]
+            places = s.points[standing[:, number] & (e.place == place), number]
             if len(places):
                 slip[number] = max(slip[number], float(np.ptp(places, axis=0).max()))
     yield Found("foot_slip", slip.max(), 3 * MILLIMETRE, "m", "how far a loaded point moves",
                 names[int(slip.argmax())])  # fmt: skip
-    height = np.where(before, np.abs(e.point_height), 0.0)
+    height = np.where(standing, np.abs(e.point_height), 0.0)
     yield Found("foot_on_ground", height.max(), 2 * MILLIMETRE, "m",
                 "how far a loaded point is off the ground")  # fmt: skip
     force = plan.contact_force
@@ -273,10 +164,33 @@ def contacts(e: Evidence) -> Iterator[Found]:
 def touchdown(e: Evidence) -> Iterator[Found]:
     """Feet that are to arrive at rest do, and every foot arrives on the ground."""
     plan, r, s = e.plan, e.replay, e.replay.samples
-    sample = int(np.searchsorted(s.time, plan.time[r.touchdown] - 1e-9))
-    if not plan.task.impact:
-        speed = np.linalg.norm(s.point_velocity[sample], axis=1).max()
-        yield Found("touchdown_speed", float(speed), 0.05, "m/s", "the feet's speed at touchdown")
+    knots = [touchdown for _, touchdown in r.flights]
+    if plan.task.impact:
+        if plan.task.formulation != "full":
+            return
+        missed = [_impact_error(e, k) for k in knots]
+        k = int(np.argmax(missed))
+        yield Found("impact", missed[k], 1e-3, "m/s or rad/s",
+                    "how far the impulse's velocities miss exact dynamics'", _which(e, k))  # fmt: skip
+        return
+    samples = np.searchsorted(s.time, plan.time[knots] - 1e-9)
+    speeds = np.linalg.norm(s.point_velocity[samples], axis=2)
+    speeds = np.where(plan.contact[knots], speeds, 0.0)
+    yield Found(
+        "touchdown_speed", float(speeds.max()), 0.05, "m/s", "the feet's speed at touchdown"
+    )
+
+
+def _impact_error(e: Evidence, knot: int) -> float:
+    """Of all generalised velocities behind the impulse at a knot; all of them without an impact."""
+    plan = e.plan
+    if knot + 1 >= len(plan.time) or plan.time[knot + 1] > plan.time[knot]:
+        return math.inf
+    dynamics = ExactDynamics(e.robot, plan.task.profile)
+    q, v, impulse = plan.position[knot], plan.velocity[knot], plan.contact_force[knot]
+    exact = dynamics.velocity_after_impact(q, v, impulse)
+    moved = np.abs(plan.position[knot + 1] - q).max()
+    return float(max(np.abs(exact - plan.velocity[knot + 1]).max(), moved))
 
 
 def machine(e: Evidence) -> Iterator[Found]:
@@ -324,12 +238,12 @@ def clearances(e: Evidence) -> Iterator[Found]:
     sample, number = worst(low)
     yield Found("foot_below_ground", low.max(), MILLIMETRE, "m", "how deep a foot is",
                 f"{names[number]} {e.moment(sample)}")  # fmt: skip
-    at = int(np.abs(e.flight_share - 0.5).argmin())
-    missing = task.foot_clearance - e.point_height[at]
+    at = [int(np.abs(e.progress - 0.5 - i).argmin()) for i in range(len(e.plan.flights))]
+    missing = task.foot_clearance - e.point_height[at].min(axis=0)
     yield Found("foot_clearance", missing.max(), MILLIMETRE, "m",
                 "what the feet lack of the clearance asked for in the middle of the flight",
                 names[int(missing.argmax())])  # fmt: skip
-    heights = body_heights(robot, task, e.poses, e.flight_share)
+    heights = body_heights(robot, task, e.poses, e.progress)
     link = min(heights, key=lambda name: float(heights[name].min()))
     sample = int(heights[link].argmin())
     yield Found("body_on_ground", -float(heights[link][sample]), 0.0, "m",

@@ -8,10 +8,10 @@ cure (a body in the way of a step, a task that is missed) is not tried again.
 from __future__ import annotations
 
 import math
-from collections import Counter
 
 from ..signals import Phase
 from .plan import JumpPlan
+from .resampling import segments
 from .task import JumpTask, Knots
 
 FACTOR = 1.5
@@ -41,13 +41,28 @@ def curable(plan: JumpPlan) -> bool:
 
 
 def finer_knots(plan: JumpPlan) -> Knots:
-    """Numbers of intervals for solving a plan's task again."""
-    count = Counter(int(phase) for phase in plan.phase[:-1])
-    of = {"squat": Phase.SQUAT, "thrust": Phase.THRUST,
-          "flight": Phase.FLIGHT, "landing": Phase.LANDING}  # fmt: skip
+    """Numbers of intervals for solving a plan's task again; of several phases of a kind the one
+    with the most counts."""
+    count = dict.fromkeys(("squat", "thrust", "flight", "landing"), 4)
+    for phase, start, stop in segments(plan.phase[:-1].tolist()):
+        name = Phase(phase).name.lower()
+        count[name] = max(count.get(name, 0), stop - start)
     return Knots.model_validate(
-        {name: math.ceil(FACTOR * count[int(phase)]) for name, phase in of.items()}
+        {name: math.ceil(FACTOR * count[name]) for name in Knots.model_fields}
     )
+
+
+def with_knots(task: JumpTask, knots: Knots) -> JumpTask:
+    """The task on those numbers of intervals; phases that name their own change in proportion."""
+    changed: dict[str, object] = {"knots": knots}
+    if task.phases is not None and knots != task.knots:
+        more = knots.total / task.knots.total
+        changed["phases"] = tuple(
+            span if span.knots is None
+            else span.model_copy(update={"knots": math.ceil(more * span.knots)})
+            for span in task.phases
+        )  # fmt: skip
+    return task.model_copy(update=changed)
 
 
 def asks_for_finer(task: JumpTask, plan: JumpPlan | None) -> bool:
