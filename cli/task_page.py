@@ -42,7 +42,7 @@ def _rows(owner: type[Parameters]) -> Iterator[str]:
 def _default(value: Any) -> str:
     if value is None:
         return "-"
-    if hasattr(value, "model_fields"):
+    if hasattr(type(value), "model_fields"):
         return "see below"
     if isinstance(value, bool):
         return str(value).lower()
