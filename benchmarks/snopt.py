@@ -56,7 +56,7 @@ class _OutOfTime(Exception):
 class _Callback:
     """A piece on a knot as a callback: rows, with minus the next state's in the gap, or the cost."""
 
-    def __init__(self, owner: SnoptProgram, piece: Any, parameters: Array, rows: Array,
+    def __init__(self, owner: SnoptProgram, piece: Any, parameters: Array, rows: Any,
                  gap: int) -> None:  # fmt: skip
         self.owner, self.piece, self.parameters = owner, piece, parameters
         self.kept, self.size = rows, int(piece.value.size1_in(0))
