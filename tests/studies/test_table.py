@@ -43,7 +43,9 @@ def test_columns_have_one_type_and_nulls_where_nothing_is(tmp_path: Path, study:
 
 
 def test_a_row_sums_up_its_cell(study: Read) -> None:
-    found = study("grid: {x: {counter.goal: [1, 2]}}\ngoals: [{rate: 0.9}, {rate: 0.5, where: {x: 1}}]\n")
+    found = study(
+        "grid: {x: {counter.goal: [1, 2]}}\ngoals: [{rate: 0.9}, {rate: 0.5, where: {x: 1}}]\n"
+    )
     first, second = summarise(found, two_cells(found))
     assert (first.n, first.successes, first.rate, first.errors) == (2, 1, 0.5, 0)
     assert (first.goal, first.met, second.goal, second.met) == (0.5, True, 0.9, False)
