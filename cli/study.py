@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from ..runtime.errors import ExitCode
+from ..runtime.errors import AloftError, ExitCode
 from .output import console, errors_reported, print_json, print_warning, say
-from .study_output import print_rows, study_json
+from .study_output import print_rows, print_tuned, study_json, tuned_json
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from ..studies.execution import Run
     from ..studies.expansion import Cell
     from ..studies.journal import Journal, Outcome
-    from ..studies.study import Study
+    from ..studies.study import Filter, Study
 
 
 def study(
@@ -30,6 +30,10 @@ def study(
     seeds: Annotated[
         str, typer.Option(help="Other seeds than the study's: 0:4 for a quick look.")
     ] = "",
+    where: Annotated[
+        list[str] | None,
+        typer.Option(help="Only part of the grid: axis=value, task=..., arm=... Repeatable."),
+    ] = None,
     tune: Annotated[
         bool, typer.Option("--tune", help="Tune the arms instead, and write what was found.")
     ] = False,
@@ -51,19 +55,28 @@ def study(
     where it was. Exits with 0 when all goals are met, 1 when one is missed, 3 when a run broke.
     """
     from ..runtime.seeds import parse_seeds
-    from ..studies.reading import read_study
+    from ..studies.reading import part_of, read_study
 
     screen = console(to_stderr=as_json)
     with errors_reported(as_json):
         found = read_study(file)
         chosen = parse_seeds(seeds) if seeds else list(found.seeds)
         folder = out or Path("results") / found.name
-        code = run_study(found, chosen, folder, workers, cluster, screen, as_json, dry_run=dry_run)
+        if tune:
+            if seeds or where:
+                raise AloftError("--seeds and --where are for runs; see the study's 'tune'")
+            code = tune_study(found, folder, workers, cluster, screen, as_json)
+        else:
+            part = part_of(found, where or [])
+            code = run_study(
+                found, part, chosen, folder, workers, cluster, screen, as_json, dry_run=dry_run
+            )
     raise typer.Exit(code)
 
 
 def run_study(
     found: Study,
+    part: Filter,
     seeds: Sequence[int],
     folder: Path,
     workers: int,
@@ -75,11 +88,19 @@ def run_study(
 ) -> ExitCode:
     """Make the study's runs; write and print what came of them."""
     from ..studies.execution import Run
+    from ..studies.expansion import cells as expand
     from ..studies.journal import Journal
+    from ..studies.plots import write_plots
     from ..studies.summary import summarise
     from ..studies.table import make_table, write_table
+    from ..studies.tuning import extreme_cells, read_tuned, tuned_path, tuning_cells
 
-    cells = check_cells(found, screen)
+    tuned = {} if dry_run and not tuned_path(found).is_file() else read_tuned(found)
+    chosen = [cell for cell in expand(found, tuned) if part.takes(cell.labels)]
+    cells = check_cells(found, chosen, screen)
+    if dry_run and found.tuning is not None:
+        tried = tuning_cells(found)
+        check_cells(found, [*tried, *extreme_cells(found, tried)], screen)
     runs = [Run(cell, seed) for cell in cells for seed in seeds]
     if dry_run:
         reason = f"{len(cells)} cells and {len(seeds)} seeds: {len(runs)} runs; no problems"
@@ -95,9 +116,16 @@ def run_study(
     rows = summarise(found, done)
     write_table(folder / "runs.parquet", make_table(done))
     result = study_json(found, rows, seeds, folder)
+    plots, undrawn = write_plots(found, done, rows, folder)
+    result["tuned"] = tuned
+    result["plots"] = {name: str(path) for name, path in plots.items()}
     (folder / "summary.json").write_text(json_text(result), encoding="utf-8")
     print_rows(screen, found, rows, seeds)
     say(screen, f"table: {folder / 'runs.parquet'}; summary: {folder / 'summary.json'}")
+    for path in plots.values():
+        say(screen, f"picture: {path}")
+    for problem in undrawn:
+        print_warning(problem)
     if as_json:
         print_json(result)
     elif result["success"]:
@@ -110,13 +138,43 @@ def run_study(
     return ExitCode.NOT_SUCCESSFUL if missed else ExitCode.SUCCESS
 
 
-def check_cells(found: Study, screen: Console) -> list[Cell]:
-    """All cells of the study, each checked as ``aloft check`` does."""
-    from ..studies.expansion import cells, checked_cells
+def tune_study(
+    found: Study, folder: Path, workers: int, cluster: str, screen: Console, as_json: bool
+) -> ExitCode:
+    """Search for every arm's best parameters; write and print them."""
+    from ..studies import tuning
+    from ..studies.journal import Journal
+
+    if found.tuning is None:
+        raise AloftError(f"{found.path} has no section 'tune'")
+    tried = tuning.tuning_cells(found)
+    if not tried:
+        raise AloftError(f"{found.path}: 'where' of 'tune' leaves nothing to run")
+    count = len(tried)
+    checked = check_cells(found, [*tried, *tuning.extreme_cells(found, tried)], screen)[:count]
+    planned = tuning.tuning_runs(found, checked)
+    runs = [run for _, _, run in planned]
+    with Journal(folder / "tuning.jsonl") as journal:
+        stopped = make_all(runs, journal, workers, cluster, screen, f"tuning {found.name}")
+        if isinstance(stopped, signal.Signals):
+            return report_stop(stopped, runs, journal, screen, as_json)
+    done = [(arm, draw, run) for (arm, draw, _), run in zip(planned, stopped, strict=True)]
+    best = tuning.best_draws(found, done)
+    path = tuning.write_tuned(found, best)
+    print_tuned(screen, found, best)
+    say(screen, f"tuned parameters: {path}")
+    broken = sum(bool(run.outcome and run.outcome.error) for run in stopped)
+    if as_json:
+        print_json(tuned_json(found, best, path, broken))
+    return ExitCode.SUCCESS
+
+
+def check_cells(found: Study, expanded: Sequence[Cell], screen: Console) -> list[Cell]:
+    """The cells, each checked as ``aloft check`` does."""
+    from ..studies.expansion import checked_cells
     from ..studies.fingerprint import code_fingerprint
     from .progress import progress_bar
 
-    expanded = list(cells(found))
     with progress_bar(screen, f"checking {len(expanded)} cells", len(expanded)) as (bar, task):
         return checked_cells(expanded, found, code_fingerprint(), lambda: bar.advance(task))
 
@@ -134,12 +192,13 @@ def make_all(
     from .progress import progress_bar
 
     successes = 0
-    known = sum(run.key in journal.outcomes for run in runs)
+    keys = {run.key for run in runs}
+    known = len(keys & journal.outcomes.keys())
     if known:
-        say(screen, f"{known} of {len(runs)} runs are there from before")
+        say(screen, f"{known} of {len(keys)} runs are there from before")
     with (
         stop_signals() as received,
-        progress_bar(screen, text, len(runs)) as (bar, task),
+        progress_bar(screen, text, len(keys)) as (bar, task),
     ):
 
         def on_run(outcome: Outcome) -> None:
@@ -176,10 +235,11 @@ def report_stop(
     stopped: signal.Signals, runs: Sequence[Run], journal: Journal, screen: Console, as_json: bool
 ) -> ExitCode:
     """Say how far it came."""
-    done = sum(run.key in journal.outcomes for run in runs)
-    reason = f"stopped by {stopped.name} after {done} of {len(runs)} runs, which are kept"
+    keys = {run.key for run in runs}
+    done, all_runs = len(keys & journal.outcomes.keys()), len(keys)
+    reason = f"stopped by {stopped.name} after {done} of {all_runs} runs, which are kept"
     if as_json:
-        print_json({"success": False, "reason": reason, "done": done, "runs": len(runs)})
+        print_json({"success": False, "reason": reason, "done": done, "runs": all_runs})
     else:
         print_warning(f"{reason}; the same command goes on from there")
     return ExitCode(128 + stopped)

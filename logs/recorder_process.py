@@ -155,7 +155,8 @@ class RecorderProcess:
             self._guard(self._writer.close)
             self._settle(flushed=True)
             self.sync()
-            self._syncing.join(LAST_SYNC)
+            if self._syncing.is_alive():
+                self._syncing.join(LAST_SYNC)
         if Path(self._task.path).is_file():
             self.report.size = Path(self._task.path).stat().st_size
         self.report.memory = _memory()

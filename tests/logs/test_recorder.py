@@ -11,7 +11,6 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
-import pytest
 
 from aloft.logs import RecordedRun, RecordingError, read
 from aloft.logs.recorder import Recorder
@@ -168,7 +167,7 @@ def test_the_run_goes_on_when_the_recorder_is_killed(tmp_path: Path) -> None:
     assert recorded.outcome is None
 
 
-def test_a_full_disk_is_a_warning(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+def test_a_full_disk_is_a_warning(tmp_path: Path) -> None:
     told: list[str] = []
     recorder = Recorder(tmp_path / "a.rrd", on_warning=told.append)
 
@@ -183,7 +182,6 @@ def test_a_full_disk_is_a_warning(tmp_path: Path, capfd: pytest.CaptureFixture[s
     assert "a.rrd cannot be written any further" in warning
     assert recorder.report is not None
     assert recorder.report.rows + recorder.report.lost == 20_000 and recorder.report.lost > 0
-    assert "warning: nothing more is recorded" in capfd.readouterr().err
     recorded = read(tmp_path / "a.rrd")
     assert result.log is not None
     count = len(recorded.ticks)
