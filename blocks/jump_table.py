@@ -13,7 +13,7 @@ from .signals import JumpReference, Phase
 
 Array = NDArray[np.float64]
 
-_FED_FORWARD = ("com_acceleration", "angular_momentum_rate")
+_FED_FORWARD = ("com_acceleration", "angular_momentum_rate", "joint_torque")
 
 
 @dataclass(frozen=True)
@@ -49,8 +49,8 @@ class JumpTableReader:
     def read(self, time: float, reference: JumpReference, lead: float = 0.0) -> None:
         """The reference at ``time``; before the table its first row, after it its last.
 
-        What a controller feeds forward, the acceleration and the rate of angular momentum, is
-        that of ``lead`` seconds later.
+        What a controller feeds forward, the acceleration, the rate of angular momentum and the
+        torques, is that of ``lead`` seconds later.
         """
         table = self._table
         here, there = locate(self._time, time), locate(self._time, time + lead)

@@ -36,12 +36,15 @@ def reference_table(plan: JumpPlan, robot: RobotDescription, stand_time: float) 
     """The plan as a table that begins with standing still for ``stand_time`` [s]."""
     dynamics = ExactDynamics(robot, plan.task.profile)
     lift_off, touchdown = flight_knots(plan)
-    forces = _MiddleForces(plan, lift_off, touchdown)
+    forces = _MiddleValues(plan, plan.contact_force, lift_off, touchdown)
+    torques = _MiddleValues(plan, plan.joint_torque, lift_off, touchdown)
     rows: dict[str, list[Array]] = {}
     times: list[float] = []
     for time, k, q, v in _states(plan, dynamics):
         times.append(time)
-        for name, value in _row(dynamics, q, v, forces.at(time, k)).items():
+        row = _row(dynamics, q, v, forces.at(time, k))
+        row["joint_torque"] = torques.at(time, k)
+        for name, value in row.items():
             rows.setdefault(name, []).append(value)
     columns = {name: np.array(values) for name, values in rows.items()}
     for foot in range(len(robot.feet)):
@@ -114,29 +117,31 @@ def _between(
     )
 
 
-class _MiddleForces:
-    """Contact forces at any time, linear between the middles of intervals on the same side of the
-    flight."""
+class _MiddleValues:
+    """What holds in the middle of the intervals, at any time: linear from one middle to the next,
+    never across lift-off or touchdown."""
 
-    def __init__(self, plan: JumpPlan, lift_off: int, touchdown: int) -> None:
-        self._plan = plan
+    def __init__(self, plan: JumpPlan, values: Array, lift_off: int, touchdown: int) -> None:
+        self._time, self._values = plan.time, values
         lasting = np.flatnonzero(np.diff(plan.time) > 0.0)
-        self._groups = [lasting[lasting < lift_off], lasting[lasting >= touchdown]]
+        self._groups = [
+            lasting[lasting < lift_off],
+            lasting[(lasting >= lift_off) & (lasting < touchdown)],
+            lasting[lasting >= touchdown],
+        ]
         self._flight = (lift_off, touchdown)
 
     def at(self, time: float, interval: int) -> Array:
-        """The forces [N], (n_contacts, 3), at an instant of that interval."""
-        plan, (lift_off, touchdown) = self._plan, self._flight
-        if lift_off <= interval < touchdown:
-            return np.zeros(plan.contact_force.shape[1:])
-        group = self._groups[0] if interval < lift_off else self._groups[1]
-        middles = 0.5 * (plan.time[group] + plan.time[group + 1])
+        """The values at an instant of that interval."""
+        lift_off, touchdown = self._flight
+        group = self._groups[(interval >= lift_off) + (interval >= touchdown)]
+        middles = 0.5 * (self._time[group] + self._time[group + 1])
         after = int(np.searchsorted(middles, time))
         if after in (0, len(middles)):
-            return np.asarray(plan.contact_force[group[min(after, len(middles) - 1)]])
+            return np.asarray(self._values[group[min(after, len(middles) - 1)]])
         before = after - 1
         share = (time - middles[before]) / (middles[after] - middles[before])
-        first, second = plan.contact_force[group[before]], plan.contact_force[group[after]]
+        first, second = self._values[group[before]], self._values[group[after]]
         return np.asarray(first + share * (second - first))
 
 
