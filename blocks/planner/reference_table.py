@@ -35,13 +35,14 @@ STEP = 0.002
 def reference_table(plan: JumpPlan, robot: RobotDescription, stand_time: float) -> JumpTable:
     """The plan as a table that begins with standing still for ``stand_time`` [s]."""
     dynamics = ExactDynamics(robot, plan.task.profile)
-    lift_off, touchdown = flight_knots(plan)
-    forces = _MiddleValues(plan, plan.contact_force, lift_off, touchdown)
-    torques = _MiddleValues(plan, plan.joint_torque, lift_off, touchdown)
+    forces = _MiddleValues(plan, plan.contact_force)
+    torques = _MiddleValues(plan, plan.joint_torque)
     rows: dict[str, list[Array]] = {}
     times: list[float] = []
+    intervals: list[int] = []
     for time, k, q, v in _states(plan, dynamics):
         times.append(time)
+        intervals.append(k)
         row = _row(dynamics, q, v, forces.at(time, k))
         row["joint_torque"] = torques.at(time, k)
         for name, value in row.items():
@@ -69,7 +70,25 @@ def reference_table(plan: JumpPlan, robot: RobotDescription, stand_time: float) 
         stand_time + plan.lift_off_time,
         stand_time + plan.touchdown_time,
         start.get(Phase.RECOVER, end),
+        tuple(_later_jumps(plan, stand_time)),
+        _contacts(plan, intervals),
     )
+
+
+def _later_jumps(plan: JumpPlan, stand_time: float) -> Iterator[tuple[float, float, float]]:
+    """When thrust, flight and landing of the jumps behind the first begin."""
+    for before, (lift_off, touchdown) in zip(plan.touchdown_times, plan.later_flights, strict=False):
+        between = (plan.time > before - 1e-9) & (plan.time < lift_off - 1e-9)
+        thrust = plan.time[between & (plan.phase == Phase.THRUST)]
+        begin = float(thrust[0]) if len(thrust) else before
+        yield stand_time + begin, stand_time + lift_off, stand_time + touchdown
+
+
+def _contacts(plan: JumpPlan, intervals: list[int]) -> NDArray[np.bool_] | None:
+    """By row which points carry load, where it is not always all of them or none."""
+    if np.all(plan.contact == (plan.phase != Phase.FLIGHT)[:, None]):
+        return None
+    return np.concatenate([plan.contact[[0, 0]], plan.contact[intervals]])
 
 
 def _states(plan: JumpPlan, dynamics: ExactDynamics) -> Iterator[State]:
@@ -121,20 +140,16 @@ class _MiddleValues:
     """What holds in the middle of the intervals, at any time: linear from one middle to the next,
     never across lift-off or touchdown."""
 
-    def __init__(self, plan: JumpPlan, values: Array, lift_off: int, touchdown: int) -> None:
+    def __init__(self, plan: JumpPlan, values: Array) -> None:
         self._time, self._values = plan.time, values
         lasting = np.flatnonzero(np.diff(plan.time) > 0.0)
-        self._groups = [
-            lasting[lasting < lift_off],
-            lasting[(lasting >= lift_off) & (lasting < touchdown)],
-            lasting[lasting >= touchdown],
-        ]
-        self._flight = (lift_off, touchdown)
+        ends = [knot for flight in flight_knots(plan) for knot in flight]
+        self._groups = np.split(lasting, np.searchsorted(lasting, ends))
+        self._ends = np.array(ends)
 
     def at(self, time: float, interval: int) -> Array:
         """The values at an instant of that interval."""
-        lift_off, touchdown = self._flight
-        group = self._groups[(interval >= lift_off) + (interval >= touchdown)]
+        group = self._groups[int(np.searchsorted(self._ends, interval, side="right"))]
         middles = 0.5 * (self._time[group] + self._time[group + 1])
         after = int(np.searchsorted(middles, time))
         if after in (0, len(middles)):
