@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from .runtime.errors import AloftError, BlockError, RunError
     from .runtime.graph import Graph, load
     from .runtime.loading import LoadError
-    from .runtime.parameters import Parameters, parameter
+    from .runtime.parameters import Parameters, live_parameter, parameter
     from .runtime.run_result import RunResult
     from .runtime.signals import Field, Signal
 
@@ -26,7 +26,7 @@ _HOMES = {
     **dict.fromkeys(("AloftError", "BlockError", "RunError"), "runtime.errors"),
     **dict.fromkeys(("Graph", "load"), "runtime.graph"),
     "LoadError": "runtime.loading",
-    **dict.fromkeys(("Parameters", "parameter"), "runtime.parameters"),
+    **dict.fromkeys(("Parameters", "live_parameter", "parameter"), "runtime.parameters"),
     "RunResult": "runtime.run_result",
     **dict.fromkeys(("Field", "Signal"), "runtime.signals"),
 }
@@ -46,6 +46,7 @@ __all__ = [
     "Signal",
     "State",
     "__version__",
+    "live_parameter",
     "load",
     "parameter",
     "write_recording",

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ..runtime.block import Block, Input, Output, State
 from ..runtime.kernel import kernel
-from ..runtime.parameters import Parameters, parameter
+from ..runtime.parameters import Parameters, live_parameter
 from ..runtime.signals import Field, Signal
 from .polynomials import minimum_jerk
 from .rotations import conjugate, exponential, from_matrix, logarithm, multiply
@@ -46,14 +46,16 @@ class BalanceTarget(Block):
     """
 
     class Params(Parameters):
-        landing_depth: float = parameter(
+        landing_depth: float = live_parameter(
             0.06, unit="m", ge=0.0, le=0.2, text="height held after touchdown, below standing"
         )
-        rise_time: float = parameter(0.6, unit="s", gt=0.0, text="from there to standing height")
-        trim_rate: float = parameter(
+        rise_time: float = live_parameter(
+            0.6, unit="s", gt=0.0, text="from there to standing height"
+        )
+        trim_rate: float = live_parameter(
             3.0, unit="1/s", ge=0.0, le=20.0, text="how fast a steady tilt is integrated away"
         )
-        trim_limit: float = parameter(
+        trim_limit: float = live_parameter(
             0.08, unit="rad", ge=0.0, le=0.5, text="largest trim about each axis"
         )
 

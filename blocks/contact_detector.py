@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from ..runtime.block import Block, Input, Output, State
 from ..runtime.kernel import kernel
-from ..runtime.parameters import Parameters, parameter
+from ..runtime.parameters import Parameters, live_parameter
 from ..runtime.signals import Field, Signal
 from .signals import ContactState, ContactSwitches
 
@@ -33,10 +33,10 @@ class ContactDetector(Block):
     """
 
     class Params(Parameters):
-        hold: float = parameter(
+        hold: float = live_parameter(
             0.03, unit="s", ge=0.0, text="how long a point stays active after its switch opens"
         )
-        close_samples: int = parameter(
+        close_samples: int = live_parameter(
             1, ge=1, text="ticks a switch must be closed before its point is active"
         )
 

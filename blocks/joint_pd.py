@@ -9,7 +9,7 @@ from ..runtime.block import Block, Input, Output, State
 from ..runtime.description import RobotDescription
 from ..runtime.errors import BlockError
 from ..runtime.kernel import kernel
-from ..runtime.parameters import Parameters, parameter
+from ..runtime.parameters import Parameters, live_parameter, parameter
 from ..runtime.signals import Field, Signal
 from .signals import (
     CommandMode,
@@ -59,28 +59,32 @@ class JointPD(Block):
     """
 
     class Params(Parameters):
-        flight_stiffness: list[float] = parameter(
+        flight_stiffness: list[float] = live_parameter(
             [40.0, 60.0, 60.0, 60.0, 15.0], unit="N m/rad", text="Kp in the air, per leg joint"
         )
-        flight_damping: list[float] = parameter(
+        flight_damping: list[float] = live_parameter(
             [1.0, 1.5, 1.5, 1.2, 0.3], unit="N m s/rad", text="Kd in the air, per leg joint"
         )
-        flight_feedforward: float = parameter(
+        flight_feedforward: float = live_parameter(
             1.0, ge=0.0, le=1.0, text="share of the planned torques that is fed forward in the air"
         )
-        stance_stiffness: list[float] = parameter(
+        stance_stiffness: list[float] = live_parameter(
             [0.0] * 5, unit="N m/rad", text="Kp on the ground, per leg joint"
         )
-        stance_damping: list[float] = parameter(
+        stance_damping: list[float] = live_parameter(
             [0.0] * 5, unit="N m s/rad", text="Kd on the ground, per leg joint"
         )
-        blend: float = parameter(0.004, unit="s", ge=0.0, text="from one set of gains to another")
+        blend: float = live_parameter(
+            0.004, unit="s", ge=0.0, text="from one set of gains to another"
+        )
         stance_feedback: bool = parameter(
             False, text="integrate the whole-body accelerations to stance targets"
         )
-        leak: float = parameter(0.02, unit="s", gt=0.0, text="how fast those forget")
-        friction: float = parameter(0.0, unit="N m", ge=0.0, text="joint friction to compensate")
-        friction_speed: float = parameter(
+        leak: float = live_parameter(0.02, unit="s", gt=0.0, text="how fast those forget")
+        friction: float = live_parameter(
+            0.0, unit="N m", ge=0.0, text="joint friction to compensate"
+        )
+        friction_speed: float = live_parameter(
             0.3, unit="rad/s", gt=0.0, text="joint speed at which most of it is compensated"
         )
 
@@ -100,8 +104,18 @@ class JointPD(Block):
             raise BlockError("JointPD needs a robot: name one in the graph, e.g. robot: bruce")
         self._chains = [leg_joints(robot, foot) for foot in range(len(robot.feet))]
         self._foot_of_point = robot.foot_of_contact()
+        self.on_parameters()
         n = len(robot.joints)
-        gains = np.zeros((4, n))
+        self._airborne = np.zeros(n)
+        self._grounded = np.zeros(n)
+        self._part = np.zeros(n)
+        self._stance_position = np.zeros(n)
+        self._stance_velocity = np.zeros(n)
+
+    def on_parameters(self) -> None:
+        robot = self.context.robot
+        assert robot is not None
+        gains = np.zeros((4, len(robot.joints)))
         for row, name in enumerate(
             ("flight_stiffness", "flight_damping", "stance_stiffness", "stance_damping")
         ):
@@ -115,11 +129,6 @@ class JointPD(Block):
                 gains[row, list(chain)] = values
         self._flight_stiffness, self._flight_damping = gains[0], gains[1]
         self._stance_stiffness, self._stance_damping = gains[2], gains[3]
-        self._airborne = np.zeros(n)
-        self._grounded = np.zeros(n)
-        self._part = np.zeros(n)
-        self._stance_position = np.zeros(n)
-        self._stance_velocity = np.zeros(n)
 
     def step(self) -> None:
         self._blend()

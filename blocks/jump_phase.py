@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ..runtime.block import Block, Input, Output, State
 from ..runtime.errors import BlockError
 from ..runtime.kernel import kernel
-from ..runtime.parameters import Parameters, parameter
+from ..runtime.parameters import Parameters, live_parameter
 from ..runtime.signals import Field, Signal
 from .signals import ContactState, DynamicsTerms, JumpReference, Phase, PhaseState
 
@@ -60,25 +60,25 @@ class JumpPhase(Block):
     """
 
     class Params(Parameters):
-        late_lift_off: float = parameter(
+        late_lift_off: float = live_parameter(
             0.0, unit="s", ge=0.0, text="how long to wait for the feet to leave the ground"
         )
-        early_lift_off: float = parameter(
+        early_lift_off: float = live_parameter(
             0.01, unit="s", gt=0.0, text="without any contact for this long the robot flies"
         )
-        touchdown_share: float = parameter(
+        touchdown_share: float = live_parameter(
             0.5, ge=0.0, le=1.0, text="share of the predicted flight before touchdown counts"
         )
-        landing_time: float = parameter(
+        landing_time: float = live_parameter(
             0.35, unit="s", ge=0.0, text="from touchdown until the robot rises again"
         )
-        contact_hold: float = parameter(
+        contact_hold: float = live_parameter(
             0.0, unit="s", ge=0.0, text="how long a point stays in stance after its contact ends"
         )
-        flat_height: float = parameter(
+        flat_height: float = live_parameter(
             0.006, unit="m", ge=0.0, text="how far a foot's other points may be from the ground"
         )
-        lost_contact: float = parameter(
+        lost_contact: float = live_parameter(
             0.2, unit="s", gt=0.0, text="how long without contact before it is a fault"
         )
 

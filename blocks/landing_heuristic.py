@@ -12,7 +12,7 @@ from ..runtime.block import Block, Input, Output, State
 from ..runtime.description import RobotDescription
 from ..runtime.errors import BlockError
 from ..runtime.kernel import kernel
-from ..runtime.parameters import Parameters, parameter
+from ..runtime.parameters import Parameters, live_parameter, parameter
 from ..runtime.signals import Field, Signal
 from .polynomials import minimum_jerk
 from .rotations import conjugate, cross, exponential, from_matrix, logarithm, multiply, to_matrix
@@ -70,28 +70,28 @@ class LandingHeuristic(Block):
         law: Literal["paper", "deviation"] = parameter(
             "deviation", text="which momentum is fed back: all of it, or what was not planned"
         )
-        w_l: tuple[float, float] = parameter(
+        w_l: tuple[float, float] = live_parameter(
             (0.03, 0.04), unit="s/kg", text="W_l: metres per linear momentum along x and y"
         )
-        w_k: tuple[float, float] = parameter(
+        w_k: tuple[float, float] = live_parameter(
             (0.0, 0.0), unit="s/(kg m)", text="W_k: metres per angular momentum about y and x"
         )
-        w_c: float = parameter(
+        w_c: float = live_parameter(
             0.04, unit="s/kg", ge=0.0, text="W_c: sideways clearance per lateral momentum"
         )
-        p_max: tuple[float, float] = parameter(
+        p_max: tuple[float, float] = live_parameter(
             (0.15, 0.16), unit="m", text="farthest places ahead and aside the leg can reach"
         )
-        alpha: float = parameter(
+        alpha: float = live_parameter(
             1.0, ge=0.0, le=1.0, text="share of the torso's rotation that the legs make up for"
         )
-        reach_share: float = parameter(
+        reach_share: float = live_parameter(
             0.7, gt=0.0, le=1.0, text="share of the predicted flight by which the feet are there"
         )
-        retraction: float = parameter(
+        retraction: float = live_parameter(
             0.3, unit="m/s", ge=0.0, le=2.0, text="upward speed of the feet at touchdown"
         )
-        retraction_time: float = parameter(
+        retraction_time: float = live_parameter(
             0.06, unit="s", gt=0.0, text="how long before touchdown it begins"
         )
 
@@ -106,10 +106,9 @@ class LandingHeuristic(Block):
         robot = self.context.robot
         if robot is None:
             raise BlockError("LandingHeuristic needs a robot: name one, e.g. robot: bruce")
-        p = self.params
         self._mass = robot.total_mass
         self._sides = foot_sides(robot)
-        self._w_l, self._w_k, self._p_max = np.array(p.w_l), np.array(p.w_k), np.array(p.p_max)
+        self.on_parameters()
         n = len(robot.feet)
         self._place, self._speed = np.zeros((n, 3)), np.zeros(3)
         self._linear, self._angular = np.zeros(3), np.zeros(3)
@@ -117,6 +116,10 @@ class LandingHeuristic(Block):
         self._rotation, self._heading = np.zeros((3, 3)), np.zeros((3, 3))
         self._vector, self._com_body, self._rate = np.zeros(3), np.zeros(3), np.zeros(3)
         self._scratch = np.zeros(3)
+
+    def on_parameters(self) -> None:
+        p = self.params
+        self._w_l, self._w_k, self._p_max = np.array(p.w_l), np.array(p.w_k), np.array(p.p_max)
 
     def step(self) -> None:
         p, reference, terms, memory = self.params, self.reference, self.terms, self.memory

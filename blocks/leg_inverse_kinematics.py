@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ..runtime.block import Block, Input, Output, State
 from ..runtime.errors import BlockError
 from ..runtime.kernel import kernel
-from ..runtime.parameters import Parameters, parameter
+from ..runtime.parameters import Parameters, live_parameter, parameter
 from ..runtime.signals import Field, Signal
 from .leg_kinematics import forward, inverse, inverse_velocity, jacobian, read_leg
 from .signals import FootTarget, JointState, JointTarget
@@ -52,10 +52,14 @@ class LegInverseKinematics(Block):
 
     class Params(Parameters):
         margin: float = parameter(0.05, unit="rad", ge=0.0, le=0.2, text="kept from joint limits")
-        damping: float = parameter(3e-4, unit="m", gt=0.0, text="of the least squares for velocity")
-        speed_limit: float = parameter(30.0, unit="rad/s", gt=0.0, text="largest joint velocity")
+        damping: float = live_parameter(
+            3e-4, unit="m", gt=0.0, text="of the least squares for velocity"
+        )
+        speed_limit: float = live_parameter(
+            30.0, unit="rad/s", gt=0.0, text="largest joint velocity"
+        )
 
-        softness: float = parameter(
+        softness: float = live_parameter(
             0.005, unit="m", ge=0.0, le=0.05, text="over which a stretching leg slows down"
         )
 

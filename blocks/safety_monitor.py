@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ..runtime.block import Block, Input, Metric, Output, State
 from ..runtime.errors import BlockError
 from ..runtime.kernel import kernel
-from ..runtime.parameters import Parameters, parameter
+from ..runtime.parameters import Parameters, live_parameter, parameter
 from ..runtime.signals import Field, Signal
 from .rotations import tilt
 from .signals import BaseState, CommandMode, JointCommand, JointState, WholeBodyCommand
@@ -90,7 +90,7 @@ class SafetyMonitor(Block):
         )
         stale_ticks: int = parameter(0, ge=0, text="equal joint readings in a row; zero: any")
         unsolved_ticks: int = parameter(25, ge=0, text="ticks in a row without a solution")
-        damping: float = parameter(
+        damping: float = live_parameter(
             0.5, unit="N m s/rad", ge=0.0, text="of every joint, when damped"
         )
 

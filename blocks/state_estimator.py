@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..runtime.block import Block, Input, Output, State
 from ..runtime.errors import BlockError
-from ..runtime.parameters import Parameters, parameter
+from ..runtime.parameters import Parameters, live_parameter, parameter
 from ..runtime.signals import Field, Signal
 from .contact_kinematics import ContactKinematics
 from .inertial_filter import (
@@ -114,25 +114,27 @@ class StateEstimator(Block):
     class Params(Parameters):
         law: Literal["weighted", "complementary"] = parameter("weighted", text="see above")
         flight: Literal["imu", "ballistic"] = parameter("imu", text="see above")
-        velocity_gain: float = parameter(0.03, gt=0.0, le=1.0, text="per tick, of the legs")
-        position_gain: float = parameter(0.05, gt=0.0, le=1.0, text="per tick, of the legs")
-        tilt_gain: float = parameter(0.002, ge=0.0, le=1.0, text="per tick, of the accelerometer")
-        gate: float = parameter(
+        velocity_gain: float = live_parameter(0.03, gt=0.0, le=1.0, text="per tick, of the legs")
+        position_gain: float = live_parameter(0.05, gt=0.0, le=1.0, text="per tick, of the legs")
+        tilt_gain: float = live_parameter(
+            0.002, ge=0.0, le=1.0, text="per tick, of the accelerometer"
+        )
+        gate: float = live_parameter(
             0.08, unit="m/s", gt=0.0, text="speed at which a point is trusted by a quarter"
         )
-        gate_growth: float = parameter(
+        gate_growth: float = live_parameter(
             2.0, unit="m/s^2", ge=0.0, text="how fast it opens while all points are rejected"
         )
-        support: float = parameter(
+        support: float = live_parameter(
             4.0, unit="m/s^2", gt=0.0, text="upward specific force at which contacts count in full"
         )
         level_ground: bool = parameter(
             True, text="all points are at one height whenever all are in contact"
         )
-        still_rate: float = parameter(
+        still_rate: float = live_parameter(
             0.08, unit="rad/s", gt=0.0, text="rate of base and joints below which it stands still"
         )
-        slow_rate: float = parameter(
+        slow_rate: float = live_parameter(
             1.5, unit="rad/s", gt=0.0, text="rate below which its feet are surely flat"
         )
 

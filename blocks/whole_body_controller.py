@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..runtime.block import Block, Input, Output, State
 from ..runtime.errors import BlockError
-from ..runtime.parameters import Parameters, parameter
+from ..runtime.parameters import Parameters, live_parameter, parameter
 from ..runtime.signals import Field, Signal
 from .quadratic_program import QuadraticProgramSolver
 from .rotations import from_matrix
@@ -98,16 +98,18 @@ class WholeBodyController(Block):
         solver: str = parameter("daqp", text="any dense solver that qpsolvers finds installed")
         limits: Literal["none", "joint", "motor"] = parameter("motor", text="torque limits")
         actuators: str = parameter("koala", text="the actuator profile of the limits")
-        torque_margin: float = parameter(
+        torque_margin: float = live_parameter(
             0.97, gt=0.0, le=1.0, text="share of the limits that is used"
         )
-        friction: float = parameter(0.5, gt=0.0, le=2.0, text="mu_c of the friction pyramid")
-        force_min: float = parameter(0.0, unit="N", ge=0.0, text="least normal force of a point")
-        force_max: float = parameter(400.0, unit="N", gt=0.0, text="largest one")
-        force_weight: float = parameter(1e-4, gt=0.0, text="W_f")
-        acceleration_weight: float = parameter(1e-4, gt=0.0, text="W_a")
-        stand: TaskGains = parameter(TaskGains(), text="gains while standing and squatting")
-        thrust: TaskGains = parameter(
+        friction: float = live_parameter(0.5, gt=0.0, le=2.0, text="mu_c of the friction pyramid")
+        force_min: float = live_parameter(
+            0.0, unit="N", ge=0.0, text="least normal force of a point"
+        )
+        force_max: float = live_parameter(400.0, unit="N", gt=0.0, text="largest one")
+        force_weight: float = live_parameter(1e-4, gt=0.0, text="W_f")
+        acceleration_weight: float = live_parameter(1e-4, gt=0.0, text="W_a")
+        stand: TaskGains = live_parameter(TaskGains(), text="gains while standing and squatting")
+        thrust: TaskGains = live_parameter(
             TaskGains(
                 linear_weight=(100.0, 600.0, 100.0),
                 linear_stiffness=(100.0, 200.0, 500.0),
@@ -119,7 +121,7 @@ class WholeBodyController(Block):
             ),
             text="gains in the thrust: angular momentum before the torso",
         )
-        landing: TaskGains = parameter(
+        landing: TaskGains = live_parameter(
             TaskGains(
                 linear_weight=(107.0, 107.0, 107.0),
                 linear_stiffness=(48.0, 60.0, 120.0),
@@ -131,7 +133,7 @@ class WholeBodyController(Block):
             text="gains after touchdown",
         )
         fallback_ticks: int = parameter(5, ge=0, text="ticks the last torque is held on failure")
-        fallback_decay: float = parameter(
+        fallback_decay: float = live_parameter(
             0.9, ge=0.0, le=1.0, text="factor on it per tick since the last solved program"
         )
 
@@ -164,9 +166,7 @@ class WholeBodyController(Block):
         self._transmission = robot.torque_to_motor if motor else np.eye(n_joints)
         limit_rows = 0 if p.limits == "none" else 2 * n_joints
         n = 6 + n_joints
-        self._gains = {
-            kind: GainArrays.of(getattr(p, kind)) for kind in ("stand", "thrust", "landing")
-        }
+        self.on_parameters()
         self._rows = np.zeros((3 * n_contacts + 9, n))
         self._desired, self._weights = np.zeros(len(self._rows)), np.zeros(len(self._rows))
         self._weighted, self._block = np.zeros_like(self._rows), np.zeros((n, n))
@@ -179,6 +179,12 @@ class WholeBodyController(Block):
         # A program of its own size for every number of points in stance: forces fixed to zero by
         # bounds would leave it without an interior.
         self._programs = [_Program.of(n, k, limit_rows) for k in range(n_contacts + 1)]
+
+    def on_parameters(self) -> None:
+        self._gains = {
+            kind: GainArrays.of(getattr(self.params, kind))
+            for kind in ("stand", "thrust", "landing")
+        }
 
     def step(self) -> None:
         memory, command = self.memory, self.command

@@ -85,7 +85,7 @@ def print_contract(out: Console, block: BlockReference) -> None:
             )
     if block.parameters:
         rows = [
-            (p.name, p.type, p.default or "required", p.unit, p.bounds, p.text)
+            (p.name, p.type, p.default or "required", p.unit, p.bounds, p.full_text)
             for p in block.parameters
         ]
         out.print()

@@ -9,7 +9,8 @@ from ..runtime.reference import BlockReference, PortReference
 HEAD = """# Blocks
 
 Made from the code by `aloft blocks --markdown > docs/blocks.md`; do not edit. A *Mealy* block's
-outputs follow from its inputs in the same tick, a *Moore* block's from its state alone.
+outputs follow from its inputs in the same tick, a *Moore* block's from its state alone. Parameters
+marked *live* can be changed while a graph runs: `aloft params set block.parameter=value`.
 """
 
 
@@ -39,7 +40,7 @@ def section(block: BlockReference) -> str:
         parts += ["**Parameters**", "", "| name | type | default | unit | bounds | what it is |"]
         parts += ["|---|---|---|---|---|---|"]
         for p in block.parameters:
-            cells = (f"`{p.name}`", p.type, p.default or "required", p.unit, p.bounds, p.text)
+            cells = (f"`{p.name}`", p.type, p.default or "required", p.unit, p.bounds, p.full_text)
             parts.append(row(cells))
         parts.append("")
     return "\n".join(parts)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import signal
 import sys
+from collections.abc import Sequence
 from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -27,8 +28,10 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from ..runtime.graph import Graph
+    from ..runtime.parameter_endpoint import ParameterEndpoint
     from ..runtime.run_result import RunResult
     from ..runtime.seeds import SeedRow
+    from ..runtime.sinks import Sink
 
 MOST_METRIC_COLUMNS = 5
 
@@ -50,6 +53,13 @@ def run(
         typer.Option(help="Where the recording goes; by default recordings/NAME.rrd."),
     ] = None,
     no_record: Annotated[bool, typer.Option("--no-record", help="Write no recording.")] = False,
+    params: Annotated[
+        str,
+        typer.Option(
+            help="Let `aloft params` reach this run by that name; a run in real time is reached "
+            "by its graph's name anyway. 'none': not at all."
+        ),
+    ] = "",
     as_json: Annotated[
         bool, typer.Option("--json", help="Tables go to standard error, one JSON object to output.")
     ] = False,
@@ -69,17 +79,36 @@ def run(
         else:
             loaded = load(graph, settings)
             default = Path("recordings") / f"{loaded.checked.name}.rrd"
-            code = run_once(loaded, None if no_record else record or default, out, as_json)
+            endpoint = open_endpoint(loaded, params)
+            sinks = [endpoint] if endpoint is not None else []
+            code = run_once(loaded, None if no_record else record or default, out, as_json, sinks)
     raise typer.Exit(code)
 
 
-def run_once(graph: Graph, record: Path | None, out: Console, as_json: bool) -> ExitCode:
+def open_endpoint(graph: Graph, name: str) -> ParameterEndpoint | None:
+    """Where `aloft params` reaches the run; where nobody asked for it, it may fail."""
+    from . import endpoints
+
+    if name == "none" or not (name or graph.checked.clock.kind != "free"):
+        return None
+    try:
+        return endpoints.open_endpoint(name or graph.checked.name)
+    except AloftError as error:
+        if name:
+            raise
+        print_warning(f"`aloft params` cannot reach this run: {error}")
+        return None
+
+
+def run_once(
+    graph: Graph, record: Path | None, out: Console, as_json: bool, sinks: Sequence[Sink] = ()
+) -> ExitCode:
     """Run the graph, record it, print what came of it."""
     from .progress import TickCounter, progress_bar
 
     name = graph.checked.name
     with progress_bar(out, f"running {name}", graph.checked.ticks) as (progress, task):
-        result = graph.run(sinks=[TickCounter(progress, task)])
+        result = graph.run(sinks=[TickCounter(progress, task), *sinks])
     recording = write_recording(record, result) if record is not None else None
     print_result(out, name, result)
     if recording is not None:

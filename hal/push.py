@@ -9,7 +9,7 @@ import numpy as np
 
 from ..blocks.signals import ExternalForce, RobotTruth
 from ..runtime.block import Block, Input, Output, State
-from ..runtime.parameters import Parameters, parameter
+from ..runtime.parameters import Parameters, live_parameter, parameter
 from ..runtime.signals import Field, Signal
 
 
@@ -40,14 +40,14 @@ class Push(Block):
     """
 
     class Params(Parameters):
-        force: float = parameter(70.0, unit="N", ge=0, text="magnitude; zero: no push")
-        angle: float = parameter(0.0, unit="rad", text="direction, from forward to the left")
-        elevation: float = parameter(0.0, unit="rad", text="direction, above the horizontal")
-        duration: float = parameter(0.01, unit="s", gt=0, text="how long it lasts")
+        force: float = live_parameter(70.0, unit="N", ge=0, text="magnitude; zero: no push")
+        angle: float = live_parameter(0.0, unit="rad", text="direction, from forward to the left")
+        elevation: float = live_parameter(0.0, unit="rad", text="direction, above the horizontal")
+        duration: float = live_parameter(0.01, unit="s", gt=0, text="how long it lasts")
         trigger: Literal["lift_off", "start"] = parameter(
             "lift_off", text="what the delay is counted from"
         )
-        delay: float = parameter(0.03, unit="s", ge=0, text="from the trigger to the push")
+        delay: float = live_parameter(0.03, unit="s", ge=0, text="from the trigger to the push")
         point: str = parameter("torso_com", text="a named point of the robot's description")
 
     params: Params
@@ -66,6 +66,11 @@ class Push(Block):
                 f"{robot.name} has no point {params.point!r}; it has {', '.join(points)}"
             )
         self._point = points.index(params.point)
+        self.on_parameters()
+
+    def on_parameters(self) -> None:
+        """Work out the force."""
+        params = self.params
         flat = math.cos(params.elevation)
         direction = [flat * math.cos(params.angle), flat * math.sin(params.angle)]
         self._force = params.force * np.array([*direction, math.sin(params.elevation)])

@@ -29,7 +29,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, ClassVar, Generic, Self, TypeVar, overload
+from typing import Any, ClassVar, Generic, Literal, Self, TypeVar, overload
 
 import numpy as np
 
@@ -156,6 +156,10 @@ class Block:
     outputs: ClassVar[Mapping[str, Output[Any]]] = {}
     states: ClassVar[Mapping[str, State[Any]]] = {}
 
+    outside: ClassVar[Literal["no", "simulated", "real"]] = "no"
+    """Whether outputs come from outside the graph: from a simulator, which repeats itself, or from
+    the real world (a robot, another machine), which does not and is replayed from a recording."""
+
     array_allocations: ClassVar[int] = 0
     """How many arrays a tick may allocate. Not zero only where a library leaves no choice; the
     class then says which in ``allocation_reason``."""
@@ -254,6 +258,15 @@ class Block:
 
     def setup(self) -> None:
         """Build models and scratch arrays, once, after the ports are bound."""
+
+    def on_parameters(self) -> None:
+        """Take over live parameters that have changed in ``self.params``, between two ticks.
+
+        Recompute what ``setup`` derived from them; ``setup`` may well call this. After it the
+        block must go on exactly as one that had these parameters from the start and is in the
+        same state, so it writes neither state nor outputs. It runs on the control thread. Should
+        it raise, the old parameters come back and the change is refused with the error's text.
+        """
 
     def start(self) -> None:
         """Open what the run needs; called once before the first tick."""

@@ -6,7 +6,7 @@ While a run goes on the garbage collector is off and what exists is frozen.
 from __future__ import annotations
 
 import gc
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from typing import Any
 
@@ -35,6 +35,8 @@ class Executor:
         timing: whether to time every block. Only benchmarks switch it off.
         finite_check: whether to check every tick. Only benchmarks switch it off.
         time_source: what time is; tests have one of their own.
+        on_ready: called once all blocks have started, before the first tick; a replay restores a
+            keyframe here.
 
     Raises:
         RunError: a block could not be set up.
@@ -52,6 +54,7 @@ class Executor:
         timing: bool = True,
         finite_check: bool = True,
         time_source: TimeSource | None = None,
+        on_ready: Callable[[], None] | None = None,
     ) -> None:
         self.bound = graph if isinstance(graph, BoundGraph) else BoundGraph(graph)
         self.life = LifeCycle(self.bound.blocks)
@@ -68,6 +71,7 @@ class Executor:
         own: list[Sink] = [sink for sink in (self._log, self._hash) if sink is not None]
         self._sinks: list[Sink] = [*own, *sinks]
         self._opened: list[Sink] = []
+        self._on_ready = on_ready
 
     def run(self, ticks: int | None = None) -> RunResult:
         """The whole life of the graph, once: start, tick, stop cycles, close.
@@ -95,6 +99,8 @@ class Executor:
                     interrupts.armed = True
                     self._open_sinks(limit)
                     self.life.start()
+                    if self._on_ready is not None:
+                        self._on_ready()
                     self.life.move(LifeState.RUNNING)
                     start_time = self._time.now()
                     self.ticker.advance(limit)
@@ -171,6 +177,7 @@ class Executor:
             skipped_periods=pacer.skipped_periods if pacer is not None else 0,
             error=error,
             stop_problems=tuple(problems),
+            parameter_changes=tuple(self.bound.parameters.changes),
             log=self._log,
             graph=self.bound.graph,
         )

@@ -17,6 +17,7 @@ from .block import Block, Clock, Context
 from .description import RobotDescription
 from .errors import AloftError, DeclarationError, RunError
 from .layout import ALIGNMENT, Layout, PortLayout
+from .live_parameters import LiveParameters
 from .signals import DTYPES, Signal
 from .stages import BlockSpec, CheckedGraph
 
@@ -173,6 +174,7 @@ class BoundGraph:
                     f"block '{spec.path}' failed in setup: {kind}{error}", block=spec.path
                 ) from error
             self.blocks[spec.path] = block
+        self.parameters = LiveParameters(self.blocks)
 
     def snapshot(self) -> Snapshot:
         """Everything the graph remembers now, after every block's ``freeze``."""

@@ -7,9 +7,11 @@ the same dimension: ``force: 70 N``, ``duration: 10 ms``.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import Any
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic.fields import FieldInfo
 
 from .errors import UnitError
 from .units import parse_quantity
@@ -26,19 +28,41 @@ def parameter(
     lt: float | None = None,
     min_length: int | None = None,
     max_length: int | None = None,
+    live: bool = False,
 ) -> Any:
-    """Declare a parameter: its default (none makes it required), unit, bounds and text."""
+    """Declare a parameter: its default (none makes it required), unit, bounds and text.
+
+    ``live`` parameters may be changed while the graph runs: the block reads them from
+    ``self.params`` in every tick, or derives from them anew in ``Block.on_parameters``.
+    """
+    extra: dict[str, Any] = {"unit": unit, **({"live": True} if live else {})}
     if default is not ... and isinstance(default, list):
         value = default
         return Field(
             default_factory=lambda: list(value), description=text, ge=ge, gt=gt, le=le, lt=lt,
-            min_length=min_length, max_length=max_length, json_schema_extra={"unit": unit},
+            min_length=min_length, max_length=max_length, json_schema_extra=extra,
         )  # fmt: skip
     return Field(
         default, description=text, ge=ge, gt=gt, le=le, lt=lt,
-        min_length=min_length, max_length=max_length, json_schema_extra={"unit": unit},
+        min_length=min_length, max_length=max_length, json_schema_extra=extra,
         validate_default=default is not ...,
     )  # fmt: skip
+
+
+live_parameter = partial(parameter, live=True)
+"""Declare a parameter that may be changed while the graph runs: a gain, a weight, a threshold."""
+
+
+def is_live(info: FieldInfo) -> bool:
+    """Whether a parameter was declared as one that may change while the graph runs."""
+    extra = info.json_schema_extra
+    return isinstance(extra, dict) and bool(extra.get("live", False))
+
+
+def unit_of(info: FieldInfo) -> str:
+    """The unit a parameter was declared with, as text."""
+    extra = info.json_schema_extra
+    return str(extra.get("unit", "")) if isinstance(extra, dict) else ""
 
 
 def _convert(value: Any, unit: str) -> Any:
@@ -64,11 +88,10 @@ class Parameters(BaseModel):
             return data
         converted = dict(data)
         for name, info in cls.model_fields.items():
-            extra = info.json_schema_extra
-            unit = extra.get("unit", "") if isinstance(extra, dict) else ""
+            unit = unit_of(info)
             if name in converted and unit:
                 try:
-                    converted[name] = _convert(converted[name], str(unit))
+                    converted[name] = _convert(converted[name], unit)
                 except UnitError:
                     continue  # left as text, so pydantic reports it at its own place
         return converted

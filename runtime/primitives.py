@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from .block import Block, Input, Output, State
 from .description import RobotDescription
 from .errors import BlockError
-from .parameters import Parameters, parameter
+from .parameters import Parameters, live_parameter, parameter
 from .signals import Field, Signal
 
 
@@ -29,7 +29,7 @@ class Constant(Block):
     """The same vector for ever: y[n] = value. It has as many elements as ``value``."""
 
     class Params(Parameters):
-        value: list[float] = parameter(text="the vector", min_length=1)
+        value: list[float] = live_parameter(text="the vector", min_length=1)
 
     params: Params
     y = Output(Vector, text="the vector")
@@ -49,6 +49,10 @@ class Constant(Block):
 
     def setup(self) -> None:
         """Make the vector."""
+        self.on_parameters()
+
+    def on_parameters(self) -> None:
+        """Make it anew."""
         self._value = np.array(self.params.value)
 
     def step(self) -> None:
@@ -61,14 +65,18 @@ class Gain(Block):
 
     class Params(Parameters):
         n: int = parameter(1, ge=1, text="elements")
-        gain: float = parameter(1.0, text="the factor")
+        gain: float = live_parameter(1.0, text="the factor")
 
     params: Params
     u = Input(Vector, text="what is scaled")
     y = Output(Vector, text="gain times u")
 
     def setup(self) -> None:
-        """Keep the factor at hand, as an array so that no tick makes one."""
+        """Keep the factor at hand."""
+        self.on_parameters()
+
+    def on_parameters(self) -> None:
+        """As an array, so that no tick makes one."""
         self._gain = np.array(self.params.gain)
 
     def step(self) -> None:
@@ -81,7 +89,7 @@ class Sum(Block):
 
     class Params(Parameters):
         n: int = parameter(1, ge=1, text="elements")
-        weights: list[float] = parameter(
+        weights: list[float] = live_parameter(
             [1.0, 1.0], min_length=2, max_length=2, text="factors of a and b"
         )
 
@@ -91,9 +99,13 @@ class Sum(Block):
     y = Output(Vector, text="the sum")
 
     def setup(self) -> None:
-        """Keep the factors at hand, as arrays so that no tick makes them."""
-        self._first, self._second = (np.array(weight) for weight in self.params.weights)
+        """Keep the factors at hand."""
         self._product = np.zeros(self.params.n)
+        self.on_parameters()
+
+    def on_parameters(self) -> None:
+        """As arrays, so that no tick makes them."""
+        self._first, self._second = (np.array(weight) for weight in self.params.weights)
 
     def step(self) -> None:
         """Add."""
@@ -177,10 +189,10 @@ class SineWave(Block):
 
     class Params(Parameters):
         n: int = parameter(1, ge=1, text="elements")
-        amplitude: float = parameter(1.0, text="half of peak to peak")
-        frequency: float = parameter(1.0, unit="Hz", ge=0.0, text="oscillations per second")
-        phase: float = parameter(0.0, unit="rad", text="angle at time zero")
-        offset: float = parameter(0.0, text="the mean")
+        amplitude: float = live_parameter(1.0, text="half of peak to peak")
+        frequency: float = live_parameter(1.0, unit="Hz", ge=0.0, text="oscillations per second")
+        phase: float = live_parameter(0.0, unit="rad", text="angle at time zero")
+        offset: float = live_parameter(0.0, text="the mean")
 
     params: Params
     y = Output(Vector, text="the sine")

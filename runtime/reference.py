@@ -15,6 +15,7 @@ from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
 from .block import Block, Input, Output, Port
+from .parameters import is_live, unit_of
 
 
 @dataclass(frozen=True)
@@ -47,6 +48,13 @@ class ParameterReference:
     unit: str
     bounds: str
     text: str
+    live: bool = False
+    """Whether it may be changed while a graph runs."""
+
+    @property
+    def full_text(self) -> str:
+        """The text, with a note where it may be changed live."""
+        return f"{self.text} (live)" if self.live else self.text
 
 
 @dataclass(frozen=True)
@@ -101,15 +109,15 @@ def _port(port: Port[Any]) -> PortReference:
 
 
 def _parameter(name: str, info: FieldInfo) -> ParameterReference:
-    extra = info.json_schema_extra
     default = info.get_default(call_default_factory=True)
     return ParameterReference(
         name=name,
         type=type_text(info.annotation),
         default="" if default is PydanticUndefined else _value_text(default),
-        unit=str(extra.get("unit", "")) if isinstance(extra, dict) else "",
+        unit=unit_of(info),
         bounds=_bounds(info),
         text=info.description or "",
+        live=is_live(info),
     )
 
 

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from .block import Metric
 from .errors import ExitCode, RunError
+from .live_parameters import ParameterChange
 from .sinks import MemoryLog
 from .stages import CheckedGraph
 from .timing import BlockTimes
@@ -43,6 +44,7 @@ class RunResult:
     skipped_periods: int = 0
     error: RunError | None = None
     stop_problems: tuple[str, ...] = ()
+    parameter_changes: tuple[ParameterChange, ...] = ()
     log: MemoryLog | None = None
     graph: CheckedGraph | None = None
     """What ran; ``None`` only in a result made by hand."""
@@ -102,6 +104,7 @@ class RunResult:
             "metrics": {name: _plain(value) for name, value in self.metrics.items()},
             "blocks": {path: asdict(times) for path, times in self.blocks.items()},
             "stop_problems": list(self.stop_problems),
+            "parameter_changes": [asdict(change) for change in self.parameter_changes],
         }
 
 

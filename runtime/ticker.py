@@ -2,7 +2,7 @@
 
 A tick: all ``emit`` and ``step`` in the computed order, one finite check of the whole bus, all
 ``update``, then one call of each recorder. For every phase of the hyperperiod these calls are one
-flat list made beforehand.
+flat list made beforehand. Between two ticks changed parameters are taken over.
 """
 
 from __future__ import annotations
@@ -103,9 +103,14 @@ class Ticker:
         table, length, records = self._table, len(self._table), self.records
         wait = None if self.pacer is None else self.pacer.wait
         now, timing = self._now, self._timing
+        parameters = self.bound.parameters
+        requests = parameters.requests
         call: Callable[..., Any] | None = None
         try:
             while tick != end and clock.stop_reason is None:
+                if requests:
+                    call = parameters.answer
+                    parameters.answer(tick)
                 if wait is not None:
                     call = wait
                     late = wait(tick)

@@ -14,6 +14,7 @@ import numpy as np
 from ...runtime.description import RobotDescription
 from .errors import PlanError
 from .plan import JumpPlan, PlanFileError, read_plan, write_plan
+from .refinement import ROUNDS, curable
 from .task import JumpTask, TaskError, make_task
 from .validity import InvalidPlanError, checked, require_valid
 
@@ -174,6 +175,8 @@ def solve_and_check(
 ) -> JumpPlan:
     """A valid plan of a task with its report; a warm start that leads nowhere is tried without.
 
+    A plan that fails the check because its intervals are too long is solved again on finer ones.
+
     Raises:
         PlanError, InvalidPlanError: as ``PlanLibrary.plan``.
     """
@@ -186,11 +189,17 @@ def solve_and_check(
         else:
             if plan.valid:
                 return plan
-    plan = make(task, robot, None)
-    with_report = checked(plan, robot)
-    if not with_report.valid:
+    plan = checked(make(task, robot, None), robot)
+    for _ in range(ROUNDS):
+        if plan.valid or not curable(plan):
+            break
+        try:
+            plan = checked(make(task, robot, plan), robot)
+        except PlanError:
+            break
+    if not plan.valid:
         require_valid(plan, robot)
-    return with_report
+    return plan
 
 
 def solve_task(task: JumpTask, robot: RobotDescription, warm_start: JumpPlan | None) -> JumpPlan:

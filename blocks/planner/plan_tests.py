@@ -8,152 +8,21 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...runtime.description import RobotDescription
-from ...runtime.kinematics import LinkPoses, link_poses, matrices_of_quaternions
 from ..signals import Phase
-from .clearance import body_heights, ground_height, leg_gap
+from .clearance import body_heights, leg_gap
+from .evidence import DEGREE, MILLIMETRE, Evidence, Found, worst
 from .exact_dynamics import ExactDynamics
-from .plan import JumpPlan
-from .replay import Replay
-from .task import GRAVITY
+from .replay import held_joints
 
 Array = NDArray[np.float64]
-DEGREE = math.pi / 180.0
-MILLIMETRE = 1e-3
 
-
-@dataclass(frozen=True)
-class Found:
-    """What a test found: it passes where ``value`` is at most ``limit``."""
-
-    name: str
-    value: float
-    limit: float
-    unit: str
-    text: str
-    where: str = ""
-
-
-@dataclass(frozen=True)
-class Evidence:
-    """A plan, its replay, and what several tests need of them."""
-
-    plan: JumpPlan
-    robot: RobotDescription
-    replay: Replay
-
-    @property
-    def effort(self) -> float:
-        """The share of the motors' limits the plan may use."""
-        return self.plan.task.effort
-
-    @cached_property
-    def motor_torque(self) -> Array:
-        """Motor torques at the samples [N m], by exact dynamics, (n, n_joints)."""
-        return np.asarray(self.replay.samples.torque @ self.robot.torque_to_motor.T)
-
-    @cached_property
-    def motor_speed(self) -> Array:
-        """Motor speeds at the samples [rad/s], (n, n_joints)."""
-        return np.asarray(self.replay.samples.velocity[:, 6:] @ self.robot.joint_to_motor.T)
-
-    @cached_property
-    def middles(self) -> NDArray[np.int64]:
-        """The sample nearest to the middle of every interval that lasts."""
-        time, samples = self.plan.time, self.replay.samples
-        lasting = np.flatnonzero(np.diff(time) > 0.0)
-        found = []
-        for k in lasting:
-            rows = np.flatnonzero(samples.knot == k)
-            middle = 0.5 * (time[k] + time[k + 1])
-            found.append(int(rows[np.abs(samples.time[rows] - middle).argmin()]))
-        return np.array(found, np.int64)
-
-    @cached_property
-    def poses(self) -> LinkPoses:
-        """The links at the samples."""
-        q = self.replay.samples.position
-        return link_poses(self.robot, q[:, :3], q[:, 3:7], q[:, 7:])
-
-    @cached_property
-    def progress(self) -> Array:
-        """How many flights are over at the samples, with the share of the present one's time."""
-        time = self.replay.samples.time
-        return np.asarray(
-            sum(np.clip((time - start) / (end - start), 0.0, 1.0) for start, end in self.plan.flights)
-        )
-
-    @cached_property
-    def place(self) -> NDArray[np.int64]:
-        """How many flights are over at the samples."""
-        return np.asarray(np.searchsorted(self.plan.touchdown_times, self.replay.samples.time,
-                                          side="right"))  # fmt: skip
-
-    @cached_property
-    def point_height(self) -> Array:
-        """The contact points' height above the ground at the samples [m], (n, n_contacts)."""
-        points = self.replay.samples.points
-        progress = np.repeat(self.progress[:, None], points.shape[1], axis=1)
-        return np.asarray(
-            points[:, :, 2] - ground_height(self.plan.task, points[:, :, 0], progress)
-        )
-
-    @cached_property
-    def rises(self) -> list[float]:
-        """The apexes above standing where each jump begins that the exact states at lift-off lead
-        to [m]."""
-        r, found = self.replay, []
-        for (k, _), place in zip(r.flights, self.plan.task.places(), strict=False):
-            up = float(r.com_velocity[k, 2])
-            standing = float(r.com[0, 2]) + place.z
-            found.append(float(r.com[k, 2]) - standing + max(up, 0.0) ** 2 / (2.0 * GRAVITY))
-        return found
-
-    @cached_property
-    def turn(self) -> tuple[float, float]:
-        """How far the base has turned in pitch and in yaw from first knot to last [rad].
-
-        The angles are those of R = Ry Rx Rz, followed through full turns.
-        """
-        matrix = matrices_of_quaternions(self.replay.samples.position[:, 3:7])
-        pitch = np.unwrap(np.arctan2(matrix[:, 0, 2], matrix[:, 2, 2]))
-        yaw = np.unwrap(np.arctan2(matrix[:, 1, 0], matrix[:, 1, 1]))
-        return float(pitch[-1] - pitch[0]), float(yaw[-1] - yaw[0])
-
-    def moment(self, sample: int) -> str:
-        """The time of a sample as text."""
-        return f"at {self.replay.samples.time[sample]:.3f} s"
-
-    def figures(self) -> dict[str, float]:
-        """What the plan does and how hard, by name with unit."""
-        r, lasting = self.replay, np.diff(self.plan.time) > 0.0
-        force = self.plan.contact_force[:-1][lasting].sum(axis=1)[:, 2]
-        k = r.flights[0][0]
-        return {
-            "rise_m": self.rises[0],
-            "take_off_speed_m_s": float(r.com_velocity[k, 2]),
-            "flight_time_s": self.plan.flight_time,
-            "duration_s": self.plan.duration,
-            "peak_motor_torque_N_m": float(np.abs(self.motor_torque).max()),
-            "peak_motor_speed_rad_s": float(np.abs(self.motor_speed).max()),
-            "peak_vertical_force_N": float(force.max()),
-            "pitch_momentum_at_lift_off_N_m_s": float(r.angular_momentum[k, 1]),
-            "flight_error_mm": max(error for error, _ in r.flight_errors) / MILLIMETRE,
-            "flight_error_deg": max(error for _, error in r.flight_errors) / DEGREE,
-            "jumps": float(len(r.flights)),
-        }
-
-
-def worst(array: Array) -> tuple[int, int]:
-    """The row and column of the largest number."""
-    row, column = np.unravel_index(int(array.argmax()), array.shape)
-    return int(row), int(column)
+SHORTEST_IMPACT = 0.004
+"""s; as long as the feet's contact takes to stop them at least. What a motor can do in that time
+bounds its impulse at touchdown."""
 
 
 def start_and_end(e: Evidence) -> Iterator[Found]:
@@ -304,27 +173,35 @@ def touchdown(e: Evidence) -> Iterator[Found]:
     if plan.task.impact:
         if plan.task.formulation != "full":
             return
-        missed = [_impact_error(e, k) for k in knots]
-        k = int(np.argmax(missed))
-        yield Found("impact", missed[k], 1e-3, "m/s or rad/s",
+        found = np.array([_impact(e, k) for k in knots])
+        k = int(np.argmax(found[:, 0]))
+        yield Found("impact", found[k, 0], 1e-3, "m/s or rad/s",
                     "how far the impulse's velocities miss exact dynamics'", _which(e, k))  # fmt: skip
+        k = int(np.argmax(found[:, 1]))
+        peak = e.effort * e.robot.profiles[plan.task.profile].peak_torque
+        yield Found("held_joints", found[k, 1], peak * SHORTEST_IMPACT, "N m s",
+                    "the impulse of a motor whose joint keeps still", _which(e, k))  # fmt: skip
         return
     samples = np.searchsorted(s.time, plan.time[knots] - 1e-9)
     speeds = np.linalg.norm(s.point_velocity[samples], axis=2)
     speeds = np.where(plan.contact[knots], speeds, 0.0)
-    yield Found("touchdown_speed", float(speeds.max()), 0.05, "m/s", "the feet's speed at touchdown")
+    yield Found(
+        "touchdown_speed", float(speeds.max()), 0.05, "m/s", "the feet's speed at touchdown"
+    )
 
 
-def _impact_error(e: Evidence, knot: int) -> float:
-    """Of all generalised velocities behind the impulse at a knot; all of them without an impact."""
+def _impact(e: Evidence, knot: int) -> tuple[float, float]:
+    """The error of all generalised velocities behind the impulse at a knot, or of all of them
+    without an impact; and the largest motor impulse that keeps a joint still [N m s]."""
     plan = e.plan
     if knot + 1 >= len(plan.time) or plan.time[knot + 1] > plan.time[knot]:
-        return math.inf
+        return math.inf, 0.0
     dynamics = ExactDynamics(e.robot, plan.task.profile)
     q, v, impulse = plan.position[knot], plan.velocity[knot], plan.contact_force[knot]
-    exact = dynamics.velocity_after_impact(q, v, impulse)
+    exact, kept = dynamics.velocity_after_impact(q, v, impulse, held_joints(plan, knot))
     moved = np.abs(plan.position[knot + 1] - q).max()
-    return float(max(np.abs(exact - plan.velocity[knot + 1]).max(), moved))
+    error = max(np.abs(exact - plan.velocity[knot + 1]).max(), moved)
+    return float(error), float(np.abs(e.robot.torque_to_motor @ kept).max())
 
 
 def machine(e: Evidence) -> Iterator[Found]:

@@ -217,9 +217,7 @@ def _impulse_balance(model: SymbolicModel, coordinates: Coordinates, q: Any, cha
             coordinates.expand(q), still, bend, forces, coordinates.limbs
         )
         wrench = base + coordinates.share * sum(limbs.values())
-        sums.append(
-            ca.vertcat(wrench[list(coordinates.rows)], torque[list(coordinates.moving)])
-        )
+        sums.append(ca.vertcat(wrench[list(coordinates.rows)], torque[list(coordinates.moving)]))
     return sums[0] - sums[1]
 
 

@@ -236,9 +236,7 @@ class JumpTask(FreeTimes):
         # What is not given is left out, so that a parameter added later changes no hash.
         # So is the weight of impulses where there are none.
         unused: dict[str, Any] = {} if self.impact else {"weights": {"impulse"}}
-        return self.model_dump(
-            mode="json", exclude={"name": True, **unused}, exclude_none=True
-        )
+        return self.model_dump(mode="json", exclude={"name": True, **unused}, exclude_none=True)
 
     def hash(self, robot: RobotDescription) -> str:
         """What a plan of this task is kept under: the same for the same task, robot and format."""

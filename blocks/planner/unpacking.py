@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from .midpoint import angular_motion, euler_angles, euler_rates, rotation
 from .plan import JumpPlan
 from .problem import Problem
+from .resampling import matching_times, means_over, same_phases, states_at
 from .symbolic_model import SymbolicModel
 
 Array = NDArray[np.float64]
@@ -79,8 +80,30 @@ def unpack(problem: Problem, values: Array) -> dict[str, Any]:
     }
 
 
+def can_start(problem: Problem, plan: JumpPlan) -> bool:
+    """Whether a plan goes through the same phases, so that ``pack`` can make variables of it."""
+    impacts = bool(np.any(np.diff(plan.time) <= 0.0)) or any(s.impact for s in problem.stretches)
+    alike = same_phases(plan.phase[:-1].tolist(), [int(phase) for phase in problem.phases])
+    return _same_grid(problem, plan) or (alike and not impacts)
+
+
+def _same_grid(problem: Problem, plan: JumpPlan) -> bool:
+    """Whether all intervals stand for the same; only then can there be impacts."""
+    intervals = len(plan.time) == problem.knots
+    impacts = {s.first for s in problem.stretches if s.impact}
+    return (
+        intervals
+        and plan.phase[:-1].tolist() == [int(phase) for phase in problem.phases]
+        and set(np.flatnonzero(np.diff(plan.time) <= 0.0).tolist()) == impacts
+    )
+
+
 def pack(problem: Problem, plan: JumpPlan, guess: Array) -> Array:
-    """Variables near a plan of a task like this one with as many knots; ``guess`` elsewhere."""
+    """Variables near a plan of a task like this one; ``guess`` elsewhere.
+
+    The plan may have other numbers of knots: it is followed phase by phase, and must go through
+    the same phases.
+    """
     assembly, coordinates = problem.assembly, problem.coordinates
     n = coordinates.size
     angles = euler_angles(plan.position[:, 3:7])
@@ -90,9 +113,16 @@ def pack(problem: Problem, plan: JumpPlan, guess: Array) -> Array:
         v[k, :3] = rotation(angles[k]) @ row[:3]
         v[k, 3:6] = euler_rates(angles[k], row[3:6])[ORDER]
         v[k, 6:] = row[6:]
-    steps, means = np.diff(plan.time), {}
-    for stretch in problem.stretches:
-        means[stretch] = float(plan.time[stretch.stop] - plan.time[stretch.first]) / stretch.count
+    steps, force = np.diff(plan.time), plan.contact_force.reshape(len(plan.time), -1)
+    instants = plan.time
+    if not _same_grid(problem, plan):
+        phases = [int(phase) for phase in problem.phases]
+        lengths = np.diff(knot_times(problem, guess))
+        instants = matching_times(plan.time, plan.phase[:-1].tolist(), lengths, phases)
+        q, v = states_at(instants, plan.time, q, v)
+        force = means_over(instants, plan.time, force)
+        steps = np.diff(instants)
+    means = {s: float(instants[s.stop] - instants[s.first]) / s.count for s in problem.stretches}
     values = guess.copy()
     for k in range(problem.knots):
         start, control = assembly.state_start[k], assembly.control_start[k]
@@ -106,7 +136,7 @@ def pack(problem: Problem, plan: JumpPlan, guess: Array) -> Array:
         if stretch.timed:
             values[start + 2 * n] = means[stretch]
         if not stretch.flies:
-            pushed = coordinates.reduce_forces(plan.contact_force[k].ravel())
+            pushed = coordinates.reduce_forces(force[k])
             values[control + n : control + n + coordinates.forces] = pushed
         hold = assembly.knots[k].hold
         if hold is not None:

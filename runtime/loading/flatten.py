@@ -214,13 +214,15 @@ class _Flattener:
         parameters = substitute(block.parameters) if block.parameters else None
         if not isinstance(parameters, MapNode):
             parameters = MapNode((), block.where)
+        use = substitute(block.use) if block.use else None
         for override in scope.sets:
-            if override.block == path:
+            if override.block == path and override.path == ("use",):
+                use = override.value
+            elif override.block == path:
                 parameters = parameters.assign(override.path, override.value, override.where)
         links, places = self._links(block, file, scope, path)
         rate = substitute(block.rate) if block.rate else scope.rate
         offset = substitute(block.offset) if block.offset else scope.offset
-        use = substitute(block.use) if block.use else None
         draft = _Draft(
             FlatBlock(
                 path,

@@ -10,7 +10,7 @@ from pydantic import ValidationError
 
 from ..block import Block
 from ..errors import UnitError
-from ..parameters import Parameters
+from ..parameters import Parameters, unit_of
 from ..stages import Position
 from ..units import parse_quantity
 from .flat import FlatBlock
@@ -218,8 +218,7 @@ def _siblings(model: type[Parameters], location: Sequence[str | int]) -> tuple[s
 
 def _unit(model: type[Parameters], name: str) -> str:
     info = model.model_fields.get(name)
-    extra = info.json_schema_extra if info else None
-    return str(extra.get("unit", "")) if isinstance(extra, dict) else ""
+    return unit_of(info) if info else ""
 
 
 def _with_text(expected: str, model: type[Parameters], name: str) -> str:

@@ -175,6 +175,7 @@ def _particular_schema(name: str, block_type: type[Block], definitions: Schema) 
         definitions[f"{name}.{inner}"] = _relocate(schema, name)
     properties: Schema = {}
     for key, schema in _relocate(model.get("properties", {}), name).items():
+        schema.pop("live", None)
         description = " ".join(filter(None, [schema.pop("description", ""), _unit_text(schema)]))
         options = [schema, _REFERENCE]
         if schema.pop("unit", ""):  # then a text with a unit is a number, also inside a list

@@ -13,7 +13,7 @@ those say nothing inputs are random, finite and of order one.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import CodeType, FunctionType
 from typing import Any
 
@@ -22,9 +22,10 @@ import numpy as np
 from ..block import Block
 from ..description import RobotDescription
 from ..finite import FiniteCheck
+from ..live_parameters import Adjustment, LiveParameters
 from .allocations import count_array_allocations
 from .bench import BlockBench
-from .examples import random_inputs
+from .examples import live_changes, random_inputs
 
 TICKS = 12
 """Ticks of each check: enough to fill most delays."""
@@ -196,6 +197,27 @@ def _restored(subject: Subject) -> None:
             )
 
 
+def _live_parameters(subject: Subject) -> None:
+    """After a live change a block goes on as one that had the parameter from the start."""
+    for name, params in live_changes(subject.bench().block.params):
+        changed = subject.bench()
+        subject.trace(changed, WARM_UP)
+        before = changed.snapshot()
+        path = changed.block.context.path
+        LiveParameters({path: changed.block}).apply(Adjustment({path: params}, ()), WARM_UP)
+        after = changed.snapshot()
+        subject.expect(before == after, f"on_parameters() writes state or outputs, for {name!r}")
+        fresh = replace(subject, params=params.model_dump(round_trip=True)).bench()
+        fresh.restore(after)
+        pairs = zip(subject.trace(changed, seed=1), subject.trace(fresh, seed=1), strict=True)
+        for tick, (one, other) in enumerate(pairs):
+            subject.expect(
+                one == other,
+                f"{name!r} is live, but {tick + 1} ticks after a change the block differs from "
+                "one that had the new value from the start; derive anew in on_parameters()",
+            )
+
+
 def _array_allocations(subject: Subject) -> None:
     """No tick allocates more arrays than declared, and a budget has its reason."""
     kind = subject.block_type
@@ -248,6 +270,7 @@ CASES: Mapping[str, Callable[[Subject], None]] = {
     "machine": _machine,
     "deterministic": _deterministic,
     "restored": _restored,
+    "live parameters": _live_parameters,
     "array allocations": _array_allocations,
     "finite": _finite,
     "life": _life,

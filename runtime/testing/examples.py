@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Iterator, Mapping
+from typing import Any, Literal, get_args, get_origin
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import BaseModel, ValidationError
 
 from ..block import Block
+from ..parameters import Parameters, is_live
 from ..signals import Field
 
 
@@ -59,3 +61,44 @@ def random_inputs(
     for port, fields in block_type.example_inputs(rng, dimensions).items():
         values[port].update(fields)
     return values
+
+
+def live_changes(params: Parameters) -> Iterator[tuple[str, Parameters]]:
+    """For every live parameter, and everything inside one, its path and parameters in which it
+    alone has another legal value."""
+    for name, info in type(params).model_fields.items():
+        if is_live(info):
+            for path, value in _others(getattr(params, name), info.annotation):
+                changed = _with(params, name, value)
+                if changed is not None:
+                    yield f"{name}{path}", changed
+
+
+def _with(params: Any, name: str, value: Any) -> Any:
+    """The model with one value replaced, or ``None`` where that is not legal or no other."""
+    data = {**params.model_dump(round_trip=True), name: value}
+    try:
+        changed = type(params).model_validate(data)
+    except ValidationError:
+        return None
+    return changed if changed != params else None
+
+
+def _others(value: Any, annotation: Any) -> Iterator[tuple[str, Any]]:
+    """Other values than this one, the first of which is usually legal, with the path inside it."""
+    if isinstance(value, BaseModel):
+        for name, info in type(value).model_fields.items():
+            for path, other in _others(getattr(value, name), info.annotation):
+                changed = _with(value, name, other)
+                if changed is not None:
+                    yield f".{name}{path}", changed
+    elif isinstance(value, bool):
+        yield "", not value
+    elif isinstance(value, int):
+        yield "", value + 1
+    elif isinstance(value, float):
+        yield "", 0.75 * value if value else 0.02
+    elif isinstance(value, (tuple, list)):
+        yield "", [0.75 * item + 0.01 for item in value]
+    elif get_origin(annotation) is Literal:
+        yield from (("", other) for other in get_args(annotation) if other != value)

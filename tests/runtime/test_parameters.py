@@ -3,7 +3,7 @@
 import pytest
 from pydantic import ValidationError
 
-from aloft.runtime.parameters import Parameters, parameter
+from aloft.runtime.parameters import Parameters, is_live, live_parameter, parameter, unit_of
 
 
 class Push(Parameters):
@@ -42,6 +42,16 @@ def test_values_cannot_be_changed_and_defaults_are_not_shared() -> None:
     assert first.gain == second.gain and first.gain is not second.gain
     with pytest.raises(ValidationError):
         first.force = 3.0
+
+
+def test_live_parameters_are_marked() -> None:
+    class Tuned(Parameters):
+        gain: float = live_parameter(1.0, text="a factor", unit="m")
+        size: int = parameter(1, text="fixed")
+
+    fields = Tuned.model_fields
+    assert is_live(fields["gain"]) and not is_live(fields["size"])
+    assert unit_of(fields["gain"]) == "m" and unit_of(fields["size"]) == ""
 
 
 def test_the_schema_carries_text_and_unit() -> None:

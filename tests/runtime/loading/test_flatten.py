@@ -142,6 +142,18 @@ set: {leg/second.gain: 10}
     assert gains == [8.0, 10.0]
 
 
+def test_another_block_in_its_place(tmp_path: Path) -> None:
+    graph = GRAPH.replace("rate: 100 Hz\nduration: 50 ms", "")
+    own = "rate: 100 Hz\ninclude: [part.yaml]\nset: {last.use: runtime.Delay}\n"
+    path = write(tmp_path, leg=LEG, body=BODY, part=graph, graph=own)
+    with pytest.raises(LoadError) as told:
+        load(path, {"one/left/second.use": "runtime.Nothing"})
+    assert "--set one/left/second.use=runtime.Nothing" in str(told.value)
+    replaced = flatten(path, ["last.use=leg.yaml", "last.gain=3"]).text
+    assert "  last/second:\n    use: runtime.Gain\n" in replaced
+    assert "  last:\n    use: runtime.Delay\n" in flatten(path).text
+
+
 def test_overrides_of_the_graph_itself(tmp_path: Path) -> None:
     path = write(tmp_path, leg=LEG, body=BODY, graph=GRAPH)
     graph = load(path, ["rate=1 kHz", "duration=2", "clock.kind=paced", "dimensions.m=4"])

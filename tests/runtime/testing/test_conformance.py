@@ -5,7 +5,7 @@ import pytest
 
 from aloft.runtime.block import Block, Input, Output, State
 from aloft.runtime.finite import NotFiniteError
-from aloft.runtime.parameters import Parameters, parameter
+from aloft.runtime.parameters import Parameters, live_parameter, parameter
 from aloft.runtime.primitives import Vector
 from aloft.runtime.signals import Field, Signal
 from aloft.runtime.testing.conformance import ConformanceError, check_block, conformance_cases
@@ -186,6 +186,39 @@ def test_a_block_that_remembers_in_secret() -> None:
         "is remembered outside the declared State"
     )
     check_block(Open, cases=["restored"])
+
+
+def test_a_block_that_does_not_take_over_a_live_parameter() -> None:
+    class Tuned(Sound):
+        """A block."""
+
+        class Params(Sound.Params):
+            gain: float = live_parameter(2.0, text="a factor")
+
+        def setup(self) -> None:
+            self.half = np.array(self.params.gain)
+
+    class Fresh(Tuned):
+        """A block."""
+
+        def on_parameters(self) -> None:
+            self.half = np.array(self.params.gain)
+
+    class Meddling(Fresh):
+        """A block."""
+
+        def on_parameters(self) -> None:
+            super().on_parameters()
+            self.x.value[...] = 0.0
+
+    assert failure(Tuned, "live parameters") == (
+        "Tuned: 'gain' is live, but 1 ticks after a change the block differs from one that had "
+        "the new value from the start; derive anew in on_parameters()"
+    )
+    assert failure(Meddling, "live parameters") == (
+        "Meddling: on_parameters() writes state or outputs, for 'gain'"
+    )
+    check_block(Fresh, cases=["live parameters"])
 
 
 def test_a_block_that_allocates() -> None:
