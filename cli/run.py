@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import signal
 import sys
 from collections.abc import Sequence
 from contextlib import closing
@@ -23,6 +22,7 @@ from .output import (
     say,
     table,
 )
+from .stopping import stopped_by_signals
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -104,12 +104,16 @@ def run_once(
     graph: Graph, record: Path | None, out: Console, as_json: bool, sinks: Sequence[Sink] = ()
 ) -> ExitCode:
     """Run the graph, record it, print what came of it."""
+    from ..logs.recorder import Recorder
     from .progress import TickCounter, progress_bar
 
     name = graph.checked.name
+    recorder = Recorder(record, on_warning=print_warning) if record is not None else None
     with progress_bar(out, f"running {name}", graph.checked.ticks) as (progress, task):
-        result = graph.run(sinks=[TickCounter(progress, task), *sinks])
-    recording = write_recording(record, result) if record is not None else None
+        counter = TickCounter(progress, task)
+        recorders = [recorder] if recorder is not None else []
+        result = graph.run(sinks=[*recorders, counter, *sinks], log=False)
+    recording = recorder.recording if recorder is not None else None
     print_result(out, name, result)
     if recording is not None:
         say(out, f"recording: {recording}; to see it: {viewer()} {recording}")
@@ -122,19 +126,6 @@ def run_once(
     else:
         print_verdict(result)
     return result.exit_code
-
-
-def write_recording(path: Path, result: RunResult) -> Path | None:
-    """Record the run; without Rerun, or where it cannot be written, warn and go on."""
-    from ..logs import recording
-
-    try:
-        return recording.write_recording(path, result).path
-    except ImportError as error:
-        print_warning(f"no recording: Rerun cannot be imported ({error}); pip install rerun-sdk")
-    except OSError as error:
-        print_warning(f"no recording: {path} cannot be written ({error.strerror or error})")
-    return None
 
 
 def viewer() -> str:
@@ -181,26 +172,14 @@ def run_many(
     from .progress import progress_bar
 
     rows: list[SeedRow] = []
-    received: list[signal.Signals] = []
-
-    def stop(number: int, _: object) -> None:
-        received.append(signal.Signals(number))
-        raise KeyboardInterrupt
-
-    before = {number: signal.signal(number, stop) for number in (signal.SIGINT, signal.SIGTERM)}
-    try:
-        with (
-            progress_bar(out, f"running {len(seeds)} seeds", len(seeds)) as (progress, task),
-            closing(run_seeds(path, overrides, seeds)) as results,
-        ):
-            for row in results:
-                rows.append(row)
-                progress.advance(task)
-    except KeyboardInterrupt:
-        pass  # the rows there are, are still worth printing
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
+    with (
+        stopped_by_signals() as received,
+        progress_bar(out, f"running {len(seeds)} seeds", len(seeds)) as (progress, task),
+        closing(run_seeds(path, overrides, seeds)) as results,
+    ):
+        for row in results:
+            rows.append(row)
+            progress.advance(task)
     successes = sum(row.success for row in rows)
     reason = f"{successes} of {len(rows)} seeds succeeded"
     success = successes == len(seeds)

@@ -126,7 +126,7 @@ class Header:
         base_rate: ticks a second [Hz].
         first_tick: zero, but for a run that began at a snapshot.
         clock: ``free``, ``paced`` or ``robot``.
-        ticks: how many were asked for, if that was said.
+        ticks: how many the graph runs by itself, if it says so.
         overrides: what was set beside the graph file.
         seeds: the parameters called ``seed``, as ``block.seed``.
         versions: of Python and of all that computes.

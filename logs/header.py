@@ -19,7 +19,7 @@ RECORDED_VERSIONS = (
 _NOTHING = RecordedLayout((), {}, {}, 0)
 
 
-def header_of(bound: BoundGraph, clock: str | None = None, ticks: int | None = None) -> Header:
+def header_of(bound: BoundGraph) -> Header:
     """The header of a run of ``bound``, as its memory is now."""
     memory, graph = bound.memory, bound.graph
     return make_header(
@@ -28,8 +28,7 @@ def header_of(bound: BoundGraph, clock: str | None = None, ticks: int | None = N
         memory.bus.buffer.tobytes(),
         state=memory.state.layout,
         first_tick=bound.clock.tick,
-        clock=clock,
-        ticks=ticks,
+        clock=bound.clock.kind,
     )
 
 
@@ -40,8 +39,7 @@ def make_header(
     *,
     state: Layout | None = None,
     first_tick: int = 0,
-    clock: str | None = None,
-    ticks: int | None = None,
+    clock: str = "",
 ) -> Header:
     """The header of a run of ``graph``; without ``state``, one that can hold no keyframes."""
     return Header(
@@ -53,7 +51,7 @@ def make_header(
         bus_start=bus_start,
         first_tick=first_tick,
         clock=clock or graph.clock.kind,
-        ticks=ticks if ticks is not None else graph.ticks,
+        ticks=graph.ticks,
         overrides=dict(graph.overrides),
         seeds={
             f"{spec.path}.seed": spec.params.seed

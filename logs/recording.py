@@ -45,8 +45,9 @@ def write_recording(path: str | PathLike[str], result: RunResult) -> Recording:
     writer = RecordingWriter(path, header, result.run_hash)
     try:
         writer.write_rows(ticks, rows)
-        for change in result.parameter_changes:
-            writer.write_note(parameter_note(change))
+        changes = [parameter_note(change) for change in result.parameter_changes]
+        for note in sorted([*log.notes, *changes], key=lambda note: note.tick):
+            writer.write_note(note)
         writer.write_outcome(result.to_json())
     finally:
         writer.close()

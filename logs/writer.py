@@ -190,3 +190,23 @@ class RecordingWriter:
 
         columns = rr.TextLog.columns(text=texts, level=levels)
         self._stream.send_columns(EVENTS, times, columns)
+
+
+def warm_up() -> None:
+    """Have Rerun import what it imports when it is first used, which takes a third of a second."""
+    import rerun as rr
+
+    stream = rr.RecordingStream("warm-up", send_properties=False)
+    times = [rr.TimeColumn("tick", sequence=np.arange(2))]
+    points, turns = np.zeros((2, 3)), np.zeros((2, 3, 3))
+    for columns in (
+        rr.Scalars.columns(scalars=points),
+        rr.Transform3D.columns(translation=points, mat3x3=turns),
+        rr.Arrows3D.columns(origins=points, vectors=points),
+        rr.Points3D.columns(positions=points),
+        rr.StateChange.columns(state=["a", "b"]),
+        rr.TextLog.columns(text=["a", "b"], level=["INFO", "INFO"]),
+        rr.DynamicArchetype.columns("aloft", components={NOTE: ["a", "b"]}),
+    ):
+        stream.send_columns("warm-up", times, columns)
+    stream.disconnect()

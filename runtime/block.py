@@ -116,11 +116,13 @@ class State(Port[S]):
 
 @dataclass
 class Clock:
-    """The time of a run: the present tick and the seconds one takes."""
+    """The time of a run: the present tick, the seconds one takes, and how it is paced (the
+    ``kind`` of its ``ClockSpec``)."""
 
     base_period: float
     tick: int = 0
     stop_reason: str | None = None
+    kind: str = "free"
 
 
 @dataclass(frozen=True)
