@@ -4,16 +4,20 @@ import shutil
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
+from aloft.logs.header import make_header
 from aloft.logs.opened_run import OpenedRun
-from aloft.logs.recorder import Recorder
 from aloft.logs.replay import replay
+from aloft.logs.replayable import Keyframes
+from aloft.logs.writer import RecordingWriter
 from aloft.runtime.errors import AloftError
 from aloft.runtime.executor import Executor
 from aloft.runtime.loading import load
 from aloft.runtime.loading.adjust import adjust
 from aloft.runtime.memory import BoundGraph
+from aloft.runtime.notes import parameter_note
 from aloft.runtime.run_result import RunResult
 
 GRAPH = """
@@ -61,8 +65,21 @@ def record(folder: Path, **settings: Any) -> RunResult:
     (folder / "sum.yaml").write_text(GRAPH)
     (folder / "parts.py").write_text(PARTS)
     graph = load(folder / "sum.yaml", {f"gain.{key}": value for key, value in settings.items()})
-    recorder = Recorder(folder / "recordings" / "sum.rrd", keyframe_period=0.5)
-    return Executor(graph, sinks=[recorder, Tune()], log=False).run()
+    keyframes = Keyframes(100)
+    result = Executor(graph, sinks=[keyframes, Tune()]).run()
+    log = result.log
+    assert log is not None and log.layout is not None
+    rows = log.rows()
+    header = make_header(graph, log.layout, rows[0].tobytes(), state=keyframes.layout)
+    writer = RecordingWriter(folder / "recordings" / "sum.rrd", header)
+    writer.write_rows(np.array(log.ticks, np.int64), rows)
+    for snapshot in keyframes.snapshots.values():
+        writer.write_keyframe(snapshot)
+    for change in result.parameter_changes:
+        writer.write_note(parameter_note(change))
+    writer.write_outcome(result.to_json())
+    writer.close()
+    return result
 
 
 @pytest.fixture(scope="module")
