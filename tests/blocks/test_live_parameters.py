@@ -74,9 +74,16 @@ def flying(tick: int) -> Inputs:
     return {"reference": {"phase": Phase.FLIGHT}, "phase": {"phase": Phase.FLIGHT, **times}}
 
 
+def hopping(tick: int) -> Inputs:
+    """In the air for ten ticks, on the ground for ten."""
+    phase = {"phase": Phase.FLIGHT, "stance": tick // 10 % 2 == 0}
+    return {"reference": {"phase": Phase.FLIGHT}, "phase": phase}
+
+
 SCENES: Mapping[str, list[Scene]] = {
     "blocks.JointPD": [
-        Scene({"stance_feedback": True, "friction": 0.1, "stance_stiffness": [1.0] * 5})
+        Scene({"stance_feedback": True, "friction": 0.1, "stance_stiffness": [1.0] * 5}),
+        Scene({}, hopping),
     ],
     "blocks.BalanceTarget": [Scene({"trim_limit": 0.01, "trim_rate": 20.0})],
     "blocks.LandingHeuristic": [Scene({"p_max": (0.1, 0.1)}), Scene({}, flying)],
