@@ -18,16 +18,20 @@ from .recorder import recorder
 from .rows import Row
 from .scheduler import scheduler
 
-BENCHMARKS: Mapping[str, Callable[[], list[Row]]] = {
+BENCHMARKS: Mapping[str, Callable[..., list[Row]]] = {
     "scheduler": scheduler,
     "planner": planner,
     "recorder": recorder,
 }
 """All benchmarks by name; each returns its rows."""
+TIMED = ("recorder",)
+"""Those that can be told how many ``seconds`` to run in real time."""
 
 
-def run_benchmarks(names: Iterable[str] | None = None) -> dict[str, Any]:
-    """Run the named benchmarks, by default all.
+def run_benchmarks(
+    names: Iterable[str] | None = None, seconds: float | None = None
+) -> dict[str, Any]:
+    """Run the named benchmarks, by default all; ``seconds`` is for those in ``TIMED``.
 
     Returns:
         ``machine``, ``load`` (averages before and after) and ``rows``, as plain data for JSON.
@@ -40,7 +44,10 @@ def run_benchmarks(names: Iterable[str] | None = None) -> dict[str, Any]:
         if name not in BENCHMARKS:
             raise KeyError(f"no benchmark {name!r}; there is {', '.join(BENCHMARKS)}")
     before = _load()
-    rows = [row for name in chosen for row in BENCHMARKS[name]()]
+    rows = []
+    for name in chosen:
+        given = {} if seconds is None or name not in TIMED else {"seconds": seconds}
+        rows += BENCHMARKS[name](**given)
     return {
         "machine": _machine(),
         "load": {"before": before, "after": _load()},

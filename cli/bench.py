@@ -19,19 +19,25 @@ def bench(
     name: Annotated[
         str, typer.Argument(help="One benchmark; by default all.", autocompletion=benchmark_names)
     ] = "",
+    seconds: Annotated[
+        float | None,
+        typer.Option(help="Length of the run in real time of 'recorder'; by default 60.", min=1.0),
+    ] = None,
     as_json: Annotated[
         bool, typer.Option("--json", help="Tables go to standard error, one JSON object to output.")
     ] = False,
 ) -> None:
     """Measure the runtime beside hand-written loops and peers; exit with 1 if a goal is missed."""
-    from ..benchmarks import BENCHMARKS, run_benchmarks
+    from ..benchmarks import BENCHMARKS, TIMED, run_benchmarks
 
     out = console(to_stderr=as_json)
     with errors_reported(as_json):
         if name and name not in BENCHMARKS:
             raise AloftError(f"there is no benchmark {name!r}; there is {', '.join(BENCHMARKS)}")
+        if seconds is not None and name not in TIMED:
+            raise AloftError(f"--seconds is for {', '.join(TIMED)}, not for {name or 'all'}")
         with out.status("measuring"):
-            results = run_benchmarks([name] if name else None)
+            results = run_benchmarks([name] if name else None, seconds)
     print_results(out, results)
     if as_json:
         print_json(results)

@@ -88,10 +88,12 @@ def export(
 def repair(file: File, as_json: AsJson = False) -> None:
     """Mend a recording that was cut off, in place: what is incomplete at its end is removed."""
     from ..logs.repair import repair as mend
+    from ..logs.tail_repair import take_in_tail
 
     with errors_reported(as_json):
         try:
             done = mend(file)
+            taken_in = 0 if done.closed else take_in_tail(file)
         except OSError as error:
             raise AloftError(f"{file} cannot be mended: {error.strerror or error}") from None
         run = read(file)
@@ -99,6 +101,7 @@ def repair(file: File, as_json: AsJson = False) -> None:
     last = int(ticks[-1]) if len(ticks) else None
     if as_json:
         found = {"closed": done.closed, "removed_bytes": done.removed, "messages": done.messages}
+        found["ticks_from_tail"] = taken_in
         print_json({"success": True, **found, "ticks": len(ticks), "last_tick": last})
         return
     if done.closed:
@@ -107,6 +110,8 @@ def repair(file: File, as_json: AsJson = False) -> None:
     cut = f"{done.removed} bytes of an incomplete message were removed" if done.removed else (
         "no message was incomplete, nothing was removed"
     )  # fmt: skip
+    if taken_in:
+        cut += f"; {taken_in} ticks were taken in from {file}.tail"
     kept = f"{len(ticks)} ticks are kept, the last is {last}" if len(ticks) else "no tick is kept"
     say(console(), f"{file} was not closed by who wrote it; {cut}. {kept}; what came after is lost")
 

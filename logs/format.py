@@ -10,7 +10,10 @@ output and a field. All but the static ones are on the timelines ``t`` (exact na
                      written last, so a recording without it was cut off
 ``graph``            the graph as it ran, after includes, sub-graphs and overrides, as text
 ``signals/B/P/F``    the field after every tick, flat, as float64 ``Scalars``; int64 fields also as
-                     component ``aloft:exact``, as float64 is exact up to 2^53 only
+                     component ``aloft:exact``, as float64 is exact up to 2^53 only. A value equal
+                     to that of the tick before and after is left out: see ``changed_rows``
+``recorded``         ``aloft:span``: first and last of ticks without a gap whose signals are all
+                     there; written after them
 ``keyframes``        ``aloft:bus`` and ``aloft:state`` at tick k: the bytes of both buffers before
                      tick k ran, from which a run can go on
 ``notes``            ``aloft:note``: JSON of a ``Note``: life cycle, overruns, faults, parameter
@@ -41,10 +44,11 @@ from ..runtime.description import RobotDescription
 from ..runtime.layout import Layout
 from ..runtime.signals import Slot
 
-FORMAT = 1
-"""The number of this format; a reader refuses a greater one."""
+FORMAT = 2
+"""The number of this format; a reader refuses any other."""
 SIGNALS, STATES, KEYFRAMES, NOTES, EVENTS = "signals", "states", "keyframes", "notes", "events"
-EXACT, BUS, STATE, NOTE = "exact", "bus", "state", "note"
+RECORDED = "recorded"
+EXACT, BUS, STATE, NOTE, SPAN = "exact", "bus", "state", "note", "span"
 
 
 @dataclass(frozen=True)
@@ -212,3 +216,10 @@ def nanoseconds(base_rate: float, ticks: NDArray[np.int64]) -> NDArray[np.int64]
     """The instant of every tick on the timeline ``t``, as integers, because floats would round."""
     instants: NDArray[np.int64] = np.rint(ticks * (1e9 / base_rate)).astype(np.int64)
     return instants
+
+
+def spans(ticks: NDArray[np.int64]) -> NDArray[np.int64]:
+    """First and last (m, 2) of each stretch without a gap of ``ticks`` (n,), which are in order."""
+    ends = np.flatnonzero(np.diff(ticks) != 1)
+    first = np.concatenate([ticks[:1], ticks[ends + 1]])
+    return np.stack([first, np.concatenate([ticks[ends], ticks[-1:]])], axis=1)

@@ -28,6 +28,7 @@ from ..runtime.errors import AloftError
 from ..runtime.live_parameters import ParameterChange
 from ..runtime.memory import Snapshot
 from ..runtime.notes import Note
+from .changed_rows import filled
 from .format import (
     BUS,
     EXACT,
@@ -35,12 +36,15 @@ from .format import (
     KEYFRAMES,
     NOTE,
     NOTES,
+    RECORDED,
     SIGNALS,
+    SPAN,
     STATE,
     Header,
     RecordedField,
     entity_of,
 )  # fmt: skip
+from .tail import read_tail
 
 
 class RecordingError(AloftError):
@@ -106,11 +110,24 @@ class RecordedRun:
     @cached_property
     def ticks(self) -> NDArray[np.int64]:
         """The recorded ticks, (ticks,), in order; those that were dropped are not among them."""
-        # of the last signal of a batch that is written: a cut file may lack it where it has others
-        fields = list(self.signals().values())
-        if not fields:
-            return np.zeros(0, np.int64)
-        return self._values(fields[-1], self._batches(fields[-1]))[0]
+        tail, _ = self._tail  # first, as what is taken out of it later is in the file by then
+        return np.unique(np.concatenate([tail, self.written_ticks()]))
+
+    def written_ticks(self) -> NDArray[np.int64]:
+        """Those of ``ticks`` that the file itself has; the others are in its tail."""
+        found = [np.zeros(0, np.int64)]
+        for _, batch in _stream(self.path, f"/{RECORDED}"):
+            for first, last in batch[f"aloft:{SPAN}"].to_pylist():
+                found.append(np.arange(first, last + 1))
+        return np.unique(np.concatenate(found))
+
+    @cached_property
+    def _tail(self) -> tuple[NDArray[np.int64], NDArray[np.uint8]]:
+        """Ticks and rows that were not in the file yet when the recording was cut off."""
+        size = self.header.bus.size
+        if self.outcome is not None:  # a tail that is there is another run's
+            return np.zeros(0, np.int64), np.zeros((0, size), np.uint8)
+        return read_tail(self.path, size)
 
     @property
     def time(self) -> NDArray[np.float64]:
@@ -174,23 +191,18 @@ class RecordedRun:
         return (batch for name, batch in _stream(self.path, entity) if name == entity)
 
     def _whole(self, field: RecordedField, batches: Iterable[Any]) -> NDArray[Any]:
-        """The values at ``ticks``, without what a cut file has beyond them."""
-        ticks, values = self._values(field, batches)
-        return values if len(ticks) == len(self.ticks) else values[np.isin(ticks, self.ticks)]
-
-    def _values(
-        self, field: RecordedField, batches: Iterable[Any]
-    ) -> tuple[NDArray[np.int64], NDArray[Any]]:
-        ticks, parts = [], []
+        """The value at each of ``ticks``, also where it was left out as it did not change."""
+        if not len(self.ticks):
+            return np.zeros((0, *field.shape), field.dtype)
+        tail_ticks, tail = self._tail
+        ticks = [tail_ticks]
+        parts = [self.header.bus.layout().view(tail, field.name)]
         for batch in batches:
             name = f"aloft:{EXACT}" if field.dtype == "int64" else "Scalars:scalars"
             ticks.append(batch["tick"].to_numpy())
-            parts.append(batch[name].flatten().to_numpy().reshape(-1, *field.shape))
-        if not ticks:
-            return np.zeros(0, np.int64), np.zeros((0, *field.shape), field.dtype)
-        tick = np.concatenate(ticks)
-        order = np.argsort(tick, kind="stable")
-        return tick[order], np.concatenate(parts)[order].astype(field.dtype, copy=False)
+            values = batch[name].flatten().to_numpy().astype(field.dtype, copy=False)
+            parts.append(values.reshape(len(ticks[-1]), *field.shape))
+        return filled(self.ticks, np.concatenate(ticks), np.concatenate(parts))
 
 
 def read(path: str | PathLike[str]) -> RecordedRun:
@@ -209,9 +221,10 @@ def read(path: str | PathLike[str]) -> RecordedRun:
     if "header" not in texts:
         raise RecordingError(f"{path} is a Rerun file, but not a recording of a run by aloft")
     number = json.loads(texts["header"]).get("format", 0)
-    if number > FORMAT:
+    if number != FORMAT:
+        newer = "update aloft" if number > FORMAT else "read it with an older one"
         raise RecordingError(
-            f"{path} has format {number}, this version of aloft reads up to {FORMAT}; update aloft"
+            f"{path} has format {number}, this version of aloft reads {FORMAT}; {newer}"
         )
     notes = [
         (row, Note(**json.loads(text)))

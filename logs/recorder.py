@@ -23,6 +23,7 @@ from ..runtime.live_parameters import ParameterChange
 from ..runtime.memory import BoundGraph
 from ..runtime.notes import Note, parameter_note
 from ..runtime.run_result import RunResult
+from . import recorder_link
 from .header import header_of
 from .recorder_link import RecorderLink
 from .recorder_process import KEYFRAME, NOTE, ROW, Report
@@ -74,6 +75,7 @@ class Recorder:
         self._ring_time = ring_time
         self._on_warning = on_warning
         self._gap: tuple[int, int, int] | None = None
+        self._told_of_stall = False
 
     @property
     def recording(self) -> Path | None:
@@ -141,12 +143,28 @@ class Recorder:
     def _wait_for_room(self, tick: int) -> bool:
         assert self.link is not None
         self.link.stirs()
-        while self.link.works():
+        while self._waiting_helps():
             if self._write(ROW, tick, self._bus):
                 return True
             time.sleep(1e-3)
         self._waits = False  # it has ended or hangs, but the run does not
         return False
+
+    def _waiting_helps(self) -> bool:
+        """Whether to go on waiting for the process; says once that it takes long."""
+        assert self.link is not None
+        stalled = self.link.stalled_for()
+        if not self.link.lives() or stalled > recorder_link.GIVE_UP_TIME:
+            return False
+        if stalled > recorder_link.STALL_TIME:
+            if not self._waits:
+                return False
+            if not self._told_of_stall:
+                self._told_of_stall = True
+                self._warn(
+                    f"the recorder has not gone on for {stalled:.0f} s; the run waits for it"
+                )
+        return True
 
     def _note_gap(self, tick: int) -> bool:
         """Note which ticks were dropped; whether there was room for that."""
@@ -192,9 +210,9 @@ class Recorder:
             return self.warnings
         if self._gap is not None:
             self.link.stirs()
-            while not self._note_gap(self._gap[1]) and self.link.works():
+            while not self._note_gap(self._gap[1]) and self._waiting_helps():
                 time.sleep(1e-3)
-        self.report, problem = self.link.finish(result.to_json())
+        self.report, problem = self.link.finish(result.to_json(), self._waiting_helps)
         if self.dropped:
             self._warn(f"{self.dropped} ticks were run but not recorded")
         if self.report is None:

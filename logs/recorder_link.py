@@ -7,6 +7,7 @@ import os
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import asdict
 from pathlib import Path
@@ -23,7 +24,9 @@ _MAIN = (
 START_TIME = 30.0
 """Seconds the process may take to be ready for a run in real time."""
 STALL_TIME = 60.0
-"""Seconds without any progress after which the process is given up."""
+"""Seconds without any progress that are worth a warning, and more than a robot waits."""
+GIVE_UP_TIME = 600.0
+"""Seconds without any progress after which a simulation gives the process up, too."""
 
 
 class RecorderLink:
@@ -72,16 +75,18 @@ class RecorderLink:
         """The process's number."""
         return self._process.pid
 
-    def works(self) -> bool:
-        """Whether the process lives and, in the time it may take, has read on."""
-        if self.ring.read_back != self._seen:
-            self._seen, self._since = self.ring.read_back, time.monotonic()
-        elif time.monotonic() - self._since > STALL_TIME:
-            return False
+    def lives(self) -> bool:
+        """Whether the process has not ended."""
         return self._process.poll() is None
 
+    def stalled_for(self) -> float:
+        """Seconds since the process has read on, or since ``stirs``."""
+        if self.ring.read_back != self._seen:
+            self._seen, self._since = self.ring.read_back, time.monotonic()
+        return time.monotonic() - self._since
+
     def stirs(self) -> None:
-        """Say that the process has had nothing to do until now, which ``works`` cannot know."""
+        """Say that the process has had nothing to do until now, which ``stalled_for`` cannot know."""
         self._since = time.monotonic()
 
     def wait_until_ready(self) -> bool:
@@ -92,8 +97,10 @@ class RecorderLink:
                 return False
         return b"\n" in self._said
 
-    def finish(self, outcome: dict[str, Any]) -> tuple[Report | None, str]:
-        """Tell the outcome and wait for the end.
+    def finish(
+        self, outcome: dict[str, Any], goes_on: Callable[[], bool]
+    ) -> tuple[Report | None, str]:
+        """Tell the outcome and wait for the end, as long as ``goes_on`` says so.
 
         Returns:
             What the process says was done, if it came to that, and else why it did not.
@@ -105,8 +112,8 @@ class RecorderLink:
             self._input.close()
         self.stirs()
         while self._listen(0.05):
-            if not self.works() and self._process.poll() is None:
-                return None, f"the recorder has been stuck for {STALL_TIME:g} s"
+            if self.lives() and not goes_on():
+                return None, f"the recorder has been stuck for {self.stalled_for():.0f} s"
         self._output.close()
         code = self._process.wait()
         self.ring.close()

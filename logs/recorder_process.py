@@ -30,6 +30,7 @@ from ..runtime.notes import Note
 from .format import Header
 from .repair import RepairError, repair
 from .ring import Record, RingReader
+from .tail import TailWriter, record_type
 from .writer import RecordingWriter, warm_up
 
 HEADER, ROW, KEYFRAME, NOTE = 1, 2, 3, 4
@@ -38,8 +39,10 @@ POLL = 0.02
 """Seconds between two looks at the ring."""
 LAST_SYNC = 2.0
 """Seconds that the end waits for the disk."""
-BATCH = 512
-"""Ticks written at once, at most."""
+BATCH, BATCH_BYTES = 4096, 1 << 25
+"""Ticks written at once, and their bytes, at most."""
+BATCH_TIME = 10.0
+"""Seconds between two batches, at most."""
 
 
 @dataclass(frozen=True)
@@ -68,7 +71,8 @@ class Report:
 
 
 class RecorderProcess:
-    """Takes records out of the ring and writes them, in batches."""
+    """Takes records out of the ring and writes them: ticks in batches, which keep the file and the
+    memory small, and until a batch is full into the file's tail; notes at every flush."""
 
     def __init__(self, task: Task) -> None:
         self.report = Report()
@@ -77,18 +81,22 @@ class RecorderProcess:
         record = next(self._ring.records())
         header = Header.from_json(bytes(record.data).decode())
         self._bus_size = header.bus.size
-        self._rows = np.zeros((BATCH, header.bus.size), np.uint8)
-        self._ticks = np.zeros(BATCH, np.int64)
-        self._waiting = self._unflushed = 0
+        batch = max(1, min(BATCH, BATCH_BYTES // (self._bus_size + 8)))
+        self._batch = np.zeros(batch, record_type(self._bus_size))
+        self._ticks, self._rows = self._batch["tick"], self._batch["row"]
+        self._filled = self._flushed_rows = 0
+        self._notes: list[Note] = []
         self._last_tick = header.first_tick
         self._dirty = False
         self._syncing = threading.Thread()
         self._writer: RecordingWriter | None = None
+        self._tail: TailWriter | None = None
         self._guard(lambda: self._open(header))
-        self._flushed = self._synced = time.monotonic()
+        self._flushed = self._synced = self._written = time.monotonic()
 
     def _open(self, header: Header) -> None:
         warm_up()
+        self._tail = TailWriter(Path(self._task.path))
         self._writer = RecordingWriter(self._task.path, header)
         self._writer.flush()
 
@@ -106,25 +114,30 @@ class RecorderProcess:
 
     def _take_one(self, record: Record) -> None:
         if record.kind == ROW:
-            self._rows[self._waiting] = np.frombuffer(record.data, np.uint8)
-            self._ticks[self._waiting] = record.tick
-            self._waiting += 1
-            if self._waiting == BATCH:
-                self._write_rows()
+            self._rows[self._filled] = np.frombuffer(record.data, np.uint8)
+            self._ticks[self._filled] = self._last_tick = record.tick
+            self._filled += 1
+            if self._filled == len(self._batch):
+                self._write_batch()
         elif record.kind == KEYFRAME:
             bus, state = bytes(record.data[: self._bus_size]), bytes(record.data[self._bus_size :])
             self._write(lambda writer: writer.write_keyframe(Snapshot(record.tick, bus, state)))
         elif record.kind == NOTE:
-            note = Note(**json.loads(bytes(record.data)))
-            self._write(lambda writer: writer.write_note(note))
+            self._notes.append(Note(**json.loads(bytes(record.data))))
 
     def flush(self) -> None:
         """Hand to the operating system all that was taken."""
-        self._write_rows()
+        if time.monotonic() - self._written >= BATCH_TIME:
+            self._write_batch()
+        new = self._batch[self._flushed_rows : self._filled]
+        if len(new) and self._writer is not None and self._tail is not None:
+            tail = self._tail
+            self._guard(lambda: tail.append(new))
+        self._settle()
+        self._write_notes()
         if self._dirty and self._writer is not None:
             self._guard(self._writer.flush)
         self._dirty = False
-        self._settle(flushed=True)
 
     def sync(self) -> None:
         """Have what was flushed put on the disk, which a thread waits for: a busy disk may take
@@ -134,7 +147,9 @@ class RecorderProcess:
             self._syncing.start()
 
     def _sync(self) -> None:
-        with suppress(OSError):  # a disk that cannot take it fails the next flush too
+        with suppress(OSError, ValueError):  # a disk that cannot take it fails the next flush too
+            if self._tail is not None:
+                self._tail.sync()
             descriptor = os.open(self._task.path, os.O_RDONLY)
             try:
                 os.fsync(descriptor)
@@ -144,44 +159,60 @@ class RecorderProcess:
     def finish(self, outcome: dict[str, Any] | None) -> Report:
         """Write what is left and close the file."""
         self.take()
-        self._write_rows()
+        self._write_batch()
         if outcome is None:
             text = "the process that ran the graph ended without a word"
-            note = Note(self._last_tick + 1, "fault", text, "ERROR")
-            self._write(lambda writer: writer.write_note(note))
-        else:
+            self._notes.append(Note(self._last_tick + 1, "fault", text, "ERROR"))
+        self._write_notes()
+        if outcome is not None:
             self._write(lambda writer: writer.write_outcome(outcome))
         if self._writer is not None:
             self._guard(self._writer.close)
-            self._settle(flushed=True)
             self.sync()
             if self._syncing.is_alive():
                 self._syncing.join(LAST_SYNC)
+        if self._tail is not None and (self._writer is not None or not self._tail.count):
+            self._tail.remove()  # all is in the recording
         if Path(self._task.path).is_file():
             self.report.size = Path(self._task.path).stat().st_size
         self.report.memory = _memory()
         return self.report
 
-    def _write_rows(self) -> None:
-        count, self._waiting = self._waiting, 0
-        if not count:
-            return
-        self._last_tick = int(self._ticks[count - 1])
-        # copies, as Rerun keeps what it is given until it has written it
-        ticks, rows = self._ticks[:count].copy(), self._rows[:count].copy()
-        self._write(lambda writer: writer.write_rows(ticks, rows))
-        self._unflushed += count
-        self._settle(flushed=False)
+    def _write_batch(self) -> None:
+        """Write the ticks that wait for it, and wait until the operating system has them."""
+        if self._filled and self._writer is not None:
+            ticks = self._ticks[: self._filled].copy()
+            rows = self._rows[: self._filled]
+            self._write(lambda writer: writer.write_rows(ticks, rows))
+        if self._writer is not None:
+            self._guard(self._writer.flush)
+        self._settle()
+        if self._writer is not None and self._tail is not None:
+            self._guard(self._tail.clear)
+        self._filled = self._flushed_rows = 0
+        self._written = time.monotonic()
 
-    def _settle(self, *, flushed: bool) -> None:
+    def _write_notes(self) -> None:
+        notes, self._notes = self._notes, []
+        if notes:
+            self._write(lambda writer: writer.write_notes(notes))
+
+    def _settle(self) -> None:
         """Count the rows that were handed over as written or, where that failed, as lost."""
+        count = self._filled - self._flushed_rows
         if self._writer is None:
-            self.report.lost += self._unflushed
-        elif flushed:
-            self.report.rows += self._unflushed
+            self.report.lost += count
         else:
-            return
-        self._unflushed = 0
+            self.report.rows += count
+        self._flushed_rows = self._filled
+
+    def _rescue(self) -> None:
+        """Put into the tail what the file did not take, as far as there is room."""
+        if self._tail is not None:
+            with suppress(OSError):
+                self._tail.append(self._batch[self._tail.count : self._filled])
+            self.report.rows += self._tail.count - self._flushed_rows
+            self._flushed_rows = self._tail.count
 
     def _write(self, write: Callable[[RecordingWriter], None]) -> None:
         writer = self._writer
@@ -198,6 +229,7 @@ class RecorderProcess:
             self._writer = None
             with suppress(OSError, RepairError):
                 repair(self._task.path)  # so that what was written before can be read
+            self._rescue()
 
 
 def _memory() -> int:

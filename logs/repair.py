@@ -29,14 +29,17 @@ class RepairError(AloftError):
 
 @dataclass(frozen=True)
 class Repair:
-    """What was found and done: the ``messages`` that are whole, the size of the file [bytes] before
-    and after, and whether it had been ``closed`` by who wrote it."""
+    """What was found and done: the ``messages`` that are whole, where in the file they begin and
+    ``end``, its size [bytes] before and after, and whether it had been ``closed`` by who wrote it.
+    """
 
     path: Path
     messages: int
     size_before: int
     size: int
     closed: bool
+    end: int
+    begin: int = _FILE_HEAD
 
     @property
     def removed(self) -> int:
@@ -71,8 +74,8 @@ def _examine(path: Path, file: BinaryIO) -> Repair:
         if kind > _LAST_KIND or end > total:
             break
         if kind == _END:
-            return Repair(path, messages, total, total, closed=True)
+            return Repair(path, messages, total, total, closed=True, end=place)
         messages, place = messages + 1, end
     if not messages:
         raise RepairError(f"{path} holds no message that is whole; there is nothing to save")
-    return Repair(path, messages, total, place, closed=False)
+    return Repair(path, messages, total, place, closed=False, end=place)

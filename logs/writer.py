@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from ..runtime.memory import Snapshot
 from ..runtime.notes import Note
 from .blueprint import recording_blueprint
+from .changed_rows import ChangedRows
 from .format import (
     BUS,
     EVENTS,
@@ -26,12 +27,16 @@ from .format import (
     KEYFRAMES,
     NOTE,
     NOTES,
+    RECORDED,
     SIGNALS,
+    SPAN,
     STATE,
     STATES,
     Header,
+    RecordedField,
     RecordedRows,
     entity_of,
+    spans,
 )  # fmt: skip
 from .robot_view import RobotWriter, port_with_pose
 from .signal_names import element_names
@@ -60,6 +65,7 @@ class RecordingWriter:
         self.path, self.header = Path(path), header
         self._layout = header.bus.layout()
         self._last_states: dict[str, int] = {}
+        self._changed = {field.name: ChangedRows() for field in header.bus.fields}
         self.path.parent.mkdir(parents=True, exist_ok=True)
         self.path.open("wb").close()  # Rerun would only warn, so find out here
         self._stream = rr.RecordingStream(
@@ -105,6 +111,7 @@ class RecordingWriter:
         self._write_states(batch)
         if self._robot is not None:
             self._robot.write(batch)
+        self._write_spans(ticks)  # last, so that what it speaks of is there
 
     def write_keyframe(self, snapshot: Snapshot) -> None:
         """Write all that the graph remembered before ``snapshot.tick`` ran."""
@@ -120,13 +127,19 @@ class RecordingWriter:
 
     def write_note(self, note: Note) -> None:
         """Write a note, for machines and for people."""
+        self.write_notes([note])
+
+    def write_notes(self, notes: Sequence[Note]) -> None:
+        """Write notes, in order, at once: a run that is late in each tick has many."""
         import rerun as rr
 
-        times = self._times(np.array([note.tick]))
-        text = json.dumps(asdict(note))
-        columns = rr.DynamicArchetype.columns("aloft", components={NOTE: [text]})
+        if not notes:
+            return
+        times = self._times(np.array([note.tick for note in notes]))
+        texts = [json.dumps(asdict(note)) for note in notes]
+        columns = rr.DynamicArchetype.columns("aloft", components={NOTE: texts})
         self._stream.send_columns(NOTES, times, columns)
-        self._write_events(times, [note.text], [note.level])
+        self._write_events(times, [note.text for note in notes], [note.level for note in notes])
 
     def write_outcome(self, outcome: dict[str, Any]) -> None:
         """Write what came of the run, last of all."""
@@ -144,6 +157,7 @@ class RecordingWriter:
 
     def close(self) -> None:
         """Flush and close the file. Raises ``OSError`` as ``flush`` does."""
+        self._write_rest()
         try:
             self.flush()
         finally:
@@ -153,17 +167,38 @@ class RecordingWriter:
         return time_columns(self.header, ticks)
 
     def _write_signals(self, batch: RecordedRows) -> None:
-        import rerun as rr
-
-        times = self._times(batch.ticks)
         for field in batch.fields():
             values = batch.signal(field.name)
             flat = np.ascontiguousarray(values.reshape(len(values), -1))
-            columns = list(rr.Scalars.columns(scalars=flat.astype(np.float64, copy=False)))
-            if field.dtype == "int64":
-                exact = rr.DynamicArchetype.columns("aloft", components={EXACT: flat.reshape(-1)})
-                columns += list(exact.partition(np.full(len(flat), flat.shape[1])))
-            self._stream.send_columns(entity_of(SIGNALS, field.name), times, columns)
+            ticks, changed = self._changed[field.name].pick(batch.ticks, flat)
+            if len(ticks):
+                self._write_signal(field, ticks, changed)
+
+    def _write_rest(self) -> None:
+        """Write the last value of the signals that were constant in the end, for the viewer."""
+        for field in self.header.bus.fields:
+            rest = self._changed[field.name].rest()
+            if rest is not None:
+                self._write_signal(field, *rest)
+
+    def _write_signal(
+        self, field: RecordedField, ticks: NDArray[np.int64], flat: NDArray[Any]
+    ) -> None:
+        import rerun as rr
+
+        columns = list(rr.Scalars.columns(scalars=flat.astype(np.float64, copy=False)))
+        if field.dtype == "int64":
+            exact = rr.DynamicArchetype.columns("aloft", components={EXACT: flat.reshape(-1)})
+            columns += list(exact.partition(np.full(len(flat), flat.shape[1])))
+        self._stream.send_columns(entity_of(SIGNALS, field.name), self._times(ticks), columns)
+
+    def _write_spans(self, ticks: NDArray[np.int64]) -> None:
+        import rerun as rr
+
+        found = spans(ticks)
+        columns = rr.DynamicArchetype.columns("aloft", components={SPAN: found.reshape(-1)})
+        partitions = columns.partition(np.full(len(found), 2))
+        self._stream.send_columns(RECORDED, self._times(found[:, 0]), partitions)
 
     def _write_states(self, batch: RecordedRows) -> None:
         """Write each change of a number whose values have names, and the same as text."""

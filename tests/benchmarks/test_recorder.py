@@ -4,7 +4,7 @@ from aloft.benchmarks.recorder import COST_GOAL, recorder
 
 
 def test_rows_are_complete_and_nothing_is_dropped() -> None:
-    rows = {row.name: row for row in recorder(duration=1.0, rounds=2)}
+    rows = {row.name: row for row in recorder(seconds=1.0, rounds=2)}
     assert rows["recording a tick"].goal == COST_GOAL == 2.0
     assert rows["array allocations of recording"].value == 0.0
     assert rows["rows dropped"].value == 0.0

@@ -68,7 +68,6 @@ def test_the_whole_way(recorded: Path, call: Call, call_json: CallJson) -> None:
 
 
 def test_mcap(recorded: Path, call: Call) -> None:
-    pytest.importorskip("mcap")
     from mcap.reader import make_reader
 
     call("log", "export", "count.rrd", "--mcap")

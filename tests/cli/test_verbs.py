@@ -117,6 +117,8 @@ def test_check_prints_the_schema(call: Call) -> None:
 def test_bench_refuses_an_unknown_name(call_json: CallJson) -> None:
     result = call_json("bench", "sheduler", code=2)
     assert result["reason"].startswith("there is no benchmark 'sheduler'; there is scheduler")
+    result = call_json("bench", "scheduler", "--seconds", "5", code=2)
+    assert result["reason"] == "--seconds is for recorder, not for scheduler"
 
 
 def test_bench_prints_rows_and_exits_by_the_goals(
@@ -128,7 +130,7 @@ def test_bench_prints_rows_and_exits_by_the_goals(
     for met, code in ((True, 0), (None, 0), (False, 1)):
         rows = [{**row, "goal": 1.1, "met": met, "note": ""}]
         monkeypatch.setattr(
-            aloft.benchmarks, "run_benchmarks", lambda _, r=rows: {**results, "rows": r}
+            aloft.benchmarks, "run_benchmarks", lambda *_, r=rows: {**results, "rows": r}
         )
         assert call_json("bench", "scheduler", code=code)["rows"] == rows
         text = call("bench", code=code).stdout

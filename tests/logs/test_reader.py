@@ -135,12 +135,14 @@ def test_what_is_no_recording_is_said_so(tmp_path: Path) -> None:
         read(tmp_path / "other.rrd")
 
 
-def test_a_later_format_is_refused(
-    bound: BoundGraph, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize("number, what", [(99, "update aloft"), (1, "read it with an older one")])
+def test_another_format_is_refused(
+    bound: BoundGraph, tmp_path: Path, number: int, what: str
 ) -> None:
     from dataclasses import replace
 
-    header = replace(header_of(bound), format=99)
+    header = replace(header_of(bound), format=number)
     RecordingWriter(tmp_path / "a.rrd", header).close()
-    with pytest.raises(RecordingError, match="has format 99, this version of aloft reads up to 1"):
+    match = f"has format {number}, this version of aloft reads 2; {what}"
+    with pytest.raises(RecordingError, match=match):
         read(tmp_path / "a.rrd")

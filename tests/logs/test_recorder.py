@@ -2,17 +2,21 @@
 
 import json
 import os
+import re
 import resource
 import signal
 import subprocess
 import sys
 import time
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
+from threading import Timer
 
 import numpy as np
+import pytest
 
-from aloft.logs import RecordedRun, RecordingError, read
+from aloft.logs import RecordedRun, RecordingError, read, recorder_link
 from aloft.logs.recorder import Recorder
 from aloft.runtime.block import Block, Output, State
 from aloft.runtime.executor import run
@@ -132,6 +136,45 @@ def test_virtual_time_waits_for_room(tmp_path: Path) -> None:
     result = run(graph(20_000), sinks=[recorder])
     assert recorder.dropped == 0 and result.warnings == ()
     assert_whole(read(tmp_path / "a.rrd"), result)
+
+
+def test_virtual_time_waits_for_a_recorder_that_is_stuck(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(recorder_link, "STALL_TIME", 0.2)
+    told: list[str] = []
+    recorder = Recorder(tmp_path / "a.rrd", ring_time=0.01, on_warning=told.append)
+
+    def stop(tick: int) -> None:
+        os.kill(process_of(recorder), signal.SIGSTOP)
+        go_on = partial(os.kill, process_of(recorder), signal.SIGCONT)
+        Timer(1.0, go_on).start()
+
+    stops = [At(tick, partial(stop, tick)) for tick in (1000, 10_000)]
+    result = run(graph(20_000), sinks=[recorder, *stops])
+    assert recorder.dropped == 0
+    assert result.warnings == tuple(told) and len(told) == 1  # not one for every stop
+    assert re.fullmatch(r"the recorder has not gone on for \d+ s; the run waits for it", told[0])
+    assert_whole(read(tmp_path / "a.rrd"), result)
+
+
+def test_a_recorder_that_is_stuck_for_very_long_is_given_up(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(recorder_link, "STALL_TIME", 0.1)
+    monkeypatch.setattr(recorder_link, "GIVE_UP_TIME", 0.3)
+    recorder = Recorder(tmp_path / "a.rrd", ring_time=0.01)
+    stop = At(1000, lambda: os.kill(process_of(recorder), signal.SIGSTOP))
+    try:
+        result = run(graph(20_000), sinks=[recorder, stop])
+    finally:
+        os.kill(process_of(recorder), signal.SIGKILL)
+    assert result.success and result.ticks == 20_000
+    assert recorder.dropped > 10_000
+    waits, dropped, stuck = result.warnings
+    assert waits.endswith("the run waits for it")
+    assert dropped == f"{recorder.dropped} ticks were run but not recorded"
+    assert "the recording is not whole: the recorder has been stuck for" in stuck
 
 
 def test_what_finds_no_room_is_counted_and_noted(tmp_path: Path) -> None:
