@@ -9,9 +9,11 @@ import numpy as np
 import pytest
 
 from aloft.logs.format import RecordedField
+from aloft.logs.flights import Flights
 from aloft.logs.header import make_header
 from aloft.logs.recording import write_recording
-from aloft.logs.robot_view import Flights, port_with_pose, quaternion_from_z
+from aloft.logs.robot_shapes import quaternion_from_z
+from aloft.logs.scene_ports import port_with_pose
 from aloft.logs.signal_names import element_names
 from aloft.runtime.block import Block, Output, State
 from aloft.runtime.description import RobotDescription
