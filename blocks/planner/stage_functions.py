@@ -63,8 +63,8 @@ def parameter_sizes(coordinates: Coordinates) -> dict[str, dict[str, int]]:
         "nominal": n, "posture": n, "velocity": n, "acceleration": n, "slope": joints,
     }  # fmt: skip
     return {
-        "stance": {"step": 1, "friction": 1, "force": 1, **interval},
-        "free_stance": {"share": 1, "friction": 1, "force": 1, **interval},
+        "stance": {"step": 1, "friction": 1, "force": 1, "pressure": 1, **interval},
+        "free_stance": {"share": 1, "friction": 1, "force": 1, "pressure": 1, **interval},
         "flight": {"share": 1, **interval},
         "impact": {"friction": 1, "impulse": 1},
         "contact": {"place": 3 * contacts, "heading": 2},
@@ -142,6 +142,7 @@ def piece_expressions(
         if forces:
             cost = cost + w["force"] * ca.dot(F, F)
             rows += _cones(coordinates, all_forces, w["friction"])
+            rows += _pressures(model, coordinates, all_forces, w["pressure"])
         cost = h * cost
     elif name == "impact":
         change, F = ca.SX.sym("dv", n), ca.SX.sym("F", coordinates.forces)
@@ -187,29 +188,48 @@ def _cones(coordinates: Coordinates, forces: Any, friction: Any) -> list[Any]:
     return rows
 
 
+def _pressures(
+    model: SymbolicModel, coordinates: Coordinates, forces: Any, share: Any
+) -> list[Any]:
+    """By how much every point carries more than that share of its foot's load."""
+    contacts = model.robot.contacts
+    rows = []
+    for c in coordinates.contacts:
+        same = [i for i in coordinates.contacts if contacts[i].foot == contacts[c].foot]
+        rows.append(forces[3 * c + 2] - share * sum(forces[3 * i + 2] for i in same))
+    return rows
+
+
 def _impulse_balance(model: SymbolicModel, coordinates: Coordinates, q: Any, change: Any,
                      impulses: Any) -> Any:  # fmt: skip
-    """M dv - J' L, of the base (body frame) and the joints; all coordinates only."""
+    """M dv - J' L of the base (body frame) and of the joints that are coordinates: the others of a
+    mirrored motion are held."""
     import casadi as ca
 
     still = ca.SX.zeros(model.size)
-    named = {c.name: impulses[3 * i : 3 * i + 3] for i, c in enumerate(model.robot.contacts)}
+    named = {
+        model.robot.contacts[c].name: impulses[3 * c : 3 * c + 3] for c in coordinates.contacts
+    }
     sums = []
     # Gravity has no impulse: what holds the robot at rest is taken off again.
     for bend, forces in ((coordinates.expand(change), named), (still, {})):
         base, limbs, torque = model.inverse_dynamics(
             coordinates.expand(q), still, bend, forces, coordinates.limbs
         )
-        sums.append(ca.vertcat(base + sum(limbs.values()), torque))
+        wrench = base + coordinates.share * sum(limbs.values())
+        sums.append(ca.vertcat(wrench[list(coordinates.rows)], torque[list(coordinates.moving)]))
     return sums[0] - sums[1]
 
 
 def make_piece(model: SymbolicModel, coordinates: Coordinates, name: str) -> Piece:
     """The functions of a piece with exact derivatives."""
+    return derived(f"{coordinates.name}_{name}", *piece_expressions(model, coordinates, name))
+
+
+def derived(prefix: str, z: Any, w: Any, cost: Any, rows: Any) -> Piece:
+    """A piece from its symbols ``z`` and ``w``, its cost and its rows."""
     import casadi as ca
 
-    z, w, cost, rows = piece_expressions(model, coordinates, name)
-    prefix = f"{coordinates.name}_{name}"
     lam_f, lam_g = ca.SX.sym("lam_f"), ca.SX.sym("lam_g", rows.numel())
     gradient = ca.densify(ca.gradient(cost, z))
     hessian, slope = ca.hessian(lam_f * cost + ca.dot(lam_g, rows), z)
