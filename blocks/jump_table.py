@@ -25,7 +25,11 @@ class JumpTable:
             where something jumps, such as the joint velocities at touchdown.
         columns: by the name of a ``JumpReference`` field its values over time, (n, ...).
         squat_time, thrust_time, lift_off_time, touchdown_time, recover_time: when the phases of
-            these names begin, flight beginning with lift-off and landing with touchdown [s].
+            these names begin, flight beginning with lift-off and landing with touchdown [s]; of the
+            first jump, but for the last.
+        later_jumps: when thrust, flight and landing of the jumps after the first begin [s].
+        contact: by row which points carry load, (n, n_contacts); ``None``: all of them, but in
+            flight.
     """
 
     time: Array
@@ -35,6 +39,8 @@ class JumpTable:
     lift_off_time: float
     touchdown_time: float
     recover_time: float
+    later_jumps: tuple[tuple[float, float, float], ...] = ()
+    contact: NDArray[np.bool_] | None = None
 
 
 class JumpTableReader:
@@ -45,9 +51,13 @@ class JumpTableReader:
         self._time = table.time
         self._columns = list(table.columns.items())
         self._scratch = {name: np.zeros(rows.shape[1:]) for name, rows in self._columns}
+        first = (table.thrust_time, table.lift_off_time, table.touchdown_time)
+        self._jumps = [first, *table.later_jumps]
+        self._touchdowns = np.array([jump[2] for jump in self._jumps])
 
     def read(self, time: float, reference: JumpReference, lead: float = 0.0) -> None:
-        """The reference at ``time``; before the table its first row, after it its last.
+        """The reference at ``time``; before the table its first row, after it its last. Lift-off
+        and touchdown times are those of the flight under way or, from a touchdown on, the next.
 
         What a controller feeds forward, the acceleration and the rate of angular momentum, is
         that of ``lead`` seconds later.
@@ -61,15 +71,20 @@ class JumpTableReader:
             np.multiply(scratch, share, out=scratch)
             np.add(rows[row], scratch, out=out)
         normalise(reference.orientation, reference.orientation)
+        jump = present_jump(time, self._touchdowns)
+        thrust, lift_off, touchdown = self._jumps[jump]
         phase = planned_phase(
-            time, table.squat_time, table.thrust_time, table.lift_off_time,
-            table.touchdown_time, table.recover_time,
-        )  # fmt: skip
+            time, table.squat_time, thrust, lift_off, touchdown, table.recover_time
+        )
+        if jump and phase < Phase.THRUST:  # between two jumps it has landed, and does not squat
+            phase = int(Phase.LANDING)
         reference.time[()] = time
         reference.phase[()] = phase
-        reference.lift_off_time[()] = table.lift_off_time
-        reference.touchdown_time[()] = table.touchdown_time
+        reference.lift_off_time[()] = lift_off
+        reference.touchdown_time[()] = touchdown
         reference.contact[...] = phase != Phase.FLIGHT
+        if table.contact is not None and phase != Phase.FLIGHT:
+            reference.contact[...] = table.contact[here[0]]
 
 
 @kernel
@@ -87,6 +102,15 @@ def locate(times: Array, time: float) -> tuple[int, float]:
         else:
             high = middle
     return low, (time - float(times[low])) / (float(times[high]) - float(times[low]))
+
+
+@kernel
+def present_jump(time: float, touchdowns: Array) -> int:
+    """The jump that is under way or comes next, by when the jumps end; behind the last one that."""
+    number = 0
+    while number + 1 < touchdowns.shape[0] and time >= float(touchdowns[number]):
+        number += 1
+    return number
 
 
 @kernel

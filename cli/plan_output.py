@@ -119,7 +119,11 @@ def recorded_motion(plan: JumpPlan, robot: RobotDescription) -> RecordedMotion:
             "motor speed [rad per s]": (evidence.motor_speed, motors),
             "foot height [m]": (samples.points[:, :, 2], contacts),
         },
-        events=[(plan.lift_off_time, "lift-off"), (plan.touchdown_time, "touchdown")],
+        events=[
+            (time, what)
+            for flight in plan.flights
+            for time, what in zip(flight, ("lift-off", "touchdown"), strict=True)
+        ],
         properties={
             "task": json.dumps(plan.task.model_dump(mode="json")),
             "statistics": json.dumps(dict(plan.statistics), default=str),

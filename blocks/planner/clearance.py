@@ -11,33 +11,36 @@ from numpy.typing import NDArray
 
 from ...runtime.description import RobotDescription
 from ...runtime.kinematics import LinkPoses, from_base_outwards
+from .sequence import edge_of
 from .task import JumpTask
 
 Array = NDArray[np.float64]
 
-SHORTEST_JUMP_OVER_AN_EDGE = 0.03
-"""Start and landing closer together than this [m] have no room for a step's edge between them."""
+
+def step_edge(task: JumpTask, jump: int = 0) -> float | None:
+    """The x at which the ground changes height under one of the task's jumps; see ``edge_of``."""
+    return edge_of(task.hops()[jump], task.places()[jump])
 
 
-def step_edge(task: JumpTask) -> float | None:
-    """The x at which the ground changes height; ``None`` if the ground is level, or if the robot
-    lands where it stood, so that there can be no edge and the ground is taken to move in flight."""
-    if task.landing_height == 0.0:
-        return None
-    if task.step_edge is not None:
-        return task.step_edge
-    return 0.5 * task.distance_x if abs(task.distance_x) >= SHORTEST_JUMP_OVER_AN_EDGE else None
+def ground_height(task: JumpTask, x: Array, progress: Array | float) -> Array:
+    """The ground's height [m] at ``x`` [m].
 
-
-def ground_height(task: JumpTask, x: Array, share: Array | float) -> Array:
-    """The ground's height [m] at ``x`` [m]; ``share`` of the flight's time is past, of the same
-    shape, below 0 before lift-off and above 1 after touchdown."""
-    share = np.broadcast_to(share, x.shape)
-    edge = step_edge(task)
-    if edge is None:
-        return np.where(share >= 0.5, task.landing_height, 0.0)
-    beyond = x > edge if task.distance_x >= 0.0 else x < edge
-    return np.where(beyond, task.landing_height, 0.0)
+    ``progress``, of the same shape, is how many flights are over, with the share of the present
+    one's time: 1.5 in the middle of the second flight. Below 0 counts as 0, above all as all.
+    """
+    hops, places = task.hops(), task.places()
+    done = np.clip(np.broadcast_to(progress, x.shape), 0.0, len(hops))
+    levels = np.array([place.z for place in places])
+    found = levels[np.floor(done + 0.5).astype(np.int64)]
+    for number, hop in enumerate(hops):
+        edge = edge_of(hop, places[number])
+        if edge is None:
+            continue
+        beyond = x > edge if (hop.distance_x or 0.0) >= 0.0 else x < edge
+        flying = (done > number) & (done < number + 1)
+        found = np.where(beyond & (flying | (done == number)), levels[number + 1], found)
+        found = np.where(~beyond & (flying | (done == number + 1)), levels[number], found)
+    return found
 
 
 def capsule_ends(
@@ -56,7 +59,7 @@ def capsule_ends(
 
 
 def body_heights(
-    robot: RobotDescription, task: JumpTask, poses: LinkPoses, share: Array
+    robot: RobotDescription, task: JumpTask, poses: LinkPoses, progress: Array
 ) -> dict[str, Array]:
     """By link, except for feet, the lowest height [m] of its capsules above the ground, (n,)."""
     feet = {foot.link for foot in robot.feet}
@@ -65,7 +68,7 @@ def body_heights(
         if link.name in feet or not link.shapes:
             continue
         heights = [
-            end[:, 2] - radius - ground_height(task, end[:, 0], share)
+            end[:, 2] - radius - ground_height(task, end[:, 0], progress)
             for start, stop, radius in capsule_ends(robot, poses, link.name)
             for end in (start, 0.5 * (start + stop), stop)
         ]

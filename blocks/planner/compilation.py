@@ -57,39 +57,42 @@ def load_pieces(
     coordinates: Coordinates,
     *,
     profile: str,
+    names: tuple[str, ...] = PIECES,
     compiled: bool = True,
     progress: Progress | None = None,
 ) -> dict[str, Piece]:
-    """The pieces' functions, compiled where there is a compiler and ``compiled`` asks for it."""
+    """The named pieces' functions, compiled where there is a compiler and ``compiled`` asks for
+    it."""
     rotors = model.robot.profiles[profile].rotor_inertia
     key = content_hash(model.robot, rotors, coordinates.name)
-    held = _held.get((key, compiled))
-    if held is None:
-        held = _held[key, compiled] = _load(model, coordinates, key, compiled, progress)
-    return held
+    held = _held.setdefault((key, compiled), {})
+    missing = tuple(name for name in names if name not in held)
+    if missing:
+        held |= _load(model, coordinates, key, missing, compiled, progress)
+    return {name: held[name] for name in names}
 
 
 _held: dict[tuple[str, bool], dict[str, Piece]] = {}
 
 
 def _load(
-    model: SymbolicModel, coordinates: Coordinates, key: str, compiled: bool,
-    progress: Progress | None,
+    model: SymbolicModel, coordinates: Coordinates, key: str, names: tuple[str, ...],
+    compiled: bool, progress: Progress | None,
 ) -> dict[str, Piece]:  # fmt: skip
     compiler = _compiler() if compiled else None
     pieces = {}
-    for done, name in enumerate(PIECES):
+    for done, name in enumerate(names):
         library = cache_folder() / key / f"{name}.so"
         usable = compiled and library.is_file()
         if not usable and progress is not None:
             how = "compiling" if compiler else "building"
-            progress(f"{how} the {coordinates.name} {name} functions", done, len(PIECES))
+            progress(f"{how} the {coordinates.name} {name} functions", done, len(names))
         piece = None if usable else make_piece(model, coordinates, name)
         if piece is not None and compiler is not None:
             usable = _compile(compiler, piece, library)
         pieces[name] = _external(library, coordinates, name) if usable or piece is None else piece
     if progress is not None:
-        progress(f"{coordinates.name} functions ready", len(PIECES), len(PIECES))
+        progress(f"{coordinates.name} functions ready", len(names), len(names))
     return pieces
 
 

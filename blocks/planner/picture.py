@@ -32,12 +32,12 @@ def plan_picture(plan: JumpPlan, robot: RobotDescription) -> str:
     each = WIDTH / 3.0
     parts = [postures(plan, robot)]
     for number, chart in enumerate(charts):
-        chart.shaded.append((plan.lift_off_time, plan.touchdown_time, "flight"))
+        chart.shaded += [(start, end, "flight") for start, end in plan.flights]
         row, column = divmod(number, 3)
         parts.append(chart.svg(column * each, 36.0 + STRIP + row * CHART, each, CHART))
-    figures = evidence.figures()
+    figures, jumps = evidence.figures(), len(plan.flights)
     title = (
-        f"{plan.task.name}: rise {100 * figures['rise_m']:.1f} cm, flight "
+        f"{plan.task.name}: {f'{jumps} jumps, ' if jumps > 1 else ''}rise {100 * figures['rise_m']:.1f} cm, flight "
         f"{1000 * plan.flight_time:.0f} ms, {figures['peak_motor_torque_N_m']:.1f} N m and "
         f"{figures['peak_motor_speed_rad_s']:.1f} rad/s at most"
     )
@@ -54,25 +54,15 @@ def write_picture(path: str | Path, plan: JumpPlan, robot: RobotDescription) -> 
 
 def postures(plan: JumpPlan, robot: RobotDescription) -> str:
     """The robot from its right side at instants in the order of time, each in its own place."""
-    lift_off, touchdown = plan.lift_off_time, plan.touchdown_time
-    times = np.unique(
-        np.concatenate(
-            [
-                [0.0, plan.time[-1]],
-                np.linspace(0.5 * lift_off, lift_off, 3),
-                np.linspace(lift_off, touchdown, POSTURES - 5),
-                [0.5 * (touchdown + plan.time[-1])],
-            ]
-        )
-    )
+    times = posture_times(plan)
     knots = [plan.knot_at(float(time)) for time in times]
     q = plan.position[knots]
     poses = link_poses(robot, q[:, :3], q[:, 3:7], q[:, 7:])
     low, high = -0.02, max(0.62, float(plan.position[:, 2].max()) + 0.25)
-    scale = (STRIP - 20.0) / (high - low + max(0.0, -plan.task.landing_height))
-    bottom = 30.0 + STRIP - 20.0
-    if plan.task.landing_height < 0.0:
-        bottom += scale * plan.task.landing_height
+    levels = [standing.z for standing in plan.task.places()]
+    deepest = min(0.0, *levels)
+    scale = (STRIP - 20.0) / (high - low - deepest)
+    bottom = 30.0 + STRIP - 20.0 + scale * deepest
     place = WIDTH / len(knots)
     out = []
     for number, knot in enumerate(knots):
@@ -81,8 +71,8 @@ def postures(plan: JumpPlan, robot: RobotDescription) -> str:
         def point(p: Array, centre: float = centre) -> str:
             return f"{centre + scale * float(p[0]):.1f},{bottom - scale * float(p[2]):.1f}"
 
-        ground = plan.task.landing_height if plan.time[knot] >= touchdown else 0.0
-        level = bottom - scale * ground
+        flown = sum(plan.time[knot] >= touchdown for touchdown in plan.touchdown_times)
+        level = bottom - scale * levels[flown]
         left = number * place + 6.0
         out.append(
             f'<line x1="{left:.1f}" y1="{level:.1f}" x2="{left + place - 12:.1f}" y2="{level:.1f}" '
@@ -110,6 +100,23 @@ def postures(plan: JumpPlan, robot: RobotDescription) -> str:
             f"{plan.time[knot]:.2f} s</text>"
         )
     return "\n".join(out)
+
+
+def posture_times(plan: JumpPlan) -> Array:
+    """Instants that show the whole motion [s]."""
+    if plan.later_flights:
+        return np.linspace(0.0, plan.time[-1], POSTURES)
+    lift_off, touchdown = plan.lift_off_time, plan.touchdown_time
+    return np.unique(
+        np.concatenate(
+            [
+                [0.0, plan.time[-1]],
+                np.linspace(0.5 * lift_off, lift_off, 3),
+                np.linspace(lift_off, touchdown, POSTURES - 5),
+                [0.5 * (touchdown + plan.time[-1])],
+            ]
+        )
+    )
 
 
 def com_chart(plan: JumpPlan) -> Chart:

@@ -59,7 +59,8 @@ class JumpPlan:
         joint_torque: [N m], (N, n).
         com, com_velocity: centre of mass in the world [m, m/s], (N, 3).
         angular_momentum: about it, world axes [N m s], (N, 3).
-        lift_off_time, touchdown_time: [s].
+        lift_off_time, touchdown_time: of the first flight [s].
+        later_flights: lift-off and touchdown times of the flights after it [s].
         statistics: how it was solved: solver, iterations, cpu_s, violation, cost and the like.
         versions: of the packages that made it.
         report: the validity report as plain data; empty until the plan is checked.
@@ -79,6 +80,7 @@ class JumpPlan:
     angular_momentum: Array
     lift_off_time: float
     touchdown_time: float
+    later_flights: tuple[tuple[float, float], ...] = ()
     statistics: Mapping[str, Any] = field(default_factory=dict)
     versions: Mapping[str, str] = field(default_factory=dict)
     report: Mapping[str, Any] = field(default_factory=dict)
@@ -99,8 +101,23 @@ class JumpPlan:
         return float(self.time[-1] - self.time[0])
 
     @property
+    def flights(self) -> tuple[tuple[float, float], ...]:
+        """Lift-off and touchdown times of all flights [s]."""
+        return ((self.lift_off_time, self.touchdown_time), *self.later_flights)
+
+    @property
+    def lift_off_times(self) -> tuple[float, ...]:
+        """When the flights begin [s]."""
+        return tuple(start for start, _ in self.flights)
+
+    @property
+    def touchdown_times(self) -> tuple[float, ...]:
+        """When they end [s]."""
+        return tuple(end for _, end in self.flights)
+
+    @property
     def flight_time(self) -> float:
-        """From lift-off to touchdown [s]."""
+        """From lift-off to touchdown of the first flight [s]."""
         return self.touchdown_time - self.lift_off_time
 
     @property
@@ -141,6 +158,8 @@ def plan_bytes(plan: JumpPlan, names: Mapping[str, list[str]] | None = None) -> 
         "format": FILE_FORMAT,
         "task": plan.task.model_dump(mode="json"),
         **{name: getattr(plan, name) for name in _SCALARS},
+        "lift_off_times": list(plan.lift_off_times),
+        "touchdown_times": list(plan.touchdown_times),
         "units": ARRAYS,
         "names": dict(names or {}),
     }
@@ -201,6 +220,8 @@ def read_plan(path: str | Path) -> JumpPlan:
         )
     try:
         task = make_task(header["task"], where=f"{path}: task")
-        return JumpPlan(task=task, **arrays, **{name: header[name] for name in _SCALARS})
+        values = {name: header[name] for name in _SCALARS if name != "later_flights"}
+        times = [(float(start), float(end)) for start, end in header.get("later_flights", [])]
+        return JumpPlan(task=task, **arrays, **values, later_flights=tuple(times))
     except (KeyError, ValueError, TaskError) as error:
         raise PlanFileError(f"{path} is no plan file: {error}") from error

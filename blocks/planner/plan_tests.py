@@ -18,6 +18,7 @@ from ...runtime.description import RobotDescription
 from ...runtime.kinematics import LinkPoses, link_poses, matrices_of_quaternions
 from ..signals import Phase
 from .clearance import body_heights, ground_height, leg_gap
+from .exact_dynamics import ExactDynamics
 from .plan import JumpPlan
 from .replay import Replay
 from .task import GRAVITY
@@ -81,24 +82,38 @@ class Evidence:
         return link_poses(self.robot, q[:, :3], q[:, 3:7], q[:, 7:])
 
     @cached_property
-    def flight_share(self) -> Array:
-        """How much of the flight's time is past at the samples, (n,)."""
-        start, end = self.plan.lift_off_time, self.plan.touchdown_time
-        return np.asarray((self.replay.samples.time - start) / (end - start))
+    def progress(self) -> Array:
+        """How many flights are over at the samples, with the share of the present one's time."""
+        time = self.replay.samples.time
+        return np.asarray(
+            sum(np.clip((time - start) / (end - start), 0.0, 1.0) for start, end in self.plan.flights)
+        )
+
+    @cached_property
+    def place(self) -> NDArray[np.int64]:
+        """How many flights are over at the samples."""
+        return np.asarray(np.searchsorted(self.plan.touchdown_times, self.replay.samples.time,
+                                          side="right"))  # fmt: skip
 
     @cached_property
     def point_height(self) -> Array:
         """The contact points' height above the ground at the samples [m], (n, n_contacts)."""
         points = self.replay.samples.points
-        share = np.repeat(self.flight_share[:, None], points.shape[1], axis=1)
-        return np.asarray(points[:, :, 2] - ground_height(self.plan.task, points[:, :, 0], share))
+        progress = np.repeat(self.progress[:, None], points.shape[1], axis=1)
+        return np.asarray(
+            points[:, :, 2] - ground_height(self.plan.task, points[:, :, 0], progress)
+        )
 
     @cached_property
-    def rise(self) -> float:
-        """The apex above standing that the exact state at lift-off leads to [m]."""
-        r, k = self.replay, self.replay.lift_off
-        up = float(r.com_velocity[k, 2])
-        return float(r.com[k, 2] - r.com[0, 2]) + max(up, 0.0) ** 2 / (2.0 * GRAVITY)
+    def rises(self) -> list[float]:
+        """The apexes above standing where each jump begins that the exact states at lift-off lead
+        to [m]."""
+        r, found = self.replay, []
+        for (k, _), place in zip(r.flights, self.plan.task.places(), strict=False):
+            up = float(r.com_velocity[k, 2])
+            standing = float(r.com[0, 2]) + place.z
+            found.append(float(r.com[k, 2]) - standing + max(up, 0.0) ** 2 / (2.0 * GRAVITY))
+        return found
 
     @cached_property
     def turn(self) -> tuple[float, float]:
@@ -119,9 +134,9 @@ class Evidence:
         """What the plan does and how hard, by name with unit."""
         r, lasting = self.replay, np.diff(self.plan.time) > 0.0
         force = self.plan.contact_force[:-1][lasting].sum(axis=1)[:, 2]
-        k = r.lift_off
+        k = r.flights[0][0]
         return {
-            "rise_m": self.rise,
+            "rise_m": self.rises[0],
             "take_off_speed_m_s": float(r.com_velocity[k, 2]),
             "flight_time_s": self.plan.flight_time,
             "duration_s": self.plan.duration,
@@ -129,8 +144,9 @@ class Evidence:
             "peak_motor_speed_rad_s": float(np.abs(self.motor_speed).max()),
             "peak_vertical_force_N": float(force.max()),
             "pitch_momentum_at_lift_off_N_m_s": float(r.angular_momentum[k, 1]),
-            "flight_error_mm": r.flight_error[0] / MILLIMETRE,
-            "flight_error_deg": r.flight_error[1] / DEGREE,
+            "flight_error_mm": max(error for error, _ in r.flight_errors) / MILLIMETRE,
+            "flight_error_deg": max(error for _, error in r.flight_errors) / DEGREE,
+            "jumps": float(len(r.flights)),
         }
 
 
@@ -202,43 +218,54 @@ def discretisation(e: Evidence) -> Iterator[Found]:
 
 def flight(e: Evidence) -> Iterator[Found]:
     """The whole flight by exact dynamics ends where the plan says."""
-    position, rotation = e.replay.flight_error
+    plan, r = e.plan, e.replay
+    position, rotation = (max(errors) for errors in zip(*r.flight_errors, strict=True))
     yield Found("flight_position", position, MILLIMETRE, "m", "the base's error at touchdown")
     yield Found("flight_rotation", rotation, 0.5 * DEGREE, "rad", "the base's error at touchdown")
-    plan, r = e.plan, e.replay
-    missed = max(
-        abs(plan.lift_off_time - plan.time[r.lift_off]),
-        abs(plan.touchdown_time - plan.time[r.touchdown]),
-    )
+    knots = plan.time[np.array(r.flights)]
+    missed = np.abs(knots - plan.flights).max() if knots.shape == np.shape(plan.flights) else np.inf
     yield Found("flight_times", float(missed), 1e-9, "s", "lift-off and touchdown from their knots")
 
 
 def task_done(e: Evidence) -> Iterator[Found]:
-    """The jump is the one that was asked for."""
+    """Every jump is the one that was asked for."""
     task, r = e.plan.task, e.replay
-    if task.rise is not None:
-        yield Found("rise", abs(e.rise - task.rise), MILLIMETRE, "m",
-                    "how far the apex, from the state at lift-off, misses the one asked for")  # fmt: skip
-    if task.take_off_speed is not None:
-        up = float(r.com_velocity[r.lift_off, 2])
-        yield Found("take_off_speed", abs(up - task.take_off_speed), 5e-3, "m/s", "its error")
-    if task.flight_time is not None:
-        missed = abs(e.plan.flight_time - task.flight_time)
-        yield Found("flight_time", missed, MILLIMETRE, "s", "its error")
-    goal = np.array([task.distance_x, task.distance_y, task.landing_height])
-    missed_by = np.abs(r.soles[-1].mean(axis=0) - goal)
+    hops, places = task.hops(), task.places()
+    for name, missed, limit, unit, text in (
+        ("rise", [(e.rises[i], hop.rise) for i, hop in enumerate(hops)], MILLIMETRE, "m",
+         "how far the apex, from the state at lift-off, misses the one asked for"),
+        ("take_off_speed", [(float(r.com_velocity[r.flights[i][0], 2]), hop.take_off_speed)
+                            for i, hop in enumerate(hops)], 5e-3, "m/s", "its error"),
+        ("flight_time", [(end - start, hop.flight_time) for (start, end), hop
+                         in zip(e.plan.flights, hops, strict=True)], MILLIMETRE, "s", "its error"),
+    ):  # fmt: skip
+        errors = [abs(found - wanted) for found, wanted in missed if wanted is not None]
+        if errors:
+            yield Found(name, max(errors), limit, unit, text, _which(e, int(np.argmax(errors))))
+    standing = [*(start for start, _ in r.flights[1:]), -1]
+    goals = np.array([(place.x, place.y, place.z) for place in places[1:]])
+    missed_by = np.abs(r.soles[standing].mean(axis=1) - goals)
+    jump, axis = worst(missed_by)
     yield Found("landing_place", missed_by.max(), 3 * MILLIMETRE, "m", "the feet's distance from it",
-                "xyz"[int(missed_by.argmax())])  # fmt: skip
+                "xyz"[axis] + _which(e, jump))  # fmt: skip
     pitch, yaw = e.turn
-    turned = float((r.heading[-1] - r.heading[0]).mean())
+    turned = (r.heading[standing] - r.heading[0]).mean(axis=1)
     # Through a somersault a heading is not defined, so it counts as it is at the end.
-    missed = math.remainder(turned - task.twist, math.tau)
-    yield Found("twist", abs(missed), 0.5 * DEGREE, "rad", "the feet's error in heading")
-    if task.rotation:
-        yield Found("rotation", abs(pitch - task.rotation), 5 * DEGREE, "rad", "the body's error")
+    twists = [math.remainder(t - place.heading, math.tau)
+              for t, place in zip(turned, places[1:], strict=True)]  # fmt: skip
+    yield Found("twist", float(np.abs(twists).max()), 0.5 * DEGREE, "rad",
+                "the feet's error in heading")  # fmt: skip
+    rotation = places[-1].turned
+    if any(hop.rotation for hop in hops):
+        yield Found("rotation", abs(pitch - rotation), 5 * DEGREE, "rad", "the body's error")
     else:
-        yield Found("whole_turn", abs(yaw - task.twist), 20 * DEGREE, "rad",
+        yield Found("whole_turn", abs(yaw - places[-1].heading), 20 * DEGREE, "rad",
                     "how far the torso's turn differs from the feet's")  # fmt: skip
+
+
+def _which(e: Evidence, jump: int) -> str:
+    """Which of several jumps."""
+    return f" jump {jump + 1}" if len(e.replay.flights) > 1 else ""
 
 
 def contacts(e: Evidence) -> Iterator[Found]:
@@ -247,16 +274,16 @@ def contacts(e: Evidence) -> Iterator[Found]:
     names = [contact.name for contact in e.robot.contacts]
     loaded = plan.contact[s.knot]
     flying = plan.phase[s.knot] == Phase.FLIGHT
-    before, after = loaded & ~flying[:, None], s.time >= plan.touchdown_time
+    standing = loaded & ~flying[:, None]
     slip = np.zeros(len(names))
-    for period in (~after, after):
+    for place in range(len(plan.flights) + 1):
         for number in range(len(names)):
-            places = s.points[before[:, number] & period, number]
+            places = s.points[standing[:, number] & (e.place == place), number]
             if len(places):
                 slip[number] = max(slip[number], float(np.ptp(places, axis=0).max()))
     yield Found("foot_slip", slip.max(), 3 * MILLIMETRE, "m", "how far a loaded point moves",
                 names[int(slip.argmax())])  # fmt: skip
-    height = np.where(before, np.abs(e.point_height), 0.0)
+    height = np.where(standing, np.abs(e.point_height), 0.0)
     yield Found("foot_on_ground", height.max(), 2 * MILLIMETRE, "m",
                 "how far a loaded point is off the ground")  # fmt: skip
     force = plan.contact_force
@@ -273,10 +300,31 @@ def contacts(e: Evidence) -> Iterator[Found]:
 def touchdown(e: Evidence) -> Iterator[Found]:
     """Feet that are to arrive at rest do, and every foot arrives on the ground."""
     plan, r, s = e.plan, e.replay, e.replay.samples
-    sample = int(np.searchsorted(s.time, plan.time[r.touchdown] - 1e-9))
-    if not plan.task.impact:
-        speed = np.linalg.norm(s.point_velocity[sample], axis=1).max()
-        yield Found("touchdown_speed", float(speed), 0.05, "m/s", "the feet's speed at touchdown")
+    knots = [touchdown for _, touchdown in r.flights]
+    if plan.task.impact:
+        if plan.task.formulation != "full":
+            return
+        missed = [_impact_error(e, k) for k in knots]
+        k = int(np.argmax(missed))
+        yield Found("impact", missed[k], 1e-3, "m/s or rad/s",
+                    "how far the impulse's velocities miss exact dynamics'", _which(e, k))  # fmt: skip
+        return
+    samples = np.searchsorted(s.time, plan.time[knots] - 1e-9)
+    speeds = np.linalg.norm(s.point_velocity[samples], axis=2)
+    speeds = np.where(plan.contact[knots], speeds, 0.0)
+    yield Found("touchdown_speed", float(speeds.max()), 0.05, "m/s", "the feet's speed at touchdown")
+
+
+def _impact_error(e: Evidence, knot: int) -> float:
+    """Of all generalised velocities behind the impulse at a knot; all of them without an impact."""
+    plan = e.plan
+    if knot + 1 >= len(plan.time) or plan.time[knot + 1] > plan.time[knot]:
+        return math.inf
+    dynamics = ExactDynamics(e.robot, plan.task.profile)
+    q, v, impulse = plan.position[knot], plan.velocity[knot], plan.contact_force[knot]
+    exact = dynamics.velocity_after_impact(q, v, impulse)
+    moved = np.abs(plan.position[knot + 1] - q).max()
+    return float(max(np.abs(exact - plan.velocity[knot + 1]).max(), moved))
 
 
 def machine(e: Evidence) -> Iterator[Found]:
@@ -324,12 +372,12 @@ def clearances(e: Evidence) -> Iterator[Found]:
     sample, number = worst(low)
     yield Found("foot_below_ground", low.max(), MILLIMETRE, "m", "how deep a foot is",
                 f"{names[number]} {e.moment(sample)}")  # fmt: skip
-    at = int(np.abs(e.flight_share - 0.5).argmin())
-    missing = task.foot_clearance - e.point_height[at]
+    at = [int(np.abs(e.progress - 0.5 - i).argmin()) for i in range(len(e.plan.flights))]
+    missing = task.foot_clearance - e.point_height[at].min(axis=0)
     yield Found("foot_clearance", missing.max(), MILLIMETRE, "m",
                 "what the feet lack of the clearance asked for in the middle of the flight",
                 names[int(missing.argmax())])  # fmt: skip
-    heights = body_heights(robot, task, e.poses, e.flight_share)
+    heights = body_heights(robot, task, e.poses, e.progress)
     link = min(heights, key=lambda name: float(heights[name].min()))
     sample = int(heights[link].argmin())
     yield Found("body_on_ground", -float(heights[link][sample]), 0.0, "m",

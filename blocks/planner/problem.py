@@ -1,13 +1,13 @@
 """A jump as an optimisation problem of the whole body's motion: the ``full`` formulation.
 
-Knots are the beginnings of the intervals of squat and thrust (feet on the ground), flight, and
-landing, and the end. Lift-off is the first knot of the flight, touchdown the first of the landing.
-The duration of a flight interval is a state that the last knot before the flight chooses.
+What the knots stand for is the ``layout``. Lift-off is the first knot of a flight, touchdown the
+first behind it. The length of a flight interval is a state that the last knot before the flight
+chooses, and so is that of any other phase whose time is free.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,9 +16,10 @@ from numpy.typing import NDArray
 
 from ..signals import Phase
 from .assembly import Assembly, Knot
-from .clearance import step_edge
+from .contact_rows import ContactRows, reduced_contacts
 from .coordinates import Coordinates
-from .knot_spacing import spacing
+from .layout import Stretch, layout
+from .sequence import edge_of
 from .stage_functions import Piece, body_points, parameter_sizes
 from .stance import Stance
 from .symbolic_model import SymbolicModel
@@ -28,8 +29,6 @@ Array = NDArray[np.float64]
 STEP_UP_SHARE, STEP_DOWN_SHARE = 0.45, 0.75
 LIMIT_MARGIN = 0.005
 """rad; between two knots a joint at its limit would pass it by about as much."""
-SHORTEST_FLIGHT, LONGEST_FLIGHT = 0.04, 1.5
-"""s; bounds of a flight time that is left to the planner."""
 
 
 @dataclass(frozen=True)
@@ -38,35 +37,71 @@ class Problem:
 
     Attributes:
         assembly: the problem's structure and functions.
+        stances: where the robot stands at the start, between jumps and at the end.
         lower, upper: bounds of the variables.
         row_lower, row_upper: bounds of the constraint rows.
         parameters: their values.
         families: of every constraint row the name of what it asks for.
-        phases: of every interval.
-        steps: the interval lengths [s]; in flight by their mean, which is a variable.
-        flight: the range of flight knots, lift-off to the one before touchdown.
+        stretches: the phases with their intervals.
+        steps: the interval lengths [s]; by their mean where that is a variable.
     """
 
     task: JumpTask
     model: SymbolicModel
     coordinates: Coordinates
     assembly: Assembly
-    start: Stance
-    end: Stance
+    stances: tuple[Stance, ...]
     lower: Array
     upper: Array
     row_lower: Array
     row_upper: Array
     parameters: Array
     families: list[str]
-    phases: list[Phase]
+    stretches: tuple[Stretch, ...]
     steps: Array
-    flight: range
 
     @property
     def knots(self) -> int:
         """The number of knots, one more than intervals."""
         return len(self.assembly.knots)
+
+    @property
+    def start(self) -> Stance:
+        """Where the robot stands at the start."""
+        return self.stances[0]
+
+    @property
+    def end(self) -> Stance:
+        """Where the robot stands at the end."""
+        return self.stances[-1]
+
+    @property
+    def phases(self) -> list[Phase]:
+        """The phase of every interval."""
+        return [stretch.phase for stretch in self.stretches for _ in range(stretch.count)]
+
+    @property
+    def flights(self) -> tuple[range, ...]:
+        """The knots of every flight, lift-off to the one before touchdown."""
+        return tuple(range(s.first, s.stop) for s in self.stretches if s.flies)
+
+    @property
+    def flight(self) -> range:
+        """The knots of the first flight."""
+        return self.flights[0]
+
+    def stretch_at(self, k: int) -> Stretch:
+        """The stretch of the interval that begins with a knot; the last one at the end."""
+        return next((s for s in self.stretches if k < s.stop), self.stretches[-1])
+
+    def posture(self, k: int) -> Array:
+        """The posture, of all coordinates, that the cost prefers: standing, turning in flight."""
+        stretch = self.stretch_at(k)
+        here = self.stances[stretch.place].coordinates
+        if not stretch.flies:
+            return here
+        share = (k - stretch.first) / stretch.count
+        return (1.0 - share) * here + share * self.stances[stretch.place + 1].coordinates
 
 
 class ProblemBuilder:
@@ -78,136 +113,183 @@ class ProblemBuilder:
         model: SymbolicModel,
         coordinates: Coordinates,
         pieces: Mapping[str, Piece],
-        start: Stance,
-        end: Stance,
+        stances: Sequence[Stance],
     ) -> None:
         self.task, self.model, self.coordinates = task, model, coordinates
-        self.start, self.end = start, end
+        self.stances, self.hops = tuple(stances), task.hops()
+        self.places = task.places()
         self.n, self.m = coordinates.size, len(coordinates.joints)
         self.forces = coordinates.forces
-        knots = task.knots
-        self.phases = (
-            [Phase.SQUAT] * knots.squat + [Phase.THRUST] * knots.thrust
-            + [Phase.FLIGHT] * knots.flight + [Phase.LANDING] * knots.landing
-        )  # fmt: skip
-        before = knots.squat + knots.thrust
-        self.flight = range(before, before + knots.flight)
+        self.stretches = layout(task, model.robot)
+        self.of_knot = [stretch for stretch in self.stretches for _ in range(stretch.count)]
         self.steps = np.concatenate(
-            [
-                task.squat_time / knots.squat * spacing(Phase.SQUAT, knots.squat),
-                task.thrust_time / knots.thrust * spacing(Phase.THRUST, knots.thrust),
-                spacing(Phase.FLIGHT, knots.flight),
-                task.landing_time / knots.landing * spacing(Phase.LANDING, knots.landing),
-            ]
+            [s.lengths * (1.0 if s.timed else (s.time or 0.0) / s.count) for s in self.stretches]
         )
+        self.contact_rows = ContactRows(model.robot, coordinates)
         self.pieces = pieces
 
     def build(self) -> Problem:
         """The problem with its bounds and parameters."""
+        self._given: dict[int, list[tuple[int, float, str]]] = {}
         self.assembly = Assembly(self._knots(), self.pieces)
         size, rows = self.assembly.variables, self.assembly.constraints
         self.lower, self.upper = np.full(size, -np.inf), np.full(size, np.inf)
         self.row_lower, self.row_upper = np.zeros(rows), np.zeros(rows)
         self.families = ["integration"] * rows
         self.parameters = np.zeros(self.assembly.parameters)
-        for k in range(len(self.phases) + 1):
-            self._bound_state(k)
-            for name in self.assembly.knots[k].pieces:
-                getattr(self, f"_fill_{name}")(k)
-        return Problem(
-            self.task, self.model, self.coordinates, self.assembly, self.start, self.end,
+        self.problem = Problem(
+            self.task, self.model, self.coordinates, self.assembly, self.stances,
             self.lower, self.upper, self.row_lower, self.row_upper, self.parameters,
-            self.families, self.phases, self.steps, self.flight,
+            self.families, self.stretches, self.steps,
         )  # fmt: skip
+        for k in range(len(self.of_knot) + 1):
+            self._bound_state(k)
+            for row, (_, value, family) in zip(
+                self.assembly.fixed_rows(k), self._given.get(k, []), strict=True
+            ):
+                self.row_lower[row] = self.row_upper[row] = value
+                self.families[row] = family
+            for name in self.assembly.knots[k].pieces:
+                fill = {"free_stance": "stance"}.get(name, name)
+                getattr(self, f"_fill_{fill}")(k)
+        return self.problem
+
+    # Which variables and rows there are
 
     def _knots(self) -> list[Knot]:
-        n = self.n
-        q_and_v = np.arange(2 * n)
-        feet = self.pieces["contact"].rows // 2
+        n, end = self.n, len(self.of_knot)
         knots = []
-        for k, phase in enumerate(self.phases):
-            rows = np.arange(2 * n, self.pieces["stance"].rows)
-            if phase is Phase.FLIGHT:
-                knot = Knot(2 * n + 1, n, gap="flight")
-                rows = np.arange(2 * n + 1, self.pieces["flight"].rows)
-                knot.pieces["flight"] = (np.arange(3 * n + 1), rows)
-                if k > self.flight.start:
-                    air = self._air_rows(k)
-                    knot.pieces["air"] = (np.arange(n), air)
-            else:
-                last = k == self.flight.start - 1
-                knot = Knot(2 * n, n + self.forces + last, gap="stance")
-                knot.hold = n + self.forces if last else None
-                knot.pieces["stance"] = (np.arange(3 * n + self.forces), rows)
-            if k == self.flight.start:
-                knot.pieces["take_off"] = (q_and_v, self._take_off_rows())
-            if k > 0 and (phase is not Phase.FLIGHT or k == self.flight.start):
-                kept = np.arange(2 * feet if k == self.flight.stop else feet)
-                knot.pieces["contact"] = (q_and_v, kept)
-            if k == 0:
-                knot.fixed = tuple(range(2 * n))
-            if k == self.flight.start - 1 and self.task.flight_time is not None:
-                knot.fixed = (*knot.fixed, 2 * n + n + self.forces)
+        for k, stretch in enumerate(self.of_knot):
+            before = self.of_knot[k - 1] if k else None
+            after = self.of_knot[k + 1] if k + 1 < end else None
+            forces = 0 if stretch.flies else self.forces
+            states = 2 * n + stretch.timed
+            holds = after is not None and after is not stretch and after.timed
+            knot = Knot(states, n + forces + holds, gap=stretch.piece)
+            knot.hold = n + forces if holds else None
+            take = np.arange(states + n + forces)
+            knot.pieces[stretch.piece] = (take, self._interval_rows(stretch))
+            q_and_v = np.arange(2 * n)
+            if stretch.flies and k > stretch.first:
+                knot.pieces["air"] = (np.arange(n), self._air_rows(k))
+            if stretch.flies and k == stretch.first:
+                knot.pieces["take_off"] = (q_and_v, self._take_off_rows(k))
+            if before is not None:
+                kept = self._contact_rows(before, stretch)
+                if len(kept):
+                    knot.pieces["contact"] = (q_and_v, kept)
+            idle = self._idle(stretch)
+            if idle and k and not stretch.impact:
+                knot.pieces["air"] = (np.arange(n), np.array(idle))
+            self._give(k, knot, stretch, after if holds else None)
             knots.append(knot)
-        # The flight's last knot leads to a touchdown that has no interval length among its states.
+        # The last interval leads to a knot that has no interval length among its states.
         base = len(self.coordinates.free_base)
-        return [*knots, Knot(2 * n, 0, fixed=(*range(base), *range(n, 2 * n)))]
+        at_rest = self.coordinates.reduce(self.stances[-1].coordinates)
+        values = [(i, float(at_rest[i]), "stance") for i in range(base)]
+        self._given[end] = values + [(n + i, 0.0, "stance") for i in range(n)]
+        fixed = tuple(i for i, _, _ in self._given[end])
+        return [*knots, Knot(2 * n, 0, fixed=fixed)]
+
+    def _give(self, k: int, knot: Knot, stretch: Stretch, timed: Stretch | None) -> None:
+        """What is given at a knot: the start, forces on points without contact, a next time."""
+        n, given = self.n, []
+        if k == 0:
+            start = self.coordinates.reduce(self.stances[0].coordinates)
+            given += [(i, float(start[i]), "stance") for i in range(n)]
+            given += [(n + i, 0.0, "stance") for i in range(n)]
+        every = len(self.coordinates.axes)
+        first = knot.states + n
+        for point in self._idle(stretch):
+            given += [(first + point * every + i, 0.0, "friction") for i in range(every)]
+        if timed is not None and timed.time is not None and knot.hold is not None:
+            given.append((knot.states + knot.hold, timed.time / timed.count, "flight time"))
+        if given:
+            self._given[k] = given
+            knot.fixed = tuple(i for i, _, _ in given)
+
+    def _idle(self, stretch: Stretch) -> list[int]:
+        """The contact variables' points that are not on the ground in a stance."""
+        if stretch.flies:
+            return []
+        on = reduced_contacts(self.coordinates, stretch.contacts)
+        return [i for i in range(len(self.coordinates.contacts)) if i not in on]
+
+    def _interval_rows(self, stretch: Stretch) -> NDArray[np.int64]:
+        """The rows of an interval that are kept: no friction where there is no contact."""
+        total = self.pieces[stretch.piece].rows
+        rows = np.arange(2 * self.n + stretch.timed, total)
+        each = 2 * (len(self.coordinates.axes) - 1)
+        cones = total - each * len(self.coordinates.contacts)
+        idle = [
+            cones + each * point + i for point in self._idle(stretch) for i in range(each)
+        ]
+        return np.setdiff1d(rows, idle) if idle else rows
+
+    def _contact_rows(self, before: Stretch, stretch: Stretch) -> NDArray[np.int64]:
+        """Which rows hold the feet at the knot between two intervals."""
+        held, now = (
+            set() if s.flies else reduced_contacts(self.coordinates, s.contacts)
+            for s in (before, stretch)
+        )  # fmt: skip
+        if stretch.impact:
+            return self.contact_rows.places(now, set())
+        if before.impact:
+            return self.contact_rows.velocities(now)
+        velocities = self.contact_rows.velocities(held | now)
+        return np.concatenate([velocities, self.contact_rows.places(now, held)])
 
     def _air_rows(self, k: int) -> NDArray[np.int64]:
         """Which rows are needed: how far ahead only where there is an edge."""
         points = self.pieces["air"].rows // 3
         feet = len(self.coordinates.contacts)
         ahead = np.arange(points, points + feet)
-        if step_edge(self.task) is None or (self.task.landing_height > 0.0) is (
-            self._flight_share(k) > (STEP_UP_SHARE if self.task.landing_height > 0.0
-                                     else STEP_DOWN_SHARE)):  # fmt: skip
+        step, edge = self._step(k)
+        if edge is None or (step > 0.0) is (
+            self._flight_share(k) > (STEP_UP_SHARE if step > 0.0 else STEP_DOWN_SHARE)):  # fmt: skip
             ahead = ahead[:0]
         return np.concatenate([np.arange(points), ahead, np.arange(2 * points, 3 * points)])
 
-    def _take_off_rows(self) -> NDArray[np.int64]:
-        task = self.task
-        kept = [0] if task.rise is not None else [1] if task.take_off_speed is not None else []
+    def _take_off_rows(self, k: int) -> NDArray[np.int64]:
+        hop = self.hops[self.of_knot[k].place]
+        kept = [0] if hop.rise is not None else [1] if hop.take_off_speed is not None else []
         return np.array(kept, dtype=np.int64)
+
+    def _step(self, k: int) -> tuple[float, float | None]:
+        """The step's height and its edge under a flight."""
+        place = self.of_knot[k].place
+        hop = self.hops[place]
+        return hop.landing_height or 0.0, edge_of(hop, self.places[place])
+
+    # Bounds of the variables
 
     def _bound_state(self, k: int) -> None:
         """Start and end are given, joints stay within their limits, feet only push."""
         n, start = self.n, int(self.assembly.state_start[k])
         base = len(self.coordinates.free_base)
         limits = self.model.robot.joint_limits[list(self.coordinates.moving)]
-        self.lower[start + base : start + n] = limits[:, 0] + LIMIT_MARGIN
-        self.upper[start + base : start + n] = limits[:, 1] - LIMIT_MARGIN
-        if k in (0, len(self.phases)):
-            stance = self.start if k == 0 else self.end
-            given = np.concatenate([self.coordinates.reduce(stance.coordinates), np.zeros(n)])
-            self._fix(k, given[list(self.assembly.knots[k].fixed)])
-            self.lower[start : start + n] = -np.inf
-            self.upper[start : start + n] = np.inf
+        if 0 < k < len(self.of_knot):
+            self.lower[start + base : start + n] = limits[:, 0] + LIMIT_MARGIN
+            self.upper[start + base : start + n] = limits[:, 1] - LIMIT_MARGIN
+        if k == len(self.of_knot):
+            return
+        stretch, knot = self.of_knot[k], self.assembly.knots[k]
         lean = self.task.touchdown_lean
-        if k == self.flight.stop and lean is not None:
+        if k and lean is not None and not stretch.flies and self.of_knot[k - 1].flies:
             pitch = start + self.coordinates.free_base.index(3)
             nominal = float(self.nominal(k)[pitch - start])
             self.lower[pitch], self.upper[pitch] = nominal - lean, nominal + lean
-        if k == len(self.phases):
-            return
-        if self.phases[k] is not Phase.FLIGHT:
-            forces = self.assembly.control_start[k] + n
-            every = len(self.coordinates.axes)
-            self.lower[forces + every - 1 : forces + self.forces : every] = 0.0
-            hold = self.assembly.knots[k].hold
-            if hold is not None:
-                time = self.task.flight_time
-                place = self.assembly.control_start[k] + hold
-                if time is not None:
-                    self._fix(k, np.array([time / len(self.flight)]))
-                else:
-                    self.lower[place] = SHORTEST_FLIGHT / len(self.flight)
-                    self.upper[place] = LONGEST_FLIGHT / len(self.flight)
-
-    def _fix(self, k: int, values: Array) -> None:
-        rows = self.assembly.fixed_rows(k)
-        self.row_lower[rows] = self.row_upper[rows] = values
-        for row in rows:
-            self.families[row] = "stance" if k in (0, len(self.phases)) else "flight time"
+        if k == 0 and stretch.timed:
+            self.lower[start + 2 * n], self.upper[start + 2 * n] = stretch.bounds
+        control = int(self.assembly.control_start[k])
+        if not stretch.flies:
+            every, idle = len(self.coordinates.axes), self._idle(stretch)
+            for point in range(len(self.coordinates.contacts)):
+                if point not in idle:
+                    self.lower[control + n + point * every + every - 1] = 0.0
+        following = self.of_knot[k + 1] if knot.hold is not None else None
+        if following is not None and following.time is None and knot.hold is not None:
+            self.lower[control + knot.hold], self.upper[control + knot.hold] = following.bounds
 
     # What a piece's rows ask for, and its parameters
 
@@ -258,20 +340,31 @@ class ProblemBuilder:
         }
 
     def nominal(self, k: int) -> Array:
-        """The posture that the cost prefers: standing, turning in flight."""
-        share = min(max((k - self.flight.start) / len(self.flight), 0.0), 1.0)
-        whole = (1.0 - share) * self.start.coordinates + share * self.end.coordinates
-        return self.coordinates.reduce(whole)
+        """The posture that the cost prefers."""
+        return self.coordinates.reduce(self.problem.posture(k))
 
     def _fill_stance(self, k: int) -> None:
-        weights, share = self.task.weights, self.coordinates.share
+        weights, share, stretch = self.task.weights, self.coordinates.share, self.of_knot[k]
         self._set(
-            "stance", k, step=self.steps[k], force=weights.force * share,
-            friction=self.task.friction / np.sqrt(2.0), **self._interval(k),
+            stretch.piece, k, step=self.steps[k], share=self.steps[k],
+            force=weights.force * share, friction=self.task.friction / np.sqrt(2.0),
+            **self._interval(k),
         )  # fmt: skip
-        cones = 2 * (len(self.coordinates.axes) - 1) * len(self.coordinates.contacts)
         base = ("dynamics", len(self.coordinates.rows), 0.0, 0.0)
-        self._rows("stance", k, [base, *self._motor_rows(), ("friction", cones, 0.0, np.inf)])
+        self._rows(stretch.piece, k, [base, *self._motor_rows(), self._cones()])
+
+    def _cones(self) -> tuple[str, int, float, float]:
+        cones = 2 * (len(self.coordinates.axes) - 1) * len(self.coordinates.contacts)
+        return ("friction", cones, 0.0, np.inf)
+
+    def _fill_impact(self, k: int) -> None:
+        top = self.model.robot.profiles[self.task.profile].no_load_speed * self.task.effort
+        self._set(
+            "impact", k, impulse=self.task.weights.impulse,
+            friction=self.task.friction / np.sqrt(2.0),
+        )  # fmt: skip
+        balance = ("impact", self.n, 0.0, 0.0)
+        self._rows("impact", k, [balance, ("motor speed", self.m, -top, top), self._cones()])
 
     def _fill_flight(self, k: int) -> None:
         self._set("flight", k, share=self.steps[k], **self._interval(k))
@@ -279,7 +372,8 @@ class ProblemBuilder:
         self._rows("flight", k, [base, *self._motor_rows()])
 
     def _fill_contact(self, k: int) -> None:
-        stance = self.start if k <= self.flight.start else self.end
+        stretch = self.of_knot[k]
+        stance = self.stances[stretch.place]
         places = stance.points[list(self.coordinates.contacts)].ravel()
         heading = [np.cos(stance.heading), np.sin(stance.heading)]
         self._set("contact", k, place=places, heading=heading)
@@ -287,8 +381,10 @@ class ProblemBuilder:
         self._rows("contact", k, [("foot velocity", feet, 0.0, 0.0), ("footholds", feet, 0.0, 0.0)])
 
     def _fill_take_off(self, k: int) -> None:
-        rise = self.start.com[2] + (self.task.rise or 0.0)
-        speed = self.task.take_off_speed or 0.0
+        place = self.of_knot[k].place
+        hop = self.hops[place]
+        rise = self.stances[place].com[2] + (hop.rise or 0.0)
+        speed = hop.take_off_speed or 0.0
         self._rows("take_off", k, [
             ("apex", 1, rise, rise), ("take-off speed", 1, speed, speed),
             ("angular momentum", 3, -np.inf, np.inf),
@@ -299,21 +395,25 @@ class ProblemBuilder:
         it is under them: until ``STEP_DOWN_SHARE`` of the flight's time, or from ``STEP_UP_SHARE``
         on, and at that instant they are still, or already, on the lower side of the edge."""
         task, points = self.task, body_points(self.model, self.coordinates)
+        n_feet, low = len(self.coordinates.contacts), self.places[self.of_knot[k].place].z
+        if not self.of_knot[k].flies:
+            self._rows("air", k, [("ground clearance", len(points), low, np.inf),
+                                  ("ground clearance", 2 * len(points), -np.inf, np.inf)])  # fmt: skip
+            return
         share = self._flight_share(k)
-        step, edge = task.landing_height, step_edge(task)
+        step, edge = self._step(k)
         switch = 0.5 if edge is None else STEP_UP_SHARE if step > 0.0 else STEP_DOWN_SHARE
-        ground = step if share > switch else 0.0
+        ground = low + step if share > switch else low
         floor = ground + task.foot_clearance * np.sin(np.pi * share)
         if self._flight_share(k - 1) < switch <= share:
-            floor = max(floor, step)
+            floor = max(floor, low + step)
         ahead = (-np.inf, np.inf)
         if edge is not None:
             before = (share <= switch) if step > 0.0 else False
             beyond = (share > switch) if step < 0.0 else False
-            forward = task.distance_x > 0.0
+            forward = (self.hops[self.of_knot[k].place].distance_x or 0.0) > 0.0
             if before or beyond:
                 ahead = (-np.inf, edge) if before is forward else (edge, np.inf)
-        n_feet = len(self.coordinates.contacts)
         free = ("ground clearance", len(points) - n_feet, -np.inf, np.inf)
         self._rows("air", k, [
             ("ground clearance", n_feet, floor, np.inf),
@@ -324,6 +424,6 @@ class ProblemBuilder:
         ])  # fmt: skip
 
     def _flight_share(self, k: int) -> float:
-        """How much of the flight's time is past at a knot."""
-        first = self.flight.start
-        return float(self.steps[first:k].sum() / len(self.flight))
+        """How much of the flight's time is past at a knot of it."""
+        stretch = self.of_knot[k]
+        return float(stretch.lengths[: max(0, k - stretch.first)].sum() / stretch.count)

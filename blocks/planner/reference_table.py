@@ -35,12 +35,13 @@ STEP = 0.002
 def reference_table(plan: JumpPlan, robot: RobotDescription, stand_time: float) -> JumpTable:
     """The plan as a table that begins with standing still for ``stand_time`` [s]."""
     dynamics = ExactDynamics(robot, plan.task.profile)
-    lift_off, touchdown = flight_knots(plan)
-    forces = _MiddleForces(plan, lift_off, touchdown)
+    forces = _MiddleForces(plan)
     rows: dict[str, list[Array]] = {}
     times: list[float] = []
+    intervals: list[int] = []
     for time, k, q, v in _states(plan, dynamics):
         times.append(time)
+        intervals.append(k)
         for name, value in _row(dynamics, q, v, forces.at(time, k)).items():
             rows.setdefault(name, []).append(value)
     columns = {name: np.array(values) for name, values in rows.items()}
@@ -66,7 +67,25 @@ def reference_table(plan: JumpPlan, robot: RobotDescription, stand_time: float) 
         stand_time + plan.lift_off_time,
         stand_time + plan.touchdown_time,
         start.get(Phase.RECOVER, end),
+        tuple(_later_jumps(plan, stand_time)),
+        _contacts(plan, intervals),
     )
+
+
+def _later_jumps(plan: JumpPlan, stand_time: float) -> Iterator[tuple[float, float, float]]:
+    """When thrust, flight and landing of the jumps behind the first begin."""
+    for before, (lift_off, touchdown) in zip(plan.touchdown_times, plan.later_flights, strict=False):
+        between = (plan.time > before - 1e-9) & (plan.time < lift_off - 1e-9)
+        thrust = plan.time[between & (plan.phase == Phase.THRUST)]
+        begin = float(thrust[0]) if len(thrust) else before
+        yield stand_time + begin, stand_time + lift_off, stand_time + touchdown
+
+
+def _contacts(plan: JumpPlan, intervals: list[int]) -> NDArray[np.bool_] | None:
+    """By row which points carry load, where it is not always all of them or none."""
+    if np.all(plan.contact == (plan.phase != Phase.FLIGHT)[:, None]):
+        return None
+    return np.concatenate([plan.contact[[0, 0]], plan.contact[intervals]])
 
 
 def _states(plan: JumpPlan, dynamics: ExactDynamics) -> Iterator[State]:
@@ -115,21 +134,21 @@ def _between(
 
 
 class _MiddleForces:
-    """Contact forces at any time, linear between the middles of intervals on the same side of the
-    flight."""
+    """Contact forces at any time, linear between the middles of intervals of the same stance."""
 
-    def __init__(self, plan: JumpPlan, lift_off: int, touchdown: int) -> None:
+    def __init__(self, plan: JumpPlan) -> None:
         self._plan = plan
         lasting = np.flatnonzero(np.diff(plan.time) > 0.0)
-        self._groups = [lasting[lasting < lift_off], lasting[lasting >= touchdown]]
-        self._flight = (lift_off, touchdown)
+        ends = [knot for flight in flight_knots(plan) for knot in flight]
+        self._groups = np.split(lasting, np.searchsorted(lasting, ends))
+        self._ends = np.array(ends)
 
     def at(self, time: float, interval: int) -> Array:
         """The forces [N], (n_contacts, 3), at an instant of that interval."""
-        plan, (lift_off, touchdown) = self._plan, self._flight
-        if lift_off <= interval < touchdown:
+        plan, number = self._plan, int(np.searchsorted(self._ends, interval, side="right"))
+        if number % 2 == 1:
             return np.zeros(plan.contact_force.shape[1:])
-        group = self._groups[0] if interval < lift_off else self._groups[1]
+        group = self._groups[number]
         middles = 0.5 * (plan.time[group] + plan.time[group + 1])
         after = int(np.searchsorted(middles, time))
         if after in (0, len(middles)):

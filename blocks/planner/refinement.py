@@ -8,9 +8,7 @@ cure (a body in the way of a step, a task that is missed) is not tried again.
 from __future__ import annotations
 
 import math
-from collections import Counter
 
-from ..signals import Phase
 from .plan import JumpPlan
 from .task import JumpTask, Knots
 
@@ -40,14 +38,23 @@ def curable(plan: JumpPlan) -> bool:
     )
 
 
-def finer_knots(plan: JumpPlan) -> Knots:
-    """Numbers of intervals for solving a plan's task again."""
-    count = Counter(int(phase) for phase in plan.phase[:-1])
-    of = {"squat": Phase.SQUAT, "thrust": Phase.THRUST,
-          "flight": Phase.FLIGHT, "landing": Phase.LANDING}  # fmt: skip
-    return Knots.model_validate(
-        {name: math.ceil(FACTOR * count[int(phase)]) for name, phase in of.items()}
+def next_refinement(plan: JumpPlan) -> float:
+    """How many times as many intervals as its task says a plan is solved on again."""
+    return FACTOR * float(plan.statistics.get("refinement", 1.0))
+
+
+def refined(task: JumpTask, factor: float) -> JumpTask:
+    """The task on so many times as many intervals in every phase."""
+
+    def more(count: int) -> int:
+        return math.ceil(factor * count)
+
+    knots = {name: more(getattr(task.knots, name)) for name in type(task.knots).model_fields}
+    spans = task.phases and tuple(
+        span if span.knots is None else span.model_copy(update={"knots": more(span.knots)})
+        for span in task.phases
     )
+    return task.model_copy(update={"knots": Knots.model_validate(knots), "phases": spans})
 
 
 def asks_for_finer(task: JumpTask, plan: JumpPlan | None) -> bool:

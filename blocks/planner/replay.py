@@ -2,7 +2,7 @@
 
 Every interval is started from the plan's own state and integrated by itself, because in stance an
 open loop is unstable and an error that has grown says nothing about the plan. The flight is also
-integrated as a whole, from lift-off to touchdown.
+integrated as a whole, from lift-off to touchdown, and so is each of several flights.
 """
 
 from __future__ import annotations
@@ -51,63 +51,71 @@ class Replay:
         defect: per interval how far exact dynamics from one knot misses the next: base position
             [m], rotation [rad], linear [m/s] and angular velocity [rad/s] of the base, (N-1, 4).
         gap, wrench: what is left over of the planner's own equations, see ``midpoint``, (N-1,).
-        flight_error: base position [m] and rotation [rad] missed at touchdown.
+        flight_errors: base position [m] and rotation [rad] missed at every touchdown.
         com, com_velocity, angular_momentum: at the knots, by Pinocchio.
         soles, heading: sole centres [m] (N, n_feet, 3) and unwrapped headings [rad] (N, n_feet).
-        lift_off, touchdown: the knots where the flight begins and ends, before any impact.
+        flights: the knots where every flight begins and ends, before any impact.
     """
 
     samples: Samples
     defect: Array
     gap: Array
     wrench: Array
-    flight_error: tuple[float, float]
+    flight_errors: tuple[tuple[float, float], ...]
     com: Array
     com_velocity: Array
     angular_momentum: Array
     soles: Array
     heading: Array
-    lift_off: int
-    touchdown: int
+    flights: tuple[tuple[int, int], ...]
 
 
 def replay(plan: JumpPlan, robot: RobotDescription) -> Replay:
     """Replay a plan.
 
     Raises:
-        ValueError: it has no flight, or more than one.
+        ValueError: it has not one flight for every jump of its task.
     """
     dynamics = ExactDynamics(robot, plan.task.profile)
-    lift_off, touchdown = flight_knots(plan)
-    flight, flight_error = _fly(plan, dynamics, lift_off, touchdown)
+    flights = flight_knots(plan)
+    flown = [_fly(plan, dynamics, lift_off, touchdown) for lift_off, touchdown in flights]
     defect = np.array([_interval_defect(plan, dynamics, k) for k in range(len(plan.time) - 1)])
     gap, wrench = midpoint_residuals(plan, dynamics)
-    samples = _sample(plan, dynamics, flight)
+    samples = _sample(plan, dynamics, [row for rows, _ in flown for row in rows])
     states = [dynamics.centroidal(q, v) for q, v in zip(plan.position, plan.velocity, strict=True)]
     placed = [dynamics.soles(q) for q in plan.position]
     turns = np.array([turn for _, turn in placed])
     return Replay(
-        samples, defect, gap, wrench, flight_error,
+        samples, defect, gap, wrench, tuple(error for _, error in flown),
         np.array([s[0] for s in states]),
         np.array([s[1] for s in states]),
         np.array([s[2] for s in states]),
         np.array([soles for soles, _ in placed]),
         np.unwrap(np.arctan2(turns[:, :, 1, 0], turns[:, :, 0, 0]), axis=0),
-        lift_off, touchdown,
+        flights,
     )  # fmt: skip
 
 
-def flight_knots(plan: JumpPlan) -> tuple[int, int]:
-    """The knots at lift-off and at touchdown, the latter before any impact.
+def flight_knots(plan: JumpPlan) -> tuple[tuple[int, int], ...]:
+    """The knots at lift-off and at touchdown of every flight, the latter before any impact.
 
     Raises:
-        ValueError: there is not exactly one flight.
+        ValueError: there are more or fewer flights than jumps.
     """
     lasting = np.diff(plan.time, append=plan.time[-1]) > 0.0
     flying = np.flatnonzero((plan.phase == Phase.FLIGHT) & lasting)
-    if len(flying) == 0 or flying[-1] - flying[0] + 1 != len(flying):
-        raise ValueError("a plan has one flight, of intervals one after the other")
-    return int(flying[0]), int(flying[-1]) + 1
+    found = [
+        (int(run[0]), int(run[-1]) + 1)
+        for run in np.split(flying, np.flatnonzero(np.diff(flying) > 1) + 1)
+        if len(run)
+    ]
+    jumps = len(plan.task.hops())
+    if len(found) != jumps:
+        raise ValueError(
+            f"a plan has a flight, of intervals one after the other, for every jump; found "
+            f"{len(found)} for {jumps}"
+        )
+    return tuple(found)
 
 
 def _fly(

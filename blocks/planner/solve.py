@@ -10,19 +10,21 @@ from numpy.typing import NDArray
 
 from ...runtime.description import RobotDescription
 from .compilation import Progress, load_pieces
+from .contact_rows import is_mirrored
 from .coordinates import Coordinates
 from .errors import PlanError
 from .guess import ballistic_guess, displaced_guess
+from .layout import Stretch, layout
 from .plan import JumpPlan
 from .problem import Problem, ProblemBuilder
-from .refinement import asks_for_finer, finer_knots
-from .resampling import same_phases
+from .refinement import asks_for_finer, next_refinement, refined
+from .resampling import kinds_of, same_phases
 from .solver import Solution, solve
-from .stage_functions import make_coordinates
-from .stance import Stance, StanceFinder, start_and_end
+from .stage_functions import PIECES, make_coordinates
+from .stance import Stance, StanceFinder, stances_of
 from .symbolic_model import SymbolicModel
-from .task import JumpTask, Knots
-from .unpacking import pack, unpack
+from .task import JumpTask
+from .unpacking import kinds_in, pack, unpack
 
 Array = NDArray[np.float64]
 ADVICE = {
@@ -47,13 +49,13 @@ def solve_jump(
     progress: Progress | None = None,
     compiled: bool = True,
     solver: str = "",
-    knots: Knots | None = None,
+    refine: float = 0.0,
 ) -> JumpPlan:
     """The plan of a task.
 
     ``warm_start`` is a plan of a near task, on any grid; one that goes through other phases is not
     used. A plan of this very task that failed the validity check is solved again on finer
-    intervals (see ``refinement``). ``knots`` are numbers of intervals to use in place of both.
+    intervals (see ``refinement``); ``refine`` asks for so many times as many as the task says.
     ``progress`` is told when functions are compiled, once per robot. ``solver`` insists on
     ``fatrop`` or ``ipopt``. The result does not depend on the number of threads.
 
@@ -62,14 +64,13 @@ def solve_jump(
         TaskError: the task names joints that the robot has not.
     """
     started = time.process_time()
-    if knots is None:
-        again = warm_start is not None and asks_for_finer(task, warm_start)
-        knots = finer_knots(warm_start) if again and warm_start is not None else task.knots
-    gridded = task.model_copy(update={"knots": knots})
+    if warm_start is not None and asks_for_finer(task, warm_start):
+        refine = refine or next_refinement(warm_start)
+    gridded = refined(task, refine) if refine else task
     problem = make_problem(gridded, robot, compiled=compiled, progress=progress)
     guess = ballistic_guess(problem)
     solution, warm = None, False
-    if warm_start is not None and same_phases(warm_start.phase[:-1].tolist(), problem.phases):
+    if warm_start is not None and same_phases(kinds_of(warm_start), kinds_in(problem)):
         warm = True
         solution = solve(problem, pack(problem, warm_start, guess), warm=True, solver="fatrop")
     if solution is None or not solution.solved:
@@ -88,6 +89,7 @@ def solve_jump(
         "cost": solution.cost,
         "warm": warm,
         "knots": problem.knots,
+        "refinement": refine or 1.0,
         "coordinates": problem.coordinates.name,
         "variables": problem.assembly.variables,
         "constraints": problem.assembly.constraints,
@@ -116,11 +118,6 @@ def make_problem(
             "use formulation: full",
             family="formulation",
         )
-    if task.impact:
-        raise PlanError(
-            f"{task.name}: impacts at touchdown cannot be planned yet; use impact: false",
-            family="footholds",
-        )
     if task.profile not in robot.profiles:
         raise PlanError(
             f"{robot.name} has no actuator profile {task.profile!r}; there is "
@@ -128,10 +125,15 @@ def make_problem(
             family="motor torque",
         )
     model, finder = _model(robot.model_dump_json(), task.profile)
-    start, end = start_and_end(task, robot, finder)
-    chosen = _choose(model, task, start, end, coordinates)
-    pieces = load_pieces(model, chosen, profile=task.profile, compiled=compiled, progress=progress)
-    return ProblemBuilder(task, model, chosen, pieces, start, end).build()
+    stances = stances_of(task, robot, finder)
+    stretches = layout(task, robot)
+    chosen = _choose(model, task, stances, stretches, coordinates)
+    used = {"contact", "take_off", "air", *(stretch.piece for stretch in stretches)}
+    names = tuple(name for name in PIECES if name in used)
+    pieces = load_pieces(
+        model, chosen, profile=task.profile, names=names, compiled=compiled, progress=progress
+    )
+    return ProblemBuilder(task, model, chosen, pieces, stances).build()
 
 
 @lru_cache(maxsize=4)
@@ -141,17 +143,21 @@ def _model(text: str, profile: str) -> tuple[SymbolicModel, StanceFinder]:
 
 
 def _choose(
-    model: SymbolicModel, task: JumpTask, start: Stance, end: Stance, asked: str
-) -> Coordinates:
+    model: SymbolicModel, task: JumpTask, stances: tuple[Stance, ...],
+    stretches: tuple[Stretch, ...], asked: str,
+) -> Coordinates:  # fmt: skip
     if asked:
         return make_coordinates(model, asked)
-    if not task.distance_y and not task.twist:
+    # An impact leaves the roll and yaw motors without an impulse, which a plane cannot tell.
+    if not task.impact and all(not hop.distance_y and not hop.twist for hop in task.hops()):
         try:
             plane = make_coordinates(model, "sagittal")
         except ValueError:
             return make_coordinates(model, "full")
-        both = np.array([start.coordinates, end.coordinates])
-        if np.allclose(plane.reduce(both) @ plane.matrix.T, both, rtol=0.0, atol=1e-12):
+        every = np.array([stance.coordinates for stance in stances])
+        if np.allclose(
+            plane.reduce(every) @ plane.matrix.T, every, rtol=0.0, atol=1e-12
+        ) and all(is_mirrored(plane, stretch.contacts) for stretch in stretches):
             return plane
     return make_coordinates(model, "full")
 
@@ -160,7 +166,11 @@ def _displaced(problem: Problem, robot: RobotDescription) -> Array | None:
     """A guess from the same jump straight ahead, where there is one and it can be solved."""
     if problem.coordinates.name == "sagittal":
         return None
-    task = problem.task.model_copy(update={"distance_y": 0.0, "twist": 0.0})
+    ahead = {"distance_y": 0.0, "twist": 0.0}
+    task = problem.task.model_copy(update=ahead)
+    if task.jumps is not None:
+        jumps = tuple(hop.model_copy(update=ahead) for hop in task.jumps)
+        task = task.model_copy(update={"jumps": jumps})
     straight = make_problem(task, robot, compiled=not problem.assembly.interpreted)
     if straight.coordinates.name != "sagittal":
         return None

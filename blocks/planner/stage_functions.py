@@ -6,11 +6,14 @@ reduced coordinates of ``Coordinates``:
 
 ``stance``  z = q, v, a, F.     Interval on the ground. Rows: gap (2n), base dynamics, motor torque,
             torque-speed line and motor speed (m each), friction pyramid (4 a contact point, or 2).
+``free_stance`` z = q, v, h, a, F. The same, ``share`` h seconds long. Rows: gap (2n + 1), then alike.
+``impact``  z = q, v, dv, L.    Touchdown: velocities change by dv under impulses L, M dv = J' L, with
+            none from the motors. Rows: gap (2n), impulse balance (n), motor speed (m), friction.
 ``flight``  z = q, v, h, a.     Interval of ``share`` h seconds in the air. Rows: gap (2n + 1), base dynamics,
             motor torque, torque-speed line at begin and end, motor speed.
-``contact`` z = q, v.           Rows: velocity + 10/s x place error of every foot on the ground (5 a
-            foot: a line foot may turn about its own line), then the place errors (5 a foot; 3 in
-            the sagittal plane).
+``contact`` z = q, v.           Rows: velocity + 10/s x place error of every contact point along its
+            foot, across it and upwards (2 in the sagittal plane), then the place errors;
+            ``ContactRows`` says which of them are independent.
 ``take_off`` z = q, v.          Rows: apex height, vertical speed, angular momentum (3).
 ``air``     z = q.              Rows: height of the points of feet and calves, how far ahead they
             are, and how far on their own leg's side of the torso's middle plane, each point's
@@ -34,7 +37,7 @@ from .symbolic_model import GRAVITY, SymbolicModel, base_rotation
 DRIFT_RATE = 10.0
 """1/s, how fast the place error of a foot on the ground dies out."""
 
-PIECES = ("stance", "flight", "contact", "take_off", "air")
+PIECES = ("stance", "free_stance", "flight", "impact", "contact", "take_off", "air")
 
 
 @dataclass(frozen=True)
@@ -61,7 +64,9 @@ def parameter_sizes(coordinates: Coordinates) -> dict[str, dict[str, int]]:
     }  # fmt: skip
     return {
         "stance": {"step": 1, "friction": 1, "force": 1, **interval},
+        "free_stance": {"share": 1, "friction": 1, "force": 1, **interval},
         "flight": {"share": 1, **interval},
+        "impact": {"friction": 1, "impulse": 1},
         "contact": {"place": 3 * contacts, "heading": 2},
         "take_off": {},
         "air": {},
@@ -89,13 +94,13 @@ def piece_expressions(
     cost: Any = ca.SX(0)
     rows: list[Any]
     z: list[Any]
-    if name in ("stance", "flight"):
+    if name in ("stance", "free_stance", "flight"):
         a = ca.SX.sym("a", n)
         state = ca.SX.sym("h")
         h = w["step"] if name == "stance" else w["share"] * state
-        forces = coordinates.forces if name == "stance" else 0
+        forces = 0 if name == "flight" else coordinates.forces
         F = ca.SX.sym("F", forces)
-        z = [q, v, a, F] if name == "stance" else [q, v, state, a]
+        z = [q, v, a, F] if name == "stance" else [q, v, state, a, F]
         half_v = v + 0.5 * h * a
         half_q = q + 0.5 * h * v + 0.125 * h * h * a
         all_forces: Any = ca.mtimes(ca.DM(coordinates.force_matrix), F) if forces else None
@@ -113,7 +118,7 @@ def piece_expressions(
         )
         wrench = base + coordinates.share * sum(limbs.values())
         to_motor = model.robot.torque_to_motor[np.ix_(coordinates.joints, coordinates.joints)]
-        geared = model.robot.joint_to_motor[np.ix_(coordinates.joints, coordinates.joints)]
+        geared = _geared(model, coordinates)
         motor = ca.mtimes(ca.DM(to_motor), torque[list(coordinates.joints)])
         own = [6 + joint for joint in coordinates.joints]
         speed = ca.mtimes(ca.DM(geared), coordinates.expand(v)[own])
@@ -121,7 +126,7 @@ def piece_expressions(
         gap = [-(q + h * v + 0.5 * h * h * a), -(v + h * a)]
         rows = [
             *gap,
-            *([-state] if name == "flight" else []),
+            *([] if name == "stance" else [-state]),
             wrench[list(coordinates.rows)],
             motor,
             motor + w["slope"] * speed,
@@ -136,12 +141,20 @@ def piece_expressions(
         )
         if forces:
             cost = cost + w["force"] * ca.dot(F, F)
-            for c in coordinates.contacts:
-                reach = w["friction"] * all_forces[3 * c + 2]
-                for axis in coordinates.axes[:-1]:
-                    pull = all_forces[3 * c + axis]
-                    rows += [reach - pull, reach + pull]
+            rows += _cones(coordinates, all_forces, w["friction"])
         cost = h * cost
+    elif name == "impact":
+        change, F = ca.SX.sym("dv", n), ca.SX.sym("F", coordinates.forces)
+        z = [q, v, change, F]
+        pushes = ca.mtimes(ca.DM(coordinates.force_matrix), F)
+        rows = [
+            -q, -(v + change),
+            _impulse_balance(model, coordinates, q, change, pushes),
+            ca.mtimes(ca.DM(_geared(model, coordinates)),
+                      coordinates.expand(v)[[6 + joint for joint in coordinates.joints]]),
+            *_cones(coordinates, pushes, w["friction"]),
+        ]  # fmt: skip
+        cost = w["impulse"] * ca.dot(F, F)
     elif name == "contact":
         z = [q, v]
         errors = _place_errors(model, coordinates, q, w["place"], w["heading"])
@@ -156,6 +169,39 @@ def piece_expressions(
         z = [q]
         rows = _air_rows(model, coordinates, q)
     return ca.vertcat(*z), ca.vertcat(*w.values()), cost, ca.vertcat(*rows)
+
+
+def _geared(model: SymbolicModel, coordinates: Coordinates) -> Any:
+    """Motor speeds from the speeds of the joints that are computed."""
+    return model.robot.joint_to_motor[np.ix_(coordinates.joints, coordinates.joints)]
+
+
+def _cones(coordinates: Coordinates, forces: Any, friction: Any) -> list[Any]:
+    """The friction pyramid's rows of every contact point."""
+    rows = []
+    for c in coordinates.contacts:
+        reach = friction * forces[3 * c + 2]
+        for axis in coordinates.axes[:-1]:
+            pull = forces[3 * c + axis]
+            rows += [reach - pull, reach + pull]
+    return rows
+
+
+def _impulse_balance(model: SymbolicModel, coordinates: Coordinates, q: Any, change: Any,
+                     impulses: Any) -> Any:  # fmt: skip
+    """M dv - J' L, of the base (body frame) and the joints; all coordinates only."""
+    import casadi as ca
+
+    still = ca.SX.zeros(model.size)
+    named = {c.name: impulses[3 * i : 3 * i + 3] for i, c in enumerate(model.robot.contacts)}
+    sums = []
+    # Gravity has no impulse: what holds the robot at rest is taken off again.
+    for bend, forces in ((coordinates.expand(change), named), (still, {})):
+        base, limbs, torque = model.inverse_dynamics(
+            coordinates.expand(q), still, bend, forces, coordinates.limbs
+        )
+        sums.append(ca.vertcat(base + sum(limbs.values()), torque))
+    return sums[0] - sums[1]
 
 
 def make_piece(model: SymbolicModel, coordinates: Coordinates, name: str) -> Piece:
@@ -180,20 +226,18 @@ def make_piece(model: SymbolicModel, coordinates: Coordinates, name: str) -> Pie
 
 def _place_errors(model: SymbolicModel, coordinates: Coordinates, q: Any, place: Any, heading: Any
                   ) -> Any:  # fmt: skip
-    """Of every foot: the first point's error in x, y, z, the others' across the foot and in z, in
-    the heading the foot lands with."""
+    """Of every contact point its error along and across the foot and upwards, in the heading that
+    the foot stands with."""
     import casadi as ca
 
     points = model.contact_points(coordinates.expand(q), coordinates.limbs)
-    errors, seen = [], set()
-    for i, c in enumerate(coordinates.contacts):
+    errors = []
+    for i in range(len(coordinates.contacts)):
         off = points[i] - place[3 * i : 3 * i + 3]
         along = heading[0] * off[0] + heading[1] * off[1]
         across = heading[0] * off[1] - heading[1] * off[0]
-        foot = model.robot.contacts[c].foot
         sideways = [across] if 1 in coordinates.axes else []
-        errors += [*sideways, off[2]] if foot in seen else [along, *sideways, off[2]]
-        seen.add(foot)
+        errors += [along, *sideways, off[2]]
     return ca.vertcat(*errors)
 
 

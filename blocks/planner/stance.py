@@ -79,17 +79,25 @@ class StanceFinder:
         return Stance(q, points.T.copy(), com.ravel(), heading)
 
 
-def start_and_end(task: JumpTask, robot: RobotDescription, finder: StanceFinder
-                  ) -> tuple[Stance, Stance]:  # fmt: skip
-    """The task's two stances; at the end the pitch includes the body's whole turn."""
+def stances_of(task: JumpTask, robot: RobotDescription, finder: StanceFinder
+               ) -> tuple[Stance, ...]:  # fmt: skip
+    """The task's stances: at the start, between jumps, with the same joint angles, and at the end.
+    The pitch includes the body's turns so far."""
     names = [joint.name for joint in robot.joints]
     first, last = task.start_joints(robot), task.end_joints(robot)
-    start = finder.place(np.array([first[name] for name in names]))
-    place = (task.distance_x, task.distance_y, task.landing_height)
-    end = finder.place(np.array([last[name] for name in names]), heading=task.twist, at=place)
-    turned = end.coordinates.copy()
-    turned[3] += task.rotation
-    return start, Stance(turned, end.points, end.com, end.heading)
+    places = task.places()
+    found = []
+    for number, place in enumerate(places):
+        angles = last if number == len(places) - 1 else first
+        stance = finder.place(
+            np.array([angles[name] for name in names]),
+            heading=place.heading,
+            at=(place.x, place.y, place.z),
+        )
+        turned = stance.coordinates.copy()
+        turned[3] += place.turned
+        found.append(Stance(turned, stance.points, stance.com, stance.heading))
+    return tuple(found)
 
 
 def _turned(lean: float, heading: float) -> Array:

@@ -20,6 +20,7 @@ from pydantic import ValidationError, model_validator
 from ...runtime.description import RobotDescription
 from ...runtime.errors import AloftError
 from ...runtime.parameters import Parameters, parameter
+from .sequence import FreeTimes, Hop, Place, Span, check_spans, places_of
 
 GRAVITY = 9.81
 """m/s^2"""
@@ -54,14 +55,19 @@ class Weights(Parameters):
     joint_velocity: float = parameter(1e-1, ge=0.0, text="joint velocities")
     acceleration: float = parameter(5e-4, ge=0.0, text="generalised accelerations")
     force: float = parameter(1e-3, ge=0.0, text="contact forces")
+    impulse: float = parameter(0.05, ge=0.0, text="a touchdown's impulses, not over time")
 
 
-class JumpTask(Parameters):
-    """One jump from standing to standing.
+class JumpTask(FreeTimes):
+    """One jump from standing to standing, or several in a row.
 
     Heights are the centre of mass's above where it stands at the start. The world's origin is the
-    ground midway between the soles at the start, x forward, z up. What is ``None`` is left to the
-    planner.
+    ground midway between the soles at the start, x forward, z up. What is ``None`` (``free`` in a
+    file) is left to the planner.
+
+    Several jumps follow each other without standing still: ``repeat`` does the same jump that many
+    times, ``jumps`` lists them, each relative to where it begins, with what the task says where
+    they say nothing. With both the whole list is repeated.
 
     Raises pydantic's ``ValidationError`` for values out of range and for contradictions;
     ``read_task`` turns it into a ``TaskError``.
@@ -96,19 +102,36 @@ class JumpTask(Parameters):
         0.0, unit="rad", ge=-12.6, le=12.6,
         text="the body's turn in pitch from start to landing; 360 deg is a forward somersault",
     )  # fmt: skip
-    squat_time: float = parameter(0.4, unit="s", gt=0.0, le=5.0, text="going down")
-    thrust_time: float = parameter(0.25, unit="s", gt=0.0, le=2.0, text="pushing off")
+    squat_time: float | None = parameter(
+        0.4, unit="s", gt=0.0, le=5.0, text="going down; None: found by the planner"
+    )
+    thrust_time: float | None = parameter(
+        0.25, unit="s", gt=0.0, le=2.0, text="pushing off; None: found by the planner"
+    )
     flight_time: float | None = parameter(
         None, unit="s", gt=0.0, le=3.0, text="in the air; None: found by the planner"
     )
-    landing_time: float = parameter(0.5, unit="s", gt=0.0, le=5.0, text="touchdown to rest")
+    landing_time: float | None = parameter(
+        0.5, unit="s", gt=0.0, le=5.0, text="touchdown to rest; None: found by the planner"
+    )
+    contact_time: float | None = parameter(
+        None, unit="s", gt=0.0, le=5.0,
+        text="on the ground between two jumps; None: found by the planner",
+    )  # fmt: skip
+    jumps: tuple[Hop, ...] | None = parameter(
+        None, min_length=1, max_length=50, text="jumps in a row; None: only the one above"
+    )
+    repeat: int | None = parameter(None, ge=1, le=50, text="how often they are done in a row")
+    phases: tuple[Span, ...] | None = parameter(
+        None, text="the sequence of contacts; None: squat, thrust, flight, landing, on all contacts"
+    )
     touchdown_lean: float | None = parameter(
         None, unit="rad", ge=0.0, le=1.5,
         text="most the torso may lean forwards or backwards at touchdown; None: any",
     )  # fmt: skip
     impact: bool = parameter(
-        False, text="feet may hit the ground with speed and stop by an impulse (not solved so "
-        "far); else they arrive at rest"
+        False, text="feet may hit the ground with speed and stop by an impulse; else they "
+        "arrive at rest"
     )  # fmt: skip
     knots: Knots = parameter(Knots(), text="intervals in each phase")
     profile: str = parameter("koala", text="actuator profile of the robot")
@@ -136,15 +159,65 @@ class JumpTask(Parameters):
     def _check_together(self) -> JumpTask:
         if self.rise is not None and self.take_off_speed is not None:
             raise ValueError("give rise or take_off_speed, not both: one follows from the other")
-        free = self.rise is None and self.take_off_speed is None
-        if free and self.flight_time is None and not self.landing_height and not self.rotation:
-            raise ValueError("say how high the jump is: rise, take_off_speed or flight_time")
-        if self.rise is not None and self.rise + 0.15 < self.landing_height:
-            raise ValueError(
-                f"a rise of {self.rise:g} m cannot reach ground that is {self.landing_height:g} m "
-                f"higher; ask for a rise above {self.landing_height:g} m"
-            )
+        for number, hop in enumerate(self.hops()):
+            which = f"jump {number + 1}: " if self.jumps else ""
+            up = hop.landing_height or 0.0
+            free = hop.rise is None and hop.take_off_speed is None and hop.flight_time is None
+            if hop.rise is not None and hop.take_off_speed is not None:
+                raise ValueError(f"{which}give rise or take_off_speed, not both")
+            if free and not up and not hop.rotation:
+                raise ValueError(
+                    f"{which}say how high the jump is: rise, take_off_speed or flight_time"
+                )
+            if hop.rise is not None and hop.rise + 0.15 < up:
+                raise ValueError(
+                    f"{which}a rise of {hop.rise:g} m cannot reach ground that is {up:g} m higher; "
+                    f"ask for a rise above {up:g} m"
+                )
+        wrong = check_spans(self.spans(), len(self.hops()))
+        if wrong:
+            raise ValueError(wrong)
         return self
+
+    def hops(self) -> tuple[Hop, ...]:
+        """The jumps in a row, everything filled in; one of them if nothing else is asked for."""
+        own = {name: getattr(self, name) for name in Hop.model_fields}
+        found = []
+        for hop in self.jumps or (Hop(),):
+            given = {name: value for name, value in hop if value is not None}
+            how = {"rise", "take_off_speed"}
+            found.append(
+                Hop(**{k: v for k, v in own.items() if not (k in how and how & set(given))} | given)
+            )
+        return tuple(found) * (self.repeat or 1)
+
+    def places(self) -> tuple[Place, ...]:
+        """Where the robot stands at the start, between its jumps, and at the end."""
+        return places_of(self.hops())
+
+    def spans(self) -> tuple[Span, ...]:
+        """The sequence of contacts, with all times that are given and numbers of knots."""
+        hops, knots = self.hops(), self.knots
+        if self.phases is None:
+            half = None if self.contact_time is None else 0.5 * self.contact_time
+            between = (Span(phase="landing", time=half), Span(phase="thrust", time=half))
+            found = [
+                Span(phase="squat", time=self.squat_time),
+                Span(phase="thrust", time=self.thrust_time),
+            ]
+            for _ in hops[:-1]:
+                found += [Span(phase="flight"), *between]
+            found += [Span(phase="flight"), Span(phase="landing", time=self.landing_time)]
+        else:
+            found = list(self.phases)
+        flights = iter(hop.flight_time for hop in hops)
+        filled = []
+        for span in found:
+            of_jump = next(flights, None) if span.phase == "flight" else None
+            time = of_jump if span.time is None else span.time
+            count = span.knots or int(getattr(knots, span.phase))
+            filled.append(span.model_copy(update={"time": time, "knots": count}))
+        return tuple(filled)
 
     def start_joints(self, robot: RobotDescription) -> dict[str, float]:
         """Joint angles [rad] by name at the start. Raises ``TaskError`` for an unknown joint."""
@@ -157,7 +230,11 @@ class JumpTask(Parameters):
     def content(self) -> dict[str, Any]:
         """All that decides the plan, as plain data: everything but the name."""
         # What is not given is left out, so that a parameter added later changes no hash.
-        return self.model_dump(mode="json", exclude={"name"}, exclude_none=True)
+        # So is the weight of impulses where there are none.
+        unused: dict[str, Any] = {} if self.impact else {"weights": {"impulse"}}
+        return self.model_dump(
+            mode="json", exclude={"name": True, **unused}, exclude_none=True
+        )
 
     def hash(self, robot: RobotDescription) -> str:
         """What a plan of this task is kept under: the same for the same task, robot and format."""
@@ -200,7 +277,9 @@ def _explain(problem: Any) -> str:
     key = ".".join(map(str, problem["loc"]))
     message = str(problem["msg"]).removeprefix("Value error, ")
     if problem["type"] == "extra_forbidden":
-        nested: dict[str, type[Parameters]] = {"knots": Knots, "weights": Weights}
+        nested: dict[str, type[Parameters]] = {
+            "knots": Knots, "weights": Weights, "jumps": Hop, "phases": Span
+        }  # fmt: skip
         owner = nested.get(str(problem["loc"][0]), JumpTask)
         near = get_close_matches(key.rpartition(".")[2], owner.model_fields, 1, 0.0)
         return f"{key}: is no parameter of a task; the nearest is {near[0]}"

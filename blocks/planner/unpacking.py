@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Hashable
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..signals import Phase
 from .midpoint import angular_motion, euler_angles, euler_rates, rotation
 from .plan import JumpPlan
 from .problem import Problem
-from .resampling import matching_times, means_over, states_at
+from .resampling import kinds_of, matching_places, means_between, states_at
 from .symbolic_model import SymbolicModel
 
 Array = NDArray[np.float64]
@@ -23,8 +23,9 @@ def knot_times(problem: Problem, values: Array) -> Array:
     """The time of every knot [s]."""
     n, assembly = problem.coordinates.size, problem.assembly
     steps = problem.steps.copy()
-    for k in problem.flight:
-        steps[k] *= values[assembly.state_start[k] + 2 * n]
+    for stretch in problem.stretches:
+        for k in range(stretch.first, stretch.stop if stretch.timed else stretch.first):
+            steps[k] *= values[assembly.state_start[k] + 2 * n]
     return np.concatenate([[0.0], np.cumsum(steps)])
 
 
@@ -36,14 +37,19 @@ def unpack(problem: Problem, values: Array) -> dict[str, Any]:
     q = np.array([values[s : s + n] for s in assembly.state_start]) @ coordinates.matrix.T
     v = np.array([values[s + n : s + 2 * n] for s in assembly.state_start]) @ coordinates.matrix.T
     bend, force = np.zeros((count, model.size)), np.zeros((count, 3 * len(model.robot.contacts)))
-    grounded = np.zeros(count, dtype=bool)
-    for k, phase in enumerate(problem.phases):
-        control = assembly.control_start[k]
-        bend[k] = coordinates.matrix @ values[control : control + n]
-        grounded[k] = phase is not Phase.FLIGHT
-        if grounded[k]:
-            pushed = values[control + n : control + n + coordinates.forces]
-            force[k] = coordinates.force_matrix @ pushed
+    grounded = np.zeros((count, len(model.robot.contacts)), dtype=bool)
+    impacts = np.zeros(count, dtype=bool)
+    for stretch in problem.stretches:
+        for k in range(stretch.first, stretch.stop):
+            control = assembly.control_start[k]
+            impacts[k] = stretch.impact
+            grounded[k, list(stretch.contacts)] = True
+            if not stretch.impact:
+                bend[k] = coordinates.matrix @ values[control : control + n]
+            if not stretch.flies:
+                pushed = values[control + n : control + n + coordinates.forces]
+                force[k] = coordinates.force_matrix @ pushed
+                force[k].reshape(-1, 3)[~grounded[k]] = 0.0
     phases = [int(phase) for phase in problem.phases]
     for array in (bend, force, grounded):
         array[-1] = array[-2]
@@ -53,23 +59,35 @@ def unpack(problem: Problem, values: Array) -> dict[str, Any]:
     moving = v + 0.5 * steps[:, None] * bend
     middle[-1], moving[-1] = middle[-2], moving[-2]
     com, speed, momentum, torque = _evaluate(model, q, v, middle, moving, bend, force)
+    torque[impacts] = 0.0
     generalised = [_twist(*row) for row in zip(q, v, bend, strict=True)]
     halfway = [_twist(*row) for row in zip(middle, moving, bend, strict=True)]
+    flights = [(float(times[f.start]), float(times[f.stop])) for f in problem.flights]
     return {
         "time": times,
         "position": np.array([_pose(row) for row in q]),
         "velocity": np.array([row[0] for row in generalised]),
         "acceleration": np.array([row[1] for row in halfway]),
         "contact_force": force.reshape(count, -1, 3),
-        "contact": np.repeat(grounded[:, None], len(model.robot.contacts), axis=1),
+        "contact": grounded,
         "phase": np.array([*phases, phases[-1]], dtype=np.int64),
         "joint_torque": torque,
         "com": com,
         "com_velocity": speed,
         "angular_momentum": momentum,
-        "lift_off_time": float(times[problem.flight.start]),
-        "touchdown_time": float(times[problem.flight.stop]),
+        "lift_off_time": flights[0][0],
+        "touchdown_time": flights[0][1],
+        "later_flights": tuple(flights[1:]),
     }
+
+
+def kinds_in(problem: Problem) -> list[Hashable]:
+    """The kind of every interval of a problem, as ``resampling.kinds_of`` a plan's."""
+    return [
+        (int(stretch.phase), tuple(stretch.contacts), not stretch.impact)
+        for stretch in problem.stretches
+        for _ in range(stretch.count)
+    ]
 
 
 def pack(problem: Problem, plan: JumpPlan, guess: Array) -> Array:
@@ -87,12 +105,15 @@ def pack(problem: Problem, plan: JumpPlan, guess: Array) -> Array:
         v[k, :3] = rotation(angles[k]) @ row[:3]
         v[k, 3:6] = euler_rates(angles[k], row[3:6])[ORDER]
         v[k, 6:] = row[6:]
-    phases = [int(phase) for phase in problem.phases]
-    instants = matching_times(plan.time, plan.phase[:-1].tolist(), problem.steps, phases)
-    q, v = states_at(instants, plan.time, q, v)
-    force = means_over(instants, plan.time, plan.contact_force.reshape(len(plan.time), -1))
-    steps = np.diff(instants)
-    mean = plan.flight_time / len(problem.flight)
+    places = matching_places(plan.time, kinds_of(plan), problem.steps, kinds_in(problem))
+    q, v = states_at(*places, plan.time, q, v)
+    force = means_between(*places, plan.time, plan.contact_force.reshape(len(plan.time), -1))
+    interval, past = places
+    steps = np.diff(plan.time[interval] + past * np.diff(plan.time)[interval])
+    means = {
+        stretch: float(steps[stretch.first : stretch.stop].sum()) / stretch.count
+        for stretch in problem.stretches
+    }
     values = guess.copy()
     for k in range(problem.knots):
         start, control = assembly.state_start[k], assembly.control_start[k]
@@ -100,16 +121,17 @@ def pack(problem: Problem, plan: JumpPlan, guess: Array) -> Array:
         values[start + n : start + 2 * n] = coordinates.reduce(v[k])
         if k == problem.knots - 1:
             break
-        bend = (v[k + 1] - v[k]) / steps[k]
+        stretch = problem.stretch_at(k)
+        bend = (v[k + 1] - v[k]) / (1.0 if stretch.impact else steps[k])
         values[control : control + n] = coordinates.reduce(bend)
-        if problem.phases[k] is Phase.FLIGHT:
-            values[start + 2 * n] = mean
-        else:
+        if stretch.timed:
+            values[start + 2 * n] = means[stretch]
+        if not stretch.flies:
             pushed = coordinates.reduce_forces(force[k])
             values[control + n : control + n + coordinates.forces] = pushed
         hold = assembly.knots[k].hold
         if hold is not None:
-            values[control + hold] = mean
+            values[control + hold] = means[problem.stretch_at(k + 1)]
     return values
 
 

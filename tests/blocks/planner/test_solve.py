@@ -78,7 +78,6 @@ def test_a_jump_beyond_the_motors_is_refused_with_a_family() -> None:
     ("change", "message"),
     [
         ({"formulation": "srbm"}, "use formulation: full"),
-        ({"impact": True}, "use impact: false"),
         ({"profile": "petrol"}, "there is koala, relaxed"),
         ({"initial": {"right_ankle": 0.1}}, "soles are not flat"),
     ],
