@@ -19,7 +19,8 @@ from .assembly import Assembly, Knot
 from .contact_rows import ContactRows, reduced_contacts
 from .coordinates import Coordinates
 from .layout import Stretch, layout
-from .sequence import edge_of
+from .obstacles import ObstacleRows, step_parameters
+from .sequence import Hop, Place, edge_of
 from .stage_functions import Piece, body_points, parameter_sizes
 from .stance import Stance
 from .symbolic_model import SymbolicModel
@@ -126,6 +127,7 @@ class ProblemBuilder:
             [s.lengths * (1.0 if s.timed else (s.time or 0.0) / s.count) for s in self.stretches]
         )
         self.contact_rows = ContactRows(model.robot, coordinates)
+        self.obstacles = ObstacleRows(model, coordinates)
         self.pieces = pieces
 
     def build(self) -> Problem:
@@ -178,6 +180,9 @@ class ProblemBuilder:
                 kept = self._contact_rows(before, stretch)
                 if len(kept):
                     knot.pieces["contact"] = (q_and_v, kept)
+            obstacle = self._obstacle_rows(k)
+            if k and len(obstacle):
+                knot.pieces["obstacle"] = (np.arange(n), obstacle)
             idle = self._idle(stretch)
             if idle and k and not stretch.impact:
                 knot.pieces["air"] = (np.arange(n), np.array(idle))
@@ -245,10 +250,35 @@ class ProblemBuilder:
         feet = len(self.coordinates.contacts)
         ahead = np.arange(points, points + feet)
         step, edge = self._step(k)
+        if self.hops[self.of_knot[k].place].rotation:
+            return np.arange(2 * points, 3 * points)
         if edge is None or (step > 0.0) is (
             self._flight_share(k) > (STEP_UP_SHARE if step > 0.0 else STEP_DOWN_SHARE)):  # fmt: skip
             ahead = ahead[:0]
         return np.concatenate([np.arange(points), ahead, np.arange(2 * points, 3 * points)])
+
+    def _hop(self, k: int) -> tuple[Hop, Place, float | None]:
+        """The jump under way at a knot, or the last one; where it began, and its step's edge."""
+        stretch = self.of_knot[k]
+        number = min(stretch.place, len(self.hops) - 1)
+        hop, place = self.hops[number], self.places[number]
+        return hop, place, edge_of(hop, place)
+
+    def _obstacle_rows(self, k: int) -> NDArray[np.int64]:
+        hop, _, edge = self._hop(k)
+        stretch = self.of_knot[k]
+        return self.obstacles.rows(hop, edge, stretch, k == stretch.first)
+
+    def _fill_obstacle(self, k: int) -> None:
+        hop, place, edge = self._hop(k)
+        stretch = self.of_knot[k]
+        share = self._flight_share(k) if stretch.flies else float(stretch.place > 0)
+        self._set("obstacle", k, **step_parameters(hop, edge, place.z, share))
+        floor = self.task.foot_clearance * np.sin(np.pi * share)
+        self._rows("obstacle", k, [
+            ("ground clearance", self.obstacles.feet, floor, np.inf),
+            ("ground clearance", self.obstacles.count - self.obstacles.feet, 0.0, np.inf),
+        ])  # fmt: skip
 
     def _take_off_rows(self, k: int) -> NDArray[np.int64]:
         hop = self.hops[self.of_knot[k].place]

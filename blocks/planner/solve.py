@@ -128,7 +128,7 @@ def make_problem(
     stances = stances_of(task, robot, finder)
     stretches = layout(task, robot)
     chosen = _choose(model, task, stances, stretches, coordinates)
-    used = {"contact", "take_off", "air", *(stretch.piece for stretch in stretches)}
+    used = {"contact", "take_off", "air", "obstacle", *(stretch.piece for stretch in stretches)}
     names = tuple(name for name in PIECES if name in used)
     pieces = load_pieces(
         model, chosen, profile=task.profile, names=names, compiled=compiled, progress=progress
