@@ -27,13 +27,13 @@ class BalanceMemory(Signal):
 
 
 class BalanceTarget(Block):
-    """Follows the plan until touchdown; after it, rest over the middle of the measured feet.
+    """Follows the plan until its last touchdown; then rest over the middle of the measured feet.
 
-    Before touchdown positions and heading are the plan's, shifted and turned with the measured
+    Before the last touchdown positions and heading are the plan's, shifted and turned with the measured
     feet: the plan is relative to where the feet stand, so a drift of the estimated position or
     heading does not matter.
 
-    After touchdown the centre of mass goes over the middle of the sole centres, at
+    After that touchdown the centre of mass goes over the middle of the sole centres, at
     ``landing_depth`` below standing height; when the phase is RECOVER it rises to standing height
     with least jerk within ``rise_time``. The torso goes level, heading as the feet do on average.
     Joint friction leaves a small steady tilt; ``trim`` integrates it away,
@@ -81,7 +81,8 @@ class BalanceTarget(Block):
             self.memory.started[()] = True
         middle_point(self.terms.foot_position, self._middle)
         heading = mean_heading(self.terms.foot_rotation)
-        if phase < Phase.LANDING:
+        goes_on = float(reference.lift_off_time) > float(reference.time)
+        if phase < Phase.LANDING or (phase == Phase.LANDING and goes_on):
             self._follow(heading)
         else:
             self._balance(phase, heading)

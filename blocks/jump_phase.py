@@ -23,7 +23,9 @@ class PhaseMemory(Signal):
 
     phase = Field(dtype="int64", values=Phase, text="see Phase")
     began = Field(unit="s", text="plan time at which the phase began")
-    touchdown = Field(unit="s", text="plan time of the first touchdown, negative before it")
+    touchdown = Field(unit="s", text="plan time of the last touchdown, negative before the first")
+    lift_off_time = Field(unit="s", text="planned lift-off of the flight under way or last")
+    touchdown_time = Field(unit="s", text="planned touchdown of that flight")
     unloaded = Field("n_contacts", unit="s", text="how long each point has been without contact")
     stance = Field("n_contacts", dtype="bool", text="the points in stance after touchdown")
 
@@ -39,11 +41,12 @@ class JumpPhase(Block):
                   still has contact; in its second half at once when no point has had
                   contact for ``early_lift_off``
     FLIGHT        at the first contact after ``touchdown_share`` of the predicted flight
-    LANDING       ``landing_time`` after touchdown
+    LANDING       ``landing_time`` after touchdown; where the plan has another flight, with the
+                  planned thrust, and THRUST follows again
     FAULT         never; entered from any other phase on the conditions below
     ============  =====================================================================
 
-    RECOVER follows LANDING and stays. FAULT: no point has had contact for ``lost_contact`` while
+    RECOVER follows the last LANDING and stays. FAULT: no point has had contact for ``lost_contact`` while
     the robot should stand, or the flight has lasted that much longer than predicted at its start
     by the plan.
 
@@ -56,7 +59,8 @@ class JumpPhase(Block):
     The time to touchdown is the ballistic fall of the measured centre of mass to the height it is
     planned to touch down at: z + v s - g s^2 / 2 = z_td.
 
-    Does not judge tilt, torques or sensors (``SafetyMonitor`` does), and never goes back.
+    Does not judge tilt, torques or sensors (``SafetyMonitor`` does), and goes back for nothing but
+    another planned flight.
     """
 
     class Params(Parameters):
@@ -101,10 +105,13 @@ class JumpPhase(Block):
     def step(self) -> None:
         p, memory, out = self.params, self.memory, self.phase
         now = float(self.reference.time)
-        touchdown_time = float(self.reference.touchdown_time)
         active, unloaded = self.contacts.active, memory.unloaded
         shortest = count_unloaded(active, self.period, unloaded)
-        lift_off = float(self.reference.lift_off_time)
+        if int(memory.phase) < Phase.FLIGHT:
+            memory.lift_off_time[...] = self.reference.lift_off_time
+            memory.touchdown_time[...] = self.reference.touchdown_time
+        lift_off, touchdown_time = float(memory.lift_off_time), float(memory.touchdown_time)
+        another = float(self.reference.lift_off_time) > touchdown_time
         remaining = 0.0
         if int(memory.phase) <= Phase.FLIGHT:
             remaining = time_to_height(
@@ -118,7 +125,7 @@ class JumpPhase(Block):
         phase = next_phase(
             before, int(self.reference.phase), now - float(memory.began), now, lift_off,
             touchdown_time, remaining, shortest, p.late_lift_off, p.early_lift_off,
-            p.touchdown_share, p.landing_time, p.lost_contact,
+            p.touchdown_share, p.landing_time, p.lost_contact, another,
         )  # fmt: skip
         if phase != before:
             memory.phase[()] = phase
@@ -177,12 +184,15 @@ def next_phase(
     touchdown_share: float,
     landing_time: float,
     lost_contact: float,
+    another: bool,
 ) -> int:
     """The phase that follows; see the block's text.
 
     Args:
         unloaded: how long no point has had contact [s].
+        lift_off_time, touchdown_time: planned, of the next flight, the one under way or the last.
         remaining: predicted time to touchdown [s].
+        another: whether the plan has a flight behind that one.
     """
     if phase == Phase.FAULT:
         return Phase.FAULT
@@ -195,6 +205,8 @@ def next_phase(
     if unloaded > lost_contact:
         return Phase.FAULT
     if phase >= Phase.LANDING:
+        if another and phase == Phase.LANDING:
+            return Phase.THRUST if planned == Phase.THRUST else Phase.LANDING
         if phase == Phase.LANDING and time_in_phase >= landing_time:
             return Phase.RECOVER
         return phase

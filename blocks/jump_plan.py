@@ -97,6 +97,7 @@ class JumpPlan(Block):
             raise BlockError(str(error)) from error
 
     def _plan(self, task: JumpTask, robot: RobotDescription) -> Any:
+        from .planner.errors import TaskError
         from .planner.library import PlanLibrary
 
         folder = Path(self.params.library) if self.params.library else None
@@ -106,5 +107,8 @@ class JumpPlan(Block):
                 f"there is no plan for the task {task.name!r}; make one with 'aloft plan', or set "
                 "solve: true"
             )
-        plan, _ = library.plan(task)
+        try:
+            plan, _ = library.plan(task)
+        except TaskError as error:
+            raise BlockError(str(error)) from error
         return plan

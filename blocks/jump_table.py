@@ -56,8 +56,10 @@ class JumpTableReader:
         self._touchdowns = np.array([jump[2] for jump in self._jumps])
 
     def read(self, time: float, reference: JumpReference, lead: float = 0.0) -> None:
-        """The reference at ``time``; before the table its first row, after it its last. Lift-off
-        and touchdown times are those of the flight under way or, from a touchdown on, the next.
+        """The reference at ``time``; before the table its first row, after it its last.
+
+        Lift-off and touchdown times are those of the next flight, and from its middle on those of
+        the one behind it: whoever lands, early or late, knows by them that it goes on.
 
         What a controller feeds forward, the acceleration and the rate of angular momentum, is
         that of ``lead`` seconds later.
@@ -80,6 +82,8 @@ class JumpTableReader:
             phase = int(Phase.LANDING)
         reference.time[()] = time
         reference.phase[()] = phase
+        if jump + 1 < len(self._jumps) and time >= 0.5 * (lift_off + touchdown):
+            _, lift_off, touchdown = self._jumps[jump + 1]
         reference.lift_off_time[()] = lift_off
         reference.touchdown_time[()] = touchdown
         reference.contact[...] = phase != Phase.FLIGHT

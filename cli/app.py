@@ -15,8 +15,10 @@ from .blocks import blocks
 from .check import check
 from .graph import graph
 from .output import print_json
+from .params import params
 from .plan import plan
 from .run import run
+from .study import study
 
 EXIT_CODES = """\b
 Exit codes:
@@ -36,8 +38,9 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
-for _verb in (run, check, graph, blocks, plan, bench):
+for _verb in (run, check, graph, blocks, plan, bench, study):
     app.command(epilog=EXIT_CODES if _verb is run else None)(_verb)
+app.add_typer(params)
 
 
 def _print_version(wanted: bool) -> None:

@@ -9,13 +9,13 @@ import typer
 
 from ..runtime.errors import ExitCode
 from .output import console, errors_reported, number, print_error, print_json, say, table
-from .plan_output import failure, failure_rows, plan_json, print_plan, recorded_motion
+from .plan_grid import plan_grid
+from .plan_output import failure, plan_json, print_plan, recorded_motion
 from .run import viewer
 
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from ..blocks.planner.library import PlanLibrary
     from ..blocks.planner.plan import JumpPlan
     from ..blocks.planner.task import JumpTask
     from ..runtime.description import RobotDescription
@@ -31,10 +31,16 @@ def plan(
         Path | None, typer.Option(help="Library folder plans are kept in; default: your cache.")
     ] = None,
     anew: Annotated[
-        bool, typer.Option("--anew", help="Solve also what is kept, from nothing.")
+        bool,
+        typer.Option(
+            "--anew",
+            help="Solve also what is kept, from nothing; in a grid: try again what failed before.",
+        ),
     ] = False,
     workers: Annotated[int, typer.Option(help="Processes for a grid; 0: one a core.", min=0)] = 0,
-    dask: Annotated[str, typer.Option(help="Address of a Dask scheduler to plan a grid on.")] = "",
+    cluster: Annotated[
+        str, typer.Option(help="Plan a grid on the Dask scheduler at this address.")
+    ] = "",
     no_pictures: Annotated[
         bool, typer.Option("--no-pictures", help="Write no picture and no recording.")
     ] = False,
@@ -48,7 +54,7 @@ def plan(
     screen = console(to_stderr=as_json)
     with errors_reported(as_json):
         if grid is not None:
-            code = plan_grid(grid, keep, anew, workers, dask, screen, as_json)
+            code = plan_grid(grid, keep, anew, workers, cluster, screen, as_json)
         else:
             folder = None if no_pictures else out
             code = plan_tasks(tasks or [], keep, anew, folder, screen, as_json)
@@ -142,85 +148,3 @@ def write_pictures(
     say(screen, f"picture: {picture}")
     say(screen, f"recording: {recording}; to see it: {viewer()} {recording}")
     return {"picture": str(picture), "recording": str(recording)}
-
-
-def plan_grid(
-    grid: Path,
-    keep: Path | None,
-    anew: bool,
-    workers: int,
-    dask: str,
-    screen: Console,
-    as_json: bool,
-) -> ExitCode:
-    """Fill the library with a grid of tasks."""
-    from ..blocks.planner.grid import fill, read_grid, robot_of
-    from ..blocks.planner.library import PlanLibrary
-    from .progress import progress_bar
-
-    tasks = read_grid(grid)
-    library = PlanLibrary(robot_of(tasks), keep)
-    if any(library.path_of(task) is None for task in tasks):
-        compile_once(library, tasks[0], screen)
-    counts = dict.fromkeys(("planned", "kept", "failed", "known"), 0)
-    rows = []
-    with (
-        progress_bar(screen, f"planning {len(tasks)} jumps", len(tasks)) as (bar, bar_task),
-        grid_executor(workers, dask) as executor,
-    ):
-        for row in fill(tasks, library, executor, again=anew):
-            counts[row.outcome] += 1
-            rows.append(row)
-            text = ", ".join(f"{n} {what}" for what, n in counts.items() if n)
-            bar.update(bar_task, advance=1, description=text)
-    failed = [row for row in rows if row.outcome in ("failed", "known")]
-    if failed:
-        screen.print(table("", ("task", "why there is no plan"), failure_rows(failed)))
-    reason = ", ".join(f"{n} {what}" for what, n in counts.items())
-    say(screen, f"{reason}; library: {library.folder}")
-    if as_json:
-        listed = [{"task": r.task.name, "outcome": r.outcome, "reason": r.reason} for r in rows]
-        listed.sort(key=lambda entry: entry["task"])
-        print_json({"success": not failed, "reason": reason, "counts": counts, "rows": listed})
-    return ExitCode.NOT_SUCCESSFUL if failed else ExitCode.SUCCESS
-
-
-def compile_once(library: PlanLibrary, task: JumpTask, screen: Console) -> None:
-    """Compile before there are workers, which would else all compile the same."""
-    from ..blocks.planner.errors import PlanError
-    from ..blocks.planner.solve import make_problem
-
-    with screen.status("compiling the model, once") as status:
-
-        def progress(text: str, done: int, total: int) -> None:
-            status.update(f"{text} ({done} of {total})")
-
-        for coordinates in ("sagittal", "full"):
-            try:
-                make_problem(task, library.robot, progress=progress, coordinates=coordinates)
-            except (PlanError, ValueError):
-                continue  # the task itself will say so
-
-
-def grid_executor(workers: int, dask: str) -> Any:
-    """Processes on this machine, or a Dask cluster's workers."""
-    import multiprocessing
-    import os
-    from concurrent.futures import ProcessPoolExecutor
-
-    from ..blocks.planner.grid import prepare_worker
-    from ..runtime.errors import AloftError
-
-    if dask:
-        try:
-            from distributed import Client
-        except ImportError as error:
-            raise AloftError(
-                "--dask needs the package distributed: pip install distributed"
-            ) from error
-        return Client(dask).get_executor()
-    return ProcessPoolExecutor(
-        workers or os.cpu_count(),
-        mp_context=multiprocessing.get_context("spawn"),
-        initializer=prepare_worker,
-    )

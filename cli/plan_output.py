@@ -85,7 +85,8 @@ def failure_rows(rows: Sequence[GridRow]) -> list[tuple[str, str]]:
 
 def recorded_motion(plan: JumpPlan, robot: RobotDescription) -> RecordedMotion:
     """The plan with its series, every 10 ms or so."""
-    from ..blocks.planner.plan_tests import Evidence, allowed_motor_torque
+    from ..blocks.planner.evidence import Evidence
+    from ..blocks.planner.plan_tests import allowed_motor_torque
     from ..blocks.planner.reference_table import reference_table
     from ..blocks.planner.replay import replay
     from ..logs.motion_recording import RecordedMotion

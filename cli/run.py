@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import signal
 import sys
+from collections.abc import Sequence
 from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -22,13 +22,16 @@ from .output import (
     say,
     table,
 )
+from .stopping import stopped_by_signals
 
 if TYPE_CHECKING:
     from rich.console import Console
 
     from ..runtime.graph import Graph
+    from ..runtime.parameter_endpoint import ParameterEndpoint
     from ..runtime.run_result import RunResult
     from ..runtime.seeds import SeedRow
+    from ..runtime.sinks import Sink
 
 MOST_METRIC_COLUMNS = 5
 
@@ -50,6 +53,13 @@ def run(
         typer.Option(help="Where the recording goes; by default recordings/NAME.rrd."),
     ] = None,
     no_record: Annotated[bool, typer.Option("--no-record", help="Write no recording.")] = False,
+    params: Annotated[
+        str,
+        typer.Option(
+            help="Let `aloft params` reach this run by that name; a run in real time is reached "
+            "by its graph's name anyway. 'none': not at all."
+        ),
+    ] = "",
     as_json: Annotated[
         bool, typer.Option("--json", help="Tables go to standard error, one JSON object to output.")
     ] = False,
@@ -69,18 +79,41 @@ def run(
         else:
             loaded = load(graph, settings)
             default = Path("recordings") / f"{loaded.checked.name}.rrd"
-            code = run_once(loaded, None if no_record else record or default, out, as_json)
+            endpoint = open_endpoint(loaded, params)
+            sinks = [endpoint] if endpoint is not None else []
+            code = run_once(loaded, None if no_record else record or default, out, as_json, sinks)
     raise typer.Exit(code)
 
 
-def run_once(graph: Graph, record: Path | None, out: Console, as_json: bool) -> ExitCode:
+def open_endpoint(graph: Graph, name: str) -> ParameterEndpoint | None:
+    """Where `aloft params` reaches the run; where nobody asked for it, it may fail."""
+    from . import endpoints
+
+    if name == "none" or not (name or graph.checked.clock.kind != "free"):
+        return None
+    try:
+        return endpoints.open_endpoint(name or graph.checked.name)
+    except AloftError as error:
+        if name:
+            raise
+        print_warning(f"`aloft params` cannot reach this run: {error}")
+        return None
+
+
+def run_once(
+    graph: Graph, record: Path | None, out: Console, as_json: bool, sinks: Sequence[Sink] = ()
+) -> ExitCode:
     """Run the graph, record it, print what came of it."""
+    from ..logs.recorder import Recorder
     from .progress import TickCounter, progress_bar
 
     name = graph.checked.name
+    recorder = Recorder(record, on_warning=print_warning) if record is not None else None
     with progress_bar(out, f"running {name}", graph.checked.ticks) as (progress, task):
-        result = graph.run(sinks=[TickCounter(progress, task)])
-    recording = write_recording(record, result) if record is not None else None
+        counter = TickCounter(progress, task)
+        recorders = [recorder] if recorder is not None else []
+        result = graph.run(sinks=[*recorders, counter, *sinks], log=False)
+    recording = recorder.recording if recorder is not None else None
     print_result(out, name, result)
     if recording is not None:
         say(out, f"recording: {recording}; to see it: {viewer()} {recording}")
@@ -93,19 +126,6 @@ def run_once(graph: Graph, record: Path | None, out: Console, as_json: bool) -> 
     else:
         print_verdict(result)
     return result.exit_code
-
-
-def write_recording(path: Path, result: RunResult) -> Path | None:
-    """Record the run; without Rerun, or where it cannot be written, warn and go on."""
-    from ..logs import recording
-
-    try:
-        return recording.write_recording(path, result).path
-    except ImportError as error:
-        print_warning(f"no recording: Rerun cannot be imported ({error}); pip install rerun-sdk")
-    except OSError as error:
-        print_warning(f"no recording: {path} cannot be written ({error.strerror or error})")
-    return None
 
 
 def viewer() -> str:
@@ -152,26 +172,14 @@ def run_many(
     from .progress import progress_bar
 
     rows: list[SeedRow] = []
-    received: list[signal.Signals] = []
-
-    def stop(number: int, _: object) -> None:
-        received.append(signal.Signals(number))
-        raise KeyboardInterrupt
-
-    before = {number: signal.signal(number, stop) for number in (signal.SIGINT, signal.SIGTERM)}
-    try:
-        with (
-            progress_bar(out, f"running {len(seeds)} seeds", len(seeds)) as (progress, task),
-            closing(run_seeds(path, overrides, seeds)) as results,
-        ):
-            for row in results:
-                rows.append(row)
-                progress.advance(task)
-    except KeyboardInterrupt:
-        pass  # the rows there are, are still worth printing
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
+    with (
+        stopped_by_signals() as received,
+        progress_bar(out, f"running {len(seeds)} seeds", len(seeds)) as (progress, task),
+        closing(run_seeds(path, overrides, seeds)) as results,
+    ):
+        for row in results:
+            rows.append(row)
+            progress.advance(task)
     successes = sum(row.success for row in rows)
     reason = f"{successes} of {len(rows)} seeds succeeded"
     success = successes == len(seeds)

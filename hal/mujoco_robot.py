@@ -60,6 +60,8 @@ class MujocoRobot(Robot):
         IndexError: a push at a point the robot does not have.
     """
 
+    outside = "simulated"
+
     Params = SimulatorParameters
     params: SimulatorParameters
 

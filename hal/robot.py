@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from typing import ClassVar, Literal
 
 from ..blocks.signals import ContactSwitches, ImuReading, JointCommand, JointState
 from ..runtime.block import Block, Input, Output
@@ -34,6 +35,8 @@ class Robot(Block, ABC):
     Errors: ``open`` raises what the link raises, naming the device. Losing the link during a run
     is the driver's to report by ``request_stop`` after its time-out.
     """
+
+    outside: ClassVar[Literal["no", "simulated", "real"]] = "real"
 
     imu = Output(ImuReading, text="inertial measurement unit, at the start of the tick")
     joints = Output(JointState, text="joint encoders and motor currents, at the same instant")

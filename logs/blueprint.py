@@ -4,28 +4,28 @@ from __future__ import annotations
 
 from typing import Any
 
-from .logged_run import LoggedRun, entity_of
+from .format import Header, entity_of
 
 MAIN_FIELDS = ("com", "com_velocity", "contact_force", "motor_torque", "motor_speed")
 """Shown as time series where the port that poses the robot has them, in this order."""
 MOST_PLOTS = 5
 
 
-def main_plots(run: LoggedRun, pose_port: str | None) -> list[str]:
+def main_plots(header: Header, pose_port: str | None) -> list[str]:
     """Full names of the fields to plot: the robot's main ones, or just the first of the graph."""
-    known = [name for name, _ in run.fields()]
+    known = [field.name for field in header.bus.fields if not field.constant]
     if pose_port is None:
         return known[:MOST_PLOTS]
     return [name for field in MAIN_FIELDS if (name := f"{pose_port}.{field}") in known]
 
 
-def recording_blueprint(run: LoggedRun, pose_port: str | None) -> Any:
+def recording_blueprint(header: Header, pose_port: str | None) -> Any:
     """The layout, saved in the file so that it needs no set-up to look at."""
     import rerun.blueprint as rrb
 
     plots = [
         rrb.TimeSeriesView(origin=entity_of("signals", name), name=name)
-        for name in main_plots(run, pose_port)
+        for name in main_plots(header, pose_port)
     ]
     below = rrb.Horizontal(
         rrb.StateTimelineView(origin="states", name="States"),

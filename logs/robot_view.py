@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from ..runtime.description import Link, RobotDescription, Shape
 from ..runtime.kinematics import link_poses
-from ..runtime.stages import CheckedGraph
-from .logged_run import LoggedRun, time_columns
+from .format import Header, RecordedRows
+from .time_columns import time_columns
 
 Array = NDArray[np.float64]
 
@@ -29,94 +29,117 @@ SHORTEST_FLIGHT = 0.03
 SIMULATED, FORCE, MASS_CENTRE = 0x90A4AEFF, 0xE53935FF, 0xFDD835FF
 
 
-def port_with_pose(graph: CheckedGraph) -> str | None:
+def port_with_pose(header: Header) -> str | None:
     """The first output, as ``block.port``, whose signal says where every link is."""
-    if graph.robot is None:
+    if header.robot is None:
         return None
-    for spec in graph.blocks:
-        for name, output in spec.block_type.outputs.items():
-            if all(field in output.signal.fields for field in POSE_FIELDS):
-                return f"{spec.path}.{name}"
-    return None
+    ports: dict[str, set[str]] = {}
+    for field in header.bus.fields:
+        if not field.constant:
+            ports.setdefault(field.name.rpartition(".")[0], set()).add(field.field_name)
+    return next((port for port, names in ports.items() if names.issuperset(POSE_FIELDS)), None)
 
 
-def write_robot(stream: Any, run: LoggedRun, robot: RobotDescription, port: str) -> None:
-    """Write the links' shapes once, then their poses, forces and centre of mass over time."""
-    import rerun as rr
+class RobotWriter:
+    """Writes the robot that ``port`` poses to a Rerun ``stream``, batch by batch."""
 
-    stream.log("world", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
-    rows = slice(None, None, max(1, round(run.graph.base_rate / POSE_RATE)))
-    columns = time_columns(run.graph, run.ticks[rows])
-    write_links(stream, columns, robot, [run.signal(f"{port}.{f}")[rows] for f in POSE_FIELDS])
-    known = {name.removeprefix(f"{port}.") for name, _ in run.fields()}
-    if {"contact_position", "contact_force"} <= known:
-        force = run.signal(f"{port}.contact_force")
-        write_forces(stream, columns, run.signal(f"{port}.contact_position")[rows], force[rows])
-        write_flights(stream, run, force)
-    if "com" in known:
-        ball = rr.Points3D.from_fields(colors=[MASS_CENTRE], radii=[0.012])
-        stream.log("world/com", ball, static=True)
-        com = run.signal(f"{port}.com")[rows]
-        stream.send_columns("world/com", columns, rr.Points3D.columns(positions=com))
+    def __init__(self, stream: Any, header: Header, port: str) -> None:
+        assert header.robot is not None
+        self._stream, self._header, self._robot, self._port = stream, header, header.robot, port
+        self._every = max(1, round(header.base_rate / POSE_RATE))
+        known = {field.name for field in header.bus.fields if not field.constant}
+        self._has_forces = {f"{port}.contact_position", f"{port}.contact_force"} <= known
+        self._has_com = f"{port}.com" in known
+        self._flights = Flights(max(1, round(SHORTEST_FLIGHT * header.base_rate)))
 
+    def write_static(self) -> None:
+        """Write what does not move: the links' shapes, colours and sizes."""
+        import rerun as rr
 
-def write_links(
-    stream: Any, columns: Sequence[Any], robot: RobotDescription, state: Sequence[Array]
-) -> None:
-    """Write every link's shape once and its pose over time; ``state`` as in ``POSE_FIELDS``."""
-    import rerun as rr
+        stream = self._stream
+        stream.log("world", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
+        for link in self._robot.links:
+            shapes = capsules(shapes_of(self._robot, link))
+            stream.log(f"world/robot/{link.name}", shapes, static=True)
+        if self._has_forces:
+            arrows = rr.Arrows3D.from_fields(colors=[FORCE])
+            stream.log("world/contact_forces", arrows, static=True)
+        if self._has_com:
+            ball = rr.Points3D.from_fields(colors=[MASS_CENTRE], radii=[0.012])
+            stream.log("world/com", ball, static=True)
 
-    base, orientation, joints = state
-    poses = link_poses(robot, base, orientation, joints)
-    for link in robot.links:
-        entity = f"world/robot/{link.name}"
-        stream.log(entity, capsules(shapes_of(robot, link)), static=True)
-        position, rotation = poses.of(link.name)
-        stream.send_columns(
-            entity, columns, rr.Transform3D.columns(translation=position, mat3x3=rotation)
+    def write(self, batch: RecordedRows) -> None:
+        """Write the ticks of a batch that are due, and the flights that ended in it."""
+        due = np.flatnonzero(batch.ticks % self._every == 0)
+        if len(due):
+            self._write_poses(batch, due)
+        if self._has_forces:
+            force = batch.signal(f"{self._port}.contact_force")
+            self._write_flights(batch.ticks, (force != 0.0).any(axis=2))
+
+    def _write_poses(self, batch: RecordedRows, due: NDArray[np.int64]) -> None:
+        import rerun as rr
+
+        times, stream = time_columns(self._header, batch.ticks[due]), self._stream
+        base, orientation, joints = (
+            batch.signal(f"{self._port}.{name}")[due] for name in POSE_FIELDS
         )
+        poses = link_poses(self._robot, base, orientation, joints)
+        for link in self._robot.links:
+            position, rotation = poses.of(link.name)
+            transforms = rr.Transform3D.columns(translation=position, mat3x3=rotation)
+            stream.send_columns(f"world/robot/{link.name}", times, transforms)
+        if self._has_forces:
+            position = batch.signal(f"{self._port}.contact_position")[due]
+            force = batch.signal(f"{self._port}.contact_force")[due] * FORCE_SCALE
+            arrows = rr.Arrows3D.columns(
+                origins=position.reshape(-1, 3), vectors=force.reshape(-1, 3)
+            )
+            points = np.full(len(position), position.shape[1])
+            stream.send_columns("world/contact_forces", times, arrows.partition(points))
+        if self._has_com:
+            com = batch.signal(f"{self._port}.com")[due]
+            stream.send_columns("world/com", times, rr.Points3D.columns(positions=com))
+
+    def _write_flights(self, ticks: NDArray[np.int64], loaded: NDArray[np.bool_]) -> None:
+        import rerun as rr
+
+        events = self._flights.add(ticks, loaded)
+        if events:
+            times = time_columns(self._header, np.array([tick for tick, _ in events]))
+            texts = [text for _, text in events]
+            columns = rr.TextLog.columns(text=texts, level=["INFO"] * len(texts))
+            self._stream.send_columns("events", times, columns)
 
 
-def write_forces(stream: Any, columns: Sequence[Any], position: Array, force: Array) -> None:
-    """Write an arrow for every contact point (n, n_contacts, 3) over time."""
-    import rerun as rr
+class Flights:
+    """When the robot left the ground and when it came back; a time in the air shorter than
+    ``least`` ticks is a bounce and no event."""
 
-    stream.log("world/contact_forces", rr.Arrows3D.from_fields(colors=[FORCE]), static=True)
-    arrows = rr.Arrows3D.columns(
-        origins=position.reshape(-1, 3), vectors=force.reshape(-1, 3) * FORCE_SCALE
-    )
-    points = np.full(len(position), position.shape[1])
-    stream.send_columns("world/contact_forces", columns, arrows.partition(points))
+    def __init__(self, least: int) -> None:
+        self._least = least
+        self._began: int | None = None
+        self._told = False
 
+    def add(self, ticks: NDArray[np.int64], loaded: NDArray[np.bool_]) -> list[tuple[int, str]]:
+        """The events, as (tick, text), that show in further ticks.
 
-def write_flights(stream: Any, run: LoggedRun, force: Array) -> None:
-    """Write lift-off and touchdown as lines of text; ``force`` (n, n_contacts, 3) of all ticks."""
-    import rerun as rr
-
-    least = max(1, round(SHORTEST_FLIGHT * run.graph.base_rate))
-    flights = flight_events((force != 0.0).any(axis=2), least)
-    if flights:
-        columns = time_columns(run.graph, run.ticks[[row for row, _ in flights]])
-        texts = [text for _, text in flights]
-        levels = ["INFO"] * len(texts)
-        stream.send_columns("events", columns, rr.TextLog.columns(text=texts, level=levels))
-
-
-def flight_events(loaded: NDArray[np.bool_], least: int) -> list[tuple[int, str]]:
-    """When the robot left the ground and when it came back, as (row, text).
-
-    ``loaded`` (n, n_contacts) says which points carry load; a time in the air shorter than
-    ``least`` rows is a bounce and no event.
-    """
-    in_air = np.logical_not(loaded.any(axis=1)).reshape(-1)
-    edges = np.flatnonzero(np.diff(in_air, prepend=False, append=False))
-    events = []
-    for start, end in edges.reshape(-1, 2).tolist():
-        if end - start >= least:
-            events.append((start, "lift-off"))
-            if end < len(in_air):
-                events.append((end, "touchdown"))
-    return events
+        ``loaded`` (n, n_contacts) says which points carry load.
+        """
+        events: list[tuple[int, str]] = []
+        on_ground: list[bool] = np.atleast_1d(loaded.any(axis=1)).tolist()
+        for tick, standing in zip(ticks.tolist(), on_ground, strict=True):
+            if standing:
+                if self._told:
+                    events.append((tick, "touchdown"))
+                self._began, self._told = None, False
+                continue
+            if self._began is None:
+                self._began = tick
+            if not self._told and tick - self._began >= self._least - 1:
+                events.append((self._began, "lift-off"))
+                self._told = True
+        return events
 
 
 def shapes_of(robot: RobotDescription, link: Link) -> list[Shape]:

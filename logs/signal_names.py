@@ -5,21 +5,21 @@ from __future__ import annotations
 from itertools import product
 
 from ..runtime.description import RobotDescription
-from ..runtime.signals import Field
+from .format import RecordedField
 
 MOST_NAMES = 24
 """Legends longer than this help nobody."""
 
 
 def names_along(
-    field: Field, size: int | str, length: int, robot: RobotDescription | None
+    field: RecordedField, size: int | str, length: int, robot: RobotDescription | None
 ) -> list[str]:
     """The names along one axis of a field: the robot's own for its dimensions, x y z for three."""
     if robot is not None:
         joints = [joint.name for joint in robot.joints]
         known = {
             # as many motors as joints, but a motor may turn two of them
-            "n_joints": list(robot.transmission.motors) if "motor" in field.name else joints,
+            "n_joints": list(robot.transmission.motors) if "motor" in field.field_name else joints,
             "n_contacts": [contact.name for contact in robot.contacts],
             "n_feet": [foot.name for foot in robot.feet],
         }
@@ -30,15 +30,13 @@ def names_along(
     return [str(k) for k in range(length)]
 
 
-def element_names(
-    field: Field, shape: tuple[int, ...], robot: RobotDescription | None
-) -> list[str]:
+def element_names(field: RecordedField, robot: RobotDescription | None) -> list[str]:
     """One name for every element in C order, or none at all where there would be too many."""
-    if not shape:
-        return [field.name]
+    if not field.shape:
+        return [field.field_name]
     axes = [
         names_along(field, size, length, robot)
-        for size, length in zip(field.shape, shape, strict=True)
+        for size, length in zip(field.dimensions, field.shape, strict=True)
     ]
     names = [" ".join(parts) for parts in product(*axes)]
     return names if len(names) <= MOST_NAMES else []

@@ -29,7 +29,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, ClassVar, Generic, Self, TypeVar, overload
+from typing import Any, ClassVar, Generic, Literal, Self, TypeVar, overload
 
 import numpy as np
 
@@ -116,11 +116,13 @@ class State(Port[S]):
 
 @dataclass
 class Clock:
-    """The time of a run: the present tick and the seconds one takes."""
+    """The time of a run: the present tick, the seconds one takes, and how it is paced (the
+    ``kind`` of its ``ClockSpec``)."""
 
     base_period: float
     tick: int = 0
     stop_reason: str | None = None
+    kind: str = "free"
 
 
 @dataclass(frozen=True)
@@ -155,6 +157,10 @@ class Block:
     inputs: ClassVar[Mapping[str, Input[Any]]] = {}
     outputs: ClassVar[Mapping[str, Output[Any]]] = {}
     states: ClassVar[Mapping[str, State[Any]]] = {}
+
+    outside: ClassVar[Literal["no", "simulated", "real"]] = "no"
+    """Whether outputs come from outside the graph: from a simulator, which repeats itself, or from
+    the real world (a robot, another machine), which does not and is replayed from a recording."""
 
     array_allocations: ClassVar[int] = 0
     """How many arrays a tick may allocate. Not zero only where a library leaves no choice; the

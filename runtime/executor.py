@@ -6,8 +6,9 @@ While a run goes on the garbage collector is off and what exists is frozen.
 from __future__ import annotations
 
 import gc
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
+from dataclasses import replace
 from typing import Any
 
 from .block import Metric
@@ -15,9 +16,10 @@ from .errors import AloftError, ExitCode, RunError
 from .interrupts import Interrupts
 from .life_cycle import LifeCycle, LifeState, describe
 from .memory import BoundGraph
+from .notes import Note, TakesNotes
 from .pacing import TimeSource, WallTime
 from .run_result import RunResult, merge_metrics
-from .sinks import MemoryLog, RunHash, Sink
+from .sinks import MemoryLog, RunHash, Sink, TakesResult
 from .stages import CheckedGraph, ClockSpec
 from .ticker import Ticker
 from .timing import block_times
@@ -35,6 +37,8 @@ class Executor:
         timing: whether to time every block. Only benchmarks switch it off.
         finite_check: whether to check every tick. Only benchmarks switch it off.
         time_source: what time is; tests have one of their own.
+        on_ready: called once all blocks have started, before the first tick; a replay restores a
+            keyframe here.
 
     Raises:
         RunError: a block could not be set up.
@@ -52,13 +56,16 @@ class Executor:
         timing: bool = True,
         finite_check: bool = True,
         time_source: TimeSource | None = None,
+        on_ready: Callable[[], None] | None = None,
     ) -> None:
         self.bound = graph if isinstance(graph, BoundGraph) else BoundGraph(graph)
         self.life = LifeCycle(self.bound.blocks)
         self._time: TimeSource = time_source or WallTime()
+        spec = clock or self.bound.graph.clock
+        self.bound.clock.kind = spec.kind
         self.ticker = Ticker(
             self.bound,
-            clock or self.bound.graph.clock,
+            spec,
             self._time,
             timing=timing,
             finite_check=finite_check,
@@ -68,6 +75,7 @@ class Executor:
         own: list[Sink] = [sink for sink in (self._log, self._hash) if sink is not None]
         self._sinks: list[Sink] = [*own, *sinks]
         self._opened: list[Sink] = []
+        self._on_ready = on_ready
 
     def run(self, ticks: int | None = None) -> RunResult:
         """The whole life of the graph, once: start, tick, stop cycles, close.
@@ -95,7 +103,11 @@ class Executor:
                     interrupts.armed = True
                     self._open_sinks(limit)
                     self.life.start()
+                    self._note("life", "ready: every block has started")
+                    if self._on_ready is not None:
+                        self._on_ready()
                     self.life.move(LifeState.RUNNING)
+                    self._note("life", "running")
                     start_time = self._time.now()
                     self.ticker.advance(limit)
                 finally:  # within the outer try, so that nothing interrupts what follows
@@ -107,12 +119,19 @@ class Executor:
                 error.__cause__ = failure
             finally:
                 end_time = self._time.now()
+                if error is not None:
+                    self._note("fault", str(error), "ERROR")
+                self._note("life", f"stopping: {clock.stop_reason or 'the end'}")
                 self.life.stop(self._pause if self.ticker.pacer is not None else None)
                 problems += self.life.problems
+                for problem in problems:
+                    self._note("fault", problem, "ERROR")
+                self._note("life", "stopped")
                 problems += self._close_sinks()
-        return self._result(
+        result = self._result(
             clock.tick - first_tick, (end_time - start_time) * 1e-9, error, problems, interrupts
         )
+        return replace(result, warnings=tuple(self._finish_sinks(result)))
 
     def _open_sinks(self, ticks: int | None) -> None:
         if self._log is not None:
@@ -121,6 +140,8 @@ class Executor:
             self._opened.append(sink)  # before, as a failed open may have opened something
             sink.open(self.bound)
             self.ticker.records.append(sink.record)
+            if isinstance(sink, TakesNotes):
+                self.ticker.notes.append(sink.note)
 
     def _close_sinks(self) -> list[str]:
         problems = []
@@ -130,6 +151,19 @@ class Executor:
             except Exception as error:  # noqa: BLE001  # the next sink must be closed too
                 problems.append(f"{type(sink).__name__} failed in close: {describe(error)}")
         return problems
+
+    def _finish_sinks(self, result: RunResult) -> list[str]:
+        warnings = []
+        for sink in self._opened:
+            if isinstance(sink, TakesResult):
+                try:
+                    warnings += sink.finish(result)
+                except Exception as error:  # noqa: BLE001  # the next sink must be finished too
+                    warnings.append(f"{type(sink).__name__} failed in finish: {describe(error)}")
+        return warnings
+
+    def _note(self, kind: str, text: str, level: str = "INFO") -> None:
+        self.ticker.tell(Note(self.bound.clock.tick, kind, text, level))
 
     def _pause(self) -> None:
         """The time between stop cycles: a period, so that a bus can carry each."""

@@ -45,6 +45,8 @@ class RunResult:
     error: RunError | None = None
     stop_problems: tuple[str, ...] = ()
     parameter_changes: tuple[ParameterChange, ...] = ()
+    warnings: tuple[str, ...] = ()
+    """What does not touch the run itself, such as a recording that is not whole."""
     log: MemoryLog | None = None
     graph: CheckedGraph | None = None
     """What ran; ``None`` only in a result made by hand."""
@@ -104,6 +106,7 @@ class RunResult:
             "metrics": {name: _plain(value) for name, value in self.metrics.items()},
             "blocks": {path: asdict(times) for path, times in self.blocks.items()},
             "stop_problems": list(self.stop_problems),
+            "warnings": list(self.warnings),
             "parameter_changes": [asdict(change) for change in self.parameter_changes],
         }
 

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import multiprocessing
-import os
-import signal
 from collections.abc import Generator, Sequence
-from concurrent.futures import ProcessPoolExecutor
+from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from .errors import AloftError, ExitCode
+from .errors import AloftError
 from .graph import Graph, load
+from .jobs import job_results
 
 
 @dataclass(frozen=True)
@@ -66,69 +64,20 @@ def run_seeds(
     """
     graph = load(path, overrides)
     jobs = [(path, overrides_for(graph, overrides, seed), seed) for seed in seeds]
-    workers = min(len(seeds), processors())
-    # Spawned, not forked: no state of this process reaches a run.
-    context = multiprocessing.get_context("spawn")
-    others = set(multiprocessing.active_children())
-    with ProcessPoolExecutor(workers, context, initializer=_take_signals) as pool:
-        runs = [pool.submit(_run_one, job) for job in jobs]
-        try:
-            for run in runs:
-                yield run.result()
-        except BaseException:
-            # The robots of runs that are under way come to rest before their process ends. What
-            # is queued is not cancelled but let go by the workers: a pool that breaks because a
-            # worker is stopped while it starts cannot cope with cancelled work, and hangs.
-            for worker in set(multiprocessing.active_children()) - others:
-                worker.terminate()
-            raise
-
-
-def processors() -> int:
-    """How many processors this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
-
-
-class _StoppedError(BaseException):
-    """In a worker: told to stop before its run could take the signal itself."""
-
-
-_told_to_stop = False
-"""In a worker: what is still queued is not begun."""
-_preparing = False
-"""In a worker: a run is being loaded and set up."""
-
-
-def _take_signals() -> None:
-    """In a worker: SIGINT is the parent's, and SIGTERM never kills a worker that waits for work,
-    which would break the pool. A run that is under way takes SIGTERM itself and stops cleanly."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    signal.signal(signal.SIGTERM, _stop)
-
-
-def _stop(number: int, frame: object) -> None:
-    global _told_to_stop
-    _told_to_stop = True
-    if _preparing:
-        raise _StoppedError
+    rows: dict[int, SeedRow] = {}
+    done = 0
+    # The robots of runs that are under way when this is closed come to rest first.
+    with closing(job_results(_run_one, jobs)) as results:
+        for result in results:
+            failed = SeedRow(seeds[result.index], False, result.error, {}, "")
+            rows[result.index] = failed if result.error else result.value
+            while (row := rows.pop(done, None)) is not None:
+                yield row
+                done += 1
 
 
 def _run_one(job: tuple[Path, Sequence[str], int]) -> SeedRow:
-    global _told_to_stop, _preparing
     path, overrides, seed = job
-    try:
-        _preparing = True
-        if _told_to_stop:
-            raise _StoppedError
-        result = load(path, overrides).run(log=False)
-    except _StoppedError:
-        return SeedRow(seed, False, "not begun", {}, "")
-    except AloftError as error:
-        return SeedRow(seed, False, str(error), {}, "")
-    finally:
-        _preparing = False
-    _told_to_stop |= result.exit_code in (ExitCode.INTERRUPTED, ExitCode.TERMINATED)
+    result = load(path, overrides).run(log=False)
     data = result.to_json()
     return SeedRow(seed, result.success, result.reason, data["metrics"], result.run_hash)

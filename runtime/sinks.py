@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 from hashlib import blake2b
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .layout import Layout
 from .memory import BoundGraph
+from .notes import Note
+
+if TYPE_CHECKING:
+    from .run_result import RunResult
 
 
 class Sink(Protocol):
@@ -23,6 +27,14 @@ class Sink(Protocol):
 
     def close(self) -> None:
         """Finish, once, also after a failure."""
+
+
+@runtime_checkable
+class TakesResult(Protocol):
+    """What a sink has beside that wants to know what came of the run."""
+
+    def finish(self, result: RunResult) -> list[str]:
+        """Take the result, last of all; gives warnings for the user."""
 
 
 class RunHash:
@@ -59,6 +71,7 @@ class MemoryLog:
         self._chunks: list[NDArray[np.uint8]] = []
         self._used = 0
         self.ticks: list[int] = []
+        self.notes: list[Note] = []
         self.layout: Layout | None = None
 
     def expect(self, ticks: int | None) -> None:
@@ -70,7 +83,7 @@ class MemoryLog:
         self.layout = bound.memory.bus.layout
         self._bus = bound.memory.bus.buffer.data
         self._size = bound.memory.bus.buffer.size
-        self._chunks, self.ticks = [], []
+        self._chunks, self.ticks, self.notes = [], [], []
         self._add_chunk(self._expected or self.CHUNK)
 
     def _add_chunk(self, rows: int) -> None:
@@ -88,6 +101,10 @@ class MemoryLog:
         self._flat[first : first + self._size] = self._bus
         self._used += 1
         self.ticks.append(tick)
+
+    def note(self, note: Note) -> None:
+        """Keep it."""
+        self.notes.append(note)
 
     def close(self) -> None:
         """Nothing to do."""

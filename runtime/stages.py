@@ -105,6 +105,8 @@ class CheckedGraph:
     """How long the graph runs by itself; ``None``: until stopped."""
     robot: RobotDescription | None = None
     clock: ClockSpec = ClockSpec()
+    file: str = ""
+    """The graph file, as it was given; what the graph names is relative to where it lies."""
     text: str = ""
     """The flattened graph as YAML: what ran, after includes and overrides."""
     overrides: Mapping[str, Any] = field(default_factory=dict)

@@ -8,6 +8,7 @@ flat list made beforehand. Between two ticks changed parameters are taken over.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from typing import Any
 
 from .block import Block
@@ -15,6 +16,7 @@ from .errors import RunError
 from .finite import FiniteCheck, NotFiniteError
 from .life_cycle import describe
 from .memory import BoundGraph
+from .notes import Note
 from .pacing import RobotDriven, TimeSource, make_pacer
 from .schedule import phases
 from .stages import ClockSpec
@@ -33,6 +35,7 @@ class Ticker:
 
     Attributes:
         records: called with the tick after each tick, and also after one that is not finite.
+        notes: called with what is to be noted beside: overruns, and what others ``tell``.
         overruns_by_block: deadlines that passed while a block ran.
     """
 
@@ -47,6 +50,7 @@ class Ticker:
     ) -> None:
         self.bound = bound
         self.records: list[Callable[[int], None]] = []
+        self.notes: list[Callable[[Note], None]] = []
         self.overruns_by_block = dict.fromkeys(bound.blocks, 0)
         self.pacer = make_pacer(clock, bound, time_source)
         self._policy = clock
@@ -167,6 +171,12 @@ class Ticker:
     def _instant(self, tick: int) -> str:
         return f"tick {tick} ({tick * self.bound.clock.base_period:.3f} s)"
 
+    def tell(self, note: Note) -> None:
+        """Have a note kept by all who keep notes; one that fails to is no reason to stop."""
+        for take in self.notes:
+            with suppress(Exception):
+                take(note)
+
     def _count_overrun(self, tick: int, late: int) -> None:
         """Blame the block that ran when the deadline of ``tick`` passed; maybe stop the run."""
         pacer = self.pacer
@@ -176,6 +186,11 @@ class Ticker:
             block = self._previous.running_at(pacer.missed_deadline)
         if block:
             self.overruns_by_block[block] += 1
+        if self.notes:
+            ran = f"; block '{block}' was running" if block else ""
+            data = {"late_ns": late, "block": block, "skipped_periods": pacer.skipped_periods}
+            text = f"overrun: {late * 1e-6:.3f} ms late{ran}"
+            self.tell(Note(tick, "overrun", text, "WARN", data))
         if self._policy.overrun == "stop" and pacer.in_a_row >= self._policy.stop_after:
             who = f"block '{block}' was running" if block else "no block was running"
             raise RunError(

@@ -14,15 +14,16 @@ import pytest
 from aloft.runtime.registry import find_block, known_names
 
 ROOT = Path(__file__).parent.parent
-PACKAGES = ("runtime", "blocks", "hal", "logs", "benchmarks", "cli", "graphs")
+PACKAGES = ("runtime", "blocks", "hal", "logs", "studies", "benchmarks", "cli", "graphs")
 ALLOWED = {
     "graphs": set(),
     "runtime": {"runtime"},
     "blocks": {"blocks", "runtime"},
     "hal": {"hal", "runtime"},
     "logs": {"logs", "runtime"},
+    "studies": {"studies", "runtime"},
     "benchmarks": {"benchmarks", "runtime", "blocks", "hal", "logs"},
-    "cli": {"cli", "benchmarks", "runtime", "blocks", "hal", "logs"},
+    "cli": {"cli", "studies", "benchmarks", "runtime", "blocks", "hal", "logs"},
 }
 HEAVY = {"mujoco", "pinocchio", "qpsolvers", "daqp", "rerun", "scipy", "numba", "pyarrow"}
 LONGEST = 400

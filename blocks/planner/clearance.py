@@ -40,7 +40,7 @@ def ground_height(task: JumpTask, x: Array, progress: Array | float) -> Array:
         flying = (done > number) & (done < number + 1)
         found = np.where(beyond & (flying | (done == number)), levels[number + 1], found)
         found = np.where(~beyond & (flying | (done == number + 1)), levels[number], found)
-    return found
+    return np.asarray(found)
 
 
 def capsule_ends(

@@ -5,6 +5,10 @@ from __future__ import annotations
 from ...runtime.errors import AloftError
 
 
+class TaskError(AloftError, ValueError):
+    """A task cannot be read, or asks for what contradicts itself; the message has every reason."""
+
+
 class PlanError(AloftError):
     """A jump that cannot be planned. ``family`` names the constraint family that cannot be met,
     ``violation`` is how far the best attempt missed it, in that family's unit."""

@@ -100,9 +100,7 @@ def layout(task: JumpTask, robot: RobotDescription) -> tuple[Stretch, ...]:
                 f"{span.contacts!r}; there is {', '.join(names)}, or all"
             )
         if task.impact and found and found[-1].flies:
-            found.append(
-                Stretch(phase, knot, 1, 0.0, np.zeros(1), place, on_ground, impact=True)
-            )
+            found.append(Stretch(phase, knot, 1, 0.0, np.zeros(1), place, on_ground, impact=True))
             knot += 1
         last = all(later.phase != "flight" for later in spans[number:])
         count = span.knots or 1

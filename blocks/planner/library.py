@@ -97,6 +97,11 @@ class PlanLibrary:
                 return found[0]
         return None
 
+    def hashes(self) -> frozenset[str]:
+        """The hashes of all tasks that have a file, in one look at the folders."""
+        files = (path for folder in self._folders for path in folder.glob("*-*.npz"))
+        return frozenset(path.stem.rpartition("-")[2] for path in files)
+
     def find(self, task: JumpTask) -> JumpPlan | None:
         """The plan of that very task, or ``None``. A file that cannot be read counts as none."""
         path = self.path_of(task)
@@ -154,6 +159,7 @@ class PlanLibrary:
         from nothing if that fails, checked, and kept. ``anew`` looks for no kept plan.
 
         Raises:
+            TaskError: what is asked for contradicts itself or the robot.
             PlanError: the task cannot be planned.
             InvalidPlanError: it can, but the plan fails the validity check; it is not kept.
         """
@@ -178,8 +184,11 @@ def solve_and_check(
     A plan that fails the check because its intervals are too long is solved again on finer ones.
 
     Raises:
-        PlanError, InvalidPlanError: as ``PlanLibrary.plan``.
+        TaskError, PlanError, InvalidPlanError: as ``PlanLibrary.plan``.
     """
+    from .task_checks import require_consistent
+
+    require_consistent(task, robot)
     make = solve or solve_task
     if warm_start is not None:
         try:

@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 from ...runtime.description import RobotDescription
 from ...runtime.kinematics import link_poses
 from .clearance import legs
+from .evidence import Evidence
 from .line_chart import COLOURS, Chart, Line, page
 from .plan import JumpPlan
-from .plan_tests import Evidence, allowed_motor_torque
+from .plan_tests import allowed_motor_torque
 from .replay import replay
 
 Array = NDArray[np.float64]

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import io
 import json
-import os
 import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
@@ -24,6 +23,7 @@ from numpy.typing import NDArray
 
 from ...runtime.errors import AloftError
 from .task import JumpTask, TaskError, make_task
+from .whole_file import write_whole
 
 Array = NDArray[np.float64]
 
@@ -153,11 +153,17 @@ _SCALARS = tuple(f.name for f in fields(JumpPlan) if f.name not in ARRAYS and f.
 
 
 def plan_bytes(plan: JumpPlan, names: Mapping[str, list[str]] | None = None) -> bytes:
-    """The plan's file. Equal plans give equal bytes: it holds no time and no machine's name."""
+    """The plan's file.
+
+    The same task gives the same bytes, also from another process: no time of day, no processor
+    time and no machine's name is in it.
+    """
+    statistics = {name: x for name, x in plan.statistics.items() if not name.endswith("cpu_s")}
     header = {
         "format": FILE_FORMAT,
         "task": plan.task.model_dump(mode="json"),
         **{name: getattr(plan, name) for name in _SCALARS},
+        "statistics": statistics,
         "lift_off_times": list(plan.lift_off_times),
         "touchdown_times": list(plan.touchdown_times),
         "units": ARRAYS,
@@ -184,18 +190,7 @@ def write_plan(
     ``names`` may hold the names of ``joints``, ``feet`` and ``contacts``, for readers without the
     robot's description.
     """
-    path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    part = path.with_name(f".{path.name}.{os.getpid()}.part")
-    try:
-        with part.open("wb") as file:
-            file.write(plan_bytes(plan, names))
-            file.flush()
-            os.fsync(file.fileno())
-        part.replace(path)
-    finally:
-        part.unlink(missing_ok=True)
-    return path
+    return write_whole(Path(path), plan_bytes(plan, names))
 
 
 def read_plan(path: str | Path) -> JumpPlan:

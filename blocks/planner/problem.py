@@ -15,19 +15,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..signals import Phase
-from .assembly import Assembly, Knot
-from .contact_rows import ContactRows, reduced_contacts
+from .assembly import Assembly
 from .coordinates import Coordinates
-from .layout import Stretch, layout
-from .obstacles import ObstacleRows, step_parameters
-from .sequence import Hop, Place, edge_of
+from .layout import Stretch
+from .obstacles import step_parameters
 from .stage_functions import Piece, body_points, parameter_sizes
 from .stance import Stance
+from .structure import STEP_DOWN_SHARE, STEP_UP_SHARE, Structure
 from .symbolic_model import SymbolicModel
 from .task import JumpTask
 
 Array = NDArray[np.float64]
-STEP_UP_SHARE, STEP_DOWN_SHARE = 0.45, 0.75
 LIMIT_MARGIN = 0.005
 """rad; between two knots a joint at its limit would pass it by about as much."""
 
@@ -117,23 +115,19 @@ class ProblemBuilder:
         stances: Sequence[Stance],
     ) -> None:
         self.task, self.model, self.coordinates = task, model, coordinates
-        self.stances, self.hops = tuple(stances), task.hops()
-        self.places = task.places()
+        self.structure = Structure(task, model, coordinates, pieces, stances)
+        self.stretches, self.of_knot = self.structure.stretches, self.structure.of_knot
+        self.stances, self.hops = self.structure.stances, self.structure.hops
         self.n, self.m = coordinates.size, len(coordinates.joints)
         self.forces = coordinates.forces
-        self.stretches = layout(task, model.robot)
-        self.of_knot = [stretch for stretch in self.stretches for _ in range(stretch.count)]
         self.steps = np.concatenate(
             [s.lengths * (1.0 if s.timed else (s.time or 0.0) / s.count) for s in self.stretches]
         )
-        self.contact_rows = ContactRows(model.robot, coordinates)
-        self.obstacles = ObstacleRows(model, coordinates)
         self.pieces = pieces
 
     def build(self) -> Problem:
         """The problem with its bounds and parameters."""
-        self._given: dict[int, list[tuple[int, float, str]]] = {}
-        self.assembly = Assembly(self._knots(), self.pieces)
+        self.assembly = Assembly(self.structure.knots, self.pieces)
         size, rows = self.assembly.variables, self.assembly.constraints
         self.lower, self.upper = np.full(size, -np.inf), np.full(size, np.inf)
         self.row_lower, self.row_upper = np.zeros(rows), np.zeros(rows)
@@ -147,7 +141,7 @@ class ProblemBuilder:
         for k in range(len(self.of_knot) + 1):
             self._bound_state(k)
             for row, (_, value, family) in zip(
-                self.assembly.fixed_rows(k), self._given.get(k, []), strict=True
+                self.assembly.fixed_rows(k), self.structure.given.get(k, []), strict=True
             ):
                 self.row_lower[row] = self.row_upper[row] = value
                 self.families[row] = family
@@ -155,141 +149,6 @@ class ProblemBuilder:
                 fill = {"free_stance": "stance"}.get(name, name)
                 getattr(self, f"_fill_{fill}")(k)
         return self.problem
-
-    # Which variables and rows there are
-
-    def _knots(self) -> list[Knot]:
-        n, end = self.n, len(self.of_knot)
-        knots = []
-        for k, stretch in enumerate(self.of_knot):
-            before = self.of_knot[k - 1] if k else None
-            after = self.of_knot[k + 1] if k + 1 < end else None
-            forces = 0 if stretch.flies else self.forces
-            states = 2 * n + stretch.timed
-            holds = after is not None and after is not stretch and after.timed
-            knot = Knot(states, n + forces + holds, gap=stretch.piece)
-            knot.hold = n + forces if holds else None
-            take = np.arange(states + n + forces)
-            knot.pieces[stretch.piece] = (take, self._interval_rows(stretch))
-            q_and_v = np.arange(2 * n)
-            if stretch.flies and k > stretch.first:
-                knot.pieces["air"] = (np.arange(n), self._air_rows(k))
-            if stretch.flies and k == stretch.first:
-                knot.pieces["take_off"] = (q_and_v, self._take_off_rows(k))
-            if before is not None:
-                kept = self._contact_rows(before, stretch)
-                if len(kept):
-                    knot.pieces["contact"] = (q_and_v, kept)
-            obstacle = self._obstacle_rows(k)
-            if k and len(obstacle):
-                knot.pieces["obstacle"] = (np.arange(n), obstacle)
-            idle = self._idle(stretch)
-            if idle and k and not stretch.impact:
-                knot.pieces["air"] = (np.arange(n), np.array(idle))
-            self._give(k, knot, stretch, after if holds else None)
-            knots.append(knot)
-        # The last interval leads to a knot that has no interval length among its states.
-        base = len(self.coordinates.free_base)
-        at_rest = self.coordinates.reduce(self.stances[-1].coordinates)
-        values = [(i, float(at_rest[i]), "stance") for i in range(base)]
-        self._given[end] = values + [(n + i, 0.0, "stance") for i in range(n)]
-        fixed = tuple(i for i, _, _ in self._given[end])
-        return [*knots, Knot(2 * n, 0, fixed=fixed)]
-
-    def _give(self, k: int, knot: Knot, stretch: Stretch, timed: Stretch | None) -> None:
-        """What is given at a knot: the start, forces on points without contact, a next time."""
-        n, given = self.n, []
-        if k == 0:
-            start = self.coordinates.reduce(self.stances[0].coordinates)
-            given += [(i, float(start[i]), "stance") for i in range(n)]
-            given += [(n + i, 0.0, "stance") for i in range(n)]
-        every = len(self.coordinates.axes)
-        first = knot.states + n
-        for point in self._idle(stretch):
-            given += [(first + point * every + i, 0.0, "friction") for i in range(every)]
-        if timed is not None and timed.time is not None and knot.hold is not None:
-            given.append((knot.states + knot.hold, timed.time / timed.count, "flight time"))
-        if given:
-            self._given[k] = given
-            knot.fixed = tuple(i for i, _, _ in given)
-
-    def _idle(self, stretch: Stretch) -> list[int]:
-        """The contact variables' points that are not on the ground in a stance."""
-        if stretch.flies:
-            return []
-        on = reduced_contacts(self.coordinates, stretch.contacts)
-        return [i for i in range(len(self.coordinates.contacts)) if i not in on]
-
-    def _interval_rows(self, stretch: Stretch) -> NDArray[np.int64]:
-        """The rows of an interval that are kept: no friction where there is no contact."""
-        total = self.pieces[stretch.piece].rows
-        rows = np.arange(2 * self.n + stretch.timed, total)
-        each = 2 * (len(self.coordinates.axes) - 1)
-        cones = total - each * len(self.coordinates.contacts)
-        idle = [
-            cones + each * point + i for point in self._idle(stretch) for i in range(each)
-        ]
-        return np.setdiff1d(rows, idle) if idle else rows
-
-    def _contact_rows(self, before: Stretch, stretch: Stretch) -> NDArray[np.int64]:
-        """Which rows hold the feet at the knot between two intervals."""
-        held, now = (
-            set() if s.flies else reduced_contacts(self.coordinates, s.contacts)
-            for s in (before, stretch)
-        )  # fmt: skip
-        if stretch.impact:
-            return self.contact_rows.places(now, set())
-        if before.impact:
-            return self.contact_rows.velocities(now)
-        velocities = self.contact_rows.velocities(held | now)
-        return np.concatenate([velocities, self.contact_rows.places(now, held)])
-
-    def _air_rows(self, k: int) -> NDArray[np.int64]:
-        """Which rows are needed: how far ahead only where there is an edge."""
-        points = self.pieces["air"].rows // 3
-        feet = len(self.coordinates.contacts)
-        ahead = np.arange(points, points + feet)
-        step, edge = self._step(k)
-        if self.hops[self.of_knot[k].place].rotation:
-            return np.arange(2 * points, 3 * points)
-        if edge is None or (step > 0.0) is (
-            self._flight_share(k) > (STEP_UP_SHARE if step > 0.0 else STEP_DOWN_SHARE)):  # fmt: skip
-            ahead = ahead[:0]
-        return np.concatenate([np.arange(points), ahead, np.arange(2 * points, 3 * points)])
-
-    def _hop(self, k: int) -> tuple[Hop, Place, float | None]:
-        """The jump under way at a knot, or the last one; where it began, and its step's edge."""
-        stretch = self.of_knot[k]
-        number = min(stretch.place, len(self.hops) - 1)
-        hop, place = self.hops[number], self.places[number]
-        return hop, place, edge_of(hop, place)
-
-    def _obstacle_rows(self, k: int) -> NDArray[np.int64]:
-        hop, _, edge = self._hop(k)
-        stretch = self.of_knot[k]
-        return self.obstacles.rows(hop, edge, stretch, k == stretch.first)
-
-    def _fill_obstacle(self, k: int) -> None:
-        hop, place, edge = self._hop(k)
-        stretch = self.of_knot[k]
-        share = self._flight_share(k) if stretch.flies else float(stretch.place > 0)
-        self._set("obstacle", k, **step_parameters(hop, edge, place.z, share))
-        floor = self.task.foot_clearance * np.sin(np.pi * share)
-        self._rows("obstacle", k, [
-            ("ground clearance", self.obstacles.feet, floor, np.inf),
-            ("ground clearance", self.obstacles.count - self.obstacles.feet, 0.0, np.inf),
-        ])  # fmt: skip
-
-    def _take_off_rows(self, k: int) -> NDArray[np.int64]:
-        hop = self.hops[self.of_knot[k].place]
-        kept = [0] if hop.rise is not None else [1] if hop.take_off_speed is not None else []
-        return np.array(kept, dtype=np.int64)
-
-    def _step(self, k: int) -> tuple[float, float | None]:
-        """The step's height and its edge under a flight."""
-        place = self.of_knot[k].place
-        hop = self.hops[place]
-        return hop.landing_height or 0.0, edge_of(hop, self.places[place])
 
     # Bounds of the variables
 
@@ -313,7 +172,7 @@ class ProblemBuilder:
             self.lower[start + 2 * n], self.upper[start + 2 * n] = stretch.bounds
         control = int(self.assembly.control_start[k])
         if not stretch.flies:
-            every, idle = len(self.coordinates.axes), self._idle(stretch)
+            every, idle = len(self.coordinates.axes), self.structure.idle(stretch)
             for point in range(len(self.coordinates.contacts)):
                 if point not in idle:
                     self.lower[control + n + point * every + every - 1] = 0.0
@@ -410,6 +269,17 @@ class ProblemBuilder:
         feet = self.pieces["contact"].rows // 2
         self._rows("contact", k, [("foot velocity", feet, 0.0, 0.0), ("footholds", feet, 0.0, 0.0)])
 
+    def _fill_obstacle(self, k: int) -> None:
+        hop, place, edge = self.structure.hop_at(k)
+        stretch, obstacles = self.of_knot[k], self.structure.obstacles
+        share = self.structure.flight_share(k) if stretch.flies else float(stretch.place > 0)
+        self._set("obstacle", k, **step_parameters(hop, edge, place.z, share))
+        floor = self.task.foot_clearance * np.sin(np.pi * share)
+        self._rows("obstacle", k, [
+            ("ground clearance", obstacles.feet, floor, np.inf),
+            ("ground clearance", obstacles.count - obstacles.feet, 0.0, np.inf),
+        ])  # fmt: skip
+
     def _fill_take_off(self, k: int) -> None:
         place = self.of_knot[k].place
         hop = self.hops[place]
@@ -425,17 +295,17 @@ class ProblemBuilder:
         it is under them: until ``STEP_DOWN_SHARE`` of the flight's time, or from ``STEP_UP_SHARE``
         on, and at that instant they are still, or already, on the lower side of the edge."""
         task, points = self.task, body_points(self.model, self.coordinates)
-        n_feet, low = len(self.coordinates.contacts), self.places[self.of_knot[k].place].z
+        n_feet, low = len(self.coordinates.contacts), self.structure.places[self.of_knot[k].place].z
         if not self.of_knot[k].flies:
             self._rows("air", k, [("ground clearance", len(points), low, np.inf),
                                   ("ground clearance", 2 * len(points), -np.inf, np.inf)])  # fmt: skip
             return
-        share = self._flight_share(k)
-        step, edge = self._step(k)
+        share = self.structure.flight_share(k)
+        step, edge = self.structure.step_under(k)
         switch = 0.5 if edge is None else STEP_UP_SHARE if step > 0.0 else STEP_DOWN_SHARE
         ground = low + step if share > switch else low
         floor = ground + task.foot_clearance * np.sin(np.pi * share)
-        if self._flight_share(k - 1) < switch <= share:
+        if self.structure.flight_share(k - 1) < switch <= share:
             floor = max(floor, low + step)
         ahead = (-np.inf, np.inf)
         if edge is not None:
@@ -452,8 +322,3 @@ class ProblemBuilder:
             free,
             ("leg clearance", len(points), 0.5 * task.leg_clearance, np.inf),
         ])  # fmt: skip
-
-    def _flight_share(self, k: int) -> float:
-        """How much of the flight's time is past at a knot of it."""
-        stretch = self.of_knot[k]
-        return float(stretch.lengths[: max(0, k - stretch.first)].sum() / stretch.count)

@@ -74,7 +74,9 @@ def reference_table(plan: JumpPlan, robot: RobotDescription, stand_time: float) 
 
 def _later_jumps(plan: JumpPlan, stand_time: float) -> Iterator[tuple[float, float, float]]:
     """When thrust, flight and landing of the jumps behind the first begin."""
-    for before, (lift_off, touchdown) in zip(plan.touchdown_times, plan.later_flights, strict=False):
+    for before, (lift_off, touchdown) in zip(
+        plan.touchdown_times, plan.later_flights, strict=False
+    ):
         between = (plan.time > before - 1e-9) & (plan.time < lift_off - 1e-9)
         thrust = plan.time[between & (plan.phase == Phase.THRUST)]
         begin = float(thrust[0]) if len(thrust) else before

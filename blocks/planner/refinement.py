@@ -9,7 +9,9 @@ from __future__ import annotations
 
 import math
 
+from ..signals import Phase
 from .plan import JumpPlan
+from .resampling import segments
 from .task import JumpTask, Knots
 
 FACTOR = 1.5
@@ -38,23 +40,29 @@ def curable(plan: JumpPlan) -> bool:
     )
 
 
-def next_refinement(plan: JumpPlan) -> float:
-    """How many times as many intervals as its task says a plan is solved on again."""
-    return FACTOR * float(plan.statistics.get("refinement", 1.0))
-
-
-def refined(task: JumpTask, factor: float) -> JumpTask:
-    """The task on so many times as many intervals in every phase."""
-
-    def more(count: int) -> int:
-        return math.ceil(factor * count)
-
-    knots = {name: more(getattr(task.knots, name)) for name in type(task.knots).model_fields}
-    spans = task.phases and tuple(
-        span if span.knots is None else span.model_copy(update={"knots": more(span.knots)})
-        for span in task.phases
+def finer_knots(plan: JumpPlan) -> Knots:
+    """Numbers of intervals for solving a plan's task again; of several phases of a kind the one
+    with the most counts."""
+    count = dict.fromkeys(("squat", "thrust", "flight", "landing"), 4)
+    for phase, start, stop in segments(plan.phase[:-1].tolist()):
+        name = Phase(phase).name.lower()
+        count[name] = max(count.get(name, 0), stop - start)
+    return Knots.model_validate(
+        {name: math.ceil(FACTOR * count[name]) for name in Knots.model_fields}
     )
-    return task.model_copy(update={"knots": Knots.model_validate(knots), "phases": spans})
+
+
+def with_knots(task: JumpTask, knots: Knots) -> JumpTask:
+    """The task on those numbers of intervals; phases that name their own change in proportion."""
+    changed: dict[str, object] = {"knots": knots}
+    if task.phases is not None and knots != task.knots:
+        more = knots.total / task.knots.total
+        changed["phases"] = tuple(
+            span if span.knots is None
+            else span.model_copy(update={"knots": math.ceil(more * span.knots)})
+            for span in task.phases
+        )  # fmt: skip
+    return task.model_copy(update=changed)
 
 
 def asks_for_finer(task: JumpTask, plan: JumpPlan | None) -> bool:

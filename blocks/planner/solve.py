@@ -17,14 +17,13 @@ from .guess import ballistic_guess, displaced_guess
 from .layout import Stretch, layout
 from .plan import JumpPlan
 from .problem import Problem, ProblemBuilder
-from .refinement import asks_for_finer, next_refinement, refined
-from .resampling import kinds_of, same_phases
+from .refinement import asks_for_finer, finer_knots, with_knots
 from .solver import Solution, solve
 from .stage_functions import PIECES, make_coordinates
 from .stance import Stance, StanceFinder, stances_of
 from .symbolic_model import SymbolicModel
-from .task import JumpTask
-from .unpacking import kinds_in, pack, unpack
+from .task import JumpTask, Knots
+from .unpacking import can_start, pack, unpack
 
 Array = NDArray[np.float64]
 ADVICE = {
@@ -49,13 +48,13 @@ def solve_jump(
     progress: Progress | None = None,
     compiled: bool = True,
     solver: str = "",
-    refine: float = 0.0,
+    knots: Knots | None = None,
 ) -> JumpPlan:
     """The plan of a task.
 
     ``warm_start`` is a plan of a near task, on any grid; one that goes through other phases is not
     used. A plan of this very task that failed the validity check is solved again on finer
-    intervals (see ``refinement``); ``refine`` asks for so many times as many as the task says.
+    intervals (see ``refinement``). ``knots`` are numbers of intervals to use in place of both.
     ``progress`` is told when functions are compiled, once per robot. ``solver`` insists on
     ``fatrop`` or ``ipopt``. The result does not depend on the number of threads.
 
@@ -64,13 +63,14 @@ def solve_jump(
         TaskError: the task names joints that the robot has not.
     """
     started = time.process_time()
-    if warm_start is not None and asks_for_finer(task, warm_start):
-        refine = refine or next_refinement(warm_start)
-    gridded = refined(task, refine) if refine else task
+    if knots is None:
+        again = warm_start is not None and asks_for_finer(task, warm_start)
+        knots = finer_knots(warm_start) if again and warm_start is not None else task.knots
+    gridded = with_knots(task, knots)
     problem = make_problem(gridded, robot, compiled=compiled, progress=progress)
     guess = ballistic_guess(problem)
     solution, warm = None, False
-    if warm_start is not None and same_phases(kinds_of(warm_start), kinds_in(problem)):
+    if warm_start is not None and can_start(problem, warm_start):
         warm = True
         solution = solve(problem, pack(problem, warm_start, guess), warm=True, solver="fatrop")
     if solution is None or not solution.solved:
@@ -89,7 +89,6 @@ def solve_jump(
         "cost": solution.cost,
         "warm": warm,
         "knots": problem.knots,
-        "refinement": refine or 1.0,
         "coordinates": problem.coordinates.name,
         "variables": problem.assembly.variables,
         "constraints": problem.assembly.constraints,
@@ -155,9 +154,9 @@ def _choose(
         except ValueError:
             return make_coordinates(model, "full")
         every = np.array([stance.coordinates for stance in stances])
-        if np.allclose(
-            plane.reduce(every) @ plane.matrix.T, every, rtol=0.0, atol=1e-12
-        ) and all(is_mirrored(plane, stretch.contacts) for stretch in stretches):
+        if np.allclose(plane.reduce(every) @ plane.matrix.T, every, rtol=0.0, atol=1e-12) and all(
+            is_mirrored(plane, stretch.contacts) for stretch in stretches
+        ):
             return plane
     return make_coordinates(model, "full")
 

@@ -14,23 +14,21 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, Literal
 
-import yaml
 from pydantic import ValidationError, model_validator
 
-from ...runtime.description import RobotDescription
-from ...runtime.errors import AloftError
+from ...runtime.description import RobotDescription, find_robot
 from ...runtime.parameters import Parameters, parameter
+from .errors import TaskError
+from .placed_file import PlacedFile, read_placed
 from .sequence import FreeTimes, Hop, Place, Span, check_spans, places_of
+
+__all__ = ["JumpTask", "Knots", "TaskError", "Weights", "make_task", "read_task"]
 
 GRAVITY = 9.81
 """m/s^2"""
 
 PLAN_FORMAT = 1
 """Part of every task's hash: plans of an older format or meaning are not taken from a library."""
-
-
-class TaskError(AloftError, ValueError):
-    """A task cannot be read, or asks for what contradicts itself; the message has every reason."""
 
 
 class Knots(Parameters):
@@ -232,9 +230,7 @@ class JumpTask(FreeTimes):
         # What is not given is left out, so that a parameter added later changes no hash.
         # So is the weight of impulses where there are none.
         unused: dict[str, Any] = {} if self.impact else {"weights": {"impulse"}}
-        return self.model_dump(
-            mode="json", exclude={"name": True, **unused}, exclude_none=True
-        )
+        return self.model_dump(mode="json", exclude={"name": True, **unused}, exclude_none=True)
 
     def hash(self, robot: RobotDescription) -> str:
         """What a plan of this task is kept under: the same for the same task, robot and format."""
@@ -258,8 +254,13 @@ def _stance(robot: RobotDescription, given: Mapping[str, float], which: str) -> 
     return standing | dict(given)
 
 
-def make_task(values: Mapping[str, Any], *, where: str = "task") -> JumpTask:
+def make_task(
+    values: Mapping[str, Any], *, where: str = "task", source: PlacedFile | None = None
+) -> JumpTask:
     """A task from plain values, quantities as numbers or text.
+
+    ``where`` is what messages call it; with ``source``, the file the values are from, they begin
+    with the line and column instead.
 
     Raises:
         TaskError: one line for every value that is wrong, with its key, what was found and what
@@ -268,8 +269,15 @@ def make_task(values: Mapping[str, Any], *, where: str = "task") -> JumpTask:
     try:
         return JumpTask.model_validate(values)
     except ValidationError as error:
-        lines = [_explain(problem) for problem in error.errors()]
-        raise TaskError(f"{where}: " + f"\n{where}: ".join(lines)) from error
+        lines = []
+        for problem in error.errors():
+            line, place = _explain(problem), where
+            if source is not None and not problem["loc"]:
+                place = source.place_of_words(line)
+            elif source is not None:
+                place = source.place(problem["loc"], key=problem["type"] == "extra_forbidden")
+            lines.append(f"{place}: {line}")
+        raise TaskError("\n".join(lines)) from error
 
 
 def _explain(problem: Any) -> str:
@@ -297,15 +305,21 @@ def read_task(path: str | Path) -> JumpTask:
     """The task in a YAML file; its name is the file's where it has none.
 
     Raises:
-        TaskError: the file cannot be read or a value is wrong.
+        TaskError: the file cannot be read, a value is wrong, or what is asked for contradicts
+            itself or the robot; one line for each, with ``file:line:column``.
     """
+    from .task_checks import contradictions
+
     path = Path(path)
+    source = read_placed(path, "rise: 15 cm")
+    task = make_task({"name": path.stem, **source.values}, where=str(path), source=source)
     try:
-        data = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise TaskError(f"cannot read {path}: {error.strerror or error}") from error
-    except yaml.YAMLError as error:
-        raise TaskError(f"{path} is not YAML: {error}") from error
-    if not isinstance(data, dict):
-        raise TaskError(f"{path}: expected keys such as 'rise: 15 cm', found {data!r}")
-    return make_task({"name": path.stem, **data}, where=str(path))
+        robot = find_robot(task.robot, path.parent)
+    except (LookupError, ValueError) as error:
+        raise TaskError(f"{source.place(['robot'])}: robot: {error.args[0]}") from error
+    wrong = contradictions(task, robot)
+    if wrong:
+        raise TaskError(
+            "\n".join(f"{source.place(key.split('.'))}: {key}: {text}" for key, text in wrong)
+        )
+    return task

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable
 from typing import Any
 
 import numpy as np
@@ -11,7 +10,7 @@ from numpy.typing import NDArray
 from .midpoint import angular_motion, euler_angles, euler_rates, rotation
 from .plan import JumpPlan
 from .problem import Problem
-from .resampling import kinds_of, matching_places, means_between, states_at
+from .resampling import matching_times, means_over, same_phases, states_at
 from .symbolic_model import SymbolicModel
 
 Array = NDArray[np.float64]
@@ -81,13 +80,22 @@ def unpack(problem: Problem, values: Array) -> dict[str, Any]:
     }
 
 
-def kinds_in(problem: Problem) -> list[Hashable]:
-    """The kind of every interval of a problem, as ``resampling.kinds_of`` a plan's."""
-    return [
-        (int(stretch.phase), tuple(stretch.contacts), not stretch.impact)
-        for stretch in problem.stretches
-        for _ in range(stretch.count)
-    ]
+def can_start(problem: Problem, plan: JumpPlan) -> bool:
+    """Whether a plan goes through the same phases, so that ``pack`` can make variables of it."""
+    impacts = bool(np.any(np.diff(plan.time) <= 0.0)) or any(s.impact for s in problem.stretches)
+    alike = same_phases(plan.phase[:-1].tolist(), [int(phase) for phase in problem.phases])
+    return _same_grid(problem, plan) or (alike and not impacts)
+
+
+def _same_grid(problem: Problem, plan: JumpPlan) -> bool:
+    """Whether all intervals stand for the same; only then can there be impacts."""
+    intervals = len(plan.time) == problem.knots
+    impacts = {s.first for s in problem.stretches if s.impact}
+    return (
+        intervals
+        and plan.phase[:-1].tolist() == [int(phase) for phase in problem.phases]
+        and set(np.flatnonzero(np.diff(plan.time) <= 0.0).tolist()) == impacts
+    )
 
 
 def pack(problem: Problem, plan: JumpPlan, guess: Array) -> Array:
@@ -105,15 +113,16 @@ def pack(problem: Problem, plan: JumpPlan, guess: Array) -> Array:
         v[k, :3] = rotation(angles[k]) @ row[:3]
         v[k, 3:6] = euler_rates(angles[k], row[3:6])[ORDER]
         v[k, 6:] = row[6:]
-    places = matching_places(plan.time, kinds_of(plan), problem.steps, kinds_in(problem))
-    q, v = states_at(*places, plan.time, q, v)
-    force = means_between(*places, plan.time, plan.contact_force.reshape(len(plan.time), -1))
-    interval, past = places
-    steps = np.diff(plan.time[interval] + past * np.diff(plan.time)[interval])
-    means = {
-        stretch: float(steps[stretch.first : stretch.stop].sum()) / stretch.count
-        for stretch in problem.stretches
-    }
+    steps, force = np.diff(plan.time), plan.contact_force.reshape(len(plan.time), -1)
+    instants = plan.time
+    if not _same_grid(problem, plan):
+        phases = [int(phase) for phase in problem.phases]
+        lengths = np.diff(knot_times(problem, guess))
+        instants = matching_times(plan.time, plan.phase[:-1].tolist(), lengths, phases)
+        q, v = states_at(instants, plan.time, q, v)
+        force = means_over(instants, plan.time, force)
+        steps = np.diff(instants)
+    means = {s: float(instants[s.stop] - instants[s.first]) / s.count for s in problem.stretches}
     values = guess.copy()
     for k in range(problem.knots):
         start, control = assembly.state_start[k], assembly.control_start[k]

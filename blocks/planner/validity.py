@@ -16,8 +16,9 @@ from numpy.typing import NDArray
 
 from ...runtime.description import RobotDescription
 from ...runtime.errors import AloftError
+from .evidence import Evidence
 from .plan import ARRAYS, JumpPlan
-from .plan_tests import PLAN_TESTS, Evidence
+from .plan_tests import PLAN_TESTS
 from .replay import replay
 
 Array = NDArray[np.float64]

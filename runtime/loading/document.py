@@ -51,8 +51,16 @@ for _name, _pattern, _first in (
     _GraphLoader.add_implicit_resolver(_PREFIX + _name, re.compile(_pattern), _first)
 
 
-def read_file(path: Path, shown: str, problems: Problems) -> MapNode | None:
-    """The mapping in a file, which messages call ``shown``; ``None`` after a problem."""
+GRAPH_FILE = ("a graph file", "rate, robot, blocks")
+
+
+def read_file(
+    path: Path, shown: str, problems: Problems, kind_of_file: tuple[str, str] = GRAPH_FILE
+) -> MapNode | None:
+    """The mapping in a file, which messages call ``shown``; ``None`` after a problem.
+
+    ``kind_of_file`` is what messages call such a file, and some of its keys.
+    """
     try:
         text = path.read_text(encoding="utf-8")
     except OSError as error:
@@ -63,10 +71,12 @@ def read_file(path: Path, shown: str, problems: Problems) -> MapNode | None:
         message = f"{shown} is not UTF-8 text (byte {error.start})"
         problems.add(Code.FILE, message, Position(shown, 0, 0))
         return None
-    return read_mapping(text, shown, problems)
+    return read_mapping(text, shown, problems, kind_of_file)
 
 
-def read_mapping(text: str, shown: str, problems: Problems) -> MapNode | None:
+def read_mapping(
+    text: str, shown: str, problems: Problems, kind_of_file: tuple[str, str] = GRAPH_FILE
+) -> MapNode | None:
     """The mapping that a text is; ``None`` after a problem."""
     before = len(problems)
     node = read_value(text, shown, problems)
@@ -78,9 +88,9 @@ def read_mapping(text: str, shown: str, problems: Problems) -> MapNode | None:
             found = "nothing"
         problems.add(
             Code.WRONG_KIND,
-            "a graph file is a mapping",
+            f"{kind_of_file[0]} is a mapping",
             node.where if node else Position(shown, 1, 1),
-            expected="keys such as rate, robot, blocks",
+            expected=f"keys such as {kind_of_file[1]}",
             found=found,
         )
     return None

@@ -261,6 +261,7 @@ def _assemble(
         ticks=settings.ticks,
         robot=settings.robot,
         clock=settings.clock,
+        file=graph.file,
         text=graph.text,
         overrides=graph.overrides,
     )

@@ -13,7 +13,10 @@ from .problems import Code, Problems
 from .written import GRAPH_KEYS
 
 Overrides = Mapping[str, Any] | Iterable[str]
-"""``{"landing.w_l": [0.03, 0.04]}`` or ``["landing.w_l=[0.03, 0.04]"]``."""
+"""``{"landing.w_l": [0.03, 0.04]}`` or ``["landing.w_l=[0.03, 0.04]"]``.
+
+A value may be an ``Entry`` of another file: problems then name its place there.
+"""
 
 
 @dataclass(frozen=True)
@@ -40,6 +43,9 @@ def read_overrides(overrides: Overrides, problems: Problems) -> tuple[Override, 
     pairs: list[tuple[str, Node, Position]] = []
     if isinstance(overrides, Mapping):
         for key, value in overrides.items():
+            if isinstance(value, Entry):
+                pairs.append((str(key), value.value, value.key_where))
+                continue
             shown = value.tolist() if hasattr(value, "tolist") else value
             where = place_of(f"{key}={_short(shown)}")
             pairs.append((str(key), from_plain(value, where), where))

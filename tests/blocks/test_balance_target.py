@@ -120,3 +120,12 @@ def test_trim_leaves_the_heading_alone():
     bench.step(100)
     assert bench.get("memory").trim == pytest.approx(np.zeros(3), abs=1e-12)
     assert bench.get("target").orientation == pytest.approx(LEVEL, abs=1e-12)
+
+
+@pytest.mark.parametrize(("lift_off", "height"), [(0.9, 0.3), (0.5, STANDING - 0.06)])
+def test_between_two_flights_it_is_the_plan_too(lift_off, height):
+    bench = make(landing_depth=0.06)
+    bench.set("phase", phase=Phase.LANDING)
+    bench.set("reference", time=0.8, lift_off_time=lift_off, com=[0.0, 0.0, 0.3])
+    bench.step()
+    assert float(bench.get("target").com[2]) == pytest.approx(height)

@@ -185,3 +185,53 @@ def test_a_foot_that_is_nearly_flat_stands_as_a_whole():
     bench.set("terms", contact_position=place)
     run(bench, 0.72, active=[True, False, False, True])
     assert bench.get("phase").stance.tolist() == [True, False, True, True]
+
+
+def hop_twice(bench, *, landed, until):
+    """Two flights, 0.5-0.8 s and 1.0-1.3 s, thrust between them from 0.9 s on; the feet touch
+    the ground at ``landed`` after the first."""
+    marks = ((0.1, 1), (0.3, 2), (0.5, 3), (0.8, 4), (0.9, 2), (1.0, 3), (1.3, 4))
+    seen = []
+    while bench.now < until - 1e-9:
+        # From the middle of the first flight on the reference names the second.
+        times = (0.5, 0.8) if bench.now < 0.65 else (1.0, 1.3)
+        bench.set("reference", lift_off_time=times[0], touchdown_time=times[1], time=bench.now)
+        bench.set("reference", phase=[p for mark, p in ((0.0, 0), *marks) if bench.now >= mark][-1])
+        start = 0.5 if bench.now < 0.9 else 1.0
+        t = min(max(bench.now - start, 0.0), 0.3)
+        com, speed = [0.0, 0.0, HEIGHT + t * (SPEED - 4.905 * t)], [0.0, 0.0, SPEED - 9.81 * t]
+        bench.set("reference", com=com, com_velocity=speed)
+        bench.set("terms", com=com, com_velocity=speed)
+        on_ground = bench.now < 0.5 or landed <= bench.now < 1.0 or bench.now >= 1.3
+        bench.set("contacts", active=on_ground)
+        bench.step()
+        seen.append(int(bench.get("phase").phase))
+        bench.now = round(bench.now + 0.002, 6)
+    return seen
+
+
+@pytest.mark.parametrize("landed", [0.77, 0.8, 0.83])
+def test_another_flight_follows_where_the_plan_has_one(landed):
+    seen = hop_twice(make(), landed=landed, until=2.0)
+    changes = [b for a, b in pairwise(seen) if a != b]
+    assert changes == [
+        Phase.SQUAT, Phase.THRUST, Phase.FLIGHT, Phase.LANDING, Phase.THRUST, Phase.FLIGHT,
+        Phase.LANDING, Phase.RECOVER,
+    ]  # fmt: skip
+    assert seen.index(Phase.LANDING) == pytest.approx(landed / 0.002, abs=1)
+    assert seen[450] == Phase.THRUST, "by the plan, whenever it landed"
+
+
+def test_a_landing_that_comes_after_the_thrust_waits_for_no_second_flight():
+    bench = make()
+    seen = hop_twice(bench, landed=1.3, until=2.5)
+    assert seen[-1] == Phase.FAULT
+    assert Phase.RECOVER not in seen
+
+
+def test_all_points_are_in_stance_in_the_second_thrust():
+    bench = make()
+    hop_twice(bench, landed=0.8, until=0.95)
+    assert phase(bench) == Phase.THRUST
+    assert bench.get("phase").stance.all()
+    assert float(bench.get("phase").time_since_touchdown) == pytest.approx(0.148, abs=3e-3)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -63,3 +65,30 @@ def test_points_are_planned_in_contact_outside_flight(time, contact):
     reference = JumpReference.allocate(find_robot("bruce").dimensions)
     JumpTableReader(table()).read(time, reference)
     assert reference.contact.tolist() == [contact] * 4
+
+
+def test_several_jumps():
+    """Flights 0.3-0.6 and 0.8-1.0, thrust between them from 0.7 on."""
+    one = table()
+    reader = JumpTableReader(replace(one, recover_time=1.2, later_jumps=((0.7, 0.8, 1.0),)))
+    reference = JumpReference.allocate(find_robot("bruce").dimensions)
+    seen = {}
+    for k in range(130):
+        reader.read(k / 100 + 1e-6, reference)
+        seen[k] = int(reference.phase)
+        second = k >= 45
+        assert float(reference.lift_off_time) == (0.8 if second else 0.3), k
+        assert float(reference.touchdown_time) == (1.0 if second else 0.6), k
+        assert reference.contact.all() == (seen[k] != Phase.FLIGHT)
+    changes = [(k, seen[k]) for k in range(1, 130) if seen[k] != seen[k - 1]]
+    assert changes == [(10, 1), (20, 2), (30, 3), (60, 4), (70, 2), (80, 3), (100, 4), (120, 5)]
+
+
+def test_contacts_of_a_table_hold_on_the_ground():
+    contact = np.array([[True, False, True, False], [True] * 4])
+    reader = JumpTableReader(replace(table(), contact=contact))
+    reference = JumpReference.allocate(find_robot("bruce").dimensions)
+    reader.read(0.25, reference)
+    assert reference.contact.tolist() == [True, False, True, False]
+    reader.read(0.45, reference)
+    assert not reference.contact.any()

@@ -61,7 +61,7 @@ def test_a_plan_that_is_not_valid_says_which_test_failed(
 def test_a_wrong_task_is_refused(folder: Path, call_json: CallJson, call: Call) -> None:
     (folder / "wrong.yaml").write_text("rise: 3 kg\n")
     result = call_json("plan", "wrong.yaml", code=2)
-    assert result["reason"] == "wrong.yaml: rise: expected a number in m, found '3 kg'"
+    assert result["reason"] == "wrong.yaml:1:7: rise: expected a number in m, found '3 kg'"
     assert "give task files, or --library" in call("plan", code=2).stderr
 
 

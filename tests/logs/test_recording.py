@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from aloft.logs.logged_run import LoggedRun
+from aloft.logs.format import RecordedField
+from aloft.logs.header import make_header
 from aloft.logs.recording import write_recording
-from aloft.logs.robot_view import flight_events, port_with_pose, quaternion_from_z
+from aloft.logs.robot_view import Flights, port_with_pose, quaternion_from_z
 from aloft.logs.signal_names import element_names
 from aloft.runtime.block import Block, Output, State
 from aloft.runtime.description import RobotDescription
@@ -125,7 +126,7 @@ def test_every_signal_of_every_tick_is_read_back_exactly(
 ) -> None:
     _, result, path = recorded
     found = batches(path, "/signals/**")
-    names = [name for name, _ in LoggedRun.of(result).fields()]
+    names = list(result.signals())
     assert set(found) == {f"signals/{name.replace('.', '/')}" for name in names}
     assert len(names) == 2 * len(HopperTruth.fields)
     for name in names:
@@ -158,8 +159,9 @@ def test_states_and_events_are_said_by_name(recorded: tuple[CheckedGraph, RunRes
 
 
 def test_the_robot_is_posed_in_space(recorded: tuple[CheckedGraph, RunResult, Path]) -> None:
-    graph, _, path = recorded
-    assert port_with_pose(graph) == "robot.truth"
+    graph, result, path = recorded
+    assert result.log is not None and result.log.layout is not None
+    assert port_with_pose(make_header(graph, result.log.layout, b"")) == "robot.truth"
     found = batches(path, "/world/**")
     links = {f"world/robot/{name}" for name in ("body", "thigh", "shank")}
     assert set(found) == links | {"world/contact_forces", "world/com"}
@@ -216,7 +218,11 @@ def test_a_run_without_a_log_cannot_be_recorded(tmp_path: Path) -> None:
     ],
 )
 def test_flights_are_found(loaded: list[int], events: list[tuple[int, str]]) -> None:
-    assert flight_events(np.array(loaded, bool)[:, None], least=2) == events
+    points = np.array(loaded, bool)[:, None]
+    assert Flights(least=2).add(np.arange(4), points) == events
+    one_by_one = Flights(least=2)
+    found = [one_by_one.add(np.array([tick]), points[tick : tick + 1]) for tick in range(4)]
+    assert [event for some in found for event in some] == events
 
 
 @pytest.mark.parametrize("direction", [(0, 0, 2), (0, 0, -3), (1, 0, 0), (-1, 2, -0.5)])
@@ -229,9 +235,14 @@ def test_capsules_are_turned_the_shortest_way(direction: tuple[float, float, flo
 
 def test_elements_are_called_what_they_are() -> None:
     robot = hopper_description()
-    assert element_names(HopperTruth.joint_position, (2,), robot) == ["hip", "knee"]
-    assert element_names(HopperTruth.com, (3,), robot) == ["x", "y", "z"]
-    assert element_names(HopperTruth.stage, (), robot) == ["stage"]
-    forces = element_names(HopperTruth.contact_force, (2, 3), robot)
+
+    def names(name: str, shape: tuple[int, ...], *dimensions: int | str) -> list[str]:
+        return element_names(RecordedField(name, "float64", 0, shape, dimensions), robot)
+
+    assert names("joint_position", (2,), "n_joints") == ["hip", "knee"]
+    assert names("motor_torque", (2,), "n_joints") == ["a", "b"]
+    assert names("com", (3,), 3) == ["x", "y", "z"]
+    assert names("robot.truth.stage", ()) == ["stage"]
+    forces = names("contact_force", (2, 3), "n_contacts", 3)
     assert forces == ["toe x", "toe y", "toe z", "heel x", "heel y", "heel z"]
-    assert element_names(Field(("n_joints", "n_joints")), (30, 30), None) == []
+    assert names("matrix", (30, 30), "n", "n") == []

@@ -1,7 +1,6 @@
 """Filling a library: the grid's tasks, what is kept at once, and what a second run skips."""
 
-from collections.abc import Callable
-from concurrent.futures import Executor, Future
+from collections.abc import Callable, Generator, Iterable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -15,21 +14,30 @@ from aloft.blocks.planner.library import SHIPPED, PlanLibrary
 from aloft.blocks.planner.plan import JumpPlan
 from aloft.blocks.planner.task import JumpTask, TaskError, make_task, read_task
 from aloft.runtime.description import RobotDescription, find_robot
+from aloft.runtime.jobs import JobResult, attempt
 
 ROBOT = find_robot("bruce")
 
 
-class Here(Executor):
-    """Works in this process, task after task."""
+class Here:
+    """Does the jobs in this process, one after another."""
 
     def __init__(self) -> None:
         self.done = 0
 
-    def submit(self, work: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
-        future: Future[Any] = Future()
-        future.set_result(work(*args, **kwargs))
-        self.done += 1
-        return future
+    def __call__(
+        self, work: Callable[[Any], Any], jobs: Iterable[Any], **where: Any
+    ) -> Generator[JobResult, None, None]:
+        for index, job in enumerate(jobs):
+            self.done += 1
+            yield JobResult(index, *attempt(work, job))
+
+
+@pytest.fixture
+def here(monkeypatch: pytest.MonkeyPatch) -> Here:
+    made = Here()
+    monkeypatch.setattr(grid, "job_results", made)
+    return made
 
 
 @pytest.fixture
@@ -73,21 +81,6 @@ def test_the_tasks_of_a_grid(tmp_path: Path) -> None:
     assert robot_of(tasks) == ROBOT
 
 
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [
-        ("rise: 3", "expected the keys name, task and grid"),
-        ("grid: {rise: 0.1}", r"grid\.rise: expected a list of values or \{from"),
-        ("grid: {rise: [0.1]}\nextra: 1", "extra: expected only name, task and grid"),
-        ("grid: {rise: [0.1, -1]}", "rise_-1: rise: Input should be greater than 0"),
-        ("grid: {hight: [1]}", "hight: is no parameter of a task"),
-    ],
-)
-def test_what_is_no_grid(tmp_path: Path, text: str, words: str) -> None:
-    with pytest.raises(TaskError, match=words):
-        read_grid(write(tmp_path, text))
-
-
 def test_a_grid_is_for_one_robot() -> None:
     tasks = [
         make_task({"name": "a", "rise": 0.1}),
@@ -98,42 +91,60 @@ def test_a_grid_is_for_one_robot() -> None:
 
 
 def test_plans_are_kept_failures_are_remembered_and_a_second_run_skips_both(
-    tmp_path: Path, solver: list[str]
+    tmp_path: Path, solver: list[str], here: Here
 ) -> None:
     rises = {"a": 0.1501, "b": 0.1502, "high": 0.3, "wrong": 0.16}
     tasks = [make_task({"name": name, "rise": rise}) for name, rise in rises.items()]
     kept = PlanLibrary(ROBOT, tmp_path, others=())
-    first = {row.task.name: row for row in fill(tasks, kept, Here())}
+    first = {row.task.name: row for row in fill(tasks, kept)}
     assert {name: row.outcome for name, row in first.items()} == {
         "a": "planned", "b": "planned", "high": "failed", "wrong": "failed",
     }  # fmt: skip
     assert "apex is missed" in first["high"].reason
     assert "rise: how far the apex" in first["wrong"].reason, "invalid plans are not kept"
     assert len(list(tmp_path.glob("*.npz"))) == 2
-    executor = Here()
-    second = {row.task.name: row.outcome for row in fill(tasks, kept, executor)}
+    here.done = 0
+    second = {row.task.name: row.outcome for row in fill(tasks, kept)}
     assert second == {"a": "kept", "b": "kept", "high": "known", "wrong": "known"}
-    assert executor.done == 0
-    assert {row.outcome for row in fill(tasks, kept, executor, again=True)} == {"kept", "failed"}
-    assert executor.done == 2
+    assert here.done == 0
+    assert {row.outcome for row in fill(tasks, kept, again=True)} == {"kept", "failed"}
+    assert here.done == 2
 
 
-def test_a_run_that_is_cut_off_has_kept_what_was_done(tmp_path: Path, solver: list[str]) -> None:
+def test_a_run_that_is_cut_off_has_kept_what_was_done(
+    tmp_path: Path, solver: list[str], here: Here
+) -> None:
     tasks = [make_task({"name": f"t{k}", "rise": 0.1501 + k * 1e-5}) for k in range(4)]
     kept = PlanLibrary(ROBOT, tmp_path, others=())
-    rows = fill(tasks, kept, Here())
+    rows = fill(tasks, kept)
     next(rows)
     next(rows)
     rows.close()
     assert len(list(tmp_path.glob("*.npz"))) == 2
-    outcomes = sorted(row.outcome for row in fill(tasks, kept, Here()))
+    outcomes = sorted(row.outcome for row in fill(tasks, kept))
     assert outcomes == ["kept", "kept", "planned", "planned"]
     assert not list(tmp_path.glob(".*")), "no half-written file is left"
 
 
-def test_a_worker_uses_one_thread(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("OMP_NUM_THREADS", "8")
-    grid.prepare_worker()
-    import os
+def test_a_task_whose_process_died_is_tried_next_time(
+    tmp_path: Path, solver: list[str], here: Here, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def dead(*_: Any, **__: Any) -> Generator[JobResult, None, None]:
+        yield JobResult(0, None, "its process was killed by SIGKILL, 2 times")
 
-    assert os.environ["OMP_NUM_THREADS"] == "1"
+    tasks, kept = [make_task({"name": "a", "rise": 0.1501})], PlanLibrary(ROBOT, tmp_path)
+    with monkeypatch.context() as patch:
+        patch.setattr(grid, "job_results", dead)
+        (row,) = fill(tasks, kept)
+    assert (row.outcome, row.reason) == ("failed", "its process was killed by SIGKILL, 2 times")
+    assert [row.outcome for row in fill(tasks, kept)] == ["planned"]
+
+
+def test_torn_files_count_as_none(tmp_path: Path, solver: list[str], here: Here) -> None:
+    tasks = [make_task({"name": "a", "rise": 0.1501}), make_task({"name": "high", "rise": 0.3})]
+    kept = PlanLibrary(ROBOT, tmp_path, others=())
+    list(fill(tasks, kept))
+    for path in tmp_path.iterdir():
+        path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
+    assert [row.outcome for row in fill(tasks, kept)] == ["planned", "failed"]
+    assert [row.outcome for row in fill(tasks, kept)] == ["kept", "known"]

@@ -8,7 +8,7 @@ import pytest
 
 from aloft.blocks.planner.library import solve_and_check
 from aloft.blocks.planner.plan import JumpPlan
-from aloft.blocks.planner.refinement import FACTOR, asks_for_finer, curable, refined
+from aloft.blocks.planner.refinement import asks_for_finer, curable, finer_knots
 from aloft.blocks.planner.solve import solve_jump
 from aloft.blocks.planner.task import make_task
 from aloft.blocks.planner.validity import InvalidPlanError, checked
@@ -48,25 +48,15 @@ def test_only_a_failed_plan_of_that_very_task_asks_for_finer(by_hand: JumpPlan) 
     assert not asks_for_finer(HIGH, None)
 
 
-def test_every_phase_is_divided_more_finely() -> None:
-    task = make_task({"name": "own", "rise": 0.1, "phases": [
-        {"phase": "thrust", "time": "free", "knots": 10}, {"phase": "flight"}, {"phase": "landing"}
-    ]})  # fmt: skip
-    finer = refined(task, 1.5)
-    assert finer.knots.flight == 42
-    assert finer.knots.squat == 12
-    assert finer.phases is not None
-    assert [span.knots for span in finer.phases] == [15, None, None]
-
-
 def test_a_high_jump_is_valid_on_the_grid_it_needs() -> None:
     coarse = checked(solve_jump(HIGH, ROBOT), ROBOT)
     assert not coarse.valid
     plan = solve_and_check(HIGH, ROBOT)
     assert plan.valid
     assert plan.task == HIGH
-    assert plan.statistics["refinement"] == FACTOR
-    assert plan.statistics["knots"] == refined(HIGH, FACTOR).knots.total + 1 == len(plan.time)
+    knots = finer_knots(coarse)
+    assert knots.flight == 42
+    assert plan.statistics["knots"] == knots.total + 1 == len(plan.time)
     error = [report["figures"]["flight_error_mm"] for report in (plan.report, coarse.report)]
     assert error[0] < 0.6 * error[1]
 
@@ -101,7 +91,7 @@ def test_an_invalid_plan_is_not_refined_without_end(by_hand: JumpPlan) -> None:
 
 def test_a_plan_on_another_grid_is_a_start() -> None:
     first = make_task({"name": "low", "rise": 0.14})
-    fine = solve_jump(first, ROBOT, refine=FACTOR)
+    fine = solve_jump(first, ROBOT, knots=finer_knots(solve_jump(first, ROBOT)))
     warm = solve_jump(make_task({"name": "near", "rise": 0.15}), ROBOT, warm_start=fine)
     assert warm.statistics["warm"]
     assert len(warm.time) < len(fine.time)

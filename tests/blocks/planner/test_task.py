@@ -57,7 +57,8 @@ def test_a_file_gives_the_task_its_name(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "words"), [("rise: [", "is not YAML"), ("- 3", "expected keys such as")]
+    ("text", "words"),
+    [("rise: [", "broken.yaml:1:8: did not find"), ("- 3", "expected keys such as")],
 )
 def test_a_file_that_is_no_task(tmp_path: Path, text: str, words: str) -> None:
     path = tmp_path / "broken.yaml"

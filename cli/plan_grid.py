@@ -1,0 +1,100 @@
+"""``aloft plan --library``: plan a grid of jumps into a library, on all cores or on a cluster."""
+
+from __future__ import annotations
+
+from contextlib import closing
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ..runtime.errors import ExitCode
+from .output import print_json, say, table
+from .plan_output import failure_rows
+from .stopping import stopped_by_signals
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from ..blocks.planner.grid import GridRow
+    from ..blocks.planner.library import PlanLibrary
+    from ..blocks.planner.task import JumpTask
+
+
+def plan_grid(
+    grid: Path,
+    keep: Path | None,
+    anew: bool,
+    workers: int,
+    cluster: str,
+    screen: Console,
+    as_json: bool,
+) -> ExitCode:
+    """Fill the library with a grid of tasks; stopped by a signal, say what is done."""
+    from ..blocks.planner.grid import fill, read_grid, robot_of
+    from ..blocks.planner.library import PlanLibrary
+    from .progress import progress_bar
+
+    tasks = read_grid(grid)
+    library = PlanLibrary(robot_of(tasks), keep)
+    there = library.hashes()
+    missing = [task for task in tasks if task.hash(library.robot) not in there]
+    counts = dict.fromkeys(("planned", "kept", "failed", "known"), 0)
+    rows: list[GridRow] = []
+    with stopped_by_signals() as received:
+        if missing and not cluster:
+            compile_once(library, missing, screen)
+        with (
+            progress_bar(screen, f"planning {len(tasks)} jumps", len(tasks)) as (bar, bar_task),
+            closing(
+                fill(tasks, library, workers=workers, cluster=cluster or None, again=anew)
+            ) as results,
+        ):
+            for row in results:
+                counts[row.outcome] += 1
+                rows.append(row)
+                text = ", ".join(f"{n} {what}" for what, n in counts.items() if n)
+                bar.update(bar_task, advance=1, description=text)
+    failed = [row for row in rows if row.outcome in ("failed", "known")]
+    if failed:
+        screen.print(table("", ("task", "why there is no plan"), failure_rows(failed)))
+    reason = ", ".join(f"{n} {what}" for what, n in counts.items())
+    code = ExitCode.NOT_SUCCESSFUL if failed else ExitCode.SUCCESS
+    if received:
+        code = ExitCode(128 + received[0])
+        reason = (
+            f"stopped by {received[0].name} after {len(rows)} of {len(tasks)}: {reason}; the same "
+            "command goes on from here"
+        )
+    say(screen, f"{reason}; library: {library.folder}")
+    if as_json:
+        listed = [
+            {
+                "task": row.task.name,
+                "outcome": row.outcome,
+                "reason": row.reason,
+                "path": str(row.path) if row.path else None,
+            }
+            for row in sorted(rows, key=lambda row: row.task.name)
+        ]
+        success = code == ExitCode.SUCCESS
+        print_json({"success": success, "reason": reason, "counts": counts, "rows": listed})
+    return code
+
+
+def compile_once(library: PlanLibrary, tasks: list[JumpTask], screen: Console) -> None:
+    """Compile before there are workers, which would else all compile the same."""
+    from ..blocks.planner.errors import PlanError
+    from ..blocks.planner.solve import make_problem
+    from ..blocks.planner.task import TaskError
+
+    # In the plane and out of it there are other functions, and for every formulation.
+    kinds = {(t.formulation, bool(t.distance_y or t.twist), t.impact): t for t in tasks}
+    with screen.status("compiling the model, once") as status:
+
+        def progress(text: str, done: int, total: int) -> None:
+            status.update(f"{text} ({done} of {total})")
+
+        for task in kinds.values():
+            try:
+                make_problem(task, library.robot, progress=progress)
+            except (PlanError, TaskError, ValueError):
+                continue  # the task itself will say so

@@ -1,0 +1,194 @@
+"""``aloft study``: run a grid of graphs, overrides and seeds; table, summary and pictures."""
+
+from __future__ import annotations
+
+import signal
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from ..runtime.errors import ExitCode
+from .output import console, errors_reported, print_json, print_warning, say
+from .study_output import print_rows, study_json
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from rich.console import Console
+
+    from ..studies.execution import Run
+    from ..studies.expansion import Cell
+    from ..studies.journal import Journal, Outcome
+    from ..studies.study import Study
+
+
+def study(
+    file: Annotated[Path, typer.Argument(help="The study file.")],
+    seeds: Annotated[
+        str, typer.Option(help="Other seeds than the study's: 0:4 for a quick look.")
+    ] = "",
+    tune: Annotated[
+        bool, typer.Option("--tune", help="Tune the arms instead, and write what was found.")
+    ] = False,
+    dry_run: Annotated[
+        bool, typer.Option("--dry-run", help="Check everything and count the runs; run nothing.")
+    ] = False,
+    out: Annotated[
+        Path | None, typer.Option(help="Folder for the results; by default results/NAME.")
+    ] = None,
+    workers: Annotated[int, typer.Option(help="Processes; 0: one a core.", min=0)] = 0,
+    cluster: Annotated[str, typer.Option(help="Run on a Dask cluster: tcp://127.0.0.1:8786.")] = "",
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Tables go to standard error, one JSON object to output.")
+    ] = False,
+) -> None:
+    """Run a study: every graph, arm and grid point with every seed, on all cores.
+
+    Runs that were made before are not made again, so a study that was stopped or killed goes on
+    where it was. Exits with 0 when all goals are met, 1 when one is missed, 3 when a run broke.
+    """
+    from ..runtime.seeds import parse_seeds
+    from ..studies.reading import read_study
+
+    screen = console(to_stderr=as_json)
+    with errors_reported(as_json):
+        found = read_study(file)
+        chosen = parse_seeds(seeds) if seeds else list(found.seeds)
+        folder = out or Path("results") / found.name
+        code = run_study(found, chosen, folder, workers, cluster, screen, as_json, dry_run=dry_run)
+    raise typer.Exit(code)
+
+
+def run_study(
+    found: Study,
+    seeds: Sequence[int],
+    folder: Path,
+    workers: int,
+    cluster: str,
+    screen: Console,
+    as_json: bool,
+    *,
+    dry_run: bool = False,
+) -> ExitCode:
+    """Make the study's runs; write and print what came of them."""
+    from ..studies.execution import Run
+    from ..studies.journal import Journal
+    from ..studies.summary import summarise
+    from ..studies.table import make_table, write_table
+
+    cells = check_cells(found, screen)
+    runs = [Run(cell, seed) for cell in cells for seed in seeds]
+    if dry_run:
+        reason = f"{len(cells)} cells and {len(seeds)} seeds: {len(runs)} runs; no problems"
+        say(screen, f"{found.path}: {reason}")
+        if as_json:
+            print_json({"success": True, "reason": reason, "cells": len(cells), "runs": len(runs)})
+        return ExitCode.SUCCESS
+    with Journal(folder / "runs.jsonl") as journal:
+        stopped = make_all(runs, journal, workers, cluster, screen, f"study {found.name}")
+        if isinstance(stopped, signal.Signals):
+            return report_stop(stopped, runs, journal, screen, as_json)
+        done = stopped
+    rows = summarise(found, done)
+    write_table(folder / "runs.parquet", make_table(done))
+    result = study_json(found, rows, seeds, folder)
+    (folder / "summary.json").write_text(json_text(result), encoding="utf-8")
+    print_rows(screen, found, rows, seeds)
+    say(screen, f"table: {folder / 'runs.parquet'}; summary: {folder / 'summary.json'}")
+    if as_json:
+        print_json(result)
+    elif result["success"]:
+        typer.secho(result["reason"], fg=typer.colors.GREEN)
+    else:
+        typer.secho(result["reason"], fg=typer.colors.RED, err=True)
+    if any(row.errors for row in rows):
+        return ExitCode.RUN_FAILED
+    missed = any(row.met is False for row in rows)
+    return ExitCode.NOT_SUCCESSFUL if missed else ExitCode.SUCCESS
+
+
+def check_cells(found: Study, screen: Console) -> list[Cell]:
+    """All cells of the study, each checked as ``aloft check`` does."""
+    from ..studies.expansion import cells, checked_cells
+    from ..studies.fingerprint import code_fingerprint
+    from .progress import progress_bar
+
+    expanded = list(cells(found))
+    with progress_bar(screen, f"checking {len(expanded)} cells", len(expanded)) as (bar, task):
+        return checked_cells(expanded, found, code_fingerprint(), lambda: bar.advance(task))
+
+
+def make_all(
+    runs: Sequence[Run],
+    journal: Journal,
+    workers: int,
+    cluster: str,
+    screen: Console,
+    text: str,
+) -> list[Run] | signal.Signals:
+    """The runs with their outcomes, or the signal that stopped them."""
+    from ..studies.execution import make_runs
+    from .progress import progress_bar
+
+    successes = 0
+    known = sum(run.key in journal.outcomes for run in runs)
+    if known:
+        say(screen, f"{known} of {len(runs)} runs are there from before")
+    with (
+        stop_signals() as received,
+        progress_bar(screen, text, len(runs)) as (bar, task),
+    ):
+
+        def on_run(outcome: Outcome) -> None:
+            nonlocal successes
+            successes += outcome.success
+            bar.update(task, advance=1, description=f"{text}: {successes} succeeded")
+
+        try:
+            return make_runs(runs, journal, workers=workers, cluster=cluster, on_run=on_run)
+        except KeyboardInterrupt:
+            if not received:
+                raise
+    return received[0]
+
+
+@contextmanager
+def stop_signals() -> Iterator[list[signal.Signals]]:
+    """SIGINT and SIGTERM as ``KeyboardInterrupt``; which they were is in the list."""
+    received: list[signal.Signals] = []
+
+    def stop(number: int, _: object) -> None:
+        received.append(signal.Signals(number))
+        raise KeyboardInterrupt
+
+    before = {number: signal.signal(number, stop) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield received
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def report_stop(
+    stopped: signal.Signals, runs: Sequence[Run], journal: Journal, screen: Console, as_json: bool
+) -> ExitCode:
+    """Say how far it came."""
+    done = sum(run.key in journal.outcomes for run in runs)
+    reason = f"stopped by {stopped.name} after {done} of {len(runs)} runs, which are kept"
+    if as_json:
+        print_json({"success": False, "reason": reason, "done": done, "runs": len(runs)})
+    else:
+        print_warning(f"{reason}; the same command goes on from there")
+    return ExitCode(128 + stopped)
+
+
+def json_text(value: dict[str, Any]) -> str:
+    """A file's text: numbers that are not finite become null."""
+    import json
+
+    from .output import plain
+
+    return json.dumps(plain(value), allow_nan=False, indent=1) + "\n"

@@ -1,0 +1,219 @@
+"""The process beside the robot that writes the recording; see ``recorder`` for the other side.
+
+It is told what to do by a ``Task`` on its command line and by the first record in the ring, the
+header. On its standard input comes the outcome of the run. The end of the input says that nothing
+more will come, also when the process that runs the graph was killed: then what is in the ring is
+written, and the file is closed. On its standard output it says, in lines of JSON, that it is ready
+and, at the end, a ``Report``.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import select
+import signal
+import sys
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..runtime.life_cycle import describe
+from ..runtime.memory import Snapshot
+from ..runtime.notes import Note
+from .format import Header
+from .repair import RepairError, repair
+from .ring import Record, RingReader
+from .writer import RecordingWriter, warm_up
+
+HEADER, ROW, KEYFRAME, NOTE = 1, 2, 3, 4
+"""The kinds of records in the ring; a keyframe is the bytes of the bus, then of the state."""
+POLL = 0.02
+"""Seconds between two looks at the ring."""
+BATCH = 512
+"""Ticks written at once, at most."""
+
+
+@dataclass(frozen=True)
+class Task:
+    """What to write: the ring's ``descriptor`` and ``capacity``, the file, and how many seconds may
+    pass before what has come is handed to the operating system (``flush_period``), and before that
+    is told to put it on the disk (``sync_period``)."""
+
+    descriptor: int
+    capacity: int
+    path: str
+    flush_period: float
+    sync_period: float
+
+
+@dataclass
+class Report:
+    """What was done: rows written, the file's size [bytes], the most memory used [bytes], and what
+    went wrong, if anything; then ``lost`` rows came after it."""
+
+    rows: int = 0
+    size: int = 0
+    memory: int = 0
+    problem: str = ""
+    lost: int = 0
+
+
+class RecorderProcess:
+    """Takes records out of the ring and writes them, in batches."""
+
+    def __init__(self, task: Task) -> None:
+        self.report = Report()
+        self._task = task
+        self._ring = RingReader(task.descriptor, task.capacity)
+        record = next(self._ring.records())
+        header = Header.from_json(bytes(record.data).decode())
+        self._bus_size = header.bus.size
+        self._rows = np.zeros((BATCH, header.bus.size), np.uint8)
+        self._ticks = np.zeros(BATCH, np.int64)
+        self._waiting = 0
+        self._last_tick = header.first_tick
+        self._dirty = False
+        self._writer: RecordingWriter | None = None
+        self._guard(lambda: self._open(header))
+        self._flushed = self._synced = time.monotonic()
+
+    def _open(self, header: Header) -> None:
+        warm_up()
+        self._writer = RecordingWriter(self._task.path, header)
+        self._writer.flush()
+
+    def take(self) -> None:
+        """Take all records that there are, and flush if it is time."""
+        for record in self._ring.records():
+            self._take_one(record)
+        now = time.monotonic()
+        if now - self._flushed >= self._task.flush_period:
+            self.flush()
+            self._flushed = now
+        if now - self._synced >= self._task.sync_period:
+            self.sync()
+            self._synced = now
+
+    def _take_one(self, record: Record) -> None:
+        if record.kind == ROW:
+            self._rows[self._waiting] = np.frombuffer(record.data, np.uint8)
+            self._ticks[self._waiting] = record.tick
+            self._waiting += 1
+            if self._waiting == BATCH:
+                self._write_rows()
+        elif record.kind == KEYFRAME:
+            bus, state = bytes(record.data[: self._bus_size]), bytes(record.data[self._bus_size :])
+            self._write(lambda writer: writer.write_keyframe(Snapshot(record.tick, bus, state)))
+        elif record.kind == NOTE:
+            note = Note(**json.loads(bytes(record.data)))
+            self._write(lambda writer: writer.write_note(note))
+
+    def flush(self) -> None:
+        """Hand to the operating system all that was taken."""
+        self._write_rows()
+        if self._dirty and self._writer is not None:
+            self._guard(self._writer.flush)
+        self._dirty = False
+
+    def sync(self) -> None:
+        """Have what was flushed put on the disk."""
+        if self._writer is not None:
+            self._guard(self._sync)
+
+    def _sync(self) -> None:
+        descriptor = os.open(self._task.path, os.O_RDONLY)
+        try:
+            os.fsync(descriptor)
+        finally:
+            os.close(descriptor)
+
+    def finish(self, outcome: dict[str, Any] | None) -> Report:
+        """Write what is left and close the file."""
+        self.take()
+        self._write_rows()
+        if outcome is None:
+            text = "the process that ran the graph ended without a word"
+            note = Note(self._last_tick + 1, "fault", text, "ERROR")
+            self._write(lambda writer: writer.write_note(note))
+        else:
+            self._write(lambda writer: writer.write_outcome(outcome))
+        if self._writer is not None:
+            self._guard(self._writer.close)
+            self.sync()
+        if Path(self._task.path).is_file():
+            self.report.size = Path(self._task.path).stat().st_size
+        self.report.memory = _memory()
+        return self.report
+
+    def _write_rows(self) -> None:
+        count, self._waiting = self._waiting, 0
+        if not count:
+            return
+        self._last_tick = int(self._ticks[count - 1])
+        # copies, as Rerun keeps what it is given until it has written it
+        ticks, rows = self._ticks[:count].copy(), self._rows[:count].copy()
+        self._write(lambda writer: writer.write_rows(ticks, rows))
+        if self._writer is not None:
+            self.report.rows += count
+        else:
+            self.report.lost += count
+
+    def _write(self, write: Callable[[RecordingWriter], None]) -> None:
+        writer = self._writer
+        if writer is not None:
+            self._guard(lambda: write(writer))
+            self._dirty = True
+
+    def _guard(self, work: Callable[[], None]) -> None:
+        """Do some writing; where it fails, write no more, but go on emptying the ring."""
+        try:
+            work()
+        except Exception as error:  # noqa: BLE001  # whatever it is, the robot goes on
+            self.report.problem = describe(error)
+            self._writer = None
+            with suppress(OSError, RepairError):
+                repair(self._task.path)  # so that what was written before can be read
+
+
+def _memory() -> int:
+    """The most memory this process has used [bytes]."""
+    try:
+        import resource
+    except ImportError:  # not on Windows
+        return 0
+    most = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return most if sys.platform == "darwin" else most * 1024
+
+
+def main(task: str) -> None:
+    """Do what the task says, until standard input ends."""
+    # Whoever stops the graph means the graph: this process ends with it, and not before.
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, signal.SIG_IGN)
+    recorder = RecorderProcess(Task(**json.loads(task)))
+    _say({"ready": True})
+    told, text, source = False, b"", sys.stdin.fileno()
+    while True:
+        if select.select([source], [], [], POLL)[0]:
+            part = os.read(source, 65536)
+            if not part:
+                break
+            text += part
+        recorder.take()
+        if recorder.report.problem and not told:
+            told = True  # now, as the run may go on for hours
+            print(f"warning: nothing more is recorded: {recorder.report.problem}", file=sys.stderr)
+    _say(asdict(recorder.finish(json.loads(text) if text else None)))
+
+
+def _say(data: dict[str, Any]) -> None:
+    try:
+        print(json.dumps(data), flush=True)
+    except BrokenPipeError:  # nobody listens any more
+        sys.stdout = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115  # until the end

@@ -1,0 +1,1 @@
+"""Studies: any grid of graphs, overrides and seeds, run, kept, summed up and drawn."""

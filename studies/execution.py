@@ -1,0 +1,107 @@
+"""Makes the runs of a study that are not kept yet, on all processors or on a cluster."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from contextlib import closing
+from dataclasses import dataclass
+from pathlib import Path
+from time import perf_counter
+
+from ..runtime.errors import AloftError, ExitCode
+from ..runtime.graph import Graph
+from ..runtime.jobs import job_results
+from .expansion import Cell, Job, job, load_cell
+from .journal import Journal, Outcome
+
+
+@dataclass(frozen=True)
+class Run:
+    """A cell with a seed and, once it is there, the outcome."""
+
+    cell: Cell
+    seed: int
+    outcome: Outcome | None = None
+
+    @property
+    def key(self) -> str:
+        """What the run is kept under."""
+        return f"{self.cell.key}-{self.seed}"
+
+
+def run_job(work: Job) -> Outcome:
+    """Make one run; called where the work is done.
+
+    A run that fails is an outcome, and so is a graph that cannot be set up.
+
+    Raises:
+        AloftError: the process was told to stop.
+    """
+    begin = perf_counter()
+    graph, origin = Path(work.graph), Path(work.origin)
+    include = [Path(file) for file in work.include]
+    seeded: Graph = load_cell(graph, include, work.overrides, origin)
+    seeds = dict.fromkeys(seeded.seed_parameters, work.seed)
+    try:
+        result = load_cell(graph, include, {**work.overrides, **seeds}, origin).run(log=False)
+    except AloftError as error:
+        text = str(error)
+        return Outcome(False, text, error=text, wall_time_s=perf_counter() - begin)
+    if result.exit_code in (ExitCode.INTERRUPTED, ExitCode.TERMINATED):
+        raise AloftError(result.reason)
+    failed = result.exit_code == ExitCode.RUN_FAILED or result.error is not None
+    return Outcome(
+        result.success,
+        result.reason,
+        result.run_hash,
+        result.to_json()["metrics"],
+        result.reason if failed else "",
+        perf_counter() - begin,
+    )
+
+
+def make_runs(
+    runs: Sequence[Run],
+    journal: Journal,
+    *,
+    workers: int = 0,
+    cluster: str = "",
+    on_run: Callable[[Outcome], None] = lambda outcome: None,
+) -> list[Run]:
+    """All runs with their outcomes, in their order, whoever made them and when.
+
+    Runs that the journal knows are not made again, and every other is kept as soon as it is there.
+    What is no outcome of the run itself, such as the death of its process, is an error here but
+    is not kept, so that the next time tries again.
+
+    Raises:
+        AloftError: as ``runtime.jobs.job_results``.
+    """
+    missing = {run.key: run for run in runs if run.key not in journal.outcomes}
+    for run in runs:
+        if run.key not in missing:
+            on_run(journal.outcomes[run.key])
+    order = list(missing.values())
+    lost: dict[str, Outcome] = {}
+    if order:
+        jobs = (job(run.cell, run.seed) for run in order)
+        with closing(
+            job_results(run_job, jobs, workers=_workers(workers, len(order)), cluster=cluster)
+        ) as results:
+            for result in results:
+                key = order[result.index].key
+                if result.error:
+                    outcome = Outcome(False, result.error, error=result.error)
+                    lost[key] = outcome
+                else:
+                    outcome = result.value
+                    journal.add(key, outcome)
+                on_run(outcome)
+    found = journal.outcomes | lost
+    return [Run(run.cell, run.seed, found[run.key]) for run in runs]
+
+
+def _workers(wanted: int, jobs: int) -> int:
+    from ..runtime.jobs import processors
+
+    return min(wanted or processors(), jobs)

@@ -1,0 +1,190 @@
+"""A study's cells: every graph with every arm and every case of every axis, checked.
+
+What is set later wins: the study's ``set``, the task's, the axes' in their order, the arm's, and
+last what tuning found for the arm. ``include`` stands in front of the graph's own includes, as if
+the graph had named those files first: a trial, say.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import itertools
+import os
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+from ..runtime.graph import Graph
+from ..runtime.loading import load, load_text
+from ..runtime.loading.nodes import Entry, from_plain, plain, text_of
+from ..runtime.loading.problems import Code, LoadError, Problem, Problems, Report
+from ..runtime.stages import CheckedGraph, Position
+from .study import Arm, Axis, Coordinate, Study, Task
+
+Tuned = Mapping[str, Mapping[str, Any]]
+"""What tuning found: parameters by arm."""
+
+
+@dataclass(frozen=True)
+class Cell:
+    """One graph with its overrides, to be run once a seed."""
+
+    task: str
+    arm: str
+    labels: Mapping[str, str]
+    """By axis, ``task`` and ``arm`` among them."""
+    coordinates: Mapping[str, Coordinate]
+    """By the column of each axis of the grid."""
+    graph: Path
+    include: tuple[Path, ...]
+    sets: Mapping[str, Entry]
+    origin: Path
+    """The study's file, for which the graph is put together."""
+    key: str = ""
+    """What the outcome depends on, but for the seed; set once the cell is checked."""
+
+    @property
+    def overrides(self) -> dict[str, Any]:
+        """The overrides as plain data."""
+        return {key: plain(entry.value) for key, entry in self.sets.items()}
+
+    def with_sets(self, values: Mapping[str, Any], where: Position) -> Cell:
+        """The cell with further overrides, which are at one place."""
+        more = {key: Entry(key, where, from_plain(value, where)) for key, value in values.items()}
+        return replace(self, sets={**self.sets, **more})
+
+
+@dataclass(frozen=True)
+class Job:
+    """What another process needs to make a cell's run."""
+
+    graph: str
+    include: tuple[str, ...]
+    origin: str
+    overrides: Mapping[str, Any] = field(default_factory=dict)
+    seed: int = 0
+
+
+def cells(study: Study, tuned: Tuned | None = None) -> Iterator[Cell]:
+    """Every cell, by task, then by arm, then by the axes with the last one fastest."""
+    where = Position("the tuned parameters", 0, 0)
+    for task, arm in itertools.product(study.tasks, study.arms):
+        for cases in itertools.product(*(axis.cases for axis in study.axes)):
+            cell = _cell(study, task, arm, dict(zip(study.axes, cases, strict=True)))
+            yield cell.with_sets((tuned or {}).get(arm.name, {}), where)
+
+
+def _cell(study: Study, task: Task, arm: Arm, cases: Mapping[Axis, Any]) -> Cell:
+    entries = [*study.sets, *task.sets, *(e for case in cases.values() for e in case.sets)]
+    return Cell(
+        task.name,
+        arm.name,
+        {"task": task.name, "arm": arm.name, **{a.name: c.label for a, c in cases.items()}},
+        {axis.column: case.value for axis, case in cases.items()},
+        task.path,
+        study.include,
+        {entry.key: entry for entry in (*entries, *arm.sets)},
+        study.path,
+    )
+
+
+def checked_cells(
+    found: Iterable[Cell],
+    study: Study,
+    fingerprint: str,
+    on_cell: Callable[[], None] = lambda: None,
+) -> list[Cell]:
+    """The cells with their keys.
+
+    Raises:
+        LoadError: some graph may not run so; the report has all problems of all cells, with the
+            study's own places where an override is wrong.
+    """
+    good: list[Cell] = []
+    problems: dict[Problem, None] = {}
+    known: dict[str, str] = {}
+    for cell in found:
+        on_cell()
+        try:
+            graph = load_cell(cell.graph, cell.include, cell.sets, cell.origin).checked
+        except LoadError as error:
+            problems.update(dict.fromkeys(error.report.problems))
+            continue
+        seeded = Graph(graph).seed_parameters
+        if not seeded:
+            task = next(task for task in study.tasks if task.name == cell.task)
+            add = Problems()
+            add.add(
+                Code.MISSING_KEY, f"graph {task.path} has no parameter called 'seed'", task.where,
+                at=task.name, expected="a block whose parameter 'seed' makes runs differ",
+            )  # fmt: skip
+            problems.update(dict.fromkeys(add.report("").problems))
+            continue
+        good.append(replace(cell, key=_key(graph, fingerprint, known)))
+    if problems:
+        ordered = tuple(sorted(problems, key=lambda problem: problem.where))
+        raise LoadError(Report(str(study.path), ordered))
+    return good
+
+
+def load_cell(
+    graph: Path, include: Sequence[Path], overrides: Mapping[str, Any], origin: Path
+) -> Graph:
+    """The graph with a cell's overrides. Raises ``LoadError``."""
+    if not include:
+        return Graph(load(graph, overrides))
+    files = [os.path.relpath(file, origin.parent) for file in (*include, graph)]
+    return Graph(load_text(f"include: {text_of(files)}\n", origin, overrides))
+
+
+def job(cell: Cell, seed: int) -> Job:
+    """A run of the cell, for another process."""
+    return Job(
+        str(cell.graph.absolute()),
+        tuple(str(file.absolute()) for file in cell.include),
+        str(cell.origin.absolute()),
+        cell.overrides,
+        seed,
+    )
+
+
+def _key(graph: CheckedGraph, fingerprint: str, known: dict[str, str]) -> str:
+    """A hash of the flattened graph and of every file that a parameter names."""
+    digest = hashlib.sha256(f"{fingerprint}\n{graph.text}".encode())
+    for spec in graph.blocks:
+        module = getattr(spec.block_type, "__module__", "")
+        if not module.startswith(__package__.partition(".")[0] + "."):
+            digest.update(_content(_source(spec.block_type), known).encode())
+        for name in _texts(spec.params.model_dump(mode="json")):
+            if len(name) < 200 and "\n" not in name and "\0" not in name:
+                digest.update(_content(spec.folder / name, known).encode())
+    return digest.hexdigest()[:24]
+
+
+def _source(block_type: type) -> Path:
+    """The file that somebody else's block is written in."""
+    import sys
+
+    module = sys.modules.get(block_type.__module__)
+    return Path(getattr(module, "__file__", None) or "nowhere")
+
+
+def _content(path: Path, known: dict[str, str]) -> str:
+    """The hash of a file's content; empty where there is no such file."""
+    shown = str(path)
+    if shown not in known:
+        is_file = bool(path.name) and path.is_file()
+        known[shown] = hashlib.sha256(path.read_bytes()).hexdigest() if is_file else ""
+    return known[shown]
+
+
+def _texts(value: Any) -> Iterator[str]:
+    if isinstance(value, str):
+        yield value
+    elif isinstance(value, Mapping):
+        for item in value.values():
+            yield from _texts(item)
+    elif isinstance(value, list):
+        for item in value:
+            yield from _texts(item)

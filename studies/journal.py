@@ -1,0 +1,96 @@
+"""Finished runs, kept one line each: what is written survives the death of the process.
+
+The file is JSON lines, only ever appended to. A line that a kill cut off is not a run.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from types import TracebackType
+from typing import IO, Any, Self
+
+from ..runtime.errors import AloftError
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What came of one run. ``error`` is empty unless something broke; a fall is no error."""
+
+    success: bool
+    reason: str
+    run_hash: str = ""
+    metrics: dict[str, Any] = field(default_factory=dict)
+    error: str = ""
+    wall_time_s: float = 0.0
+
+
+class Journal:
+    """The runs in one file, by key; a context that adds to it.
+
+    Raises:
+        AloftError: another process adds to the same file, or it cannot be written.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.outcomes: dict[str, Outcome] = {}
+        self._file: IO[bytes] | None = None
+
+    def __enter__(self) -> Self:
+        try:
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+            self._file = self.path.open("a+b")
+            self._lock(self._file)
+            self._read(self._file)
+        except OSError as error:
+            raise AloftError(f"cannot write {self.path}: {error.strerror or error}") from error
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        if self._file is not None:
+            self._file.close()
+
+    def add(self, key: str, outcome: Outcome) -> None:
+        """Keep a run."""
+        assert self._file is not None
+        line = json.dumps({"key": key, **asdict(outcome)}, allow_nan=False)
+        self._file.write(line.encode() + b"\n")
+        self._file.flush()  # to the system, which outlives this process
+        self.outcomes[key] = outcome
+
+    def _lock(self, file: IO[bytes]) -> None:
+        try:
+            import fcntl
+        except ImportError:  # no such thing here: two at once are then the user's affair
+            return
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise AloftError(
+                f"another process works on {self.path.parent}; wait for it or give another --out"
+            ) from None
+
+    def _read(self, file: IO[bytes]) -> None:
+        file.seek(0)
+        whole = 0
+        for line in file:
+            if not line.endswith(b"\n"):
+                break
+            whole += len(line)
+            try:
+                data = json.loads(line)
+                key = data.pop("key")
+                self.outcomes[key] = Outcome(**data)
+            except (ValueError, KeyError, TypeError, AttributeError):
+                continue  # a damaged line is a run that is made again
+        file.seek(0, os.SEEK_END)
+        if file.tell() > whole:
+            file.truncate(whole)

@@ -1,0 +1,201 @@
+"""Reads a study's file: every mistake in it at once, as for graphs.
+
+The keys: ``graph`` or ``graphs``, ``include``, ``seeds``, ``title``, ``set``, ``arms``, ``grid``,
+``goals``, ``tune``, ``plots``; docs/studies.md explains them. What overrides mean to the graphs is
+checked by ``expansion``.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from ..runtime.loading.document import read_file
+from ..runtime.loading.nodes import Entry, ListNode, MapNode, Node, ScalarNode, plain, text_of
+from ..runtime.loading.problems import Code, LoadError, Problems, nearest
+from ..runtime.loading.written import unknown_key, wrong_kind
+from ..runtime.stages import Position
+from .axes import read_axes, read_sets
+from .ranges import read_range
+from .sections import Labels, read_goals, read_plots, read_seeds, read_tuning
+from .study import Arm, Range, Study, Task
+
+KEYS = (
+    "graph", "graphs", "include", "seeds", "title", "set", "arms", "grid", "goals", "tune", "plots",
+)  # fmt: skip
+ARM_KEYS = ("set", "tune")
+TASK_KEYS = ("graph", "set")
+_DECIDES = ("graph", "graphs", "include", "set", "arms", "grid", "tune")
+"""The sections that decide what tuning finds."""
+
+
+def read_study(path: Path) -> Study:
+    """The study in a file.
+
+    Raises:
+        LoadError: something is wrong with it; the text is the report of everything that is.
+    """
+    problems = Problems()
+    tree = read_file(path, str(path), problems, ("a study file", "graph, seeds, grid"))
+    study = _read(tree, path, problems) if tree is not None else None
+    if study is None or len(problems):
+        raise LoadError(problems.report(str(path)))
+    return study
+
+
+def _read(tree: MapNode, path: Path, problems: Problems) -> Study:
+    keys = {entry.key: entry for entry in tree if not entry.key.startswith("_")}
+    for entry in keys.values():
+        if entry.key not in KEYS:
+            unknown_key(entry, KEYS, "of a study file", problems)
+
+    def section(key: str) -> MapNode:
+        entry = keys.get(key)
+        if entry is None or isinstance(entry.value, MapNode):
+            return entry.value if entry else MapNode((), tree.where)  # type: ignore[return-value]
+        if not (isinstance(entry.value, ScalarNode) and entry.value.value is None):
+            wrong_kind(entry.value, repr(key), "a mapping", problems)
+        return MapNode((), entry.value.where)
+
+    tasks = _read_tasks(keys, path, problems)
+    sets = (read_sets(keys["set"], problems) or ()) if "set" in keys else ()
+    seeds: tuple[int, ...] = ()
+    if "seeds" in keys:
+        seeds = read_seeds(keys["seeds"].value, "seeds", problems)
+    else:
+        problems.add(
+            Code.MISSING_KEY, "the study does not say its seeds", Position(str(path), 1, 1),
+            expected="seeds, from 1000 on where results are reported", fix="seeds: 2000:2040",
+        )  # fmt: skip
+    common = _read_ranges(section("tune").get("ranges"), problems)
+    arms = tuple(_read_arm(entry, common, problems) for entry in section("arms"))
+    arms = arms or (Arm("default", (), common),)
+    axes = read_axes(section("grid"), problems)
+    labels = Labels(
+        {
+            "task": tuple(task.name for task in tasks),
+            "arm": tuple(arm.name for arm in arms),
+            **{axis.name: tuple(case.label for case in axis.cases) for axis in axes},
+        },
+        {axis.name: axis for axis in axes},
+    )
+    tuning = read_tuning(section("tune"), labels, problems) if "tune" in keys else None
+    if tuning is not None and not any(arm.ranges for arm in arms):
+        problems.add(
+            Code.MISSING_KEY, "there is nothing to tune", keys["tune"].key_where,
+            expected="ranges here, or 'tune' in an arm",
+            fix="ranges: {block.parameter: [low, high]}",
+        )  # fmt: skip
+    title = keys.get("title")
+    return Study(
+        path.stem,
+        path,
+        str(plain(title.value)) if title else path.stem.replace("_", " "),
+        tasks,
+        tuple(p for _, p in _files(keys.get("include"), path, problems)),
+        seeds,
+        sets,
+        arms,
+        axes,
+        read_goals(keys["goals"].value, labels, problems) if "goals" in keys else (),
+        tuning,
+        read_plots(section("plots"), labels, problems),
+        text_of({key: plain(keys[key].value) for key in _DECIDES if key in keys}),
+    )
+
+
+def _read_tasks(keys: dict[str, Entry], path: Path, problems: Problems) -> tuple[Task, ...]:
+    one, many = keys.get("graph"), keys.get("graphs")
+    if (one is None) == (many is None):
+        problems.add(
+            Code.MISSING_KEY if one is None else Code.DUPLICATE_KEY,
+            "the study names no graph" if one is None else "'graph' and 'graphs' are both there",
+            one.key_where if one else Position(str(path), 1, 1),
+            expected="graph: FILE, or graphs: {task: FILE}",
+            fix="" if one else "graph: ../jump.yaml",
+        )
+        return ()
+    if one is not None:
+        return tuple(Task(p.stem, p, node.where) for node, p in _files(one, path, problems))
+    assert many is not None
+    if not isinstance(many.value, MapNode):
+        found = _files(many, path, problems)
+        tasks = [Task(p.stem, p, node.where) for node, p in found]
+    else:
+        named = [_read_task(entry, path, problems) for entry in many.value]
+        tasks = [task for task in named if task is not None]
+    names: set[str] = set()
+    for task in tasks:
+        if task.name in names:
+            problems.add(
+                Code.DUPLICATE_KEY, f"two tasks are called {task.name!r}", task.where,
+                fix="name them: graphs: {first: FILE, second: FILE}",
+            )  # fmt: skip
+        names.add(task.name)
+    return tuple(tasks)
+
+
+def _read_task(entry: Entry, path: Path, problems: Problems) -> Task | None:
+    """``name: FILE`` or ``name: {graph: FILE, set: {...}}``."""
+    file = entry
+    sets: tuple[Entry, ...] = ()
+    if isinstance(entry.value, MapNode):
+        for item in entry.value:
+            if item.key not in TASK_KEYS:
+                unknown_key(item, TASK_KEYS, f"of task {entry.key!r}", problems)
+        graph, given = entry.value.get("graph"), entry.value.get("set")
+        if graph is None:
+            problems.add(
+                Code.MISSING_KEY, f"task {entry.key!r} names no graph", entry.key_where,
+                expected="graph", fix="graph: ../jump.yaml",
+            )  # fmt: skip
+            return None
+        file, sets = graph, (read_sets(given, problems) or ()) if given else ()
+    found = _files(file, path, problems)
+    return Task(entry.key, found[0][1], entry.key_where, sets) if found else None
+
+
+def _files(entry: Entry | None, path: Path, problems: Problems) -> list[tuple[Node, Path]]:
+    """The files that a key names, relative to the study's; those that are not there are noted."""
+    if entry is None:
+        return []
+    found = []
+    for node in entry.value.items if isinstance(entry.value, ListNode) else (entry.value,):
+        name = plain(node)
+        if not isinstance(name, str):
+            wrong_kind(node, repr(entry.key), "a file, relative to this one", problems)
+            continue
+        file = path.parent / name
+        if not file.is_file():
+            present = sorted(p.name for p in file.parent.glob("*.y*ml"))
+            near = tuple((Path(name).parent / n).as_posix() for n in nearest(file.name, present))
+            problems.add(
+                Code.FILE, f"there is no file {file}", node.where, at=entry.key, found=name,
+                expected="a file, relative to this one", nearest=near, fix=near[0] if near else "",
+            )  # fmt: skip
+            continue
+        found.append((node, file))
+    return found
+
+
+def _read_ranges(entry: Entry | None, problems: Problems) -> tuple[Range, ...]:
+    if entry is None:
+        return ()
+    if not isinstance(entry.value, MapNode):
+        wrong_kind(entry.value, repr(entry.key), "{block.parameter: [low, high]}", problems)
+        return ()
+    found = [read_range(item, problems) for item in entry.value if not item.key.startswith("_")]
+    return tuple(each for each in found if each is not None)
+
+
+def _read_arm(entry: Entry, common: tuple[Range, ...], problems: Problems) -> Arm:
+    """``name: {block.parameter: value}``, or ``name: {set: {...}, tune: {...}}``."""
+    node = entry.value
+    if isinstance(node, MapNode) and any(node.get(key) for key in ARM_KEYS):
+        for item in node:
+            if item.key not in ARM_KEYS:
+                unknown_key(item, ARM_KEYS, f"of arm {entry.key!r}", problems)
+        given, own = node.get("set"), node.get("tune")
+        sets = (read_sets(given, problems) or ()) if given else ()
+        ranges = _read_ranges(own, problems) if own else common
+        return Arm(entry.key, sets, ranges)
+    return Arm(entry.key, read_sets(entry, problems) or (), common)

@@ -1,0 +1,161 @@
+"""What a study is once its file has been read: plain data, with the place of every override.
+
+study -> cells (one graph with its overrides, see ``expansion``) -> runs (a cell and a seed).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from ..runtime.loading.nodes import Entry
+from ..runtime.stages import Position
+
+FIRST_REPORT_SEED = 1000
+"""Gains are tuned on the seeds below, and reported on those from here on."""
+
+Coordinate = float | int | str | bool
+"""Where a run lies on an axis."""
+
+
+@dataclass(frozen=True)
+class Case:
+    """One value of an axis: its text, the value that goes into the table, and what it sets."""
+
+    label: str
+    value: Coordinate
+    sets: tuple[Entry, ...]
+
+
+@dataclass(frozen=True)
+class Axis:
+    """One dimension of the grid; ``column`` is its name in the table, with the unit."""
+
+    name: str
+    column: str
+    unit: str
+    cases: tuple[Case, ...]
+    where: Position
+
+
+@dataclass(frozen=True)
+class Range:
+    """Where a tuned parameter may lie.
+
+    ``bounds`` has (low, high) for every number of the value, uniform or, with ``log``, uniform in
+    the logarithm; or ``choices`` are all that it may be.
+    """
+
+    key: str
+    where: Position
+    bounds: tuple[tuple[float, float], ...] = ()
+    scalar: bool = True
+    unit: str = ""
+    log: bool = False
+    choices: tuple[object, ...] = ()
+
+
+@dataclass(frozen=True)
+class Arm:
+    """One of the ways that are compared, and which of its parameters may be tuned."""
+
+    name: str
+    sets: tuple[Entry, ...] = ()
+    ranges: tuple[Range, ...] = ()
+
+
+@dataclass(frozen=True)
+class Task:
+    """One graph."""
+
+    name: str
+    path: Path
+    where: Position
+    sets: tuple[Entry, ...] = ()
+
+
+@dataclass(frozen=True)
+class Filter:
+    """The labels that a cell may have on some axes, ``task`` and ``arm`` among them."""
+
+    labels: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+
+    def takes(self, labels: Mapping[str, str]) -> bool:
+        """Whether a cell with these labels is meant."""
+        return all(labels[axis] in allowed for axis, allowed in self.labels.items())
+
+
+@dataclass(frozen=True)
+class Goal:
+    """The success rate that the cells of a filter should reach."""
+
+    rate: float
+    cells: Filter = Filter()
+
+
+@dataclass(frozen=True)
+class Tuning:
+    """Random search with the same effort for every arm."""
+
+    seeds: tuple[int, ...]
+    draws: int
+    seed: int = 0
+    cells: Filter = Filter()
+    sets: tuple[Entry, ...] = ()
+    least: str = ""
+    """Between draws of the same number of successes, the one whose mean of this metric is less."""
+
+
+@dataclass(frozen=True)
+class Plot:
+    """One picture; see ``plots``."""
+
+    name: str
+    kind: str
+    title: str = ""
+    x: str = ""
+    y: str = "rate"
+    lines: str = "arm"
+    panels: str = ""
+    angle: str = ""
+    radius: str = ""
+    level: float = 0.95
+    cells: Filter = Filter()
+
+
+@dataclass(frozen=True)
+class Study:
+    """Everything that a study's file says."""
+
+    name: str
+    path: Path
+    title: str
+    tasks: tuple[Task, ...]
+    include: tuple[Path, ...]
+    seeds: tuple[int, ...]
+    sets: tuple[Entry, ...] = ()
+    arms: tuple[Arm, ...] = (Arm("default"),)
+    axes: tuple[Axis, ...] = ()
+    goals: tuple[Goal, ...] = ()
+    tuning: Tuning | None = None
+    plots: tuple[Plot, ...] = ()
+    definition: str = ""
+    """What decides the outcome of tuning, as text."""
+
+    @property
+    def axis_names(self) -> tuple[str, ...]:
+        """Every name that a filter or a plot may use."""
+        return ("task", "arm", *(axis.name for axis in self.axes))
+
+    def labels_of(self, axis: str) -> tuple[str, ...]:
+        """The labels of an axis, in order."""
+        if axis == "task":
+            return tuple(task.name for task in self.tasks)
+        if axis == "arm":
+            return tuple(arm.name for arm in self.arms)
+        return tuple(c.label for a in self.axes if a.name == axis for c in a.cases)
+
+    def axis(self, name: str) -> Axis | None:
+        """The axis of the grid of that name."""
+        return next((axis for axis in self.axes if axis.name == name), None)

@@ -1,0 +1,96 @@
+"""``aloft params``: a running graph's parameters, from another process."""
+
+import json
+import signal
+import subprocess
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+Call = Callable[..., subprocess.CompletedProcess[str]]
+CallJson = Callable[..., dict[str, Any]]
+Start = Callable[..., subprocess.Popen[str]]
+
+GRAPH = """
+rate: 200 Hz
+clock: {kind: paced}
+blocks:
+  wave: {use: runtime.SineWave, with: {n: 2}}
+  gain: {use: runtime.Gain, with: {n: 2}, in: {u: wave.y}}
+"""
+
+
+@pytest.fixture
+def sockets(folder: Path, tmp_path_factory: pytest.TempPathFactory,
+            monkeypatch: pytest.MonkeyPatch) -> Path:  # fmt: skip
+    """Where this test's sockets are: a short path, as theirs must be."""
+    path = tmp_path_factory.mktemp("run")
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(path))
+    (folder / "tune.yaml").write_text(GRAPH)
+    return path
+
+
+@pytest.fixture
+def running(sockets: Path, start: Start) -> Iterator[subprocess.Popen[str]]:
+    """A paced run called ``tune``."""
+    process = start("run", "tune.yaml", "--no-record", "--json")
+    path = sockets / "aloft" / "tune.sock"
+    end = time.monotonic() + 30
+    while not path.exists() and process.poll() is None and time.monotonic() < end:
+        time.sleep(0.02)
+    yield process
+    if process.poll() is None:
+        process.send_signal(signal.SIGINT)
+        process.communicate(timeout=30)
+
+
+def test_list_get_set(running: subprocess.Popen[str], call: Call, call_json: CallJson) -> None:
+    listed = call_json("params", "list")
+    assert listed["graph"] == "tune"
+    assert [entry["path"] for entry in listed["parameters"]] == [
+        "wave.amplitude", "wave.frequency", "wave.phase", "wave.offset", "gain.gain",
+    ]  # fmt: skip
+    table = call("params", "list", "--all").stdout
+    assert "wave.n" in table and "oscillations per second" in table
+    assert call("params", "get", "gain.gain").stdout == "1.0\n"
+    done = call("params", "set", "gain.gain=2", "wave.frequency=0.0005 kHz", "--run", "tune").stdout
+    first, second = done.splitlines()
+    assert first.endswith("gain.gain 1.0 -> 2.0")
+    assert second.endswith("wave.frequency 1.0 -> 0.5")
+    assert first.partition(":")[0] == second.partition(":")[0]
+    values = call_json("params", "get", "gain.gain", "wave.frequency")["values"]
+    assert values == {"gain.gain": 2.0, "wave.frequency": 0.5}
+    running.send_signal(signal.SIGINT)
+    output, _ = running.communicate(timeout=30)
+    changes = json.loads(output)["parameter_changes"]
+    assert [(c["path"], c["old"], c["new"]) for c in changes] == [
+        ("gain.gain", 1.0, 2.0), ("wave.frequency", 1.0, 0.5),
+    ]  # fmt: skip
+
+
+def test_what_is_refused(running: subprocess.Popen[str], call: Call, call_json: CallJson) -> None:
+    errors = call("params", "set", "gain.gain=high", "gain.n=3", "gian.gain=1", code=2).stderr
+    assert "gain.gain cannot be high" in errors
+    assert "gain.n cannot be changed while the graph runs" in errors
+    assert "there is no block 'gian' in the running graph" in errors
+    assert call("params", "get", "gain.gain").stdout == "1.0\n"
+    reason = call_json("params", "get", "gain.gian", code=2)["reason"]
+    assert reason == "there is no parameter 'gain.gian'; the nearest is gain.gain"
+    reason = call_json("params", "list", "--run", "other", code=2)["reason"]
+    assert reason == "no running graph is called 'other'; there is tune"
+    assert call("run", "tune.yaml", "--params", "tune", code=2).stderr.startswith(
+        "error: another run answers at"
+    )
+
+
+def test_nothing_runs(sockets: Path, call: Call, call_json: CallJson) -> None:
+    reason = call_json("params", "list", code=2)["reason"]
+    assert reason.startswith("no graph is running whose parameters can be changed")
+    (sockets / "aloft" / "dead.sock").touch()  # left behind by a run that was killed
+    assert call_json("params", "list", code=2)["reason"] == reason
+    result = call_json("run", "count.yaml", "--no-record", "--params", "dead")
+    assert result["success"] and not (sockets / "aloft" / "dead.sock").exists()
+    assert "cannot name a run" in call("run", "count.yaml", "--params", "a/b", code=2).stderr

@@ -1,0 +1,125 @@
+"""``aloft plan --library`` with real processes: the same bytes from any number of them, on a cluster
+too, and nothing lost however it ends."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from aloft.blocks.planner.plan import read_plan
+
+CallJson = Callable[..., dict[str, Any]]
+Start = Callable[..., subprocess.Popen[str]]
+
+CLUSTER = """
+import sys
+from distributed import LocalCluster
+if __name__ == "__main__":
+    with LocalCluster(
+        n_workers=2, threads_per_worker=1, host="127.0.0.1", dashboard_address=None,
+        worker_dashboard_address=None, silence_logs=50,
+    ) as cluster:
+        print(cluster.scheduler_address, flush=True)
+        sys.stdin.read()
+"""
+
+
+def write_grid(folder: Path, count: int = 2) -> None:
+    (folder / "grid.yaml").write_text(
+        f"task: {{friction: 0.45}}\ngrid:\n  rise: {{from: 8 cm, to: 9 cm, count: {count}}}\n"
+    )
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    return {path.name: path.read_bytes() for path in folder.glob("*.*")}
+
+
+def children(pid: int) -> list[int]:
+    """The worker processes of a process: its children that are not the tracker of resources."""
+    listed = Path(f"/proc/{pid}/task/{pid}/children").read_text().split()
+    return [c for c in map(int, listed) if b"spawn_main" in Path(f"/proc/{c}/cmdline").read_bytes()]
+
+
+def wait_for(condition: Callable[[], Any]) -> Any:
+    end = time.monotonic() + 60.0
+    while not (found := condition()):
+        assert time.monotonic() < end, "it never happened"
+        time.sleep(0.01)
+    return found
+
+
+def test_any_number_of_workers_and_a_cluster_make_the_same_bytes(
+    folder: Path, call_json: CallJson
+) -> None:
+    write_grid(folder)
+    for workers in ("1", "3"):
+        result = call_json(
+            "plan", "--library", "grid.yaml", "--keep", workers, "--workers", workers
+        )
+        assert result["counts"] == {"planned": 2, "kept": 0, "failed": 0, "known": 0}
+    one = contents(folder / "1")
+    assert len(one) == 2
+    assert one == contents(folder / "3")
+    pytest.importorskip("distributed")
+    (folder / "cluster.py").write_text(CLUSTER)
+    with subprocess.Popen(
+        [sys.executable, "cluster.py"], text=True,
+        stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
+    ) as cluster:  # fmt: skip
+        assert cluster.stdout is not None
+        address = cluster.stdout.readline().strip()
+        call_json("plan", "--library", "grid.yaml", "--keep", "dask", "--cluster", address)
+        cluster.terminate()
+    assert one == contents(folder / "dask")
+
+
+@pytest.mark.skipif(not Path("/proc/self/task").is_dir(), reason="finds processes in /proc")
+def test_nothing_is_lost_when_workers_and_the_whole_are_killed(
+    folder: Path, call_json: CallJson, start: Start
+) -> None:
+    write_grid(folder, count=6)
+    arguments = ("plan", "--library", "grid.yaml", "--keep", "kept", "--workers", "2")
+    whole = start(*arguments)
+    kept = folder / "kept"
+    wait_for(lambda: list(kept.glob("*.npz")))
+    os.kill(wait_for(lambda: children(whole.pid))[0], signal.SIGKILL)
+    wait_for(lambda: len(list(kept.glob("*.npz"))) > 1)
+    whole.kill()
+    whole.communicate(timeout=30)
+    there = contents(kept)
+    assert 1 < len(there) < 6
+    for name in there:
+        assert read_plan(kept / name).valid
+    result = call_json(*arguments)
+    assert result["counts"]["kept"] >= len(there)
+    assert result["counts"]["kept"] + result["counts"]["planned"] == 6
+    assert len(contents(kept)) == 6
+
+
+def test_a_signal_stops_a_grid_and_says_what_is_done(folder: Path, start: Start) -> None:
+    write_grid(folder, count=6)
+    whole = start("plan", "--library", "grid.yaml", "--keep", "kept", "--workers", "1", "--json")
+    wait_for(lambda: list((folder / "kept").glob("*.npz")))
+    whole.send_signal(signal.SIGINT)
+    output, errors = whole.communicate(timeout=30)
+    assert whole.returncode == 130
+    result = json.loads(output)
+    assert result["success"] is False
+    assert result["reason"].startswith("stopped by SIGINT after ")
+    assert "the same command goes on from here" in result["reason"]
+    assert "Traceback" not in errors
+
+
+def test_no_cluster_is_one_clear_error(folder: Path, call_json: CallJson) -> None:
+    pytest.importorskip("distributed")
+    write_grid(folder)
+    arguments = ("--keep", "kept", "--cluster", "nonsense://here")
+    result = call_json("plan", "--library", "grid.yaml", *arguments, code=2)
+    assert result["reason"].startswith("there is no Dask scheduler at 'nonsense://here'")

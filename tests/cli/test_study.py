@@ -1,0 +1,151 @@
+"""``aloft study``: rows, table, goals, exit codes, resuming after a kill, workers."""
+
+import json
+import os
+import signal
+import subprocess
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from pyarrow import parquet
+
+Call = Callable[..., subprocess.CompletedProcess[str]]
+CallJson = Callable[..., dict[str, Any]]
+Start = Callable[..., subprocess.Popen[str]]
+
+STUDY = """
+graph: count.yaml
+seeds: 1000:1004
+arms: {low: {}, high: {counter.goal: 1101}}
+grid: {stop: {counter.stop_at: [50, 100], shown: [0.5 s, 1 s]}}
+goals: [{rate: 0.9, where: {arm: low}}, {rate: 0.5, where: {arm: high}}]
+"""
+
+
+@pytest.fixture
+def study(folder: Path) -> Path:
+    path = folder / "grid.yaml"
+    path.write_text(STUDY)
+    return path
+
+
+def table_bytes(path: Path, folder: Path) -> bytes:
+    """The table's file without the times that runs took."""
+    table = parquet.read_table(path).drop_columns(["wall_time_s"])
+    parquet.write_table(table, folder / "without.parquet")
+    return (folder / "without.parquet").read_bytes()
+
+
+def test_rows_goals_and_table(study: Path, folder: Path, call_json: CallJson) -> None:
+    result = call_json("study", "grid.yaml", "--workers", "1")
+    assert result["success"] is True
+    assert result["reason"] == "14 of 16 runs succeeded; 4 of 4 goals met"
+    assert result["seeds"] == [1000, 1001, 1002, 1003] and result["tuning_seeds"] == []
+    last = result["rows"][-1]
+    assert {"task": "count", "arm": "high", "stop_s": 1.0}.items() <= last.items()
+    assert (last["n"], last["successes"], last["rate"], last["errors"]) == (4, 2, 0.5, 0)
+    assert (last["goal"], last["met"], last["reasons"]) == (0.5, True, {"counted too far": 2})
+    assert last["ci_low"] == pytest.approx(0.15004, abs=1e-4)
+    assert last["ci_high"] == pytest.approx(0.84996, abs=1e-4)
+    assert last["metrics"]["counter.last_count"]["median"] == 1101.5
+    assert json.loads((folder / "results/grid/summary.json").read_text()) == result
+    table = parquet.read_table(folder / "results/grid/runs.parquet")
+    assert table.num_rows == 16
+    assert table.column_names == [
+        "task", "arm", "stop_s", "seed", "tuning_seed", "success", "reason", "error", "run_hash",
+        "counter.last_count", "double.last_count", "wall_time_s",
+    ]  # fmt: skip
+    rows = table.to_pylist()
+    assert [row["seed"] for row in rows[:5]] == [1000, 1001, 1002, 1003, 1000]
+    assert rows[0]["counter.last_count"] == 1051.0 and len(rows[0]["run_hash"]) == 32
+
+
+def test_a_missed_goal_a_broken_run_and_tuning_seeds(
+    study: Path, call: Call, call_json: CallJson
+) -> None:
+    study.write_text(STUDY.replace("0.5, where", "0.6, where"))
+    missed = call_json("study", "grid.yaml", code=1)
+    assert missed["success"] is False and missed["rows"][-1]["met"] is False
+    study.write_text(STUDY.replace("stop_at: [50", "fail_at: [50").replace("1004", "1001"))
+    broken = call_json("study", "grid.yaml", code=3)
+    assert broken["reason"].endswith("2 runs broke")
+    assert "the spring broke" in next(iter(broken["rows"][0]["reasons"]))
+    study.write_text(STUDY)
+    quick = call("study", "grid.yaml", "--seeds", "999:1001")
+    assert "1 of 2 seeds are tuning seeds (below 1000): no result to report" in quick.stderr
+    assert "56.6%" not in quick.stdout and "34.2% to 100.0%" in quick.stdout
+
+
+def test_a_wrong_study_is_refused_before_anything_runs(
+    study: Path, folder: Path, call: Call, call_json: CallJson
+) -> None:
+    assert call_json("study", "grid.yaml", "--dry-run")["runs"] == 16
+    study.write_text(STUDY.replace("counter.goal", "counter.gaol"))
+    result = call_json("study", "grid.yaml", code=2)
+    assert result["problems"][0]["nearest"] == ["goal"]
+    assert (result["problems"][0]["file"], result["problems"][0]["line"]) == ("grid.yaml", 4)
+    assert "grid.yaml:4:24" in call("study", "grid.yaml", code=2).stderr
+    assert not (folder / "results").exists()
+
+
+def test_killed_and_resumed_with_nothing_lost_or_made_twice(
+    study: Path, folder: Path, call_json: CallJson, start: Start
+) -> None:
+    study.write_text(STUDY.replace("1000:1004", "1000:1010"))
+    journal = folder / "results" / "grid" / "runs.jsonl"
+    process = start("study", "grid.yaml", "--workers", "1")
+    end = time.monotonic() + 60
+    while time.monotonic() < end and process.poll() is None:
+        if journal.is_file() and journal.read_bytes().count(b"\n") >= 3:
+            break
+        time.sleep(0.01)
+    os.kill(process.pid, signal.SIGKILL)
+    process.communicate(timeout=60)
+    # as if the kill had come in the middle of a line
+    kept = journal.read_bytes().rpartition(b"\n")[0] + b"\n"
+    journal.write_bytes(kept + kept[:40])
+    before = kept.count(b"\n")
+    assert 3 <= before < 40
+    result = call_json("study", "grid.yaml", "--workers", "2", code=1)
+    assert result["n"] == 40
+    lines = journal.read_text().splitlines()
+    assert len(lines) == 40 == len({json.loads(line)["key"] for line in lines})
+    assert journal.read_bytes().startswith(kept)
+    again = call_json("study", "grid.yaml", "--out", "fresh", "--workers", "1", code=1)
+    assert {**again, "table": ""} == {**result, "table": ""}
+    first, second = (folder / name / "runs.parquet" for name in ("results/grid", "fresh"))
+    assert table_bytes(first, folder) == table_bytes(second, folder)
+    assert table_bytes(first, folder) != table_bytes(first, folder)[:-1]
+
+
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_a_signal_stops_it_cleanly(
+    study: Path, folder: Path, start: Start, number: signal.Signals, code: int
+) -> None:
+    study.write_text(STUDY.replace("1000:1004", "1000:1400"))
+    process = start("study", "grid.yaml", "--workers", "1", "--json")
+    journal = folder / "results" / "grid" / "runs.jsonl"
+    end = time.monotonic() + 60
+    while time.monotonic() < end and process.poll() is None:
+        if journal.is_file() and journal.stat().st_size:
+            break
+        time.sleep(0.01)
+    process.send_signal(number)
+    output, errors = process.communicate(timeout=60)
+    assert process.returncode == code, errors
+    said = json.loads(output)
+    assert said["done"] == journal.read_text().count("\n")
+    assert said["reason"].startswith(f"stopped by {number.name} after {said['done']} of 1600 runs")
+
+
+def test_two_at_once_do_not_share_a_folder(study: Path, folder: Path, call: Call) -> None:
+    import fcntl
+
+    (folder / "results" / "grid").mkdir(parents=True)
+    with (folder / "results" / "grid" / "runs.jsonl").open("ab") as held:
+        fcntl.flock(held, fcntl.LOCK_EX)
+        text = call("study", "grid.yaml", code=2).stderr
+    assert "another process works on results/grid; wait for it or give another --out" in text

@@ -1,0 +1,101 @@
+"""What is wrong with a study's file is reported at once, with places and fixes."""
+
+from pathlib import Path
+
+import pytest
+
+from aloft.runtime.loading import LoadError
+from aloft.studies.reading import read_study
+
+
+def report(folder: Path, text: str) -> str:
+    (folder / "wrong.yaml").write_text(text)
+    with pytest.raises(LoadError) as caught:
+        read_study(Path("wrong.yaml"))
+    return str(caught.value)
+
+
+def test_all_mistakes_at_once(folder: Path) -> None:
+    text = report(
+        folder,
+        """graph: cuont.yaml
+sedes: 1
+seeds: 5:1
+arms: {a: {set: {}, tuen: {}}}
+grid:
+  seed: {a.b: [1]}
+  flat: [1, 2]
+  mixed: {a.b: [1, 2], c.d: [1]}
+  twice: {a.b: [5 cm, 50 mm]}
+  nowhere: {a.b: {from: 1, to: 0, step: 1}}
+  good: {e.f: [1, 2]}
+goals:
+  - {where: {good: 1}}
+  - {rate: 95, where: {god: 1, good: 3}}
+tune: {seeds: 990:1010, ranges: {a.b: [2, 1], c.d: {form: 1}}}
+plots:
+  first: {kind: line}
+  second: {kind: polar, angle: good, level: 2}
+""",
+    )
+    for line in (
+        "wrong.yaml:1:8: file: there is no file cuont.yaml",
+        "nearest    count.yaml",
+        "wrong.yaml:2:1: unknown-key: 'sedes' is not a key of a study file",
+        "fix        seeds: 1",
+        "wrong.yaml:3:8: bad-value: seeds '5:1' are none, one of them twice, or below zero",
+        "wrong.yaml:4:21: unknown-key: 'tuen' is not a key of arm 'a'",
+        "wrong.yaml:6:3: bad-value: 'seed' cannot name an axis",
+        "wrong.yaml:7:9: wrong-kind: axis 'flat' cannot be a list",
+        "wrong.yaml:8:24: bad-value: the values of axis 'mixed' do not go side by side",
+        "expected   2 values, as a.b has",
+        "wrong.yaml:9:23: duplicate-key: 5 cm is there twice on axis 'twice'",
+        "wrong.yaml:10:18: bad-value: 1 does not lead from 1 to 0",
+        "wrong.yaml:13:5: missing-key: the goal has no rate",
+        "wrong.yaml:14:12: bad-value: rate cannot be the number 95",
+        "wrong.yaml:14:24: unknown-key: 'god' is not a key of 'where': no axis",
+        "wrong.yaml:14:38: bad-value: axis 'good' has no 3",
+        "missing-key: 'tune' does not say its draws",
+        "wrong.yaml:15:15: bad-value: seeds from 1000 on are for reports and cannot be tuned on",
+        "wrong.yaml:15:39: bad-value: [2, 1] is no range for a.b",
+        "'form' is not a key of a range",
+        "wrong.yaml:17:17: unknown-reference: 'kind' cannot be the text 'line'",
+        "fix        kind: lines",
+        "plot 'second' does not say its radius",
+    ):
+        assert line in text
+
+
+def test_two_axes_may_not_set_one_parameter(folder: Path) -> None:
+    text = report(
+        folder,
+        "graph: count.yaml\nseeds: 1\ngrid: {a: {x.y: [1]}, b: {cases: {c: {x.y: 2}}}}\n",
+    )
+    assert "wrong.yaml:3:23: duplicate-key: x.y is set by two axes, 'a' and 'b'" in text
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("seeds: 1\n", "wrong.yaml:1:1: missing-key: the study names no graph"),
+        ("graph: count.yaml\n", "wrong.yaml:1:1: missing-key: the study does not say its seeds"),
+        ("- 1\n", "wrong.yaml:1:1: wrong-kind: a study file is a mapping"),
+        ("graph: [\n", "wrong.yaml:"),
+        ("seeds: 1\ngraphs: [count.yaml, ./count.yaml]\n", "two tasks are called 'count'"),
+        ("seeds: 1\ngraphs: {a: {set: {}}}\n", "wrong.yaml:2:10: missing-key: task 'a' names no"),
+        ("seeds: 1\ngraph: count.yaml\ntune: {seeds: 1, draws: 2}\n", "there is nothing to tune"),
+    ],
+)  # fmt: skip
+def test_one_mistake(folder: Path, text: str, expected: str) -> None:
+    assert expected in report(folder, text)
+
+
+def test_goals_may_name_values_in_other_units(folder: Path) -> None:
+    (folder / "right.yaml").write_text(
+        "graph: count.yaml\nseeds: [4, 2]\ngrid: {d: {counter.goal: [5 cm, 10 cm]}}\n"
+        "goals: [{rate: 90 %}, {rate: 0.5, where: {d: [50 mm]}}]\n"
+    )
+    found = read_study(Path("right.yaml"))
+    assert found.seeds == (4, 2)
+    assert [goal.rate for goal in found.goals] == [0.9, 0.5]
+    assert found.goals[1].cells.labels == {"d": ("5 cm",)}
