@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from ..runtime.errors import ExitCode
+from ..runtime.errors import AloftError, ExitCode
 from .output import console, errors_reported, print_json, print_warning, say
-from .study_output import print_rows, study_json
+from .study_output import print_rows, print_tuned, study_json, tuned_json
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -58,7 +58,14 @@ def study(
         found = read_study(file)
         chosen = parse_seeds(seeds) if seeds else list(found.seeds)
         folder = out or Path("results") / found.name
-        code = run_study(found, chosen, folder, workers, cluster, screen, as_json, dry_run=dry_run)
+        if tune:
+            if seeds:
+                raise AloftError("--seeds is for runs; tuning has its own in the study's 'tune'")
+            code = tune_study(found, folder, workers, cluster, screen, as_json)
+        else:
+            code = run_study(
+                found, chosen, folder, workers, cluster, screen, as_json, dry_run=dry_run
+            )
     raise typer.Exit(code)
 
 
@@ -75,11 +82,18 @@ def run_study(
 ) -> ExitCode:
     """Make the study's runs; write and print what came of them."""
     from ..studies.execution import Run
+    from ..studies.expansion import cells as expand
     from ..studies.journal import Journal
+    from ..studies.plots import write_plots
     from ..studies.summary import summarise
     from ..studies.table import make_table, write_table
+    from ..studies.tuning import extreme_cells, read_tuned, tuned_path, tuning_cells
 
-    cells = check_cells(found, screen)
+    tuned = {} if dry_run and not tuned_path(found).is_file() else read_tuned(found)
+    cells = check_cells(found, list(expand(found, tuned)), screen)
+    if dry_run and found.tuning is not None:
+        tried = tuning_cells(found)
+        check_cells(found, [*tried, *extreme_cells(found, tried)], screen)
     runs = [Run(cell, seed) for cell in cells for seed in seeds]
     if dry_run:
         reason = f"{len(cells)} cells and {len(seeds)} seeds: {len(runs)} runs; no problems"
@@ -95,9 +109,14 @@ def run_study(
     rows = summarise(found, done)
     write_table(folder / "runs.parquet", make_table(done))
     result = study_json(found, rows, seeds, folder)
+    plots = write_plots(found, done, rows, folder)
+    result["tuned"] = tuned
+    result["plots"] = {name: str(path) for name, path in plots.items()}
     (folder / "summary.json").write_text(json_text(result), encoding="utf-8")
     print_rows(screen, found, rows, seeds)
     say(screen, f"table: {folder / 'runs.parquet'}; summary: {folder / 'summary.json'}")
+    for path in plots.values():
+        say(screen, f"picture: {path}")
     if as_json:
         print_json(result)
     elif result["success"]:
@@ -110,13 +129,43 @@ def run_study(
     return ExitCode.NOT_SUCCESSFUL if missed else ExitCode.SUCCESS
 
 
-def check_cells(found: Study, screen: Console) -> list[Cell]:
-    """All cells of the study, each checked as ``aloft check`` does."""
-    from ..studies.expansion import cells, checked_cells
+def tune_study(
+    found: Study, folder: Path, workers: int, cluster: str, screen: Console, as_json: bool
+) -> ExitCode:
+    """Search for every arm's best parameters; write and print them."""
+    from ..studies import tuning
+    from ..studies.journal import Journal
+
+    if found.tuning is None:
+        raise AloftError(f"{found.path} has no section 'tune'")
+    tried = tuning.tuning_cells(found)
+    if not tried:
+        raise AloftError(f"{found.path}: 'where' of 'tune' leaves nothing to run")
+    count = len(tried)
+    checked = check_cells(found, [*tried, *tuning.extreme_cells(found, tried)], screen)[:count]
+    planned = tuning.tuning_runs(found, checked)
+    runs = [run for _, _, run in planned]
+    with Journal(folder / "tuning.jsonl") as journal:
+        stopped = make_all(runs, journal, workers, cluster, screen, f"tuning {found.name}")
+        if isinstance(stopped, signal.Signals):
+            return report_stop(stopped, runs, journal, screen, as_json)
+    done = [(arm, draw, run) for (arm, draw, _), run in zip(planned, stopped, strict=True)]
+    best = tuning.best_draws(found, done)
+    path = tuning.write_tuned(found, best)
+    print_tuned(screen, found, best)
+    say(screen, f"tuned parameters: {path}")
+    broken = sum(bool(run.outcome and run.outcome.error) for run in stopped)
+    if as_json:
+        print_json(tuned_json(found, best, path, broken))
+    return ExitCode.SUCCESS
+
+
+def check_cells(found: Study, expanded: Sequence[Cell], screen: Console) -> list[Cell]:
+    """The cells, each checked as ``aloft check`` does."""
+    from ..studies.expansion import checked_cells
     from ..studies.fingerprint import code_fingerprint
     from .progress import progress_bar
 
-    expanded = list(cells(found))
     with progress_bar(screen, f"checking {len(expanded)} cells", len(expanded)) as (bar, task):
         return checked_cells(expanded, found, code_fingerprint(), lambda: bar.advance(task))
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,6 +13,7 @@ if TYPE_CHECKING:
 
     from ..studies.study import Study
     from ..studies.summary import Row
+    from ..studies.tuning import Draw
 
 MOST_ROWS = 60
 
@@ -82,3 +83,40 @@ def print_rows(screen: Console, study: Study, rows: Sequence[Row], seeds: Sequen
     screen.print(table(study.title, columns, cells))
     if len(rows) > MOST_ROWS:
         screen.print(f"... and {len(rows) - MOST_ROWS} more cells, in the summary")
+
+
+def tuned_json(study: Study, best: Mapping[str, Draw], path: Path, broken: int) -> dict[str, Any]:
+    """What tuning found, as one object."""
+    assert study.tuning is not None
+    return {
+        "success": True,
+        "reason": f"tuned {len(best)} arms",
+        "study": study.name,
+        "seeds": list(study.tuning.seeds),
+        "draws_per_arm": study.tuning.draws,
+        "errors": broken,
+        "file": str(path),
+        "arms": {
+            arm: {"draw": d.number, "successes": d.successes, "n": d.n, "set": dict(d.values)}
+            for arm, d in best.items()
+        },
+    }
+
+
+def print_tuned(screen: Console, study: Study, best: Mapping[str, Draw]) -> None:
+    """Print the best draw of every arm."""
+    from ..runtime.loading.nodes import text_of
+
+    assert study.tuning is not None
+    cells = [
+        (
+            arm,
+            str(found.number),
+            f"{found.successes}/{found.n}",
+            ", ".join(f"{key} {text_of(value)}" for key, value in found.values.items())
+            or "as written",
+        )
+        for arm, found in best.items()
+    ]
+    title = f"best of {study.tuning.draws} draws for every arm"
+    screen.print(table(title, ("arm", ">draw", ">succeed", "parameters"), cells))

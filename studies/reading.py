@@ -10,7 +10,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from ..runtime.loading.document import read_file
-from ..runtime.loading.nodes import Entry, ListNode, MapNode, Node, ScalarNode, plain, text_of
+from ..runtime.loading.nodes import Entry, ListNode, MapNode, Node, ScalarNode, plain
 from ..runtime.loading.problems import Code, LoadError, Problems, nearest
 from ..runtime.loading.written import unknown_key, wrong_kind
 from ..runtime.stages import Position
@@ -24,8 +24,6 @@ KEYS = (
 )  # fmt: skip
 ARM_KEYS = ("set", "tune")
 TASK_KEYS = ("graph", "set")
-_DECIDES = ("graph", "graphs", "include", "set", "arms", "grid", "tune")
-"""The sections that decide what tuning finds."""
 
 
 def read_study(path: Path) -> Study:
@@ -99,7 +97,6 @@ def _read(tree: MapNode, path: Path, problems: Problems) -> Study:
         read_goals(keys["goals"].value, labels, problems) if "goals" in keys else (),
         tuning,
         read_plots(section("plots"), labels, problems),
-        text_of({key: plain(keys[key].value) for key in _DECIDES if key in keys}),
     )
 
 

@@ -140,8 +140,6 @@ class Study:
     goals: tuple[Goal, ...] = ()
     tuning: Tuning | None = None
     plots: tuple[Plot, ...] = ()
-    definition: str = ""
-    """What decides the outcome of tuning, as text."""
 
     @property
     def axis_names(self) -> tuple[str, ...]:

@@ -1,0 +1,196 @@
+"""Random search for the gains of every arm, with the same effort for each.
+
+Every arm gets the same number of draws, and every draw the same cells and seeds. Draw 0 is the arm
+as it is written, so tuning never ends below it; the others come from a generator that the study's
+``tune.seed``, the arm's name and the number of the draw decide, so that neither the order of the
+runs nor another arm changes them. The best draw is the one with most successes; then the one whose
+mean of the metric ``least`` is least; then the first. An arm without ranges keeps what is written.
+
+What was found is a file beside the study's, which the study's runs take over, and which says what
+it was found for: a study that was changed since wants to be tuned again.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..runtime.errors import AloftError
+from ..runtime.loading.document import read_file
+from ..runtime.loading.nodes import plain, text_of
+from ..runtime.loading.problems import LoadError, Problems
+from ..runtime.stages import Position
+from .execution import Run
+from .expansion import Cell, Tuned, cells
+from .ranges import corners, draw
+from .study import Arm, Study, Tuning
+
+
+@dataclass(frozen=True)
+class Draw:
+    """One set of parameters of an arm, and how its runs came out."""
+
+    number: int
+    values: Mapping[str, Any]
+    n: int = 0
+    successes: int = 0
+    least: float = math.nan
+    """The mean of the metric that should be least; NaN where no run has it, or none is named."""
+
+
+def draws(arm: Arm, tuning: Tuning) -> list[Draw]:
+    """The draws of an arm; one only, as it is written, where nothing may be tuned."""
+    found = [Draw(0, {})]
+    name = int.from_bytes(hashlib.sha256(arm.name.encode()).digest()[:8], "big")
+    for number in range(1, tuning.draws if arm.ranges else 1):
+        generator = np.random.default_rng([tuning.seed, name, number])
+        found.append(Draw(number, {each.key: draw(each, generator) for each in arm.ranges}))
+    return found
+
+
+def tuning_cells(study: Study) -> list[Cell]:
+    """The cells that every draw of an arm is tried on, as they are written."""
+    assert study.tuning is not None
+    tuning = study.tuning
+    chosen = [cell for cell in cells(study) if tuning.cells.takes(cell.labels)]
+    common = {entry.key: entry for entry in tuning.sets}
+    return [replace(cell, sets={**cell.sets, **common}) for cell in chosen]
+
+
+def extreme_cells(study: Study, chosen: Sequence[Cell]) -> list[Cell]:
+    """Cells with every range at its ends: whether these may run is known before anything does."""
+    found = []
+    for arm in study.arms:
+        first = next((cell for cell in chosen if cell.arm == arm.name), None)
+        for each in arm.ranges if first else ():
+            assert first is not None
+            found += [first.with_sets({each.key: end}, each.where) for end in corners(each)]
+    return found
+
+
+def tuning_runs(study: Study, chosen: Sequence[Cell]) -> list[tuple[str, int, Run]]:
+    """Every run of every draw, as (arm, draw, run); the cells must have been checked."""
+    assert study.tuning is not None
+    found = []
+    for arm in study.arms:
+        mine = [cell for cell in chosen if cell.arm == arm.name]
+        for each in draws(arm, study.tuning):
+            for cell in mine:
+                where = Position(f"draw {each.number} of arm {arm.name}", 0, 0)
+                tried = cell.with_sets(each.values, where)
+                if each.values:
+                    text = f"{cell.key} {text_of(dict(each.values))}"
+                    tried = replace(tried, key=hashlib.sha256(text.encode()).hexdigest()[:24])
+                found += [(arm.name, each.number, Run(tried, s)) for s in study.tuning.seeds]
+    return found
+
+
+def best_draws(study: Study, done: Sequence[tuple[str, int, Run]]) -> dict[str, Draw]:
+    """The best draw of every arm."""
+    assert study.tuning is not None
+    best = {}
+    for arm in study.arms:
+        by_draw: dict[int, list[Run]] = {}
+        for name, number, run in done:
+            if name == arm.name:
+                by_draw.setdefault(number, []).append(run)
+        tried = [
+            _scored(each, by_draw[each.number], study.tuning.least)
+            for each in draws(arm, study.tuning)
+            if each.number in by_draw
+        ]
+        if tried:
+            best[arm.name] = min(tried, key=_order)
+    return best
+
+
+def _order(found: Draw) -> tuple[float, float, int]:
+    least = math.inf if math.isnan(found.least) else found.least
+    return -found.successes, least, found.number
+
+
+def _scored(found: Draw, runs: Sequence[Run], least: str) -> Draw:
+    outcomes = [run.outcome for run in runs if run.outcome is not None]
+    values = [float(o.metrics[least]) for o in outcomes if o.metrics.get(least) is not None]
+    mean = math.fsum(values) / len(values) if values else math.nan
+    successes = sum(outcome.success for outcome in outcomes)
+    return Draw(found.number, found.values, len(outcomes), successes, mean)
+
+
+def tuned_path(study: Study) -> Path:
+    """The file beside the study's."""
+    return study.path.with_name(f"{study.path.stem}.tuned.yaml")
+
+
+def definition(study: Study) -> str:
+    """A hash of all that the search was over: the cells, the ranges, the seeds and the draws."""
+    assert study.tuning is not None
+    tuning = study.tuning
+    searched: list[Any] = [list(tuning.seeds), tuning.draws, tuning.seed, tuning.least]
+    searched += [path.name for path in study.include]
+    searched += [[c.task, c.graph.name, c.arm, c.overrides] for c in tuning_cells(study)]
+    searched += [
+        [arm.name, each.key, each.unit, each.log, *map(list, each.bounds), *each.choices]
+        for arm in study.arms
+        for each in arm.ranges
+    ]
+    return hashlib.sha256(text_of(searched).encode()).hexdigest()[:16]
+
+
+def write_tuned(study: Study, best: Mapping[str, Draw]) -> Path:
+    """Write what was found. Raises ``AloftError``."""
+    assert study.tuning is not None
+    tuning = study.tuning
+    lines = [
+        f"# What `aloft study {study.path.name} --tune` found; its runs take it from here.",
+        f"definition: {text_of(definition(study))}",
+        f"seeds: {text_of(list(tuning.seeds))}",
+        f"draws_per_arm: {tuning.draws}",
+        "arms:",
+    ]
+    for arm, found in best.items():
+        score = f"draw: {found.number}, successes: {found.successes}, n: {found.n}"
+        lines.append(f"  {text_of(arm)}: {{{score}, set: {text_of(dict(found.values))}}}")
+    path = tuned_path(study)
+    partial = path.with_name(f".{path.name}.partial")
+    try:
+        partial.write_text("\n".join(lines) + "\n", encoding="utf-8")
+        partial.replace(path)
+    except OSError as error:
+        raise AloftError(f"cannot write {path}: {error.strerror or error}") from error
+    return path
+
+
+def read_tuned(study: Study) -> Tuned:
+    """What tuning found for every arm; nothing for a study without a section ``tune``.
+
+    Raises:
+        AloftError: the study has not been tuned, or has been changed since.
+        LoadError: the file is not what ``write_tuned`` writes.
+    """
+    if study.tuning is None:
+        return {}
+    path = tuned_path(study)
+    fix = f"aloft study {study.path} --tune"
+    if not path.is_file():
+        raise AloftError(f"{study.path} has not been tuned: there is no {path}; run {fix}")
+    problems = Problems()
+    tree = read_file(path, str(path), problems, ("a file of tuned parameters", "arms"))
+    if tree is None:
+        raise LoadError(problems.report(str(path)))
+    data = plain(tree)
+    if data.get("definition") != definition(study):
+        raise AloftError(
+            f"{path} was found for another {study.path}: what is tuned, or on what, has changed "
+            f"since; run {fix}"
+        )
+    try:
+        return {arm.name: dict(data["arms"][arm.name]["set"]) for arm in study.arms}
+    except (KeyError, TypeError) as error:
+        raise AloftError(f"{path} does not have all arms; run {fix}") from error

@@ -1,0 +1,62 @@
+"""A study on a real Dask cluster makes the same table as on this machine's processes."""
+
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from pyarrow import parquet
+
+from aloft.studies.execution import Run, make_runs
+from aloft.studies.expansion import cells, checked_cells
+from aloft.studies.journal import Journal
+from aloft.studies.reading import read_study
+from aloft.studies.table import make_table, write_table
+
+pytest.importorskip("distributed")
+
+CLUSTER = """
+import sys
+from distributed import LocalCluster
+if __name__ == "__main__":
+    with LocalCluster(
+        n_workers=2, threads_per_worker=1, host="127.0.0.1", dashboard_address=None,
+        worker_dashboard_address=None, silence_logs=50,
+    ) as cluster:
+        print(cluster.scheduler_address, flush=True)
+        sys.stdin.read()
+"""
+
+
+@pytest.fixture
+def cluster(folder: Path) -> Iterator[str]:
+    """The address of a scheduler with two worker processes."""
+    script = folder / "cluster.py"
+    script.write_text(CLUSTER)
+    with subprocess.Popen(
+        [sys.executable, script], text=True, stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+    ) as process:  # fmt: skip
+        assert process.stdout is not None
+        yield process.stdout.readline().strip()
+        process.communicate(timeout=60)  # the end of its input ends it
+
+
+def test_the_table_is_the_same_on_a_cluster(folder: Path, cluster: str) -> None:
+    (folder / "study.yaml").write_text(
+        "graph: count.yaml\nseeds: 0:6\narms: {a: {counter.goal: 104}, b: {counter.fail_at: 9}}\n"
+    )
+    found = read_study(Path("study.yaml"))
+    checked = checked_cells(cells(found), found, "code")
+    runs = [Run(cell, seed) for cell in checked for seed in found.seeds]
+    files = []
+    for name, address in (("here", ""), ("there", cluster)):
+        with Journal(folder / name / "runs.jsonl") as journal:
+            done = make_runs(runs, journal, workers=1, cluster=address)
+            assert len(journal.outcomes) == 12
+        assert [run.outcome.success for run in done if run.outcome] == 5 * [True] + 7 * [False]
+        files.append(folder / name / "runs.parquet")
+        write_table(files[-1], make_table(done).drop_columns(["wall_time_s"]))
+    assert files[0].read_bytes() == files[1].read_bytes()
+    hashes = parquet.read_table(files[0])["run_hash"].to_pylist()
+    assert len(set(hashes)) == 12 and all(len(text) == 32 for text in hashes)
