@@ -12,6 +12,7 @@ from ...runtime.description import RobotDescription
 from .compilation import Progress, load_pieces
 from .contact_rows import is_mirrored
 from .coordinates import Coordinates
+from .easing import EASES, eased, from_eased, tighten, with_impacts
 from .errors import PlanError
 from .guess import ballistic_guess, displaced_guess
 from .layout import Stretch, layout
@@ -75,6 +76,9 @@ def solve_jump(
         solution = solve(problem, pack(problem, warm_start, guess), warm=True, solver="fatrop")
     if solution is None or not solution.solved:
         warm = False
+        turns = any(hop.rotation for hop in task.hops()) and not solver
+        solution = _turning(problem, robot, guess) if turns else None
+    if solution is None or not solution.solved:
         solution = solve(
             problem, guess, solver=solver, other_guess=lambda: _displaced(problem, robot)
         )
@@ -175,6 +179,20 @@ def _displaced(problem: Problem, robot: RobotDescription) -> Array | None:
         return None
     solution = solve(straight, ballistic_guess(straight), solver="fatrop")
     return displaced_guess(problem, straight, solution.values) if solution.solved else None
+
+
+def _turning(problem: Problem, robot: RobotDescription, guess: Array) -> Solution | None:
+    """A somersault by way of stronger motors; one with impacts also by way of one without."""
+    found = from_eased(problem, guess)
+    if found is not None or not problem.task.impact:
+        return found
+    task = problem.task.model_copy(update={"impact": False})
+    gentle = make_problem(task, robot, compiled=not problem.assembly.interpreted)
+    first = solve(eased(gentle, EASES[-1]), ballistic_guess(gentle), solver="fatrop")
+    if not first.solved:
+        return None
+    plan = with_impacts(JumpPlan(task=task, **unpack(gentle, first.values)))
+    return tighten(problem, pack(problem, plan, guess), EASES[-1])
 
 
 def _failure(task: JumpTask, solution: Solution) -> PlanError:
