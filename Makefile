@@ -12,7 +12,7 @@ RECORDING := recordings/jump.rrd
 # One thread for each test process: the workers already take every core.
 SINGLE := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 
-.PHONY: setup jump test lint format bench docs clean help
+.PHONY: setup jump test lint format bench plans docs clean help
 
 help:  ## list the targets
 	@sed -n 's/^\([a-z]*\):.*##/\1:/p' $(MAKEFILE_LIST)
@@ -44,6 +44,9 @@ format: $(READY)  ## rewrite the files in the project's style
 
 bench: $(READY)  ## run all benchmarks
 	@$(SINGLE) $(BIN)/aloft bench
+
+plans: $(READY)  ## make the shipped plans anew, one for every file in graphs/tasks
+	@$(SINGLE) $(BIN)/aloft plan graphs/tasks/*.yaml --anew --prune --keep graphs/plans --no-pictures
 
 docs: $(READY)  ## make what is generated under docs/
 	@$(BIN)/aloft blocks --markdown > docs/blocks.md

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ..runtime.description import RobotDescription
 from .pinocchio_model import build_pinocchio_model
-from .rotations import cross, rotate_back
+from .rotations import cross, rotate_back, skew
 
 Array = NDArray[np.float64]
 
@@ -28,6 +28,10 @@ class ContactKinematics:
         soles: the sole centres [m, body], (n_feet, 3).
         forward: the sum of the feet's forward directions [body], (3,).
         com_velocity: of the centre of mass relative to the base's origin [m/s, body], (3,).
+        centres: of the contacts' round rubber [m, body], (n_contacts, 3).
+        jacobians: of the centres by the joints [m, body], (n_contacts, 3, n_joints).
+
+    The last two are brought up to date by ``differentiate`` only.
     """
 
     def __init__(self, robot: RobotDescription) -> None:
@@ -61,6 +65,14 @@ class ContactKinematics:
         self.points, self.rates = np.zeros((len(self._radii), 3)), np.zeros((len(self._radii), 3))
         self.soles = np.zeros((len(self._feet), 3))
         self.forward, self.com_velocity = np.zeros(3), np.zeros(3)
+        n_joints = len(robot.joints)
+        self._differentiate: Any = pinocchio.computeAllTerms
+        self._joint_jacobians = data.J[:, 6:]
+        self._linear, self._angular = np.zeros((3, n_joints)), np.zeros((3, n_joints))
+        self._lever = np.zeros((3, 3))
+        self._of_leg = np.array([_joints_above(robot, foot.link) for foot in robot.feet], float)
+        self.centres = np.zeros((len(self._radii), 3))
+        self.jacobians = np.zeros((len(self._radii), 3, n_joints))
 
     def evaluate(
         self, orientation: Array, angular_velocity: Array, position: Array, velocity: Array
@@ -94,3 +106,32 @@ class ContactKinematics:
             np.dot(turn, self._sole_offsets[foot], self.soles[foot])
             self.soles[foot] += place
         np.divide(self._momentum, self._mass, out=self.com_velocity)
+
+    def differentiate(self) -> None:
+        """Bring ``centres`` and ``jacobians`` up to date with the joints of the last ``evaluate``.
+
+        The centre of the rubber is its radius above the ground, whatever the base's orientation.
+        """
+        # The function for Jacobians alone returns them, as a new array.
+        self._differentiate(self._model, self._data, self._position, self._velocity)
+        self._linear[...] = self._joint_jacobians[:3]
+        self._angular[...] = self._joint_jacobians[3:]
+        for i, foot in enumerate(self._foot_of_point):
+            centre = self.centres[i]
+            np.dot(self._feet[foot][0], self._centres[i], centre)
+            centre += self._feet[foot][1]
+            skew(centre, self._lever)
+            jacobian = self.jacobians[i]
+            np.dot(self._lever, self._angular, jacobian)
+            np.subtract(self._linear, jacobian, out=jacobian)
+            jacobian *= self._of_leg[foot]
+
+
+def _joints_above(robot: RobotDescription, link: str) -> list[bool]:
+    """Which joints move a link."""
+    above = [False] * len(robot.joints)
+    while link != robot.base:
+        index = next(i for i, joint in enumerate(robot.joints) if joint.child == link)
+        above[index] = True
+        link = robot.joints[index].parent
+    return above

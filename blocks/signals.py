@@ -77,6 +77,22 @@ class BaseState(Signal):
     angular_velocity = Field(3, unit="rad/s", frame="body", text="angular velocity of the base")
 
 
+class EstimatorHealth(Signal):
+    """How far an estimator believes itself, and what it has to live with.
+
+    A standard deviation here is that of the error's norm: the root of the covariance's trace.
+    """
+
+    position_std = Field(unit="m", text="standard deviation of the position's error")
+    velocity_std = Field(unit="m/s", text="of the velocity's error")
+    tilt_std = Field(unit="rad", text="of the orientation's error about the horizontal axes")
+    yaw_std = Field(unit="rad", text="of the orientation's error about the vertical axis")
+    trusted = Field("n_contacts", dtype="bool", text="points that the estimate leans on now")
+    gyro_saturated = Field(dtype="bool", text="an axis of the gyroscope is at the end of its range")
+    accelerometer_saturated = Field(dtype="bool", text="the same of the accelerometer")
+    saturated_ticks = Field(dtype="int64", text="ticks so far in which any of the two was")
+
+
 class DynamicsTerms(Signal):
     """The whole-body model at the present state: everything the controllers need, once a tick."""
 

@@ -17,8 +17,10 @@ from .graph import graph
 from .output import print_json
 from .params import params
 from .plan import plan
+from .replay import replay
 from .run import run
 from .study import study
+from .test import test
 
 EXIT_CODES = """\b
 Exit codes:
@@ -38,7 +40,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
-for _verb in (run, check, graph, blocks, plan, bench, study):
+for _verb in (run, replay, check, graph, blocks, plan, bench, study, test):
     app.command(epilog=EXIT_CODES if _verb is run else None)(_verb)
 app.add_typer(params)
 

@@ -2,20 +2,31 @@
 
 from __future__ import annotations
 
+import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from ..runtime.errors import ExitCode
-from .output import console, errors_reported, number, print_error, print_json, say, table
+from .output import console, errors_reported, print_error, print_json, say
 from .plan_grid import plan_grid
-from .plan_output import failure, plan_json, print_plan, recorded_motion
+from .plan_output import (
+    failure,
+    listed_row,
+    listing,
+    nearest_json,
+    plan_json,
+    print_plan,
+    recorded_motion,
+    summary,
+)
 from .run import viewer
 
 if TYPE_CHECKING:
     from rich.console import Console
 
+    from ..blocks.planner.library import PlanLibrary
     from ..blocks.planner.plan import JumpPlan
     from ..blocks.planner.task import JumpTask
     from ..runtime.description import RobotDescription
@@ -37,6 +48,11 @@ def plan(
             help="Solve also what is kept, from nothing; in a grid: try again what failed before.",
         ),
     ] = False,
+    listed: Annotated[bool, typer.Option("--list", help="List the plans that are kept.")] = False,
+    prune: Annotated[
+        bool,
+        typer.Option("--prune", help="Remove from --keep the plans of all tasks but these."),
+    ] = False,
     workers: Annotated[int, typer.Option(help="Processes for a grid; 0: one a core.", min=0)] = 0,
     cluster: Annotated[
         str, typer.Option(help="Plan a grid on the Dask scheduler at this address.")
@@ -44,20 +60,28 @@ def plan(
     no_pictures: Annotated[
         bool, typer.Option("--no-pictures", help="Write no picture and no recording.")
     ] = False,
+    nearest: Annotated[
+        bool,
+        typer.Option(help="Where a task has no plan, search the nearest one that has; up to 20 s."),
+    ] = True,
     as_json: Annotated[
         bool, typer.Option("--json", help="Tables go to standard error, one JSON object to output.")
     ] = False,
 ) -> None:
     """Plan jumps, check each with exact dynamics, and keep the valid ones in the plan library."""
-    if bool(tasks) == (grid is not None):
-        raise typer.BadParameter("give task files, or --library with a grid file")
+    if bool(tasks) + (grid is not None) + listed != 1:
+        raise typer.BadParameter("give task files, or --library with a grid file, or --list")
+    if prune and (keep is None or not tasks):
+        raise typer.BadParameter("--prune goes with task files and --keep")
     screen = console(to_stderr=as_json)
     with errors_reported(as_json):
-        if grid is not None:
+        if listed:
+            code = list_plans(keep, screen, as_json)
+        elif grid is not None:
             code = plan_grid(grid, keep, anew, workers, cluster, screen, as_json)
         else:
             folder = None if no_pictures else out
-            code = plan_tasks(tasks or [], keep, anew, folder, screen, as_json)
+            code = plan_tasks(tasks or [], keep, anew, folder, nearest, prune, screen, as_json)
     raise typer.Exit(code)
 
 
@@ -66,42 +90,55 @@ def plan_tasks(
     keep: Path | None,
     anew: bool,
     out: Path | None,
+    nearest: bool,
+    prune: bool,
     screen: Console,
     as_json: bool,
 ) -> ExitCode:
-    """Plan each task file; all of them, even where one fails."""
+    """Plan each task file; all of them, even where one fails. All are read before any is planned.
+
+    Raises:
+        TaskError: what is wrong with any of them.
+    """
+    from ..blocks.planner.errors import TaskError
+    from ..blocks.planner.library import PlanLibrary
     from ..blocks.planner.task import read_task
     from ..runtime.description import find_robot
 
-    rows: list[dict[str, Any]] = []
+    tasks, wrong = [], []
     for path in paths:
-        task = read_task(path)
-        robot = find_robot(task.robot, path.parent)
-        rows.append(plan_task(task, robot, keep, anew, out, screen))
+        try:
+            tasks.append(read_task(path))
+        except TaskError as error:
+            wrong.append(str(error))
+    if wrong:
+        raise TaskError("\n".join(wrong))
+    rows: list[dict[str, Any]] = []
+    for path, task in zip(paths, tasks, strict=True):
+        library = PlanLibrary(find_robot(task.robot, path.parent), keep)
+        rows.append(plan_task(task, library, anew, out, nearest, screen))
     failed = [row["task"] for row in rows if not row["success"]]
+    if prune and not failed:
+        for path in PlanLibrary(find_robot(tasks[0].robot), keep).prune(tasks):
+            say(screen, f"removed: {path}")
     reason = f"not planned: {', '.join(failed)}" if failed else f"{len(rows)} planned and valid"
     if len(rows) > 1:
-        cells = [
-            (r["task"], "yes" if r["success"] else "no", number(r.get("cpu_s", "")), r["reason"])
-            for r in rows
-        ]
-        screen.print(table("", ("task", "valid", ">CPU [s]", "what came of it"), cells))
+        screen.print(summary(rows))
     if as_json:
         print_json({"success": not failed, "reason": reason, "plans": rows})
     return ExitCode.NOT_SUCCESSFUL if failed else ExitCode.SUCCESS
 
 
 def plan_task(
-    task: JumpTask, robot: RobotDescription, keep: Path | None, anew: bool, out: Path | None,
+    task: JumpTask, library: PlanLibrary, anew: bool, out: Path | None, nearest: bool,
     screen: Console,
 ) -> dict[str, Any]:  # fmt: skip
     """Plan one task; print it, picture it, and return its row."""
     from ..blocks.planner.errors import PlanError
-    from ..blocks.planner.library import PlanLibrary
     from ..blocks.planner.validity import InvalidPlanError
 
-    library = PlanLibrary(robot, keep)
-    found: JumpPlan | None = None
+    robot = library.robot
+    started = time.process_time()
     try:
         with screen.status(f"planning {task.name}") as status:
             found, kept = library.plan(task, solver_with_progress(status.update), anew=anew)
@@ -110,8 +147,10 @@ def plan_task(
         found, kept, reason = error.plan, False, str(error)
     except PlanError as error:
         print_error(str(error))
-        return failure(task, robot, error)
+        row = failure(task, robot, error)
+        return row | (search_nearest(task, library, error.family, screen) if nearest else {})
     row = plan_json(found, robot, library.path_of(task), kept, reason)
+    row["cpu_s"] = None if kept else time.process_time() - started
     print_plan(screen, found)
     if not found.valid:
         print_error(reason)
@@ -119,7 +158,41 @@ def plan_task(
         row |= write_pictures(found, robot, out, screen)
     if row["path"]:
         say(screen, f"plan: {row['path']} ({reason})")
+    if not found.valid and nearest:
+        row |= search_nearest(task, library, "", screen)
     return row
+
+
+def list_plans(keep: Path | None, screen: Console, as_json: bool) -> ExitCode:
+    """Every plan of the library: its task, what it does, and where it is."""
+    from ..blocks.planner.library import PlanLibrary
+    from ..runtime.description import find_robot
+
+    library = PlanLibrary(find_robot("bruce"), keep)
+    rows = [listed_row(path, header) for path, header in library.headers()]
+    screen.print(listing(rows))
+    if as_json:
+        print_json({"success": True, "reason": f"{len(rows)} plans", "plans": rows})
+    return ExitCode.SUCCESS
+
+
+def search_nearest(
+    task: JumpTask, library: PlanLibrary, family: str, screen: Console
+) -> dict[str, Any]:
+    """The nearest task that has a plan, which is kept; for the row of the one that has none."""
+    from ..blocks.planner.nearest_feasible import nearest_feasible
+
+    with screen.status("searching the nearest task that can be planned") as status:
+
+        def progress(text: str) -> None:
+            status.update(f"searching the nearest task that can be planned: {text}")
+
+        found = nearest_feasible(task, library.robot, family=family, progress=progress)
+    if found is None:
+        say(screen, "a short search found no task near it that can be planned")
+        return {"nearest": None}
+    say(screen, found.text)
+    return {"nearest": nearest_json(found, library.add(found.plan))}
 
 
 def solver_with_progress(tell: Any) -> Any:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,9 +13,11 @@ from .output import number, table
 
 if TYPE_CHECKING:
     from rich.console import Console
+    from rich.table import Table
 
     from ..blocks.planner.errors import PlanError
     from ..blocks.planner.grid import GridRow
+    from ..blocks.planner.nearest_feasible import NearestFeasible
     from ..blocks.planner.plan import JumpPlan
     from ..blocks.planner.task import JumpTask
     from ..logs.motion_recording import RecordedMotion
@@ -76,6 +78,69 @@ def failure(task: JumpTask, robot: RobotDescription, error: PlanError) -> dict[s
         "family": error.family,
         "violation": error.violation,
     }
+
+
+def nearest_json(found: NearestFeasible, path: Path) -> dict[str, Any]:
+    """The nearest task that has a plan as part of the JSON output."""
+    return {
+        "parameter": found.parameter,
+        "asked": found.asked,
+        "value": found.value,
+        "beyond": found.beyond,
+        "text": found.text,
+        "solves": found.solves,
+        "cpu_s": found.cpu_s,
+        "path": str(path),
+    }
+
+
+def summary(rows: Sequence[Mapping[str, Any]]) -> Table:
+    """One line for every task of the command line."""
+    cells = []
+    for row in rows:
+        figures = row.get("figures", {})
+        names = ("rise_m", "flight_time_s", "peak_motor_torque_N_m", "peak_motor_speed_rad_s")
+        shown = [number(figures[name]) if name in figures else "" for name in names]
+        cpu = row.get("cpu_s")
+        took = "" if cpu is None else number(cpu)
+        first = str(row["reason"]).partition("\n")[0]
+        cells.append((row["task"], "yes" if row["success"] else "NO", *shown, took, first))
+    columns = (
+        "task", "valid", ">rise [m]", ">flight [s]", ">torque [N m]", ">speed [rad/s]",
+        ">CPU [s]", "what came of it",
+    )  # fmt: skip
+    return table("", columns, cells)
+
+
+def listed_row(path: Path, header: Mapping[str, Any]) -> dict[str, Any]:
+    """A kept plan as an entry of the JSON output, from its file's header."""
+    report = header.get("report") or {}
+    return {
+        "task": header.get("task", {}).get("name", ""),
+        "hash": path.stem.rpartition("-")[2],
+        "path": str(path),
+        "valid": bool(report.get("valid", False)),
+        "asked": header.get("task", {}),
+        "figures": report.get("figures", {}),
+    }
+
+
+def listing(rows: Sequence[Mapping[str, Any]]) -> Table:
+    """One line for every kept plan."""
+    cells = []
+    for row in rows:
+        asked = [f"{100 * (row['asked'].get(name) or 0.0):.4g}" for name in
+                 ("rise", "distance_x", "distance_y", "landing_height")]  # fmt: skip
+        twist = f"{np.degrees(row['asked'].get('twist') or 0.0):.4g}"
+        folder = str(Path(row["path"]).parent)
+        cells.append(
+            (row["task"], "yes" if row["valid"] else "NO", *asked, twist, row["hash"], folder)
+        )
+    columns = (
+        "task", "valid", ">rise [cm]", ">ahead [cm]", ">left [cm]", ">up [cm]", ">twist [deg]",
+        "hash", "folder",
+    )  # fmt: skip
+    return table("", columns, cells)
 
 
 def failure_rows(rows: Sequence[GridRow]) -> list[tuple[str, str]]:

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from ..studies.execution import Run
     from ..studies.expansion import Cell
     from ..studies.journal import Journal, Outcome
-    from ..studies.study import Study
+    from ..studies.study import Filter, Study
 
 
 def study(
@@ -30,6 +30,10 @@ def study(
     seeds: Annotated[
         str, typer.Option(help="Other seeds than the study's: 0:4 for a quick look.")
     ] = "",
+    where: Annotated[
+        list[str] | None,
+        typer.Option(help="Only part of the grid: axis=value, task=..., arm=... Repeatable."),
+    ] = None,
     tune: Annotated[
         bool, typer.Option("--tune", help="Tune the arms instead, and write what was found.")
     ] = False,
@@ -51,7 +55,7 @@ def study(
     where it was. Exits with 0 when all goals are met, 1 when one is missed, 3 when a run broke.
     """
     from ..runtime.seeds import parse_seeds
-    from ..studies.reading import read_study
+    from ..studies.reading import part_of, read_study
 
     screen = console(to_stderr=as_json)
     with errors_reported(as_json):
@@ -59,18 +63,20 @@ def study(
         chosen = parse_seeds(seeds) if seeds else list(found.seeds)
         folder = out or Path("results") / found.name
         if tune:
-            if seeds:
-                raise AloftError("--seeds is for runs; tuning has its own in the study's 'tune'")
+            if seeds or where:
+                raise AloftError("--seeds and --where are for runs; see the study's 'tune'")
             code = tune_study(found, folder, workers, cluster, screen, as_json)
         else:
+            part = part_of(found, where or [])
             code = run_study(
-                found, chosen, folder, workers, cluster, screen, as_json, dry_run=dry_run
+                found, part, chosen, folder, workers, cluster, screen, as_json, dry_run=dry_run
             )
     raise typer.Exit(code)
 
 
 def run_study(
     found: Study,
+    part: Filter,
     seeds: Sequence[int],
     folder: Path,
     workers: int,
@@ -90,7 +96,8 @@ def run_study(
     from ..studies.tuning import extreme_cells, read_tuned, tuned_path, tuning_cells
 
     tuned = {} if dry_run and not tuned_path(found).is_file() else read_tuned(found)
-    cells = check_cells(found, list(expand(found, tuned)), screen)
+    chosen = [cell for cell in expand(found, tuned) if part.takes(cell.labels)]
+    cells = check_cells(found, chosen, screen)
     if dry_run and found.tuning is not None:
         tried = tuning_cells(found)
         check_cells(found, [*tried, *extreme_cells(found, tried)], screen)
@@ -109,7 +116,7 @@ def run_study(
     rows = summarise(found, done)
     write_table(folder / "runs.parquet", make_table(done))
     result = study_json(found, rows, seeds, folder)
-    plots = write_plots(found, done, rows, folder)
+    plots, undrawn = write_plots(found, done, rows, folder)
     result["tuned"] = tuned
     result["plots"] = {name: str(path) for name, path in plots.items()}
     (folder / "summary.json").write_text(json_text(result), encoding="utf-8")
@@ -117,6 +124,8 @@ def run_study(
     say(screen, f"table: {folder / 'runs.parquet'}; summary: {folder / 'summary.json'}")
     for path in plots.values():
         say(screen, f"picture: {path}")
+    for problem in undrawn:
+        print_warning(problem)
     if as_json:
         print_json(result)
     elif result["success"]:
@@ -183,12 +192,13 @@ def make_all(
     from .progress import progress_bar
 
     successes = 0
-    known = sum(run.key in journal.outcomes for run in runs)
+    keys = {run.key for run in runs}
+    known = len(keys & journal.outcomes.keys())
     if known:
-        say(screen, f"{known} of {len(runs)} runs are there from before")
+        say(screen, f"{known} of {len(keys)} runs are there from before")
     with (
         stop_signals() as received,
-        progress_bar(screen, text, len(runs)) as (bar, task),
+        progress_bar(screen, text, len(keys)) as (bar, task),
     ):
 
         def on_run(outcome: Outcome) -> None:
@@ -225,10 +235,11 @@ def report_stop(
     stopped: signal.Signals, runs: Sequence[Run], journal: Journal, screen: Console, as_json: bool
 ) -> ExitCode:
     """Say how far it came."""
-    done = sum(run.key in journal.outcomes for run in runs)
-    reason = f"stopped by {stopped.name} after {done} of {len(runs)} runs, which are kept"
+    keys = {run.key for run in runs}
+    done, all_runs = len(keys & journal.outcomes.keys()), len(keys)
+    reason = f"stopped by {stopped.name} after {done} of {all_runs} runs, which are kept"
     if as_json:
-        print_json({"success": False, "reason": reason, "done": done, "runs": len(runs)})
+        print_json({"success": False, "reason": reason, "done": done, "runs": all_runs})
     else:
         print_warning(f"{reason}; the same command goes on from there")
     return ExitCode(128 + stopped)

@@ -74,6 +74,10 @@ class JumpRecord(Signal):
 class JumpCriteria(Parameters):
     """The tolerances of a successful jump. Targets that are not given are the reference's."""
 
+    jumps: int = parameter(1, ge=1, text="how many jumps in a row, each with its own flight")
+    series_distance_tolerance: float = parameter(
+        0.03, unit="m", gt=0, text="of the feet after every jump of a row but the last"
+    )
     distance: list[float] | None = parameter(
         None, unit="m", min_length=2, max_length=2, text="target of the feet, forward and left"
     )

@@ -17,6 +17,15 @@ from .jump_criteria import (
     feet_turned,
     first_failure,
 )
+from .jump_series import (
+    EARLY_LIFT_OFF,
+    JumpSeries,
+    goes_on,
+    keep_place,
+    note_landing,
+    note_place,
+    series_failure,
+)
 from .support_margin import support_margin
 
 GRAVITY = 9.81
@@ -48,7 +57,11 @@ class JumpScore(Block):
     share of saturated motor samples, peak torque and speed. Metrics: ``success``, ``reason`` (the
     first failed criterion with its figures) and the figures themselves.
 
-    It does not judge several jumps in a row.
+    Of several ``jumps`` in a row all the figures above are of the last; those before it must be
+    real flights too, with their lift-off speed and apex as planned, and land within
+    ``series_distance_tolerance`` and the yaw's tolerance. Feet that leave the ground more than 0.1 s
+    before the next planned lift-off count as a bounce. A row that does not go on ends the run 1.5 s
+    after its last touchdown.
 
     Raises:
         ValueError: the graph has no robot.
@@ -60,6 +73,7 @@ class JumpScore(Block):
     reference = Input(JumpReference, default={}, text="the planned jump, for its targets")
     wbc = Input(WholeBodyCommand, default={}, text="the controller's answers, to count failures")
     record = State(JumpRecord, text="everything the judgement needs")
+    series = State(JumpSeries, text="the jumps of a row that are over")
 
     def setup(self) -> None:
         """Group the contact points by foot."""
@@ -99,6 +113,8 @@ class JumpScore(Block):
         self._follow_flight(time)
         if record.touchdown_time != NEVER:
             self._follow_landing(time - float(record.touchdown_time), tilt)
+        elif self.series.made:
+            self._follow_row(time)
         record.vertical_speed[()] = truth.com_velocity.item(2)
 
     def metrics(self) -> Mapping[str, Metric]:
@@ -107,6 +123,9 @@ class JumpScore(Block):
         if record.ticks == 0:
             return {"success": False, "reason": "the run had no ticks"}
         failure = first_failure(record, self.params, self._planned)
+        made = int(self.series.made) + int(record.touchdown_time != NEVER)
+        if self.params.jumps > 1 and record.fall_time == NEVER and not record.forbidden:
+            failure = series_failure(self.series, self.params, made) or failure
         x, y = feet_moved(record)
         flown = record.lift_off_time != NEVER
         landed = record.touchdown_time != NEVER
@@ -122,6 +141,8 @@ class JumpScore(Block):
             "joint_limit_violation_rad": float(record.violation),
             "motor_overload_nm": float(record.overload),
         }
+        if self.params.jumps > 1:
+            values |= {"jumps": made, "worst_landing_error_m": float(self.series.place_error)}
         if flown:
             values |= {
                 "apex_above_standing_m": float(record.apex_height - record.standing_height),
@@ -191,9 +212,14 @@ class JumpScore(Block):
             record.planned_apex[()] = height
             record.planned_speed_time[()] = NEVER
         record.planned_apex[()] = max(record.planned_apex.item(), height)
-        record.planned_flight[()] = plan.touchdown_time - plan.lift_off_time
         taken_off = plan.lift_off_time - 1e-9 <= plan.time < plan.touchdown_time
-        if taken_off and record.planned_speed_time == NEVER:
+        fresh = record.planned_speed_time == NEVER
+        if fresh or taken_off:  # from the middle of a flight on the reference names the next
+            record.planned_flight[()] = plan.touchdown_time - plan.lift_off_time
+        later = plan.lift_off_time > self.series.planned_lift_off
+        if taken_off and (fresh or later):
+            self.series.planned_lift_off[()] = plan.lift_off_time
+            record.planned_apex[()] = height if not fresh else record.planned_apex.item()
             record.planned_speed_time[()] = time
             # The plan's own ballistic flight takes it back to the planned instant.
             late = plan.time.item() - plan.lift_off_time.item()
@@ -228,6 +254,7 @@ class JumpScore(Block):
         height, speed = truth.com.item(2), truth.com_velocity.item(2)
         touched = any(truth.contact_touched.tolist())
         if record.lift_off_time == NEVER:
+            touched = touched or self._bounces()
             record.squat_height[()] = min(record.squat_height.item(), height)
             if touched:
                 record.unloaded_time[()] = NEVER
@@ -240,11 +267,30 @@ class JumpScore(Block):
             if time - record.unloaded_time.item() >= self.params.flight_confirmation - 1e-9:
                 record.lift_off_time[()] = record.unloaded_time
                 record.lift_off_speed[()] = record.unloaded_speed
+                if self.series.made:
+                    keep_place(self.series)
         elif record.touchdown_time == NEVER and touched:
             record.touchdown_time[()] = time - self.period
             record.touchdown_speed[()] = -record.vertical_speed
+            if goes_on(self.series, self.params):
+                note_landing(record, self.series, self._planned)
+                return
         if record.touchdown_time == NEVER:
             record.apex_height[()] = max(record.apex_height.item(), height)
+
+    def _bounces(self) -> bool:
+        """Whether a foot off the ground between two jumps is no lift-off."""
+        plan = self.reference
+        early = float(plan.time) < float(plan.lift_off_time) - EARLY_LIFT_OFF
+        return self._planned and bool(self.series.made) and early
+
+    def _follow_row(self, time: float) -> None:
+        """Between two jumps: where the feet stand, and whether another comes."""
+        if self._planned and any(self.truth.contact_touched.tolist()):
+            note_place(self.record, self.series)
+        landed = time - float(self.series.landed_time)
+        if self.record.lift_off_time == NEVER and landed >= self.params.rest_time - 1e-9:
+            self.request_stop(f"no other jump {landed:.2f} s after touchdown")
 
     def _follow_landing(self, landed: float, tilt: float) -> None:
         """Peaks since touchdown, feet that slide or step, and the rest when its time comes."""

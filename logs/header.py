@@ -63,7 +63,7 @@ def make_header(
         blocks=tuple(_block(spec) for spec in graph.blocks),
         order=graph.order,
         robot=graph.robot,
-        source=next((spec.where.file for spec in graph.blocks if spec.where), ""),
+        source=graph.file or next((spec.where.file for spec in graph.blocks if spec.where), ""),
     )
 
 

@@ -10,7 +10,7 @@ Three ways, which differ only in which blocks run; all others are fed from the r
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -26,9 +26,10 @@ from ..runtime.memory import BoundGraph, Snapshot
 from ..runtime.run_result import RunResult
 from ..runtime.sinks import Sink
 from ..runtime.stages import CheckedGraph, ClockSpec
-from .recorded_run import RecordedRun, RowCursor, nearest_keyframe
+from .replayable import Replayable, RowCursor, nearest_keyframe
 
 Inputs = Literal["seed", "recorded"]
+BeforeTick = Callable[[BoundGraph, int], None]
 PIECE = 256
 """Ticks compared at once."""
 
@@ -74,7 +75,7 @@ class Replayed:
 
 
 def replay(
-    recorded: RecordedRun,
+    recorded: Replayable,
     *,
     graph: CheckedGraph | None = None,
     inputs: Inputs | None = None,
@@ -82,6 +83,7 @@ def replay(
     first_tick: int | None = None,
     last_tick: int | None = None,
     keep: bool = False,
+    before_tick: BeforeTick | None = None,
     sinks: Sequence[Sink] = (),
 ) -> Replayed:
     """Execute a recorded run again.
@@ -95,6 +97,7 @@ def replay(
         first_tick: begin at the last keyframe at or before it; by default at the beginning.
         last_tick: end before it; by default with the recording.
         keep: whether to keep the replayed rows.
+        before_tick: called with the graph before every tick, and once after the last.
         sinks: what else looks on.
 
     Raises:
@@ -117,7 +120,7 @@ def replay(
     _expect_no_gap(recorded, fed, start, end)
     bound = BoundGraph(fed_graph(graph, fed))
     bound.clock.tick = start
-    follower = Follower(recorded, bound, start, keep)
+    follower = Follower(recorded, bound, start, keep, before_tick)
     result = Executor(
         bound, clock=ClockSpec("free"), sinks=[follower, *sinks], log=False,
         on_ready=follower.ready,
@@ -151,7 +154,7 @@ def _fed(graph: CheckedGraph, inputs: Inputs, run: Sequence[str] | None) -> list
     return [spec.path for spec in graph.blocks if spec.block_type.outside != "no"]
 
 
-def _start(recorded: RecordedRun, first_tick: int | None) -> int:
+def _start(recorded: Replayable, first_tick: int | None) -> int:
     """The tick to begin with: the recording's first, or a keyframe."""
     first = int(recorded.ticks[0])
     if first_tick is None:
@@ -164,7 +167,7 @@ def _start(recorded: RecordedRun, first_tick: int | None) -> int:
     return first if keyframe is None else keyframe
 
 
-def _expect_beginning(recorded: RecordedRun, start: int) -> None:
+def _expect_beginning(recorded: Replayable, start: int) -> None:
     """What is not the beginning of a run needs a keyframe."""
     if start > 0 and start not in recorded.keyframes:
         raise ReplayError(
@@ -174,7 +177,7 @@ def _expect_beginning(recorded: RecordedRun, start: int) -> None:
         )
 
 
-def _expect_no_gap(recorded: RecordedRun, fed: Sequence[str], start: int, end: int) -> None:
+def _expect_no_gap(recorded: Replayable, fed: Sequence[str], start: int, end: int) -> None:
     """Blocks can be fed only where every tick was recorded."""
     ticks = recorded.ticks
     if int(ticks[0]) == start == 0 and len(ticks) == ticks[-1] + 1:
@@ -193,10 +196,11 @@ class Follower:
     """A sink that feeds what does not run, applies recorded parameter changes, and compares."""
 
     def __init__(
-        self, recorded: RecordedRun, bound: BoundGraph, first_tick: int, keep: bool
-    ) -> None:
+        self, recorded: Replayable, bound: BoundGraph, first_tick: int, keep: bool,
+        before_tick: BeforeTick | None = None,
+    ) -> None:  # fmt: skip
         self._recorded, self._bound = recorded, bound
-        self._first, self._keep = first_tick, keep
+        self._first, self._keep, self._before_tick = first_tick, keep, before_tick
         memory, order = bound.memory, bound.graph.order
         try:
             self._feed = Feed(bound, recorded.bus)
@@ -210,9 +214,9 @@ class Follower:
         if first_tick > 0:
             self._expect_state()
         ran = dict.fromkeys(self.ran)
-        self.notes = [
-            note for note in (*self._bus.notes, *self._state.notes) if _block(note) in ran
-        ]
+        # a recording without keyframes says nothing of state
+        states = self._state.notes if recorded.keyframes else []
+        self.notes = [note for note in (*self._bus.notes, *states) if _block(note) in ran]
         whole = self._bus.identical and not self._feed.paths
         names = [name for name in self._bus.names if _block(name) in ran]
         self.signals = Comparison(memory.bus.layout, order, None if whole else names)
@@ -280,6 +284,8 @@ class Follower:
             row = self._cursor.at(tick)
             if row is not None:
                 self._feed.show(row)
+        if self._before_tick is not None:
+            self._before_tick(self._bound, tick)
 
     def _restore(self, keyframe: Snapshot) -> None:
         """Bus and state of a keyframe, as far as this graph has the same."""

@@ -71,6 +71,7 @@ def make_runs(
     """All runs with their outcomes, in their order, whoever made them and when.
 
     Runs that the journal knows are not made again, and every other is kept as soon as it is there.
+    Runs with the same key are one; ``on_run`` hears of it once.
     What is no outcome of the run itself, such as the death of its process, is an error here but
     is not kept, so that the next time tries again.
 
@@ -78,9 +79,8 @@ def make_runs(
         AloftError: as ``runtime.jobs.job_results``.
     """
     missing = {run.key: run for run in runs if run.key not in journal.outcomes}
-    for run in runs:
-        if run.key not in missing:
-            on_run(journal.outcomes[run.key])
+    for key in dict.fromkeys(run.key for run in runs if run.key not in missing):
+        on_run(journal.outcomes[key])
     order = list(missing.values())
     lost: dict[str, Outcome] = {}
     if order:

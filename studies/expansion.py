@@ -66,17 +66,23 @@ class Job:
     seed: int = 0
 
 
-def cells(study: Study, tuned: Tuned | None = None) -> Iterator[Cell]:
-    """Every cell, by task, then by arm, then by the axes with the last one fastest."""
+def cells(study: Study, tuned: Tuned | None = None, common: Sequence[Entry] = ()) -> Iterator[Cell]:
+    """Every cell, by task, then by arm, then by the axes with the last one fastest.
+
+    ``common`` comes behind the study's ``set`` and in front of all else.
+    """
     where = Position("the tuned parameters", 0, 0)
     for task, arm in itertools.product(study.tasks, study.arms):
         for cases in itertools.product(*(axis.cases for axis in study.axes)):
-            cell = _cell(study, task, arm, dict(zip(study.axes, cases, strict=True)))
+            cell = _cell(study, common, task, arm, dict(zip(study.axes, cases, strict=True)))
             yield cell.with_sets((tuned or {}).get(arm.name, {}), where)
 
 
-def _cell(study: Study, task: Task, arm: Arm, cases: Mapping[Axis, Any]) -> Cell:
-    entries = [*study.sets, *task.sets, *(e for case in cases.values() for e in case.sets)]
+def _cell(
+    study: Study, common: Sequence[Entry], task: Task, arm: Arm, cases: Mapping[Axis, Any]
+) -> Cell:
+    entries = [*study.sets, *common, *task.sets]
+    entries += [entry for case in cases.values() for entry in case.sets]
     return Cell(
         task.name,
         arm.name,

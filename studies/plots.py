@@ -82,18 +82,20 @@ def draw_plot(study: Study, plot: Plot, runs: Sequence[Run], rows: Sequence[Row]
 
 def write_plots(
     study: Study, runs: Sequence[Run], rows: Sequence[Row], folder: Path
-) -> dict[str, Path]:
-    """Draw all plots; their files by name. Raises ``AloftError``."""
-    written = {}
+) -> tuple[dict[str, Path], list[str]]:
+    """Draw all plots: their files by name, and why others could not be drawn."""
+    written: dict[str, Path] = {}
+    problems = []
     for plot in study.plots:
-        name = plot.name if plot.name.endswith(".svg") else f"{plot.name}.svg"
+        path = folder / (plot.name if plot.name.endswith(".svg") else f"{plot.name}.svg")
         try:
-            (folder / name).write_text(draw_plot(study, plot, runs, rows), encoding="utf-8")
+            path.write_text(draw_plot(study, plot, runs, rows), encoding="utf-8")
+            written[plot.name] = path
+        except AloftError as error:
+            problems.append(str(error))
         except OSError as error:
-            message = f"cannot write {folder / name}: {error.strerror or error}"
-            raise AloftError(message) from error
-        written[plot.name] = folder / name
-    return written
+            problems.append(f"cannot write {path}: {error.strerror or error}")
+    return written, problems
 
 
 def _values(study: Study, name: str) -> dict[str, float]:

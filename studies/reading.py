@@ -7,6 +7,7 @@ checked by ``expansion``.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from ..runtime.loading.document import read_file
@@ -17,7 +18,7 @@ from ..runtime.stages import Position
 from .axes import read_axes, read_sets
 from .ranges import read_range
 from .sections import Labels, read_goals, read_plots, read_seeds, read_tuning
-from .study import Arm, Range, Study, Task
+from .study import Arm, Filter, Range, Study, Task
 
 KEYS = (
     "graph", "graphs", "include", "seeds", "title", "set", "arms", "grid", "goals", "tune", "plots",
@@ -38,6 +39,33 @@ def read_study(path: Path) -> Study:
     if study is None or len(problems):
         raise LoadError(problems.report(str(path)))
     return study
+
+
+def part_of(study: Study, texts: Sequence[str]) -> Filter:
+    """The cells that are meant by ``axis=value``; several values of one axis are alternatives.
+
+    Raises:
+        LoadError: there is no such axis, or it has no such value.
+    """
+    problems = Problems()
+    labels = Labels(
+        {name: study.labels_of(name) for name in study.axis_names},
+        {axis.name: axis for axis in study.axes},
+    )
+    nodes: dict[str, list[Node]] = {}
+    for text in texts:
+        axis, _, value = text.partition("=")
+        node = ScalarNode(value.strip(), Position(f"--where {text}", 0, 0))
+        nodes.setdefault(axis.strip(), []).append(node)
+    entries = [
+        Entry(axis, found[0].where, ListNode(tuple(found), found[0].where))
+        for axis, found in nodes.items()
+    ]
+    whole = MapNode(tuple(entries), Position("--where", 0, 0))
+    part = labels.read_filter(Entry("where", whole.where, whole), problems)
+    if len(problems):
+        raise LoadError(problems.report(str(study.path)))
+    return part
 
 
 def _read(tree: MapNode, path: Path, problems: Problems) -> Study:

@@ -58,9 +58,8 @@ def tuning_cells(study: Study) -> list[Cell]:
     """The cells that every draw of an arm is tried on, as they are written."""
     assert study.tuning is not None
     tuning = study.tuning
-    chosen = [cell for cell in cells(study) if tuning.cells.takes(cell.labels)]
-    common = {entry.key: entry for entry in tuning.sets}
-    return [replace(cell, sets={**cell.sets, **common}) for cell in chosen]
+    expanded = cells(study, common=tuning.sets)
+    return [cell for cell in expanded if tuning.cells.takes(cell.labels)]
 
 
 def extreme_cells(study: Study, chosen: Sequence[Cell]) -> list[Cell]:

@@ -41,11 +41,25 @@ UNUSED = {
     "aloft.blocks.inertial_filter.right_up": (
         np.array([0.0, 0.0, 0.0, 1.0]), np.array([0.3, 0.2, 9.8]), 0.01, np.zeros(3),
     ),
+    "aloft.blocks.invariant_contacts.forget": (1, np.full((37, 37), 0.5)),
+    "aloft.blocks.extended_pose.exponential": (
+        np.linspace(-0.5, 0.6, 12), np.zeros(4), np.zeros((3, 3)),
+    ),
+    "aloft.blocks.extended_pose.unbend": (
+        np.array([0.1, -0.4, 0.3]), np.array([0.5, 0.2, -0.3]), np.zeros(3),
+    ),
+    "aloft.blocks.extended_pose.logarithm": (
+        np.array([0.1, 0.2, 0.3, 0.92]), np.ones((3, 3)), np.zeros(12),
+    ),
+    "aloft.blocks.extended_pose.divide": (
+        np.array([0.1, 0.2, 0.3, 0.92]), np.ones((3, 3)), np.array([0.6, 0.0, 0.0, 0.8]),
+        np.ones((3, 3)), np.zeros(4), np.zeros((3, 3)), np.zeros(4),
+    ),
     "aloft.blocks.whole_body_qp.share_weight": (
         np.array([True, False, True, True]), 50.0, np.zeros((4, 3)),
     ),
 }  # fmt: skip
-"""Arguments of kernels that ``graphs/jump.yaml`` does not call."""
+"""Arguments of kernels that ``graphs/jump.yaml`` does not call with either estimator."""
 
 SAMPLES = 6
 EVERY = 211
@@ -95,6 +109,8 @@ def calls():
                 if id(value) in name_of:
                     patch.setattr(module, key, recorder(name_of[id(value)], value))
         aloft.load(ROOT / "graphs/jump.yaml").run()
+        other = {"estimator.use": "blocks.InvariantKalmanFilter"}
+        aloft.load(ROOT / "graphs/jump.yaml", other).run(duration=0.1)
     for name, arguments in UNUSED.items():
         samples[name].append(arguments)
     return samples

@@ -6,8 +6,9 @@ import json
 import os
 import re
 import zipfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -19,7 +20,7 @@ from .task import JumpTask, TaskError, make_task
 from .validity import InvalidPlanError, checked, require_valid
 
 SHIPPED = Path(__file__).parents[2] / "graphs" / "plans"
-"""The plans that come with aloft; ``aloft plan --ship`` makes them anew."""
+"""The plans that come with aloft; ``make plans`` makes them anew."""
 
 SCALES = {
     "rise": 0.05, "take_off_speed": 0.3, "distance_x": 0.1, "distance_y": 0.1, "twist": 0.5,
@@ -133,13 +134,33 @@ class PlanLibrary:
 
         Only the header of each file is read.
         """
+        for path, header in self.headers():
+            try:
+                yield path, make_task(header["task"])
+            except (KeyError, TypeError, TaskError):
+                continue
+
+    def headers(self) -> Iterator[tuple[Path, dict[str, Any]]]:
+        """Every file with its header; broken files are left out."""
         for folder in self._folders:
             for path in sorted(folder.glob("*-*.npz")):
                 try:
                     with np.load(path, allow_pickle=False) as file:
-                        yield path, make_task(json.loads(str(file["header"]))["task"])
-                except (OSError, KeyError, ValueError, EOFError, zipfile.BadZipFile, TaskError):
+                        yield path, json.loads(str(file["header"]))
+                except (OSError, KeyError, ValueError, EOFError, zipfile.BadZipFile):
                     continue
+
+    def prune(self, tasks: Iterable[JumpTask]) -> list[Path]:
+        """Remove from this library's own folder every plan of a task that is none of these."""
+        wanted = {task.hash(self.robot) for task in tasks}
+        others = [
+            path
+            for path in sorted(self.folder.glob("*-*.npz"))
+            if path.stem.rpartition("-")[2] not in wanted
+        ]
+        for path in others:
+            path.unlink(missing_ok=True)
+        return others
 
     def add(self, plan: JumpPlan) -> Path:
         """Keep a plan, which replaces any of the same task in this folder."""

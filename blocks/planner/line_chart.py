@@ -17,6 +17,11 @@ COLOURS = (
     "#17becf", "#bcbd22",
 )  # fmt: skip
 """Ten colours that stay apart for most eyes; lines take them in turn."""
+SHADES = {
+    "squat": "#f4f1e6", "thrust": "#fdeadb", "flight": "#e6f0fa", "landing": "#e7f4e8",
+    "recover": "#f3f3f3",
+}  # fmt: skip
+"""Colours of stretches by what they are; any other is as a flight."""
 
 
 @dataclass(frozen=True)
@@ -31,18 +36,18 @@ class Line:
 
 @dataclass
 class Chart:
-    """A chart with a title, lines, and shaded stretches (from, to, what) of the x axis."""
+    """A chart with a title, lines, the unit of the x axis, and shaded stretches (from, to, what)."""
 
     title: str
     lines: list[Line]
-    x_label: str = "time [s]"
+    x_unit: str = "s"
     shaded: list[tuple[float, float, str]] = field(default_factory=list)
 
     def svg(self, left: float, top: float, width: float, height: float) -> str:
         """The chart in that rectangle [px]."""
         x, y = self._range("x"), self._range("y")
-        inner_left, inner_top = left + 46.0, top + 22.0
-        inner_width, inner_height = width - 54.0, height - 54.0
+        inner_left, inner_top = left + 46.0, top + 28.0
+        inner_width, inner_height = width - 54.0, height - 60.0
 
         def across(value: float) -> float:
             return inner_left + (value - x[0]) / (x[1] - x[0]) * inner_width
@@ -51,14 +56,20 @@ class Chart:
             return inner_top + (y[1] - value) / (y[1] - y[0]) * inner_height
 
         out = [
-            f'<text x="{inner_left:.1f}" y="{top + 14:.1f}" font-weight="bold">{escape(self.title)}</text>'
+            f'<text x="{inner_left:.1f}" y="{top + 13:.1f}" font-weight="bold">{escape(self.title)}</text>'
         ]
         for start, end, what in self.shaded:
             a, b = across(max(start, x[0])), across(min(end, x[1]))
             out.append(
                 f'<rect x="{a:.1f}" y="{inner_top:.1f}" width="{max(0.0, b - a):.1f}" '
-                f'height="{inner_height:.1f}" fill="#eef3f8"><title>{escape(what)}</title></rect>'
+                f'height="{inner_height:.1f}" fill="{SHADES.get(what, SHADES["flight"])}">'
+                f"<title>{escape(what)}</title></rect>"
             )
+            if b - a > 5.0 * len(what):
+                out.append(
+                    f'<text x="{0.5 * (a + b):.1f}" y="{inner_top - 3:.1f}" font-size="8" '
+                    f'fill="#888888" text-anchor="middle">{escape(what)}</text>'
+                )
         for value in ticks(*y, 5):
             level = down(value)
             out.append(
@@ -66,15 +77,13 @@ class Chart:
                 f'y2="{level:.1f}" stroke="#dddddd"/>'
                 f'<text x="{inner_left - 4:.1f}" y="{level + 3:.1f}" text-anchor="end">{value:g}</text>'
             )
-        for value in ticks(*x, 7):
+        across_ticks = ticks(*x, 7)
+        for value in across_ticks:
+            unit = f" {self.x_unit}" if value == across_ticks[-1] else ""
             out.append(
                 f'<text x="{across(value):.1f}" y="{inner_top + inner_height + 13:.1f}" '
-                f'text-anchor="middle">{value:g}</text>'
+                f'text-anchor="middle">{value:g}{escape(unit)}</text>'
             )
-        out.append(
-            f'<text x="{inner_left + inner_width:.1f}" y="{inner_top + inner_height + 26:.1f}" '
-            f'text-anchor="end">{escape(self.x_label)}</text>'
-        )
         legend = inner_left
         for number, line in enumerate(self.lines):
             colour = "#444444" if line.level else COLOURS[number % len(COLOURS)]
@@ -89,7 +98,7 @@ class Chart:
                     f'<text x="{legend:.1f}" y="{inner_top + inner_height + 26:.1f}" '
                     f'fill="{colour}">{escape(line.name)}</text>'
                 )
-                legend += 6.2 * len(line.name) + 10.0
+                legend += 5.8 * len(line.name) + 10.0
         return "\n".join(out)
 
     def _range(self, axis: str) -> tuple[float, float]:

@@ -11,9 +11,9 @@ from ...runtime.description import RobotDescription
 from ...runtime.kinematics import link_poses
 from .clearance import legs
 from .evidence import Evidence
-from .line_chart import COLOURS, Chart, Line, page
+from .line_chart import COLOURS, page
 from .plan import JumpPlan
-from .plan_tests import allowed_motor_torque
+from .plan_charts import charts_of
 from .replay import replay
 
 Array = NDArray[np.float64]
@@ -26,14 +26,9 @@ POSTURES = 9
 def plan_picture(plan: JumpPlan, robot: RobotDescription) -> str:
     """The picture as SVG text."""
     evidence = Evidence(plan, robot, replay(plan, robot))
-    charts = [
-        com_chart(plan), momentum_chart(plan), force_chart(plan, robot),
-        torque_chart(evidence), speed_chart(evidence), feet_chart(evidence),
-    ]  # fmt: skip
     each = WIDTH / 3.0
     parts = [postures(plan, robot)]
-    for number, chart in enumerate(charts):
-        chart.shaded += [(start, end, "flight") for start, end in plan.flights]
+    for number, chart in enumerate(charts_of(evidence)):
         row, column = divmod(number, 3)
         parts.append(chart.svg(column * each, 36.0 + STRIP + row * CHART, each, CHART))
     figures, jumps = evidence.figures(), len(plan.flights)
@@ -42,7 +37,7 @@ def plan_picture(plan: JumpPlan, robot: RobotDescription) -> str:
         f"{1000 * plan.flight_time:.0f} ms, {figures['peak_motor_torque_N_m']:.1f} N m and "
         f"{figures['peak_motor_speed_rad_s']:.1f} rad/s at most"
     )
-    return page(title, parts, WIDTH, 36.0 + STRIP + 2.0 * CHART)
+    return page(title, parts, WIDTH, 36.0 + STRIP + 3.0 * CHART)
 
 
 def write_picture(path: str | Path, plan: JumpPlan, robot: RobotDescription) -> Path:
@@ -118,63 +113,3 @@ def posture_times(plan: JumpPlan) -> Array:
             ]
         )
     )
-
-
-def com_chart(plan: JumpPlan) -> Chart:
-    """The way of the centre of mass."""
-    way = 100.0 * (plan.com - plan.com[0])
-    lines = [Line(name, plan.time, way[:, k]) for k, name in enumerate(("forward", "left", "up"))]
-    return Chart("centre of mass from standing [cm]", lines)
-
-
-def momentum_chart(plan: JumpPlan) -> Chart:
-    """The angular momentum."""
-    names = ("roll", "pitch", "yaw")
-    lines = [Line(n, plan.time, plan.angular_momentum[:, k]) for k, n in enumerate(names)]
-    return Chart("angular momentum about it [N m s]", lines)
-
-
-def force_chart(plan: JumpPlan, robot: RobotDescription) -> Chart:
-    """The vertical force on every contact, constant over each interval."""
-    lasting = np.diff(plan.time) > 0.0
-    time = np.repeat(plan.time, 2)[1:-1].reshape(-1, 2)[lasting].ravel()
-    lines = [
-        Line(contact.name, time, np.repeat(plan.contact_force[:-1, k, 2][lasting], 2))
-        for k, contact in enumerate(robot.contacts)
-    ]
-    return Chart("vertical force of the ground [N]", lines)
-
-
-def torque_chart(e: Evidence) -> Chart:
-    """Motor torques as shares of what the motors can do at their speed."""
-    share = np.abs(e.motor_torque) / np.maximum(allowed_motor_torque(e, 1.0), 1e-3)
-    return _motor_chart(e, "motor torque [% of what its speed allows]", 100.0 * share, 100.0)
-
-
-def speed_chart(e: Evidence) -> Chart:
-    """Motor speeds as shares of the speed without load."""
-    share = np.abs(e.motor_speed) / e.robot.profiles[e.plan.task.profile].no_load_speed
-    return _motor_chart(e, "motor speed [% of no-load speed]", 100.0 * share, 100.0)
-
-
-def _motor_chart(e: Evidence, title: str, shares: Array, limit: float) -> Chart:
-    time = e.replay.samples.time
-    shares = np.minimum(shares, 1.5 * limit)
-    busiest = set(np.argsort(shares.max(axis=0))[-3:].tolist())
-    lines = [
-        Line(name.removesuffix("_motor") if k in busiest else "", time, shares[:, k])
-        for k, name in enumerate(e.robot.transmission.motors)
-    ]
-    level = np.array([time[0], time[-1]])
-    lines.append(Line("", level, np.full(2, limit * e.effort), level=True))
-    return Chart(title, lines)
-
-
-def feet_chart(e: Evidence) -> Chart:
-    """The heights of the contact points above the ground at the start."""
-    samples = e.replay.samples
-    lines = [
-        Line(contact.name, samples.time, 100.0 * samples.points[:, k, 2])
-        for k, contact in enumerate(e.robot.contacts)
-    ]
-    return Chart("height of toes and heels [cm]", lines)

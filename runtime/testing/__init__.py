@@ -4,10 +4,13 @@ from .allocations import count_array_allocations
 from .bench import BlockBench
 from .conformance import ConformanceError, check_block, conformance_cases
 from .graphs import Use, checked_graph
+from .stretch import Stretch, StretchError
 
 __all__ = [
     "BlockBench",
     "ConformanceError",
+    "Stretch",
+    "StretchError",
     "Use",
     "check_block",
     "checked_graph",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from pathlib import Path
 from types import TracebackType
 from typing import Any, Generic, Self, TypeVar
 
@@ -25,7 +26,9 @@ class BlockBench(Generic[B]):
         block_type: the block's class.
         params: its parameters as a graph file would give them, or a ready object.
         robot: a robot's name, a description, or nothing.
-        rate: how often the block runs [Hz]; one step is one tick.
+        rate: of the ticks [Hz].
+        period_ticks: ticks from one run of the block to the next; one step is one run.
+        folder: to which files that a parameter names are relative.
         dimensions: named sizes; they win over the robot's, and the block's own win over them.
         wired: which inputs the block is told are wired; all by default. The others read their
             defaults and cannot be set.
@@ -45,6 +48,8 @@ class BlockBench(Generic[B]):
         *,
         robot: str | RobotDescription | None = None,
         rate: float = 500.0,
+        period_ticks: int = 1,
+        folder: Path | None = None,
         dimensions: Mapping[str, int] | None = None,
         wired: Iterable[str] | None = None,
     ) -> None:
@@ -65,7 +70,16 @@ class BlockBench(Generic[B]):
         self.memory = Memory([spec], description)
         self.block: B = block_type(
             params,
-            Context("block", self.clock, 1, 0, dimensions=sizes, robot=description, wired=names),
+            Context(
+                "block",
+                self.clock,
+                period_ticks,
+                0,
+                dimensions=sizes,
+                robot=description,
+                wired=names,
+                folder=folder or Path(),
+            ),
         )
         self.memory.bind(self.block, spec)
         self._is_moore = block_type.is_moore()
@@ -109,20 +123,20 @@ class BlockBench(Generic[B]):
             raise KeyError(f"{kind.__name__} has no port {port!r}")
         return getattr(self.block, port)
 
-    def step(self, ticks: int = 1) -> None:
-        """Run the block once a tick: ``step``, or ``emit`` and then ``update``.
+    def step(self, runs: int = 1) -> None:
+        """Run the block: ``step``, or ``emit`` and then ``update``; its period passes.
 
         After a step of a Moore block its outputs are what ``emit`` wrote before ``update``; call
         ``bench.block.emit()`` to see what the new state says.
         """
         block: Any = self.block
-        for _ in range(ticks):
+        for _ in range(runs):
             if self._is_moore:
                 block.emit()
                 block.update()
             else:
                 block.step()
-            self.clock.tick += 1
+            self.clock.tick += block.context.period_ticks
 
     @property
     def stop_reason(self) -> str | None:

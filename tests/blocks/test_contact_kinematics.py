@@ -90,3 +90,23 @@ def test_com_velocity_is_pinocchios(seed):
     q = np.r_[np.zeros(3), UPRIGHT, joints]
     pin.centerOfMass(model, data, q, np.r_[np.zeros(3), rate, speeds])
     assert np.abs(SEEN.com_velocity - data.vcom[0]).max() < 1e-13
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_jacobians_of_the_centres_of_the_rubber(seed):
+    orientation, rate, joints, speeds = draw(seed)
+    up = pin.Quaternion(orientation).toRotationMatrix()[2]
+
+    def centres(at):
+        SEEN.evaluate(orientation, rate, at, speeds)
+        SEEN.differentiate()
+        return SEEN.centres.copy()
+
+    found = centres(joints), SEEN.jacobians.copy(), SEEN.points.copy()
+    radius = np.array([[contact.radius] for contact in ROBOT.contacts])
+    np.testing.assert_allclose(found[2], found[0] - radius * up, atol=1e-12)
+    for joint in range(10):
+        step = np.zeros(10)
+        step[joint] = 1e-6
+        numeric = (centres(joints + step) - centres(joints - step)) / 2e-6
+        np.testing.assert_allclose(found[1][:, :, joint], numeric, atol=1e-8)

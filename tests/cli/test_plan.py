@@ -1,6 +1,7 @@
 """``aloft plan``: table, picture and recording of a kept plan, grids, and what it refuses."""
 
 import json
+import shutil
 import subprocess
 from collections.abc import Callable
 from dataclasses import replace
@@ -10,8 +11,12 @@ from typing import Any
 import numpy as np
 import pytest
 
+from aloft.blocks.planner import nearest_feasible
+from aloft.blocks.planner.errors import PlanError
 from aloft.blocks.planner.library import SHIPPED, PlanLibrary
-from aloft.blocks.planner.task import make_task, read_task
+from aloft.blocks.planner.nearest_feasible import Axis
+from aloft.blocks.planner.plan import JumpPlan
+from aloft.blocks.planner.task import JumpTask, make_task, read_task
 from aloft.runtime.description import find_robot
 
 Call = Callable[..., subprocess.CompletedProcess[str]]
@@ -50,12 +55,72 @@ def test_a_plan_that_is_not_valid_says_which_test_failed(
     higher = make_task({"name": "higher", "rise": 0.16})
     PlanLibrary(robot, folder / "library").add(replace(kept, task=higher))
     (folder / "higher.yaml").write_text("rise: 16 cm\n")
-    arguments = ("plan", "higher.yaml", "--keep", "library", "--no-pictures")
+    arguments = ("plan", "higher.yaml", "--keep", "library", "--no-pictures", "--no-nearest")
     result = call_json(*arguments, code=1)
     assert result["reason"] == "not planned: higher"
     failed = [test["name"] for test in result["plans"][0]["tests"] if not test["passed"]]
     assert failed == ["rise"]
     assert "rise: how far the apex" in call(*arguments, code=1).stderr
+
+
+def test_where_there_is_no_plan_the_nearest_task_is_found_and_kept(
+    folder: Path, call_json: CallJson, call: Call, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from aloft.blocks.planner import library, solve
+
+    kept = PlanLibrary(find_robot("bruce"), Path("nowhere")).find(read_task(TASKS / "in_situ.yaml"))
+
+    def stand_in(task: JumpTask, *_: object, **__: object) -> JumpPlan:
+        if abs((task.rise or 0.0) - 0.15) > 2e-3:
+            raise PlanError("no plan: apex is missed", family="apex", violation=0.1)
+        assert kept is not None
+        return replace(kept, task=task)
+
+    monkeypatch.setattr(solve, "solve_jump", stand_in)
+    monkeypatch.setattr(nearest_feasible, "AXES", {"rise": Axis(0.15, 0.05, 100.0, "cm")})
+    monkeypatch.setattr(library, "solve_task", stand_in)
+    (folder / "high.yaml").write_text("rise: 40 cm\nthrust_time: 260 ms\n")
+    arguments = ("plan", "high.yaml", "--keep", "library", "--no-pictures")
+    (row,) = call_json(*arguments, code=1)["plans"]
+    assert (row["family"], row["violation"]) == ("apex", 0.1)
+    near = row["nearest"]
+    assert (near["parameter"], near["value"], near["beyond"]) == ("rise", 0.15, 0.2)
+    assert near["solves"] == 3 and Path(near["path"]).is_file()
+    done = call(*arguments, code=1)
+    assert "error: no plan: apex is missed" in done.stderr
+    assert "the nearest that can be planned is rise: 15 cm; 20 cm cannot" in done.stdout
+    assert "nearest" not in call_json(*arguments, "--no-nearest", code=1)["plans"][0]
+
+
+def test_all_files_are_read_before_anything_is_planned(folder: Path, call_json: CallJson) -> None:
+    (folder / "one.yaml").write_text("rise: 3 kg\n")
+    (folder / "two.yaml").write_text("rize: 3\n")
+    reason = call_json("plan", str(TASKS / "in_situ.yaml"), "one.yaml", "two.yaml", code=2)[
+        "reason"
+    ]
+    assert [line.partition(": ")[0] for line in reason.splitlines()] == [
+        "one.yaml:1:7", "two.yaml:1:1",
+    ]  # fmt: skip
+
+
+def test_the_library_is_listed(folder: Path, call_json: CallJson, call: Call) -> None:
+    rows = {row["task"]: row for row in call_json("plan", "--list")["plans"]}
+    assert {"in_situ", "twist_30deg", "step_up_5cm"} <= set(rows)
+    assert rows["in_situ"]["valid"] is True
+    assert rows["in_situ"]["figures"]["rise_m"] == pytest.approx(0.15, abs=1e-3)
+    assert rows["step_up_5cm"]["asked"]["landing_height"] == 0.05
+    assert "twist [deg]" in call("plan", "--list").stdout
+    assert "or --list" in call("plan", "--list", "a.yaml", code=2).stderr
+
+
+def test_pruning_keeps_the_tasks_that_are_given(
+    folder: Path, call_json: CallJson, call: Call
+) -> None:
+    shutil.copytree(SHIPPED, folder / "kept")
+    one = str(TASKS / "in_situ.yaml")
+    call_json("plan", one, "--keep", "kept", "--prune", "--no-pictures")
+    assert [path.name.partition("-")[0] for path in (folder / "kept").iterdir()] == ["in_situ"]
+    assert "--prune goes with" in call("plan", one, "--prune", code=2).stderr
 
 
 def test_a_wrong_task_is_refused(folder: Path, call_json: CallJson, call: Call) -> None:

@@ -145,7 +145,7 @@ def complete(start: Start, words: str) -> list[str]:
 
 
 def test_the_tab_key_completes(folder: Path, start: Start) -> None:
-    assert complete(start, "aloft r") == ["run"]
+    assert complete(start, "aloft ru") == ["run"]
     assert "--seeds" in complete(start, "aloft run --se")
     assert complete(start, "aloft blocks runtime.Ga") == ["runtime.Gain"]
     assert complete(start, "aloft run count.yaml --set counter.s") == [

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from aloft.logs.recorded_run import KeptRun, Keyframes, RowCursor, nearest_keyframe
 from aloft.logs.replay import ReplayError, default_inputs, replay
+from aloft.logs.replayable import KeptRun, Keyframes, RowCursor, nearest_keyframe
 from aloft.runtime.block import Block, Output, State
 from aloft.runtime.errors import BlockError
 from aloft.runtime.executor import Executor

@@ -127,3 +127,12 @@ def test_another_robot_finds_nothing(tmp_path: Path) -> None:
     other = ROBOT.model_copy(update={"text": "another"})
     shutil.copytree(SHIPPED, tmp_path / "plans")
     assert PlanLibrary(other, tmp_path / "plans").find(IN_SITU) is None
+
+
+def test_pruning_leaves_the_tasks_that_are_named(tmp_path: Path, good: JumpPlan) -> None:
+    library = PlanLibrary(ROBOT, tmp_path)
+    kept, gone = (library.add(replace(good, task=near(rise=rise))) for rise in (0.1501, 0.1502))
+    (tmp_path / "notes.txt").write_text("mine")
+    assert library.prune([near(rise=0.1501)]) == [gone]
+    assert sorted(path.name for path in tmp_path.iterdir()) == [kept.name, "notes.txt"]
+    assert library.find(IN_SITU) is not None, "other folders are left alone"

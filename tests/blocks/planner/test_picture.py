@@ -20,6 +20,7 @@ def test_a_plans_picture(by_hand: JumpPlan, tmp_path: Path) -> None:
     assert any(text.startswith("by_hand: rise 8.5 cm, flight 291 ms") for text in texts)
     assert {"right_toe", "pitch", "up"} <= set(texts)
     assert len(list(root.iter(f"{SVG}polyline"))) > 40
+    assert {"squat", "flight", "landing", "ground", "allowed at that speed"} <= set(texts)
     assert len(list(root.iter(f"{SVG}circle"))) == 9, "the centre of mass in every posture"
 
 

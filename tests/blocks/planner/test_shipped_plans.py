@@ -11,7 +11,7 @@ from aloft.blocks.planner.validity import check_plan
 from aloft.runtime.description import find_robot
 
 TASKS = sorted((SHIPPED.parent / "tasks").glob("*.yaml"))
-REMEDY = "make it anew: aloft plan graphs/tasks/*.yaml --anew --keep graphs/plans --no-pictures"
+REMEDY = "run: make plans"
 
 
 def test_there_are_the_basic_tasks() -> None:
@@ -26,17 +26,26 @@ def test_every_task_has_its_valid_plan(path: Path, tmp_path: Path) -> None:
     task = read_task(path)
     robot = find_robot(task.robot)
     plan = PlanLibrary(robot, tmp_path).find(task)
-    assert plan is not None, REMEDY
+    assert plan is not None, f"{path.name} has changed or is new, and has no plan; {REMEDY}"
     report = check_plan(plan, robot)
-    assert report.valid, f"{report.explain()}\n{REMEDY}"
+    assert report.valid, f"{report.explain()}\nthe planner or the check has changed; {REMEDY}"
     assert plan.valid, "the file says so itself"
 
 
 def test_no_plan_is_there_without_its_task() -> None:
     robot = find_robot("bruce")
     wanted = {read_task(path).hash(robot) for path in TASKS}
-    kept = {path.stem.rpartition("-")[2] for path in SHIPPED.glob("*.npz")}
-    assert kept == wanted, REMEDY
+    stale = [p.name for p in SHIPPED.glob("*.npz") if p.stem.rpartition("-")[2] not in wanted]
+    assert stale == [], f"plans of tasks that are no more; {REMEDY}"
+
+
+def test_the_remedy_is_one_command_that_makes_them_all() -> None:
+    """What the messages above say is there, makes every task anew, and removes what is stale."""
+    makefile = (SHIPPED.parents[1] / "Makefile").read_text()
+    rule = makefile.partition("\nplans: ")[2].partition("\n\n")[0]
+    command = rule.splitlines()[1]
+    for part in ("graphs/tasks/*.yaml", "--anew", "--prune", "--keep graphs/plans"):
+        assert part in command
 
 
 def test_every_plan_names_what_made_it() -> None:

@@ -17,8 +17,8 @@ from ..runtime.run_result import RunResult
 from ..runtime.stages import CheckedGraph
 
 
-class RecordedRun(Protocol):
-    """A run that was kept.
+class Replayable(Protocol):
+    """A run that was kept: in memory, or in a recording.
 
     Attributes:
         graph: what ran.
@@ -115,7 +115,7 @@ class Keyframes:
         """Nothing to do."""
 
 
-def nearest_keyframe(recorded: RecordedRun, tick: int) -> int | None:
+def nearest_keyframe(recorded: Replayable, tick: int) -> int | None:
     """The last keyframe at or before ``tick``; ``None`` where there is none but the beginning."""
     place = bisect_right(recorded.keyframes, tick)
     return recorded.keyframes[place - 1] if place else None
@@ -127,7 +127,7 @@ class RowCursor:
     PIECE = 512
     """Ticks read at once."""
 
-    def __init__(self, recorded: RecordedRun) -> None:
+    def __init__(self, recorded: Replayable) -> None:
         self._recorded = recorded
         self._ticks: NDArray[np.int64] = np.zeros(0, np.int64)
         self._rows: NDArray[np.uint8] = np.zeros((0, 0), np.uint8)

@@ -1,0 +1,244 @@
+"""``aloft replay``: execute a recorded run again, and say where it differs."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import typer
+
+from ..runtime.errors import AloftError, ExitCode
+from .output import (
+    SET_HELP,
+    console,
+    errors_reported,
+    number,
+    print_json,
+    print_warning,
+    say,
+    table,
+)
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from ..logs.opened_run import OpenedRun
+    from ..logs.replay import Replayed
+
+MOST_ROWS = 15
+
+
+def replay(
+    recording: Annotated[Path, typer.Argument(help="The recording, a .rrd file.")],
+    check: Annotated[
+        bool, typer.Option("--check", help="Exit with 1 unless every byte is the same.")
+    ] = False,
+    inputs: Annotated[
+        Literal["auto", "seed", "recorded"],
+        typer.Option(
+            help="seed: run everything; recorded: feed what came from outside the graph, robot or "
+            "simulator, from the recording; auto: seed for a simulation."
+        ),
+    ] = "auto",
+    first: Annotated[
+        int | None, typer.Option("--from", help="Begin at the last keyframe up to this tick.")
+    ] = None,
+    until: Annotated[int | None, typer.Option(help="End before this tick.")] = None,
+    swap: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="BLOCK=USE: run another block in the place of one, e.g. wbc=mypkg:MyWbc, and feed "
+            "all others from the recording. Repeatable."
+        ),
+    ] = None,
+    overrides: Annotated[
+        list[str] | None,
+        typer.Option("--set", help=f"{SET_HELP} Runs that block alone, as --swap does."),
+    ] = None,
+    output: Annotated[
+        Path | None,
+        typer.Option(help="Write recorded and replayed signals side by side to this .rrd file."),
+    ] = None,
+    folder: Annotated[
+        Path | None,
+        typer.Option(help="Where the graph file's folder is now, if it is not where it was."),
+    ] = None,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Tables go to standard error, one JSON object to output.")
+    ] = False,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print the verdict only.")] = False,
+) -> None:
+    """Execute a recorded run again and compare every byte of every tick with the recording."""
+    from ..logs.opened_run import OpenedRun
+
+    out = console(to_stderr=as_json, quiet=quiet)
+    with errors_reported(as_json):
+        if not recording.is_file():
+            raise AloftError(f"there is no recording {recording}")
+        opened = OpenedRun.of(recording, folder)
+        changed = changed_blocks(opened, swap or [], overrides or [])
+        if changed and output is None:
+            output = recording.with_name(f"{recording.stem}-replay.rrd")
+        done = execute(opened, changed, inputs, first, until, output is not None, out)
+        done.result.raise_if_failed() if not done.signals.compared else None
+        written = write(output, opened, done) if output is not None else None
+    other = opened.what_is_other_now()
+    verdict = describe(opened, done)
+    print_differences(out, done)
+    for note in done.notes:
+        print_warning(note)
+    if done.first is not None:
+        for difference in other:
+            print_warning(f"since the recording was made: {difference}")
+    if written is not None:
+        say(out, f"recorded and replayed side by side: {written}")
+    if as_json:
+        print_json(as_data(recording, done, verdict, other, written))
+    else:
+        same = done.identical
+        color = typer.colors.GREEN if same else typer.colors.YELLOW
+        typer.secho(verdict, fg=color, err=check and not same)
+    raise typer.Exit(ExitCode.NOT_SUCCESSFUL if check and not done.identical else ExitCode.SUCCESS)
+
+
+def changed_blocks(opened: OpenedRun, swaps: list[str], sets: list[str]) -> dict[str, list[str]]:
+    """What is changed, as overrides by block. Raises ``AloftError``."""
+    from ..runtime.registry import find_block
+
+    changed: dict[str, list[str]] = {}
+    known = opened.file.header.order
+    for text, form, suffix in (
+        *((text, "--swap block=mypkg:MyBlock", ".use") for text in swaps),
+        *((text, "--set block.parameter=value", "") for text in sets),
+    ):
+        name, equals, value = text.partition("=")
+        block = name if suffix else name.partition(".")[0]
+        if not equals or not value or (not suffix and "." not in name):
+            raise AloftError(f"{text!r} changes nothing; write {form}")
+        if block not in known:
+            raise AloftError(f"the recorded graph has no block {block!r}; it has {_list(known)}")
+        if suffix and ":" in value:
+            find_block(value, Path.cwd())  # also a file in this folder
+        changed.setdefault(block, []).append(f"{name}{suffix}={value}")
+    return changed
+
+
+def _list(names: tuple[str, ...]) -> str:
+    return ", ".join(name for name in names if "~" not in name)
+
+
+def execute(
+    opened: OpenedRun,
+    changed: dict[str, list[str]],
+    inputs: Literal["auto", "seed", "recorded"],
+    first: int | None,
+    until: int | None,
+    keep: bool,
+    out: Console,
+) -> Replayed:
+    """Replay, with a progress bar. Raises ``AloftError``."""
+    from ..logs.replay import replay as replay_run
+    from .progress import TickCounter, progress_bar
+
+    settings = [text for texts in changed.values() for text in texts]
+    graph = opened.load(settings) if settings else opened.graph
+    end = min(until or int(opened.ticks[-1]) + 1, int(opened.ticks[-1]) + 1)
+    total = end - max(int(opened.ticks[0]), first or 0)
+    with progress_bar(out, f"replaying {graph.name}", total) as (progress, task):
+        return replay_run(
+            opened,
+            graph=graph,
+            inputs=None if inputs == "auto" else inputs,
+            run=list(changed) or None,
+            first_tick=first,
+            last_tick=until,
+            keep=keep,
+            sinks=[TickCounter(progress, task)],
+        )
+
+
+def write(output: Path, opened: OpenedRun, done: Replayed) -> Path:
+    """Write both runs to a file. Raises ``AloftError``."""
+    from ..logs.replay_recording import write_replay
+
+    try:
+        return write_replay(output, opened, done)
+    except OSError as error:
+        raise AloftError(f"{output} cannot be written ({error.strerror or error})") from error
+
+
+def describe(opened: OpenedRun, done: Replayed) -> str:
+    """The verdict in one line."""
+    ticks, states = done.signals.compared, done.states.compared
+    ran = "all blocks" if len(done.ran) == len(done.bound.blocks) else ", ".join(done.ran)
+    what = f"{ticks} ticks from {done.first_tick} on"
+    if done.first is not None:
+        return f"differs first at {done.first}"
+    if done.notes:
+        return f"equal where it can be compared, but: {done.notes[0]}"
+    also = f", and the state at {states} keyframe{'s' * (states != 1)}" if states else ""
+    return f"identical: every byte of {what}{also} ({ran})"
+
+
+def print_differences(out: Console, done: Replayed) -> None:
+    """Print the fields that differ, those with the largest difference first."""
+    units = _units(done)
+    rows = []
+    for name, each in done.signals.largest()[:MOST_ROWS]:
+        ulps = "" if each.first.ulps is None else f"{each.ulps:.3g}"
+        rows.append(
+            (name, number(each.largest), units.get(name, ""), str(each.largest_tick),
+             ulps, str(each.first.tick), str(each.ticks), str(each.elements))
+        )  # fmt: skip
+    if rows:
+        more = len(done.signals.fields) - len(rows)
+        title = "differences" + (f" (the largest; {more} more fields differ)" if more > 0 else "")
+        columns = ("field", ">largest", "unit", ">at tick", ">most ULP", ">first tick",
+                   ">ticks", ">elements")  # fmt: skip
+        out.print(table(title, columns, rows))
+
+
+def _units(done: Replayed) -> dict[str, str]:
+    """The unit of every field, by name."""
+    return {
+        f"{spec.path}.{port}.{name}": "" if field.unit is None else str(field.unit)
+        for spec in done.bound.graph.blocks
+        for port, declared in spec.block_type.outputs.items()
+        for name, field in declared.signal.fields.items()
+    }
+
+
+def as_data(
+    recording: Path, done: Replayed, verdict: str, other: list[str], written: Path | None
+) -> dict[str, Any]:
+    """The whole answer as plain data."""
+    first = done.first
+    return {
+        "success": done.identical,
+        "reason": verdict,
+        "recording": str(recording),
+        "first_tick": done.first_tick,
+        "ticks": done.signals.compared,
+        "keyframes": done.states.compared,
+        "ran": list(done.ran),
+        "first_difference": None
+        if first is None
+        else {**asdict(first), "block": first.block, "place": first.place},
+        "differing_elements": done.signals.elements,
+        "fields": {
+            name: {
+                "largest": each.largest,
+                "largest_tick": each.largest_tick,
+                "ulps": each.ulps,
+                "first_tick": each.first.tick,
+                "ticks": each.ticks,
+                "elements": each.elements,
+            }
+            for name, each in done.signals.largest()
+        },
+        "notes": list(done.notes),
+        "other_since": other,
+        "outcome": {"success": done.result.success, "reason": done.result.reason},
+        "output": None if written is None else str(written),
+    }

@@ -1,0 +1,207 @@
+"""``aloft test``: run tests of blocks, or turn a stretch of a recording into one."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from importlib.util import find_spec
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from ..runtime.errors import AloftError, ExitCode
+from .output import console, errors_reported, print_json, print_warning, say, table
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from ..runtime.block import Block
+
+Row = tuple[str, str, str]
+"""A block, the name of a check, and what is wrong, empty if nothing is."""
+
+
+def test(
+    targets: Annotated[
+        list[str] | None,
+        typer.Argument(
+            help="Blocks (mypkg:MyBlock), graph files (all their blocks), or Python files and "
+            "folders for pytest; by default pytest in this folder."
+        ),
+    ] = None,
+    recording: Annotated[
+        Path | None, typer.Option("--from", help="Write a test from this recording.")
+    ] = None,
+    block: Annotated[str, typer.Option(help="With --from: the block's path in the graph.")] = "",
+    ticks: Annotated[
+        str, typer.Option(help="With --from: which ticks, e.g. 1200:1400 (1400 not among them).")
+    ] = "",
+    output: Annotated[
+        Path | None,
+        typer.Option(help="With --from: the file; by default test_BLOCK_FIRST_LAST.py in tests/."),
+    ] = None,
+    rtol: Annotated[float, typer.Option(min=0.0, help="With --from: relative tolerance.")] = 0.0,
+    atol: Annotated[float, typer.Option(min=0.0, help="With --from: absolute tolerance.")] = 0.0,
+    robot: Annotated[str, typer.Option(help="The robot for blocks that need one.")] = "bruce",
+    folder: Annotated[
+        Path | None,
+        typer.Option(help="With --from: where the graph file's folder is now, if it has moved."),
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
+) -> None:
+    """Test blocks: that they keep what every block promises, and your own tests with pytest.
+
+    With --from, write a test instead: the block's state, inputs and outputs in a stretch of a
+    recorded run, which it must reproduce to the last bit.
+    """
+    out = console(to_stderr=as_json)
+    with errors_reported(as_json):
+        if recording is not None:
+            if targets:
+                raise AloftError("with --from there is nothing else to test")
+            write(recording, block, ticks, output, rtol, atol, folder, out, as_json)
+            return
+        if block or ticks or output:
+            raise AloftError("--block, --ticks and --output go with --from RECORDING")
+        blocks, paths = sort_targets(targets or [])
+        rows = [row for each in blocks for row in check(*each, robot)]
+    passed = report(rows, out)
+    code = run_pytest(paths, as_json) if paths or not targets else None
+    good = passed and code in (None, 0)
+    if as_json:
+        checks = [{"block": b, "check": c, "problem": p} for b, c, p in rows]
+        print_json({"success": good, "checks": checks, "pytest_exit_code": code})
+    raise typer.Exit(ExitCode.SUCCESS if good else ExitCode.NOT_SUCCESSFUL)
+
+
+def sort_targets(
+    targets: list[str],
+) -> tuple[list[tuple[str, type[Block], dict[str, Any] | None]], list[str]]:
+    """Blocks with their parameters (``None``: examples), and paths for pytest.
+
+    Raises:
+        LoadError: a graph may not run.
+        AloftError: a target is nothing that can be tested.
+    """
+    from ..runtime.loading import load
+    from ..runtime.loading.adjust import plain_parameters
+    from ..runtime.registry import find_block
+
+    blocks: list[tuple[str, type[Block], dict[str, Any] | None]] = []
+    paths = []
+    for target in targets:
+        path = Path(target.partition("::")[0])
+        if path.suffix in (".yaml", ".yml"):
+            blocks += [
+                (f"{spec.path} ({spec.block_type.__name__})", spec.block_type,
+                 plain_parameters(spec.params))
+                for spec in load(path).blocks
+                if "~" not in spec.path
+            ]  # fmt: skip
+        elif path.exists():
+            paths.append(target)
+        else:
+            blocks.append((target, find_block(target, Path.cwd()), None))
+    return blocks, paths
+
+
+def check(
+    name: str, block_type: type[Block], params: dict[str, Any] | None, robot: str
+) -> list[Row]:
+    """Every promise of a block, checked by itself."""
+    from ..runtime.testing.conformance import ConformanceError, check_block, conformance_cases
+
+    rows = []
+    for case in conformance_cases():
+        problem = ""
+        try:
+            check_block(block_type, params, robot=robot, cases=[case])
+        except ConformanceError as error:
+            problem = str(error)
+        except Exception as error:  # noqa: BLE001  the other checks still count
+            problem = f"{type(error).__name__}: {error}"
+        rows.append((name, case, problem))
+    return rows
+
+
+def report(rows: list[Row], out: Console) -> bool:
+    """Print what is wrong and how many checks passed; whether all have."""
+    wrong = [row for row in rows if row[2]]
+    if wrong:
+        out.print(table("", ("block", "check", "what is wrong"), wrong))
+    if rows:
+        names = len(dict.fromkeys(row[0] for row in rows))
+        say(out, f"{len(rows) - len(wrong)} of {len(rows)} checks of {names} blocks passed")
+    return not wrong
+
+
+def run_pytest(paths: list[str], as_json: bool) -> int:
+    """Run pytest on some paths, or in this folder; its exit code.
+
+    A folder without tests is no failure.
+    """
+    if find_spec("pytest") is None:
+        print_warning("no tests were run: pytest is not installed; pip install pytest")
+        return 1
+    command = [sys.executable, "-m", "pytest", *paths]
+    if as_json:  # standard output is for the object alone
+        done = subprocess.run(
+            command, check=False, text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT
+        )
+        sys.stderr.write(done.stdout)
+    else:
+        done = subprocess.run(command, check=False, text=True)
+    return 0 if done.returncode == 5 and not paths else done.returncode
+
+
+def write(
+    recording: Path,
+    block: str,
+    ticks: str,
+    output: Path | None,
+    rtol: float,
+    atol: float,
+    folder: Path | None,
+    out: Console,
+    as_json: bool,
+) -> None:
+    """Write a test from a recording. Raises ``AloftError``."""
+    from ..logs.opened_run import OpenedRun
+    from ..logs.regression import write_test
+
+    if not recording.is_file():
+        raise AloftError(f"there is no recording {recording}")
+    if not block or not ticks:
+        raise AloftError("--from needs --block NAME and --ticks FIRST:END")
+    first, last = parse_ticks(ticks)
+    opened = OpenedRun.of(recording, folder)
+    if output is None:
+        start = Path("tests") if Path("tests").is_dir() else Path()
+        output = start / f"test_{block.replace('/', '_')}_{first}_{last}.py"
+    try:
+        written = write_test(
+            opened, block, first, last, output, source=str(recording), rtol=rtol, atol=atol
+        )
+    except OSError as error:
+        raise AloftError(f"{output} cannot be written ({error.strerror or error})") from error
+    if written.difference is not None:
+        print_warning(f"the block as it is now fails this test: {written.difference}")
+    if as_json:
+        differs = None if written.difference is None else str(written.difference)
+        print_json(
+            {"success": True, "test": str(written.test), "data": str(written.data),
+             "runs": written.runs, "differs_now": differs}
+        )  # fmt: skip
+        return
+    say(out, f"{written.test}: {written.runs} runs of {block}; data in {written.data}")
+    say(out, f"to run it: pytest {written.test}")
+
+
+def parse_ticks(text: str) -> tuple[int, int]:
+    """``1200:1400`` as two numbers. Raises ``AloftError``."""
+    first, colon, last = text.partition(":")
+    try:
+        return int(first), int(last) if colon else int(first) + 1
+    except ValueError:
+        raise AloftError(f"ticks {text!r} are no range like 1200:1400") from None

@@ -1,0 +1,60 @@
+"""``aloft test``: blocks keep their promises, a recording becomes a test, pytest runs."""
+
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+Call = Callable[..., subprocess.CompletedProcess[str]]
+CallJson = Callable[..., dict[str, Any]]
+
+
+def test_blocks_and_graphs(folder: Path, call: Call, call_json: CallJson) -> None:
+    done = call("test", "blocks.ContactDetector")
+    assert "11 of 11 checks of 1 blocks passed" in done.stdout
+    answer = call_json("test", "count.yaml", code=1)  # its block has undocumented ports
+    problems = {(c["block"], c["check"]): c["problem"] for c in answer["checks"] if c["problem"]}
+    assert problems["counter (Counter)", "documented"] == "Counter: port 'y' has no text"
+    assert "counter (Counter)" in call("test", "counter:Counter", "count.yaml", code=1).stdout
+
+
+def test_a_recording_becomes_a_test_that_pytest_runs(
+    folder: Path, call: Call, call_json: CallJson, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("PYTEST_DISABLE_PLUGIN_AUTOLOAD", "1")  # starts twice as fast
+    call("run", "count.yaml", "--quiet")
+    record = "recordings/count.rrd"
+    answer = call_json("test", "--from", record, "--block", "counter", "--ticks", "20:30")
+    assert answer["test"] == "test_counter_20_30.py" and answer["runs"] == 10
+    (folder / "tests").mkdir()
+    done = call("test", "--from", record, "--block", "double", "--ticks", "5", "--rtol", "1e-9")
+    assert "tests/test_double_5_6.py: 1 runs of double" in done.stdout
+    assert "rtol=1e-09" in (folder / "tests" / "test_double_5_6.py").read_text()
+    answer = call_json("test", "tests")
+    assert answer["success"] and answer["pytest_exit_code"] == 0
+    source = (folder / "counter.py").read_text()
+    (folder / "counter.py").write_text(source.replace("+= 1.0", "+= 1.00001"))
+    answer = call_json("test", "test_counter_20_30.py", code=1)
+    assert not answer["success"] and answer["pytest_exit_code"] == 1
+
+
+def test_what_is_refused(folder: Path, call_json: CallJson) -> None:
+    def reason(*arguments: str) -> str:
+        return str(call_json("test", *arguments, code=2)["reason"])
+
+    assert reason("--from", "none.rrd", "--block", "a", "--ticks", "1:2") == (
+        "there is no recording none.rrd"
+    )
+    assert reason("--block", "counter").startswith("--block, --ticks and --output go with --from")
+    assert "blocks.Contacts" in reason("blocks.Contacts")
+    call_json("run", "count.yaml")
+    record = ("--from", "recordings/count.rrd")
+    assert reason(*record) == "--from needs --block NAME and --ticks FIRST:END"
+    assert reason(*record, "--block", "counter", "--ticks", "a:b") == (
+        "ticks 'a:b' are no range like 1200:1400"
+    )
+    assert "there is no block 'counts' to test" in reason(
+        *record, "--block", "counts", "--ticks", "1:2"
+    )
