@@ -92,9 +92,7 @@ class ObstacleRows:
         return np.concatenate([self._of_kind[kind] for kind in kinds])
 
 
-def step_parameters(
-    hop: Hop, edge: float | None, ground: float, share: float
-) -> dict[str, float]:
+def step_parameters(hop: Hop, edge: float | None, ground: float, share: float) -> dict[str, float]:
     """The piece's parameters where a jump begins at a height of ``ground``. With no edge the ground
     changes its height in the middle of the flight; ``share`` of its time is past."""
     step = hop.landing_height or 0.0

@@ -281,13 +281,15 @@ class ProblemBuilder:
         ])  # fmt: skip
 
     def _fill_take_off(self, k: int) -> None:
-        place = self.of_knot[k].place
-        hop = self.hops[place]
-        rise = self.stances[place].com[2] + (hop.rise or 0.0)
+        hop, stretch = self.structure.hop_at(k)[0], self.of_knot[k]
+        rise = self.stances[stretch.place].com[2] + (hop.rise or 0.0)
         speed = hop.take_off_speed or 0.0
+        lift_off, touchdown = self.task.lift_off_momentum, self.task.touchdown_momentum
+        given = lift_off if stretch.flies else touchdown
+        most = np.inf if given is None else given
         self._rows("take_off", k, [
             ("apex", 1, rise, rise), ("take-off speed", 1, speed, speed),
-            ("angular momentum", 3, -np.inf, np.inf),
+            ("angular momentum", 3, -most, most),
         ])  # fmt: skip
 
     def _fill_air(self, k: int) -> None:

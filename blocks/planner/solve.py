@@ -37,6 +37,7 @@ ADVICE = {
     "joint limits": "ask for a smaller jump",
     "footholds": "ask for a place within reach: a smaller distance, or a greater rise",
     "apex": "ask for a smaller rise or a longer thrust_time",
+    "angular momentum": "allow more lift_off_momentum or touchdown_momentum",
     "flight time": "leave flight_time to the planner",
 }
 
@@ -188,11 +189,15 @@ def _turning(problem: Problem, robot: RobotDescription, guess: Array) -> Solutio
         return found
     task = problem.task.model_copy(update={"impact": False})
     gentle = make_problem(task, robot, compiled=not problem.assembly.interpreted)
-    first = solve(eased(gentle, EASES[-1]), ballistic_guess(gentle), solver="fatrop")
-    if not first.solved:
-        return None
-    plan = with_impacts(JumpPlan(task=task, **unpack(gentle, first.values)))
-    return tighten(problem, pack(problem, plan, guess), EASES[-1])
+    for ease in EASES:
+        first = solve(eased(gentle, ease), ballistic_guess(gentle), solver="fatrop")
+        if not first.solved:
+            continue
+        plan = with_impacts(JumpPlan(task=task, **unpack(gentle, first.values)))
+        found = tighten(problem, pack(problem, plan, guess), ease)
+        if found is not None:
+            return found
+    return None
 
 
 def _failure(task: JumpTask, solution: Solution) -> PlanError:

@@ -42,7 +42,8 @@ class Structure:
         pieces: Mapping[str, Piece],
         stances: Sequence[Stance],
     ) -> None:
-        self.coordinates, self.pieces, self.stances = coordinates, pieces, tuple(stances)
+        self.task, self.coordinates = task, coordinates
+        self.pieces, self.stances = pieces, tuple(stances)
         self.n, self.forces = coordinates.size, coordinates.forces
         self.hops, self.places = task.hops(), task.places()
         self.stretches = layout(task, model.robot)
@@ -68,8 +69,9 @@ class Structure:
             q_and_v = np.arange(2 * n)
             if stretch.flies and k > stretch.first:
                 knot.pieces["air"] = (np.arange(n), self._air_rows(k))
-            if stretch.flies and k == stretch.first:
-                knot.pieces["take_off"] = (q_and_v, self._take_off_rows(k))
+            moment = self._moment_rows(before, stretch, k)
+            if moment is not None:
+                knot.pieces["take_off"] = (q_and_v, moment)
             if before is not None:
                 kept = self._contact_rows(before, stretch)
                 if len(kept):
@@ -160,10 +162,29 @@ class Structure:
         stretch = self.of_knot[k]
         return self.obstacles.rows(hop, edge, stretch, k == stretch.first)
 
-    def _take_off_rows(self, k: int) -> NDArray[np.int64]:
-        hop = self.hops[self.of_knot[k].place]
-        kept = [0] if hop.rise is not None else [1] if hop.take_off_speed is not None else []
+    def _moment_rows(
+        self, before: Stretch | None, stretch: Stretch, k: int
+    ) -> NDArray[np.int64] | None:
+        """What is asked for at a lift-off (apex or speed, angular momentum) or at a touchdown
+        (angular momentum); ``None`` at any other knot."""
+        lift_off = stretch.flies and k == stretch.first
+        kept = []
+        if lift_off:
+            hop = self.hops[stretch.place]
+            kept = [0] if hop.rise is not None else [1] if hop.take_off_speed is not None else []
+        elif not self.is_touchdown(before, stretch) or self.task.touchdown_momentum is None:
+            return None
+        most = self.task.lift_off_momentum if lift_off else self.task.touchdown_momentum
+        if most is not None:
+            # The momentum about an axis is a base moment's: zero by symmetry, or to be bounded.
+            kept += [row - 1 for row in self.coordinates.rows if row >= 3]
         return np.array(kept, dtype=np.int64)
+
+    @staticmethod
+    def is_touchdown(before: Stretch | None, stretch: Stretch) -> bool:
+        """Whether a knot between two intervals is the first on the ground, behind any impact."""
+        landed = before is not None and (before.flies or before.impact)
+        return landed and not stretch.flies and not stretch.impact
 
     def step_under(self, k: int) -> tuple[float, float | None]:
         """The step's height and its edge under a flight."""
