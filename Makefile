@@ -50,6 +50,7 @@ plans: $(READY)  ## make the shipped plans anew, one for every file in graphs/ta
 
 docs: $(READY)  ## make what is generated under docs/
 	@$(BIN)/aloft blocks --markdown > docs/blocks.md
+	@$(BIN)/python docs/refresh_task_parameters.py
 	@$(BIN)/python docs/refresh_excerpts.py
 	@$(BIN)/python docs/refresh_results.py
 	@$(BIN)/python docs/make_pictures.py

@@ -64,6 +64,7 @@ class Journal:
         line = json.dumps({"key": key, **asdict(outcome)}, allow_nan=False)
         self._file.write(line.encode() + b"\n")
         self._file.flush()  # to the system, which outlives this process
+        os.fsync(self._file.fileno())  # to the disk, which outlives the system
         self.outcomes[key] = outcome
 
     def _lock(self, file: IO[bytes]) -> None:

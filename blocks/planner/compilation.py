@@ -14,6 +14,7 @@ import shutil
 import subprocess
 import tempfile
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -39,12 +40,30 @@ def cache_folder() -> Path:
     return Path(root) / "aloft" / "planner"
 
 
-def content_hash(robot: RobotDescription, rotors: float, name: str) -> str:
+@dataclass(frozen=True)
+class FunctionSet:
+    """Pieces that are kept together.
+
+    Attributes:
+        name: what the functions' names begin with.
+        pieces: the names of the pieces that are wanted.
+        sources: the files of this folder that decide what the functions compute.
+        make: the piece of a name.
+    """
+
+    name: str
+    pieces: tuple[str, ...]
+    sources: tuple[str, ...]
+    make: Callable[[str], Piece]
+
+
+def content_hash(robot: RobotDescription, rotors: float, name: str,
+                 sources: tuple[str, ...] = SOURCES) -> str:  # fmt: skip
     """The name of a library: the same for the same content."""
     import casadi as ca
 
     digest = hashlib.sha256()
-    for source in SOURCES:
+    for source in sources:
         digest.update((Path(__file__).parent / source).read_bytes())
     kept = robot.model_dump(mode="json", exclude={"profiles", "standing", "points", "text"})
     digest.update(json.dumps(kept, sort_keys=True).encode())
@@ -63,21 +82,36 @@ def load_pieces(
 ) -> dict[str, Piece]:
     """The named pieces' functions, compiled where there is a compiler and ``compiled`` asks for
     it."""
+    functions = FunctionSet(
+        coordinates.name, names, SOURCES, lambda name: make_piece(model, coordinates, name)
+    )
+    return load_functions(functions, model, profile, compiled=compiled, progress=progress)
+
+
+def load_functions(
+    functions: FunctionSet,
+    model: SymbolicModel,
+    profile: str,
+    *,
+    compiled: bool = True,
+    progress: Progress | None = None,
+) -> dict[str, Piece]:
+    """The same for any set of pieces."""
     rotors = model.robot.profiles[profile].rotor_inertia
-    key = content_hash(model.robot, rotors, coordinates.name)
+    key = content_hash(model.robot, rotors, functions.name, functions.sources)
     held = _held.setdefault((key, compiled), {})
-    missing = tuple(name for name in names if name not in held)
+    missing = tuple(name for name in functions.pieces if name not in held)
     if missing:
-        held |= _load(model, coordinates, key, missing, compiled, progress)
-    return {name: held[name] for name in names}
+        held |= _load(functions, key, missing, compiled, progress)
+    return {name: held[name] for name in functions.pieces}
 
 
 _held: dict[tuple[str, bool], dict[str, Piece]] = {}
 
 
 def _load(
-    model: SymbolicModel, coordinates: Coordinates, key: str, names: tuple[str, ...],
-    compiled: bool, progress: Progress | None,
+    functions: FunctionSet, key: str, names: tuple[str, ...], compiled: bool,
+    progress: Progress | None,
 ) -> dict[str, Piece]:  # fmt: skip
     compiler = _compiler() if compiled else None
     pieces = {}
@@ -86,22 +120,21 @@ def _load(
         usable = compiled and library.is_file()
         if not usable and progress is not None:
             how = "compiling" if compiler else "building"
-            progress(f"{how} the {coordinates.name} {name} functions", done, len(names))
-        piece = None if usable else make_piece(model, coordinates, name)
+            progress(f"{how} the {functions.name} {name} functions", done, len(names))
+        piece = None if usable else functions.make(name)
         if piece is not None and compiler is not None:
             usable = _compile(compiler, piece, library)
-        pieces[name] = _external(library, coordinates, name) if usable or piece is None else piece
+        prefix = f"{functions.name}_{name}"
+        pieces[name] = _external(library, prefix) if usable or piece is None else piece
     if progress is not None:
-        progress(f"{coordinates.name} functions ready", len(names), len(names))
+        progress(f"{functions.name} functions ready", len(names), len(names))
     return pieces
 
 
-def _external(library: Path, coordinates: Coordinates, name: str) -> Piece:
+def _external(library: Path, prefix: str) -> Piece:
     import casadi as ca
 
-    found: list[Any] = [
-        ca.external(f"{coordinates.name}_{name}_{kind}", str(library)) for kind in KINDS
-    ]
+    found: list[Any] = [ca.external(f"{prefix}_{kind}", str(library)) for kind in KINDS]
     return Piece(*found)
 
 

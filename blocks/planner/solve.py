@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import time
-from functools import lru_cache
+from collections.abc import Mapping
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,33 +14,41 @@ from .compilation import Progress, load_pieces
 from .contact_rows import is_mirrored
 from .coordinates import Coordinates
 from .easing import EASES, eased, from_eased, tighten, with_impacts
-from .errors import PlanError
 from .guess import ballistic_guess, displaced_guess
 from .layout import Stretch, layout
+from .outcome import failure, versions
+from .paper_plan import solve_paper
 from .plan import JumpPlan
 from .problem import Problem, ProblemBuilder
 from .refinement import asks_for_finer, finer_knots, with_knots
-from .solver import Solution, solve
+from .rigid_body_plan import solve_rigid_body
+from .robot_model import model_of
+from .solver import solve
 from .stage_functions import PIECES, make_coordinates
-from .stance import Stance, StanceFinder, stances_of
+from .stance import Stance, stances_of
 from .symbolic_model import SymbolicModel
 from .task import JumpTask, Knots
 from .unpacking import can_start, pack, unpack
 
 Array = NDArray[np.float64]
-ADVICE = {
-    "motor torque": "ask for a smaller jump, a longer thrust_time or a stronger profile",
-    "motor torque at speed": "ask for a smaller jump, a longer thrust_time or a faster profile",
-    "motor speed": "ask for a smaller jump, a longer flight or a faster profile",
-    "friction": "ask for a shorter distance or more friction",
-    "ground clearance": "ask for a greater rise or less foot_clearance",
-    "leg clearance": "ask for less twist or less leg_clearance",
-    "joint limits": "ask for a smaller jump",
-    "footholds": "ask for a place within reach: a smaller distance, or a greater rise",
-    "apex": "ask for a smaller rise or a longer thrust_time",
-    "angular momentum": "allow more lift_off_momentum or touchdown_momentum",
-    "flight time": "leave flight_time to the planner",
-}
+
+
+class Formulation(Protocol):
+    """Makes a plan of a task with one set of decision variables, cost and constraints."""
+
+    def __call__(
+        self,
+        task: JumpTask,
+        robot: RobotDescription,
+        *,
+        warm_start: JumpPlan | None = None,
+        progress: Progress | None = None,
+        compiled: bool = True,
+        solver: str = "",
+        knots: Knots | None = None,
+    ) -> JumpPlan:
+        """As ``solve_jump``."""
+        ...
 
 
 def solve_jump(
@@ -52,7 +61,7 @@ def solve_jump(
     solver: str = "",
     knots: Knots | None = None,
 ) -> JumpPlan:
-    """The plan of a task.
+    """The plan of a task, in the formulation that it names.
 
     ``warm_start`` is a plan of a near task, on any grid; one that goes through other phases is not
     used. A plan of this very task that failed the validity check is solved again on finer
@@ -64,6 +73,23 @@ def solve_jump(
         PlanError: no motion was found; ``family`` names the constraints that could not be met.
         TaskError: the task names joints that the robot has not.
     """
+    return FORMULATIONS[task.formulation](
+        task, robot, warm_start=warm_start, progress=progress, compiled=compiled, solver=solver,
+        knots=knots,
+    )  # fmt: skip
+
+
+def solve_full(
+    task: JumpTask,
+    robot: RobotDescription,
+    *,
+    warm_start: JumpPlan | None = None,
+    progress: Progress | None = None,
+    compiled: bool = True,
+    solver: str = "",
+    knots: Knots | None = None,
+) -> JumpPlan:
+    """The ``full`` formulation: the whole body's dynamics with its motors' limits; see ``problem``."""
     started = time.process_time()
     if knots is None:
         again = warm_start is not None and asks_for_finer(task, warm_start)
@@ -84,7 +110,7 @@ def solve_jump(
             problem, guess, solver=solver, other_guess=lambda: _displaced(problem, robot)
         )
     if not solution.solved:
-        raise _failure(task, solution)
+        raise failure(task, solution)
     statistics = {
         "solver": solution.solver,
         "iterations": solution.iterations,
@@ -100,8 +126,16 @@ def solve_jump(
         "compiled": not problem.assembly.interpreted,
     }
     return JumpPlan(
-        task=task, statistics=statistics, versions=_versions(), **unpack(problem, solution.values)
+        task=task, statistics=statistics, versions=versions(), **unpack(problem, solution.values)
     )
+
+
+FORMULATIONS: Mapping[str, Formulation] = {
+    "full": solve_full,
+    "paper": solve_paper,
+    "srbm": solve_rigid_body,
+}
+"""By the name a task gives."""
 
 
 def make_problem(
@@ -112,23 +146,11 @@ def make_problem(
     progress: Progress | None = None,
     coordinates: str = "",
 ) -> Problem:
-    """The problem of a task, in the sagittal plane where the task stays in it.
+    """The problem of a task in the ``full`` formulation, in the sagittal plane where the task stays in it.
 
     Raises ``PlanError`` and ``TaskError`` as ``solve_jump`` does.
     """
-    if task.formulation != "full":
-        raise PlanError(
-            f"{task.name}: the formulation {task.formulation!r} cannot be solved yet; "
-            "use formulation: full",
-            family="formulation",
-        )
-    if task.profile not in robot.profiles:
-        raise PlanError(
-            f"{robot.name} has no actuator profile {task.profile!r}; there is "
-            + ", ".join(robot.profiles),
-            family="motor torque",
-        )
-    model, finder = _model(robot.model_dump_json(), task.profile)
+    model, finder = model_of(robot, task.profile)
     stances = stances_of(task, robot, finder)
     stretches = layout(task, robot)
     chosen = _choose(model, task, stances, stretches, coordinates)
@@ -138,12 +160,6 @@ def make_problem(
         model, chosen, profile=task.profile, names=names, compiled=compiled, progress=progress
     )
     return ProblemBuilder(task, model, chosen, pieces, stances).build()
-
-
-@lru_cache(maxsize=4)
-def _model(text: str, profile: str) -> tuple[SymbolicModel, StanceFinder]:
-    model = SymbolicModel(RobotDescription.model_validate_json(text), profile)
-    return model, StanceFinder(model)
 
 
 def _choose(
@@ -198,23 +214,3 @@ def _turning(problem: Problem, robot: RobotDescription, guess: Array) -> Solutio
         if found is not None:
             return found
     return None
-
-
-def _failure(task: JumpTask, solution: Solution) -> PlanError:
-    family = solution.family
-    advice = ADVICE.get(family, "ask for a smaller jump, or change the durations")
-    reason = (
-        f"{family} is missed by {solution.violation:.3g}"
-        if solution.violation > 1e-5
-        else "the solver found no optimum"
-    )
-    return PlanError(
-        f"no plan for {task.name!r} after {solution.iterations} iterations: {reason}; {advice}",
-        family=family, violation=solution.violation,
-    )  # fmt: skip
-
-
-def _versions() -> dict[str, str]:
-    import casadi as ca
-
-    return {"casadi": str(ca.CasadiMeta.version()), "numpy": np.__version__}

@@ -8,13 +8,12 @@ import time
 from collections import OrderedDict
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .assembly import Assembly
-from .problem import Problem
 
 Array = NDArray[np.float64]
 
@@ -24,6 +23,45 @@ DUAL_TOLERANCE = 1e-4
 """fatrop's dual infeasibility does not fall much further; the cost is then stable to 7 digits."""
 KEPT = 12
 """Solvers kept for problems of the same structure."""
+
+
+class Problem(Protocol):
+    """What is solved: of every formulation the structure, bounds and parameters."""
+
+    @property
+    def assembly(self) -> Assembly:
+        """Variables, rows and their functions."""
+        ...
+
+    @property
+    def lower(self) -> Array:
+        """Bounds of the variables."""
+        ...
+
+    @property
+    def upper(self) -> Array:
+        """Bounds of the variables."""
+        ...
+
+    @property
+    def row_lower(self) -> Array:
+        """Bounds of the constraint rows."""
+        ...
+
+    @property
+    def row_upper(self) -> Array:
+        """Bounds of the constraint rows."""
+        ...
+
+    @property
+    def parameters(self) -> Array:
+        """Values of the parameters."""
+        ...
+
+    @property
+    def families(self) -> list[str]:
+        """What every constraint row asks for."""
+        ...
 
 
 @dataclass(frozen=True)

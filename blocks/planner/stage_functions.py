@@ -213,10 +213,13 @@ def _impulse_balance(model: SymbolicModel, coordinates: Coordinates, q: Any, cha
 
 def make_piece(model: SymbolicModel, coordinates: Coordinates, name: str) -> Piece:
     """The functions of a piece with exact derivatives."""
+    return derived(f"{coordinates.name}_{name}", *piece_expressions(model, coordinates, name))
+
+
+def derived(prefix: str, z: Any, w: Any, cost: Any, rows: Any) -> Piece:
+    """A piece from its symbols ``z`` and ``w``, its cost and its rows."""
     import casadi as ca
 
-    z, w, cost, rows = piece_expressions(model, coordinates, name)
-    prefix = f"{coordinates.name}_{name}"
     lam_f, lam_g = ca.SX.sym("lam_f"), ca.SX.sym("lam_g", rows.numel())
     gradient = ca.densify(ca.gradient(cost, z))
     hessian, slope = ca.hessian(lam_f * cost + ca.dot(lam_g, rows), z)

@@ -75,8 +75,8 @@ class JumpTask(FreeTimes):
     robot: str = parameter("bruce", text="the robot's description, as in a graph file")
     formulation: Literal["full", "paper", "srbm"] = parameter(
         "full",
-        text="full: whole-body dynamics; paper: centroidal momentum and kinematics as in the "
-        "paper; srbm: a single rigid body. Only full can be solved so far",
+        text="full: whole-body dynamics and motors; paper: centroidal momentum and kinematics as in the "
+        "paper; srbm: a single rigid body with legs that weigh nothing",
     )
     rise: float | None = parameter(
         None, unit="m", gt=0.0, le=2.0, text="apex of the centre of mass above standing"

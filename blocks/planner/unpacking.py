@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from .midpoint import angular_motion, euler_angles, euler_rates, rotation
 from .plan import JumpPlan
 from .problem import Problem
+from .quaternions import pose_of
 from .resampling import matching_times, means_over, same_phases, states_at
 from .symbolic_model import SymbolicModel
 
@@ -59,12 +60,12 @@ def unpack(problem: Problem, values: Array) -> dict[str, Any]:
     middle[-1], moving[-1] = middle[-2], moving[-2]
     com, speed, momentum, torque = _evaluate(model, q, v, middle, moving, bend, force)
     torque[impacts] = 0.0
-    generalised = [_twist(*row) for row in zip(q, v, bend, strict=True)]
-    halfway = [_twist(*row) for row in zip(middle, moving, bend, strict=True)]
+    generalised = [twist(*row) for row in zip(q, v, bend, strict=True)]
+    halfway = [twist(*row) for row in zip(middle, moving, bend, strict=True)]
     flights = [(float(times[f.start]), float(times[f.stop])) for f in problem.flights]
     return {
         "time": times,
-        "position": np.array([_pose(row) for row in q]),
+        "position": np.array([pose_of(row) for row in q]),
         "velocity": np.array([row[0] for row in generalised]),
         "acceleration": np.array([row[1] for row in halfway]),
         "contact_force": force.reshape(count, -1, 3),
@@ -144,21 +145,7 @@ def pack(problem: Problem, plan: JumpPlan, guess: Array) -> Array:
     return values
 
 
-def _pose(q: Array) -> Array:
-    """Base position, quaternion x, y, z, w with no jump of sign at rest, joints."""
-    pitch, roll, yaw = q[3:6]
-    half = np.array([[0.0, np.sin(pitch / 2), 0.0, np.cos(pitch / 2)],
-                     [np.sin(roll / 2), 0.0, 0.0, np.cos(roll / 2)],
-                     [0.0, 0.0, np.sin(yaw / 2), np.cos(yaw / 2)]])  # fmt: skip
-    return np.concatenate([q[:3], _product(_product(half[0], half[1]), half[2]), q[6:]])
-
-
-def _product(a: Array, b: Array) -> Array:
-    vector = a[3] * b[:3] + b[3] * a[:3] + np.cross(a[:3], b[:3])
-    return np.append(vector, a[3] * b[3] - a[:3] @ b[:3])
-
-
-def _twist(q: Array, v: Array, bend: Array) -> tuple[Array, Array]:
+def twist(q: Array, v: Array, bend: Array) -> tuple[Array, Array]:
     """Generalised velocity and its derivative with the base's part in the body frame."""
     angles = q[3:6][ORDER]
     spin, turn = angular_motion(angles, v[3:6][ORDER], bend[3:6][ORDER])

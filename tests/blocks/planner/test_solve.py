@@ -77,7 +77,6 @@ def test_a_jump_beyond_the_motors_is_refused_with_a_family() -> None:
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"formulation": "srbm"}, "use formulation: full"),
         ({"profile": "petrol"}, "there is koala, relaxed"),
         ({"initial": {"right_ankle": 0.1}}, "soles are not flat"),
     ],

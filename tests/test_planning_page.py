@@ -1,0 +1,52 @@
+"""docs/planning.md is true: its files plan, its table is the declarations', its code reads a plan."""
+
+import re
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from aloft.blocks.planner.grid import read_grid
+from aloft.blocks.planner.library import SHIPPED
+from aloft.blocks.planner.task import read_task
+from aloft.cli.task_page import BEGIN, END, task_tables
+
+ROOT = Path(__file__).parent.parent
+PAGE = (ROOT / "docs" / "planning.md").read_text(encoding="utf-8")
+FILES = dict(re.findall(r"<!-- file: (\S+) -->\n```\w+\n(.*?)```", PAGE, re.DOTALL))
+
+
+def test_the_table_of_parameters_is_up_to_date() -> None:
+    written = PAGE.partition(BEGIN)[2].partition(END)[0]
+    assert written == task_tables(), "run: python docs/refresh_task_parameters.py"
+
+
+def test_the_task_and_the_grid_are_what_the_page_says(tmp_path: Path) -> None:
+    for name, text in FILES.items():
+        (tmp_path / name).write_text(text)
+    hop = read_task(tmp_path / "hop.yaml")
+    assert (hop.name, hop.rise, hop.distance_x, hop.effort) == ("hop", 0.12, 0.08, 0.9)
+    assert hop.twist == pytest.approx(0.1745, abs=1e-4)
+    grid = read_grid(tmp_path / "grid.yaml")
+    assert len(grid) == 15
+    assert {task.friction for task in grid} == {0.6}
+
+
+def test_a_plan_is_read_as_the_page_shows() -> None:
+    (code,) = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
+    names: dict[str, Any] = {"path": next(SHIPPED.glob("in_situ-*.npz"))}
+    exec(code, names)  # noqa: S102  # the page that users copy from
+    assert "aloft" not in code
+    assert names["header"]["names"]["joints"][0] == "right_hip_yaw"
+
+
+def test_commands_of_the_page_have_options_that_are_there() -> None:
+    from typer.main import get_command
+
+    from aloft.cli import app
+
+    known = {option for parameter in get_command(app).commands["plan"].params  # type: ignore[attr-defined]
+             for option in (*parameter.opts, *parameter.secondary_opts)}  # fmt: skip
+    prose = PAGE.partition("The cluster needs")[0]
+    used = set(re.findall(r"--[a-z][a-z-]+", prose))
+    assert used <= known, used - known
