@@ -23,7 +23,7 @@ from .problem import Problem, ProblemBuilder
 from .refinement import asks_for_finer, finer_knots, with_knots
 from .rigid_body_plan import solve_rigid_body
 from .robot_model import model_of
-from .solver import solve
+from .solver import Solution, solve
 from .stage_functions import PIECES, make_coordinates
 from .stance import Stance, stances_of
 from .symbolic_model import SymbolicModel
