@@ -16,6 +16,7 @@ from .signals import (
     JointCommand,
     JointState,
     JointTarget,
+    JumpReference,
     Phase,
     PhaseState,
     WholeBodyCommand,
@@ -40,8 +41,9 @@ class JointPD(Block):
 
     The drives evaluate it at their own rate with the command's targets and gains. A leg with a
     stance point gets the whole-body controller's tau_ff and the stance gains; a leg without one
-    during FLIGHT or LANDING gets tau_ff = 0, the flight gains and the targets of its inverse
-    kinematics, so a leg that lands late keeps swinging while the other already stands. Between the
+    during FLIGHT or LANDING gets the flight gains, the targets of its inverse kinematics and, as
+    tau_ff, ``flight_feedforward`` times the planned torques while the plan flies too, so that it
+    need not lag behind by what moves it; a leg that lands late keeps swinging while the other already stands. Between the
     two everything moves linearly within ``blend``.
 
     Stance gains are zero by default: the feedforward alone carries the robot. With
@@ -62,6 +64,9 @@ class JointPD(Block):
         )
         flight_damping: list[float] = live_parameter(
             [1.0, 1.5, 1.5, 1.2, 0.3], unit="N m s/rad", text="Kd in the air, per leg joint"
+        )
+        flight_feedforward: float = live_parameter(
+            1.0, ge=0.0, le=1.0, text="share of the planned torques that is fed forward in the air"
         )
         stance_stiffness: list[float] = live_parameter(
             [0.0] * 5, unit="N m/rad", text="Kp on the ground, per leg joint"
@@ -89,6 +94,7 @@ class JointPD(Block):
     legs = Input(JointTarget, text="joint targets of the legs in the air")
     phase = Input(PhaseState, text="the phase and which points may push")
     joints = Input(JointState, text="measured joints")
+    reference = Input(JumpReference, default={}, text="the planned torques, if they are known")
     command = Output(JointCommand, text="what the drives execute")
     follower = State(JointFollower, text="blending and stance targets")
 
@@ -130,6 +136,10 @@ class JointPD(Block):
         command, legs, joints = self.command, self.legs, self.joints
         command.mode[()] = CommandMode.ACTIVE
         np.multiply(self._grounded, self.wbc.torque, out=command.torque)
+        if int(self.phase.phase[()]) == int(self.reference.phase[()]) == Phase.FLIGHT:
+            np.multiply(self._airborne, self.reference.joint_torque, out=self._part)
+            self._part *= self.params.flight_feedforward
+            command.torque += self._part
         if self.params.friction > 0.0:
             np.divide(joints.velocity, self.params.friction_speed, out=self._part)
             np.tanh(self._part, out=self._part)

@@ -13,7 +13,7 @@ from .signals import JumpReference, Phase
 
 Array = NDArray[np.float64]
 
-_FED_FORWARD = ("com_acceleration", "angular_momentum_rate")
+_FED_FORWARD = ("com_acceleration", "angular_momentum_rate", "joint_torque")
 
 
 @dataclass(frozen=True)
@@ -61,8 +61,8 @@ class JumpTableReader:
         Lift-off and touchdown times are those of the next flight, and from its middle on those of
         the one behind it: whoever lands, early or late, knows by them that it goes on.
 
-        What a controller feeds forward, the acceleration and the rate of angular momentum, is
-        that of ``lead`` seconds later.
+        What a controller feeds forward, the acceleration, the rate of angular momentum and the
+        torques, is that of ``lead`` seconds later.
         """
         table = self._table
         here, there = locate(self._time, time), locate(self._time, time + lead)

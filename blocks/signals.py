@@ -139,6 +139,7 @@ class JumpReference(Signal):
     foot_yaw = Field("n_feet", unit="rad", frame="world", text="heading of each foot")
     joint_position = Field("n_joints", unit="rad", text="planned joint angles")
     joint_velocity = Field("n_joints", unit="rad/s", text="planned joint velocities")
+    joint_torque = Field("n_joints", unit="N m", text="planned joint torques; zero if not known")
 
 
 class PhaseState(Signal):

@@ -122,10 +122,22 @@ class ExactDynamics:
             return np.zeros(self.model.nv)
         return np.asarray(self.contact_jacobians(q)[1].T @ force.ravel())
 
-    def velocity_after_impact(self, q: Array, v: Array, impulse: Array) -> Array:
-        """The generalised velocity behind contact impulses [N s, world], (n_contacts, 3), with no
-        impulse from the motors."""
-        return np.asarray(v + np.linalg.solve(self.mass_matrix(q), self._pushed(q, impulse)))
+    def velocity_after_impact(
+        self, q: Array, v: Array, impulse: Array, held: NDArray[np.bool_] | None = None
+    ) -> tuple[Array, Array]:
+        """The generalised velocity behind contact impulses [N s, world], (n_contacts, 3).
+
+        Joints that are ``held`` (n_joints) keep their velocity, by impulses [N m s] (n_joints) of
+        their motors, which come second; the other motors give none.
+        """
+        matrix, pushed = self.mass_matrix(q), self._pushed(q, impulse)
+        fixed = np.zeros(self.model.nv, dtype=bool)
+        if held is not None:
+            fixed[6:] = held
+        change = np.zeros(self.model.nv)
+        free = ~fixed
+        change[free] = np.linalg.solve(matrix[np.ix_(free, free)], pushed[free])
+        return np.asarray(v + change), np.asarray((matrix @ change - pushed)[6:] * fixed[6:])
 
     def integrate(
         self, q: Array, v: Array, joints: JointMotion, force: Array, longest_step: float

@@ -16,8 +16,13 @@ from ..signals import Phase
 from .clearance import body_heights, leg_gap
 from .evidence import DEGREE, MILLIMETRE, Evidence, Found, worst
 from .exact_dynamics import ExactDynamics
+from .replay import held_joints
 
 Array = NDArray[np.float64]
+
+SHORTEST_IMPACT = 0.004
+"""s; as long as the feet's contact takes to stop them at least. What a motor can do in that time
+bounds its impulse at touchdown."""
 
 
 def start_and_end(e: Evidence) -> Iterator[Found]:
@@ -168,10 +173,14 @@ def touchdown(e: Evidence) -> Iterator[Found]:
     if plan.task.impact:
         if plan.task.formulation != "full":
             return
-        missed = [_impact_error(e, k) for k in knots]
-        k = int(np.argmax(missed))
-        yield Found("impact", missed[k], 1e-3, "m/s or rad/s",
+        found = np.array([_impact(e, k) for k in knots])
+        k = int(np.argmax(found[:, 0]))
+        yield Found("impact", found[k, 0], 1e-3, "m/s or rad/s",
                     "how far the impulse's velocities miss exact dynamics'", _which(e, k))  # fmt: skip
+        k = int(np.argmax(found[:, 1]))
+        peak = e.effort * e.robot.profiles[plan.task.profile].peak_torque
+        yield Found("held_joints", found[k, 1], peak * SHORTEST_IMPACT, "N m s",
+                    "the impulse of a motor whose joint keeps still", _which(e, k))  # fmt: skip
         return
     samples = np.searchsorted(s.time, plan.time[knots] - 1e-9)
     speeds = np.linalg.norm(s.point_velocity[samples], axis=2)
@@ -181,16 +190,18 @@ def touchdown(e: Evidence) -> Iterator[Found]:
     )
 
 
-def _impact_error(e: Evidence, knot: int) -> float:
-    """Of all generalised velocities behind the impulse at a knot; all of them without an impact."""
+def _impact(e: Evidence, knot: int) -> tuple[float, float]:
+    """The error of all generalised velocities behind the impulse at a knot, or of all of them
+    without an impact; and the largest motor impulse that keeps a joint still [N m s]."""
     plan = e.plan
     if knot + 1 >= len(plan.time) or plan.time[knot + 1] > plan.time[knot]:
-        return math.inf
+        return math.inf, 0.0
     dynamics = ExactDynamics(e.robot, plan.task.profile)
     q, v, impulse = plan.position[knot], plan.velocity[knot], plan.contact_force[knot]
-    exact = dynamics.velocity_after_impact(q, v, impulse)
+    exact, kept = dynamics.velocity_after_impact(q, v, impulse, held_joints(plan, knot))
     moved = np.abs(plan.position[knot + 1] - q).max()
-    return float(max(np.abs(exact - plan.velocity[knot + 1]).max(), moved))
+    error = max(np.abs(exact - plan.velocity[knot + 1]).max(), moved)
+    return float(error), float(np.abs(e.robot.torque_to_motor @ kept).max())
 
 
 def momentum(e: Evidence) -> Iterator[Found]:

@@ -18,6 +18,7 @@ from ..signals import Phase
 from .assembly import Assembly
 from .coordinates import Coordinates
 from .layout import Stretch
+from .margins import Margins, joint_bounds
 from .obstacles import step_parameters
 from .stage_functions import Piece, body_points, parameter_sizes
 from .stance import Stance
@@ -26,8 +27,6 @@ from .symbolic_model import SymbolicModel
 from .task import JumpTask
 
 Array = NDArray[np.float64]
-LIMIT_MARGIN = 0.005
-"""rad; between two knots a joint at its limit would pass it by about as much."""
 
 
 @dataclass(frozen=True)
@@ -118,6 +117,7 @@ class ProblemBuilder:
         self.structure = Structure(task, model, coordinates, pieces, stances)
         self.stretches, self.of_knot = self.structure.stretches, self.structure.of_knot
         self.stances, self.hops = self.structure.stances, self.structure.hops
+        self.margins = task.margins or Margins()
         self.n, self.m = coordinates.size, len(coordinates.joints)
         self.forces = coordinates.forces
         self.steps = np.concatenate(
@@ -156,15 +156,15 @@ class ProblemBuilder:
         """Start and end are given, joints stay within their limits, feet only push."""
         n, start = self.n, int(self.assembly.state_start[k])
         base = len(self.coordinates.free_base)
-        limits = self.model.robot.joint_limits[list(self.coordinates.moving)]
-        if 0 < k < len(self.of_knot):
-            self.lower[start + base : start + n] = limits[:, 0] + LIMIT_MARGIN
-            self.upper[start + base : start + n] = limits[:, 1] - LIMIT_MARGIN
         if k == len(self.of_knot):
             return
         stretch, knot = self.of_knot[k], self.assembly.knots[k]
-        lean = self.task.touchdown_lean
-        if k and lean is not None and not stretch.flies and self.of_knot[k - 1].flies:
+        if k:
+            limits = joint_bounds(self.model.robot, self.margins, stretch.place > 0)
+            limits = limits[list(self.coordinates.moving)]
+            self.lower[start + base : start + n] = limits[:, 0]
+            self.upper[start + base : start + n] = limits[:, 1]
+            lean = self._most_lean(k)
             pitch = start + self.coordinates.free_base.index(3)
             nominal = float(self.nominal(k)[pitch - start])
             self.lower[pitch], self.upper[pitch] = nominal - lean, nominal + lean
@@ -179,6 +179,17 @@ class ProblemBuilder:
         following = self.of_knot[k + 1] if knot.hold is not None else None
         if following is not None and following.time is None and knot.hold is not None:
             self.lower[control + knot.hold], self.upper[control + knot.hold] = following.bounds
+
+    def _most_lean(self, k: int) -> float:
+        """How far the torso may lean away from the nominal posture at a knot."""
+        stretch, bounds = self.of_knot[k], [np.inf]
+        if stretch.place == 0 and not (stretch.flies and k > stretch.first):
+            bounds.append(self.margins.squat_lean or np.inf)
+        if stretch.place > 0 and not stretch.flies:
+            bounds.append(self.margins.landing_lean or np.inf)
+            if self.of_knot[k - 1].flies and self.task.touchdown_lean is not None:
+                bounds.append(self.task.touchdown_lean)
+        return float(min(bounds))
 
     # What a piece's rows ask for, and its parameters
 
@@ -237,10 +248,11 @@ class ProblemBuilder:
         self._set(
             stretch.piece, k, step=self.steps[k], share=self.steps[k],
             force=weights.force * share, friction=self.task.friction / np.sqrt(2.0),
-            **self._interval(k),
+            pressure=self.margins.pressure, **self._interval(k),
         )  # fmt: skip
         base = ("dynamics", len(self.coordinates.rows), 0.0, 0.0)
-        self._rows(stretch.piece, k, [base, *self._motor_rows(), self._cones()])
+        pressure = ("pressure", len(self.coordinates.contacts), 0.0, np.inf)
+        self._rows(stretch.piece, k, [base, *self._motor_rows(), self._cones(), pressure])
 
     def _cones(self) -> tuple[str, int, float, float]:
         cones = 2 * (len(self.coordinates.axes) - 1) * len(self.coordinates.contacts)

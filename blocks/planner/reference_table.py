@@ -35,14 +35,17 @@ STEP = 0.002
 def reference_table(plan: JumpPlan, robot: RobotDescription, stand_time: float) -> JumpTable:
     """The plan as a table that begins with standing still for ``stand_time`` [s]."""
     dynamics = ExactDynamics(robot, plan.task.profile)
-    forces = _MiddleForces(plan)
+    forces = _MiddleValues(plan, plan.contact_force)
+    torques = _MiddleValues(plan, plan.joint_torque)
     rows: dict[str, list[Array]] = {}
     times: list[float] = []
     intervals: list[int] = []
     for time, k, q, v in _states(plan, dynamics):
         times.append(time)
         intervals.append(k)
-        for name, value in _row(dynamics, q, v, forces.at(time, k)).items():
+        row = _row(dynamics, q, v, forces.at(time, k))
+        row["joint_torque"] = torques.at(time, k)
+        for name, value in row.items():
             rows.setdefault(name, []).append(value)
     columns = {name: np.array(values) for name, values in rows.items()}
     for foot in range(len(robot.feet)):
@@ -135,29 +138,27 @@ def _between(
     )
 
 
-class _MiddleForces:
-    """Contact forces at any time, linear between the middles of intervals of the same stance."""
+class _MiddleValues:
+    """What holds in the middle of the intervals, at any time: linear from one middle to the next,
+    never across lift-off or touchdown."""
 
-    def __init__(self, plan: JumpPlan) -> None:
-        self._plan = plan
+    def __init__(self, plan: JumpPlan, values: Array) -> None:
+        self._time, self._values = plan.time, values
         lasting = np.flatnonzero(np.diff(plan.time) > 0.0)
         ends = [knot for flight in flight_knots(plan) for knot in flight]
         self._groups = np.split(lasting, np.searchsorted(lasting, ends))
         self._ends = np.array(ends)
 
     def at(self, time: float, interval: int) -> Array:
-        """The forces [N], (n_contacts, 3), at an instant of that interval."""
-        plan, number = self._plan, int(np.searchsorted(self._ends, interval, side="right"))
-        if number % 2 == 1:
-            return np.zeros(plan.contact_force.shape[1:])
-        group = self._groups[number]
-        middles = 0.5 * (plan.time[group] + plan.time[group + 1])
+        """The values at an instant of that interval."""
+        group = self._groups[int(np.searchsorted(self._ends, interval, side="right"))]
+        middles = 0.5 * (self._time[group] + self._time[group + 1])
         after = int(np.searchsorted(middles, time))
         if after in (0, len(middles)):
-            return np.asarray(plan.contact_force[group[min(after, len(middles) - 1)]])
+            return np.asarray(self._values[group[min(after, len(middles) - 1)]])
         before = after - 1
         share = (time - middles[before]) / (middles[after] - middles[before])
-        first, second = plan.contact_force[group[before]], plan.contact_force[group[after]]
+        first, second = self._values[group[before]], self._values[group[after]]
         return np.asarray(first + share * (second - first))
 
 

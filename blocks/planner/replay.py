@@ -137,6 +137,13 @@ def _fly(
     return out, missed
 
 
+def held_joints(plan: JumpPlan, k: int) -> NDArray[np.bool_]:
+    """The joints (n_joints) that stand still before and behind the impact at a knot: roll and yaw
+    of a mirrored jump, which their motors keep."""
+    still = (plan.velocity[k : k + 2, 6:] == 0.0).all(axis=0)
+    return np.asarray(still)
+
+
 def _interval_defect(plan: JumpPlan, dynamics: ExactDynamics, k: int) -> Array:
     """How far exact dynamics from knot ``k`` misses the next knot; see ``Replay``."""
     q, v, planned_q, planned_v = (
@@ -147,7 +154,7 @@ def _interval_defect(plan: JumpPlan, dynamics: ExactDynamics, k: int) -> Array:
         joints = joint_motion(plan.position, plan.velocity, plan.time, k)
         _, q, v = dynamics.integrate(q, v, joints, force, 0.5 * joints.duration)[-1]
     else:
-        v = dynamics.velocity_after_impact(q, v, force)
+        v, _ = dynamics.velocity_after_impact(q, v, force, held_joints(plan, k))
     return np.array(
         [
             np.linalg.norm(q[:3] - planned_q[:3]),

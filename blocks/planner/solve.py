@@ -169,7 +169,7 @@ def _choose(
     if asked:
         return make_coordinates(model, asked)
     # An impact leaves the roll and yaw motors without an impulse, which a plane cannot tell.
-    if not task.impact and all(not hop.distance_y and not hop.twist for hop in task.hops()):
+    if all(not hop.distance_y and not hop.twist for hop in task.hops()):
         try:
             plane = make_coordinates(model, "sagittal")
         except ValueError:

@@ -66,8 +66,8 @@ def parameter_sizes(coordinates: Coordinates) -> dict[str, dict[str, int]]:
         "nominal": n, "posture": n, "velocity": n, "acceleration": n, "slope": joints,
     }  # fmt: skip
     return {
-        "stance": {"step": 1, "friction": 1, "force": 1, **interval},
-        "free_stance": {"share": 1, "friction": 1, "force": 1, **interval},
+        "stance": {"step": 1, "friction": 1, "force": 1, "pressure": 1, **interval},
+        "free_stance": {"share": 1, "friction": 1, "force": 1, "pressure": 1, **interval},
         "flight": {"share": 1, **interval},
         "impact": {"friction": 1, "impulse": 1},
         "contact": {"place": 3 * contacts, "heading": 2},
@@ -146,6 +146,7 @@ def piece_expressions(
         if forces:
             cost = cost + w["force"] * ca.dot(F, F)
             rows += _cones(coordinates, all_forces, w["friction"])
+            rows += _pressures(model, coordinates, all_forces, w["pressure"])
         cost = h * cost
     elif name == "impact":
         change, F = ca.SX.sym("dv", n), ca.SX.sym("F", coordinates.forces)
@@ -194,20 +195,36 @@ def _cones(coordinates: Coordinates, forces: Any, friction: Any) -> list[Any]:
     return rows
 
 
+def _pressures(
+    model: SymbolicModel, coordinates: Coordinates, forces: Any, share: Any
+) -> list[Any]:
+    """By how much every point carries more than that share of its foot's load."""
+    contacts = model.robot.contacts
+    rows = []
+    for c in coordinates.contacts:
+        same = [i for i in coordinates.contacts if contacts[i].foot == contacts[c].foot]
+        rows.append(forces[3 * c + 2] - share * sum(forces[3 * i + 2] for i in same))
+    return rows
+
+
 def _impulse_balance(model: SymbolicModel, coordinates: Coordinates, q: Any, change: Any,
                      impulses: Any) -> Any:  # fmt: skip
-    """M dv - J' L, of the base (body frame) and the joints; all coordinates only."""
+    """M dv - J' L of the base (body frame) and of the joints that are coordinates: the others of a
+    mirrored motion are held."""
     import casadi as ca
 
     still = ca.SX.zeros(model.size)
-    named = {c.name: impulses[3 * i : 3 * i + 3] for i, c in enumerate(model.robot.contacts)}
+    named = {
+        model.robot.contacts[c].name: impulses[3 * c : 3 * c + 3] for c in coordinates.contacts
+    }
     sums = []
     # Gravity has no impulse: what holds the robot at rest is taken off again.
     for bend, forces in ((coordinates.expand(change), named), (still, {})):
         base, limbs, torque = model.inverse_dynamics(
             coordinates.expand(q), still, bend, forces, coordinates.limbs
         )
-        sums.append(ca.vertcat(base + sum(limbs.values()), torque))
+        wrench = base + coordinates.share * sum(limbs.values())
+        sums.append(ca.vertcat(wrench[list(coordinates.rows)], torque[list(coordinates.moving)]))
     return sums[0] - sums[1]
 
 

@@ -42,8 +42,8 @@ class Structure:
         pieces: Mapping[str, Piece],
         stances: Sequence[Stance],
     ) -> None:
-        self.task, self.coordinates = task, coordinates
-        self.pieces, self.stances = pieces, tuple(stances)
+        self.task = task
+        self.coordinates, self.pieces, self.stances = coordinates, pieces, tuple(stances)
         self.n, self.forces = coordinates.size, coordinates.forces
         self.hops, self.places = task.hops(), task.places()
         self.stretches = layout(task, model.robot)
@@ -117,12 +117,18 @@ class Structure:
         return [i for i in range(len(self.coordinates.contacts)) if i not in on]
 
     def _interval_rows(self, stretch: Stretch) -> NDArray[np.int64]:
-        """The rows of an interval that are kept: no friction where there is no contact."""
-        total = self.pieces[stretch.piece].rows
+        """The rows of an interval that are kept: no friction where there is no contact, and
+        pressure only where a share is asked for and the whole foot is down."""
+        total, points = self.pieces[stretch.piece].rows, len(self.coordinates.contacts)
         rows = np.arange(2 * self.n + stretch.timed, total)
+        if stretch.flies:
+            return rows
         each = 2 * (len(self.coordinates.axes) - 1)
-        cones = total - each * len(self.coordinates.contacts)
+        pressure = 0 if stretch.impact else points
+        cones = total - pressure - each * points
         idle = [cones + each * point + i for point in self.idle(stretch) for i in range(each)]
+        if idle or self.task.margins is None or not self.task.margins.pressure:
+            idle += range(total - pressure, total)
         return np.setdiff1d(rows, idle) if idle else rows
 
     def _contact_rows(self, before: Stretch, stretch: Stretch) -> NDArray[np.int64]:

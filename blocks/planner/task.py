@@ -19,6 +19,7 @@ from pydantic import ValidationError, model_validator
 from ...runtime.description import RobotDescription, find_robot
 from ...runtime.parameters import Parameters, parameter
 from .errors import TaskError
+from .margins import Margins
 from .placed_file import PlacedFile, read_placed
 from .sequence import FreeTimes, Hop, Place, Span, check_spans, places_of
 
@@ -155,6 +156,9 @@ class JumpTask(FreeTimes):
         0.01, unit="m", ge=0.0, le=0.2, text="least gap between the legs"
     )
     weights: Weights = parameter(Weights(), text="weights of the cost")
+    margins: Margins | None = parameter(
+        None, text="what the plan leaves to the feedback; None: nothing but 5 mrad at the joints"
+    )
     initial: Mapping[str, float] = parameter(
         {}, unit="rad", text="joint angles at the start, by name; others as the robot stands"
     )
@@ -295,7 +299,7 @@ def _explain(problem: Any) -> str:
     message = str(problem["msg"]).removeprefix("Value error, ")
     if problem["type"] == "extra_forbidden":
         nested: dict[str, type[Parameters]] = {
-            "knots": Knots, "weights": Weights, "jumps": Hop, "phases": Span
+            "knots": Knots, "weights": Weights, "margins": Margins, "jumps": Hop, "phases": Span
         }  # fmt: skip
         owner = nested.get(str(problem["loc"][0]), JumpTask)
         near = get_close_matches(key.rpartition(".")[2], owner.model_fields, 1, 0.0)

@@ -14,6 +14,7 @@ import numpy as np
 from ...runtime.description import RobotDescription
 from ...runtime.kinematics import link_poses
 from .errors import TaskError
+from .margins import unknown_joints
 from .sequence import Hop, Place, edge_of
 from .task import GRAVITY, JumpTask
 
@@ -58,6 +59,14 @@ def _unknown_names(task: JumpTask, robot: RobotDescription) -> Iterator[Contradi
                     f"{key}.{name}",
                     f"{angle:.4g} rad is outside the joint's limits, {low:.4g} to {high:.4g} rad",
                 )
+    if task.margins is not None:
+        for name in unknown_joints(task.margins, list(joints)):
+            short = sorted({joint.partition("_")[2] for joint in joints} | set(joints))
+            near = ", ".join(nearest(name, short) or short)
+            yield (
+                f"margins.landing_limits.{name}",
+                f"{robot.name} has no joint {name}; the nearest is {near}",
+            )
 
 
 def _jumps(task: JumpTask) -> Iterator[tuple[str, Hop, Place, Place]]:

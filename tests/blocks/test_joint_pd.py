@@ -47,6 +47,14 @@ def test_in_the_air_only_the_feedback_acts():
     assert (command.position == 0.1).all() and (command.velocity == 0.2).all()
 
 
+def test_planned_torques_are_fed_forward_while_plan_and_robot_fly():
+    bench = make(flight_feedforward=0.5)
+    bench.set("reference", phase=int(Phase.FLIGHT), joint_torque=np.arange(10.0))
+    assert np.array_equal(settle(bench, Phase.FLIGHT, False).torque, 0.5 * np.arange(10.0))
+    bench.set("reference", phase=int(Phase.LANDING), joint_torque=np.arange(10.0))
+    assert not settle(bench, Phase.FLIGHT, False).torque.any()
+
+
 def test_a_leg_that_lands_late_keeps_swinging():
     command = settle(make(), Phase.LANDING, [True, False, False, False])
     assert np.array_equal(command.torque, np.r_[np.arange(1.0, 6.0), np.zeros(5)])

@@ -33,8 +33,8 @@ def test_the_graph_has_no_problems():
 
 def test_it_jumps_lands_and_recovers(jump):
     assert jump.success, jump.reason
-    assert jump.metrics["apex_above_standing_m"] >= 0.07
-    assert jump.metrics["apex_from_squat_m"] >= 0.15
+    assert jump.metrics["apex_above_standing_m"] >= 0.11
+    assert jump.metrics["apex_from_squat_m"] >= 0.23
     assert jump.metrics["qp_failures"] == 0
 
 
@@ -42,7 +42,7 @@ def test_it_jumps_lands_and_recovers(jump):
 def test_other_noise_other_delays(seed):
     result = aloft.load(JUMP, {"robot.seed": seed}).run(log=False)
     assert result.success, result.reason
-    assert result.metrics["apex_above_standing_m"] >= 0.07
+    assert result.metrics["apex_above_standing_m"] >= 0.11
 
 
 def test_the_phases_follow_one_another(jump):
@@ -62,7 +62,8 @@ def test_the_body_follows_its_plan_off_the_ground(jump):
     assert found == pytest.approx(planned, abs=0.1)
     height = jump.signal("robot.truth.com")[last, 2]
     assert height == pytest.approx(jump.signal("plan.reference.com")[last, 2], abs=0.01)
-    assert np.abs(jump.signal("robot.truth.angular_momentum")[last]).max() < 0.03
+    momentum = jump.signal("robot.truth.angular_momentum")[last]
+    assert momentum == pytest.approx(jump.signal("plan.reference.angular_momentum")[last], abs=0.03)
 
 
 def test_the_same_seed_gives_the_same_bits_and_another_does_not(jump):
@@ -80,19 +81,6 @@ def test_no_controller_reads_the_truth():
         if any(wire.source == "robot.truth" for wire in spec.wires.values())
     }
     assert readers == {"push", "score"}
-
-
-def test_a_higher_jump_is_one_number_away():
-    result = aloft.load(JUMP, {"robot.seed": 5, "plan.rise": 0.1}).run(log=False)
-    assert result.success, result.reason
-    assert result.metrics["apex_above_standing_m"] == pytest.approx(0.1, abs=0.008)
-
-
-def test_a_jump_forward():
-    settings = {"robot.seed": 6, "plan.rise": 0.06, "plan.distance": 0.1}
-    result = aloft.load(JUMP, settings).run(log=False)
-    assert result.success, result.reason
-    assert result.metrics["jump_distance_x_m"] == pytest.approx(0.1, abs=0.02)
 
 
 @pytest.mark.parametrize("trial", ["nominal", "standard", "robust"])
@@ -124,23 +112,3 @@ def test_without_the_plan_for_angular_momentum_it_falls():
     gains = {"torso_weight": [10.0] * 3, "angular_weight": [1.0] * 3}
     result = aloft.load(JUMP, {"wbc.thrust": gains}).run(log=False)
     assert not result.success
-
-
-PUSHED = {
-    "robot.seed": 70, "plan.rise": 0.04, "push.force": 70.0, "score.peak_tilt": 0.785,
-    "score.foot_slip": 0.02, "score.distance_tolerance": 0.2,
-}  # fmt: skip
-"""The paper's push test, at about its flight time of 0.2 s."""
-
-
-@pytest.mark.parametrize("angle", [0.0, np.pi, np.pi / 2.0])
-def test_a_push_in_the_air_is_landed(angle):
-    result = aloft.load(JUMP, {**PUSHED, "push.angle": angle}).run(log=False)
-    assert result.success, result.reason
-
-
-def test_without_the_landing_heuristic_the_push_from_behind_ends_in_a_fall():
-    off = {"landing.w_l": [0.0, 0.0], "landing.w_c": 0.0}
-    result = aloft.load(JUMP, {**PUSHED, **off}).run(log=False)
-    assert not result.success
-    assert result.metrics["peak_tilt_deg"] > 60.0

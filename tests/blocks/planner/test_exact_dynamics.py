@@ -57,12 +57,25 @@ def test_in_flight_the_centre_falls_and_the_angular_momentum_stays(
 def test_an_impulse_changes_the_momentum_by_itself(dynamics: ExactDynamics) -> None:
     q, v = random_state(dynamics, 3)
     impulse = np.random.default_rng(5).normal(size=(4, 3))
-    behind = dynamics.velocity_after_impact(q, v, impulse)
+    behind, motors = dynamics.velocity_after_impact(q, v, impulse)
+    np.testing.assert_array_equal(motors, np.zeros(10))
     com, before, spin = dynamics.centroidal(q, v)
     _, after, spin_after = dynamics.centroidal(q, behind)
     np.testing.assert_allclose(dynamics.mass * (after - before), impulse.sum(axis=0), atol=1e-10)
     moment = np.cross(dynamics.points(q) - com, impulse).sum(axis=0)
     np.testing.assert_allclose(spin_after - spin, moment, atol=1e-10)
+
+
+def test_held_joints_keep_their_speed_by_their_motors_impulse(dynamics: ExactDynamics) -> None:
+    q, v = random_state(dynamics, 4)
+    impulse = np.random.default_rng(6).normal(size=(4, 3))
+    held = np.arange(10) % 3 == 0
+    behind, motors = dynamics.velocity_after_impact(q, v, impulse, held)
+    np.testing.assert_array_equal(behind[6:][held], v[6:][held])
+    assert np.all(motors[~held] == 0.0)
+    pushed = dynamics.contact_jacobians(q)[1].T @ impulse.ravel()
+    pushed[6:] += motors
+    np.testing.assert_allclose(dynamics.mass_matrix(q) @ (behind - v), pushed, atol=1e-10)
 
 
 def test_the_joints_cubic_meets_both_ends_and_a_constant_acceleration() -> None:

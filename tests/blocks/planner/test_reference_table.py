@@ -86,3 +86,16 @@ def test_the_flight_keeps_its_momentum(table: JumpTable) -> None:
     np.testing.assert_allclose(
         table.columns["com_acceleration"][flying], [[0, 0, -9.81]] * flying.sum()
     )
+
+
+def test_torques_are_the_plans_in_the_middle_of_every_interval(
+    table: JumpTable, plan: JumpPlan
+) -> None:
+    steps = np.diff(plan.time)
+    middles = STAND + plan.time[:-1] + 0.5 * steps
+    found = np.array(
+        [np.interp(middles, table.time, table.columns["joint_torque"][:, j]) for j in range(10)]
+    ).T
+    # Rows are up to 2 ms apart, and torques bend at the middles.
+    inner = steps > 0.004
+    np.testing.assert_allclose(found[inner], plan.joint_torque[:-1][inner], atol=0.4)

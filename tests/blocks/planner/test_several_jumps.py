@@ -74,7 +74,7 @@ def test_a_file_of_several_jumps(tmp_path: Path) -> None:
     path = write_plan(tmp_path / "steps.npz", steps())
     assert read_plan(path).flights == steps().flights
     assert read_plan(path).task == steps().task
-    assert plan_picture(steps(), ROBOT).count("<title>flight</title>") == 12
+    assert plan_picture(steps(), ROBOT).count("<title>flight</title>") == 18  # nine charts
 
 
 def test_a_near_plan_of_several_jumps_saves_iterations() -> None:

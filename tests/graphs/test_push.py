@@ -1,0 +1,37 @@
+"""The paper's push test: pushed in the air, the robot lands with the heuristic and falls without."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import aloft
+from aloft.runtime.loading import check
+
+PUSH = Path(aloft.__file__).parent / "graphs" / "push.yaml"
+
+
+def test_the_graph_has_no_problems():
+    assert check(PUSH).ok
+
+
+@pytest.mark.parametrize("angle", [0.0, np.pi, np.pi / 2.0])
+def test_a_push_in_the_air_is_landed(angle):
+    result = aloft.load(PUSH, {"robot.seed": 70, "push.angle": angle}).run(log=False)
+    assert result.success, result.reason
+
+
+def test_without_the_landing_heuristic_the_push_from_behind_ends_in_a_fall():
+    off = {"landing.w_l": [0.0, 0.0], "landing.w_c": 0.0}
+    result = aloft.load(PUSH, {"robot.seed": 70, **off}).run(log=False)
+    assert not result.success
+    assert result.metrics["peak_tilt_deg"] > 60.0
+
+
+def test_the_parametric_jump_is_one_number_higher():
+    settings = {"robot.seed": 5, "push.force": 0.0, "plan.rise": 0.1, "score.peak_tilt": 0.26}
+    result = aloft.load(PUSH, settings).run(log=False)
+    assert result.success, result.reason
+    assert result.metrics["apex_above_standing_m"] == pytest.approx(0.1, abs=0.008)
