@@ -20,6 +20,7 @@ ADVICE = {
     "apex": "ask for a smaller rise or a longer thrust_time",
     "angular momentum": "allow more lift_off_momentum or touchdown_momentum",
     "flight time": "leave flight_time to the planner",
+    "impact": "use impact: false, or ask for a smaller jump",
 }
 
 
