@@ -14,12 +14,14 @@ from typing import Any
 import numpy as np
 
 from .planner import planner
+from .recorder import recorder
 from .rows import Row
 from .scheduler import scheduler
 
 BENCHMARKS: Mapping[str, Callable[[], list[Row]]] = {
     "scheduler": scheduler,
     "planner": planner,
+    "recorder": recorder,
 }
 """All benchmarks by name; each returns its rows."""
 

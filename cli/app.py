@@ -14,6 +14,7 @@ from .bench import bench
 from .blocks import blocks
 from .check import check
 from .graph import graph
+from .log import log
 from .output import print_json
 from .params import params
 from .plan import plan
@@ -43,6 +44,7 @@ app = typer.Typer(
 for _verb in (run, replay, check, graph, blocks, plan, bench, study, test):
     app.command(epilog=EXIT_CODES if _verb is run else None)(_verb)
 app.add_typer(params)
+app.add_typer(log)
 
 
 def _print_version(wanted: bool) -> None:

@@ -19,7 +19,7 @@ from difflib import get_close_matches
 from functools import cached_property
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
@@ -76,11 +76,32 @@ class RecordedRun:
         """
         known = self.signals()
         if name not in known:
-            near = get_close_matches(name, known, 3, 0.0)
-            raise KeyError(f"no signal {name!r}; the nearest are {', '.join(near)}")
+            self.nearest(name)
         if "rows" in self.__dict__:
             return self.header.bus.layout().view(self.rows, name)
         return self._whole(known[name], self._batches(known[name]))
+
+    def nearest(self, name: str) -> NoReturn:
+        """Raise the ``KeyError`` for a name that is none, with the nearest that are."""
+        near = get_close_matches(name, self.signals(), 3, 0.0)
+        raise KeyError(f"no signal {name!r}; the nearest are {', '.join(near)}")
+
+    def to_pandas(self, *names: str) -> Any:
+        """Some signals, by default all, as a pandas ``DataFrame``: one column a number, called
+        ``block.port.field[i]``, by time [s]. Raises ``ImportError`` without pandas."""
+        import pandas
+
+        from .table import TIME, flat_columns
+
+        return pandas.DataFrame(flat_columns(self, names)).set_index(TIME)
+
+    def to_polars(self, *names: str) -> Any:
+        """The same as a polars ``DataFrame``. Raises ``ImportError`` without polars."""
+        import polars
+
+        from .table import flat_columns
+
+        return polars.DataFrame(flat_columns(self, names))
 
     @cached_property
     def ticks(self) -> NDArray[np.int64]:
@@ -228,7 +249,8 @@ def _stream(path: Path, content: str, *, static: bool = False) -> Iterator[tuple
             reader = RrdReader(path)
         for chunk in reader.stream().filter(content=content):
             if chunk.is_static == static:
-                yield str(chunk.entity_path), chunk.to_record_batch()
+                # Rerun escapes what is no letter, as in the names of blocks that loading inserts
+                yield str(chunk.entity_path).replace("\\", ""), chunk.to_record_batch()
     except (RuntimeError, ValueError, OSError) as error:
         raise RecordingError(
             f"{path} cannot be read ({error}); if a recording was cut off, mend it with "

@@ -22,7 +22,7 @@ _MAIN = (
 )
 START_TIME = 30.0
 """Seconds the process may take to be ready for a run in real time."""
-STALL_TIME = 20.0
+STALL_TIME = 60.0
 """Seconds without any progress after which the process is given up."""
 
 

@@ -14,6 +14,7 @@ import os
 import select
 import signal
 import sys
+import threading
 import time
 from collections.abc import Callable
 from contextlib import suppress
@@ -35,6 +36,8 @@ HEADER, ROW, KEYFRAME, NOTE = 1, 2, 3, 4
 """The kinds of records in the ring; a keyframe is the bytes of the bus, then of the state."""
 POLL = 0.02
 """Seconds between two looks at the ring."""
+LAST_SYNC = 2.0
+"""Seconds that the end waits for the disk."""
 BATCH = 512
 """Ticks written at once, at most."""
 
@@ -54,8 +57,8 @@ class Task:
 
 @dataclass
 class Report:
-    """What was done: rows written, the file's size [bytes], the most memory used [bytes], and what
-    went wrong, if anything; then ``lost`` rows came after it."""
+    """What was done: rows surely written, the file's size [bytes], the most memory used [bytes], and
+    what went wrong, if anything; then ``lost`` rows may not be in the file."""
 
     rows: int = 0
     size: int = 0
@@ -76,9 +79,10 @@ class RecorderProcess:
         self._bus_size = header.bus.size
         self._rows = np.zeros((BATCH, header.bus.size), np.uint8)
         self._ticks = np.zeros(BATCH, np.int64)
-        self._waiting = 0
+        self._waiting = self._unflushed = 0
         self._last_tick = header.first_tick
         self._dirty = False
+        self._syncing = threading.Thread()
         self._writer: RecordingWriter | None = None
         self._guard(lambda: self._open(header))
         self._flushed = self._synced = time.monotonic()
@@ -120,18 +124,22 @@ class RecorderProcess:
         if self._dirty and self._writer is not None:
             self._guard(self._writer.flush)
         self._dirty = False
+        self._settle(flushed=True)
 
     def sync(self) -> None:
-        """Have what was flushed put on the disk."""
-        if self._writer is not None:
-            self._guard(self._sync)
+        """Have what was flushed put on the disk, which a thread waits for: a busy disk may take
+        seconds, and the ring must be emptied meanwhile."""
+        if self._writer is not None and not self._syncing.is_alive():
+            self._syncing = threading.Thread(target=self._sync, daemon=True)
+            self._syncing.start()
 
     def _sync(self) -> None:
-        descriptor = os.open(self._task.path, os.O_RDONLY)
-        try:
-            os.fsync(descriptor)
-        finally:
-            os.close(descriptor)
+        with suppress(OSError):  # a disk that cannot take it fails the next flush too
+            descriptor = os.open(self._task.path, os.O_RDONLY)
+            try:
+                os.fsync(descriptor)
+            finally:
+                os.close(descriptor)
 
     def finish(self, outcome: dict[str, Any] | None) -> Report:
         """Write what is left and close the file."""
@@ -145,7 +153,10 @@ class RecorderProcess:
             self._write(lambda writer: writer.write_outcome(outcome))
         if self._writer is not None:
             self._guard(self._writer.close)
+            self._settle(flushed=True)
             self.sync()
+            if self._syncing.is_alive():
+                self._syncing.join(LAST_SYNC)
         if Path(self._task.path).is_file():
             self.report.size = Path(self._task.path).stat().st_size
         self.report.memory = _memory()
@@ -159,10 +170,18 @@ class RecorderProcess:
         # copies, as Rerun keeps what it is given until it has written it
         ticks, rows = self._ticks[:count].copy(), self._rows[:count].copy()
         self._write(lambda writer: writer.write_rows(ticks, rows))
-        if self._writer is not None:
-            self.report.rows += count
+        self._unflushed += count
+        self._settle(flushed=False)
+
+    def _settle(self, *, flushed: bool) -> None:
+        """Count the rows that were handed over as written or, where that failed, as lost."""
+        if self._writer is None:
+            self.report.lost += self._unflushed
+        elif flushed:
+            self.report.rows += self._unflushed
         else:
-            self.report.lost += count
+            return
+        self._unflushed = 0
 
     def _write(self, write: Callable[[RecordingWriter], None]) -> None:
         writer = self._writer

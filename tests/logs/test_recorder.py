@@ -11,9 +11,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
-import pytest
 
-from aloft.logs import RecordedRun, read
+from aloft.logs import RecordedRun, RecordingError, read
 from aloft.logs.recorder import Recorder
 from aloft.runtime.block import Block, Output, State
 from aloft.runtime.executor import run
@@ -75,6 +74,20 @@ def process_of(recorder: Recorder) -> int:
     return recorder.link.process_id
 
 
+def until(condition: Callable[[], bool], seconds: float = 60.0) -> None:
+    end = time.monotonic() + seconds
+    while not condition() and time.monotonic() < end:
+        time.sleep(0.05)
+
+
+def ticks_in(path: Path) -> list[int]:
+    """What a file that is being written has by now."""
+    try:
+        return read(path).ticks.tolist()
+    except RecordingError:
+        return []
+
+
 def assert_whole(recorded: RecordedRun, result: RunResult) -> None:
     assert result.log is not None
     assert recorded.ticks.tolist() == result.log.ticks
@@ -125,7 +138,7 @@ def test_what_finds_no_room_is_counted_and_noted(tmp_path: Path) -> None:
     recorder = Recorder(tmp_path / "a.rrd", ring_time=0.01, when_full="drop")
     freeze = At(1000, lambda: os.kill(process_of(recorder), signal.SIGSTOP))
     thaw = At(15_000, lambda: os.kill(process_of(recorder), signal.SIGCONT))
-    pause = At(16_000, lambda: time.sleep(2.0))
+    pause = At(16_000, lambda: until(lambda: _is_empty(recorder)))
     result = run(graph(20_000), sinks=[recorder, freeze, thaw, pause])
     assert result.success
     assert result.warnings == (f"{recorder.dropped} ticks were run but not recorded",)
@@ -141,7 +154,7 @@ def test_what_finds_no_room_is_counted_and_noted(tmp_path: Path) -> None:
 
 def test_the_run_goes_on_when_the_recorder_is_killed(tmp_path: Path) -> None:
     recorder = Recorder(tmp_path / "a.rrd", flush_period=0.05)
-    wait = At(999, lambda: time.sleep(3.0))
+    wait = At(999, lambda: until(lambda: len(ticks_in(tmp_path / "a.rrd")) >= 1000))
     kill = At(2000, lambda: os.kill(process_of(recorder), signal.SIGKILL))
     result = run(graph(5000), sinks=[recorder, wait, kill])
     assert result.success and result.ticks == 5000
@@ -154,7 +167,7 @@ def test_the_run_goes_on_when_the_recorder_is_killed(tmp_path: Path) -> None:
     assert recorded.outcome is None
 
 
-def test_a_full_disk_is_a_warning(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+def test_a_full_disk_is_a_warning(tmp_path: Path) -> None:
     told: list[str] = []
     recorder = Recorder(tmp_path / "a.rrd", on_warning=told.append)
 
@@ -169,11 +182,10 @@ def test_a_full_disk_is_a_warning(tmp_path: Path, capfd: pytest.CaptureFixture[s
     assert "a.rrd cannot be written any further" in warning
     assert recorder.report is not None
     assert recorder.report.rows + recorder.report.lost == 20_000 and recorder.report.lost > 0
-    assert "warning: nothing more is recorded" in capfd.readouterr().err
     recorded = read(tmp_path / "a.rrd")
     assert result.log is not None
     count = len(recorded.ticks)
-    assert 0 < count < 20_000
+    assert recorder.report.rows <= count < 20_000 and count > 0
     assert recorded.rows.tobytes() == result.log.rows()[:count].tobytes()
 
 
@@ -207,8 +219,8 @@ def test_the_recorder_finishes_when_the_run_is_killed(tmp_path: Path) -> None:
     assert process.stdout is not None
     recorder = int(process.stdout.readline())  # tick 300 has run
     process.kill()
-    process.wait(30)
-    end = time.monotonic() + 30.0
+    process.wait(240)
+    end = time.monotonic() + 240.0
     while time.monotonic() < end and _lives(recorder):
         time.sleep(0.02)
     assert not _lives(recorder)
@@ -220,6 +232,11 @@ def test_the_recorder_finishes_when_the_run_is_killed(tmp_path: Path) -> None:
     assert recorded.notes[-1].tick == len(recorded.ticks)
     assert recorded.outcome is None
     assert recorded.header.clock == "paced"
+
+
+def _is_empty(recorder: Recorder) -> bool:
+    assert recorder.link is not None
+    return recorder.link.ring.read_back == recorder.link.ring.written
 
 
 def _lives(number: int) -> bool:

@@ -1,0 +1,163 @@
+"""``aloft log``: look into recordings, export them, mend them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from ..runtime.errors import AloftError
+from .output import console, errors_reported, number, print_json, say, table
+
+if TYPE_CHECKING:
+    from ..logs.reader import RecordedRun
+
+log = typer.Typer(
+    name="log",
+    help="Look into recordings, export them, mend them.",
+    no_args_is_help=True,
+    rich_markup_mode=None,
+)
+
+File = Annotated[Path, typer.Argument(help="The recording, a file .rrd.")]
+AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
+
+
+@log.command("info")
+def info(file: File, as_json: AsJson = False) -> None:
+    """Print what ran, what came of it, and every signal with its unit."""
+    with errors_reported(as_json):
+        run = read(file)
+        about = summary(run)
+    if as_json:
+        print_json({"success": True, **about})
+        return
+    out = console()
+    rows = [(key, plain(value)) for key, value in about.items() if key not in ("signals", "notes")]
+    out.print(table(str(file), ("", ""), rows))
+    fields = [
+        (s["name"], s["dtype"], plain(s["shape"]), s["unit"] or "", s["frame"] or "", s["text"])
+        for s in about["signals"]
+    ]
+    columns = ("signal", "type", "shape", "unit", "frame", "what it is")
+    out.print(table("signals", columns, fields))
+    notes = [(str(note["tick"]), note["level"], note["text"]) for note in about["notes"]]
+    out.print(table("what happened", (">tick", "", "note"), notes))
+
+
+@log.command("export")
+def export(
+    file: File,
+    csv: Annotated[bool, typer.Option("--csv", help="Comma-separated values.")] = False,
+    parquet: Annotated[bool, typer.Option("--parquet", help="Apache Parquet.")] = False,
+    mcap: Annotated[
+        bool, typer.Option("--mcap", help="MCAP with JSON; needs pip install 'aloft[mcap]'.")
+    ] = False,
+    signal: Annotated[
+        list[str] | None,
+        typer.Option(help="Only this signal, port or block; may be given several times."),
+    ] = None,
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="By default beside the recording.")
+    ] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Write the signals of a recording, every number exact, into a file of another format."""
+    from ..logs.export import EXPORTS
+
+    with errors_reported(as_json):
+        kinds = [k for k, on in (("csv", csv), ("parquet", parquet), ("mcap", mcap)) if on]
+        if len(kinds) != 1:
+            raise AloftError("say one of --csv, --parquet and --mcap")
+        target = output or file.with_suffix(f".{kinds[0]}")
+        run = read(file)
+        try:
+            EXPORTS[kinds[0]](run, target, signal or ())
+        except KeyError as error:
+            raise AloftError(str(error.args[0])) from None
+        except OSError as error:
+            raise AloftError(f"{target} cannot be written: {error.strerror or error}") from None
+    if as_json:
+        print_json({"success": True, "file": str(target), "ticks": len(run.ticks)})
+    else:
+        say(console(), f"{len(run.ticks)} ticks in {target}")
+
+
+@log.command("repair")
+def repair(file: File, as_json: AsJson = False) -> None:
+    """Mend a recording that was cut off, in place: what is incomplete at its end is removed."""
+    from ..logs.repair import repair as mend
+
+    with errors_reported(as_json):
+        try:
+            done = mend(file)
+        except OSError as error:
+            raise AloftError(f"{file} cannot be mended: {error.strerror or error}") from None
+        run = read(file)
+    ticks = run.ticks
+    last = int(ticks[-1]) if len(ticks) else None
+    if as_json:
+        found = {"closed": done.closed, "removed_bytes": done.removed, "messages": done.messages}
+        print_json({"success": True, **found, "ticks": len(ticks), "last_tick": last})
+        return
+    if done.closed:
+        say(console(), f"{file} is whole: nothing was done")
+        return
+    cut = f"{done.removed} bytes of an incomplete message were removed" if done.removed else (
+        "no message was incomplete, nothing was removed"
+    )  # fmt: skip
+    kept = f"{len(ticks)} ticks are kept, the last is {last}" if len(ticks) else "no tick is kept"
+    say(console(), f"{file} was not closed by who wrote it; {cut}. {kept}; what came after is lost")
+
+
+def read(file: Path) -> RecordedRun:
+    """The recording. Raises ``AloftError`` if it cannot be read."""
+    from ..logs import reader
+
+    try:
+        return reader.read(file)
+    except OSError as error:
+        raise AloftError(f"{file} cannot be read: {error.strerror or error}") from None
+
+
+def summary(run: RecordedRun) -> dict[str, Any]:
+    """What there is to say of a recording, as plain data."""
+    header, outcome, ticks = run.header, run.outcome, run.ticks
+    duration = len(ticks) / header.base_rate
+    return {
+        "graph": header.name,
+        "whole": outcome is not None,
+        "outcome": outcome["reason"] if outcome else None,
+        "run_hash": outcome["run_hash"] if outcome else None,
+        "ticks": len(ticks),
+        "duration_s": duration,
+        "base_rate_hz": header.base_rate,
+        "clock": header.clock,
+        "dropped_ticks": run.dropped_ticks,
+        "keyframes": len(run.keyframes),
+        "parameter_changes": len(run.parameter_changes),
+        "size_bytes": run.path.stat().st_size,
+        "overrides": dict(header.overrides),
+        "seeds": dict(header.seeds),
+        "versions": dict(header.versions),
+        "machine": dict(header.machine),
+        "schema_hashes": header.schema_hashes,
+        "signals": [
+            {"name": f.name, "dtype": f.dtype, "shape": list(f.shape), "unit": f.unit,
+             "frame": f.frame, "text": f.text}
+            for f in run.signals().values()
+        ],
+        "notes": [
+            {"tick": n.tick, "kind": n.kind, "level": n.level, "text": n.text} for n in run.notes
+        ],
+    }  # fmt: skip
+
+
+def plain(value: Any) -> str:
+    """A value in a table's cell."""
+    if isinstance(value, dict):
+        return ", ".join(f"{key} {entry}" for key, entry in value.items())
+    if isinstance(value, list):
+        return " x ".join(map(str, value))
+    return "" if value is None else number(value)

@@ -1,0 +1,65 @@
+"""Recorded signals as flat columns: one a number, called ``block.port.field[i, j]``."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .format import RecordedField
+from .reader import RecordedRun
+
+TICK, TIME = "tick", "t"
+"""The first two columns; the second is in seconds."""
+
+
+def flat_columns(run: RecordedRun, names: Sequence[str] = ()) -> dict[str, NDArray[Any]]:
+    """``tick``, ``t`` and every number of some signals, by default of all, each (ticks,).
+
+    Args:
+        run: the recording.
+        names: of signals, or the beginnings of such, ``dynamics`` or ``dynamics.terms``.
+
+    Raises:
+        KeyError: no signal has such a name or beginning.
+    """
+    columns: dict[str, NDArray[Any]] = {TICK: run.ticks, TIME: run.time}
+    fields = chosen(run, names)
+    if len(fields) > 1:
+        _ = run.rows  # read all at once, not the file anew for each
+    for field in fields:
+        values = run[field.name]
+        for place in np.ndindex(field.shape):
+            columns[column_name(field, place)] = values[(slice(None), *place)]
+    return columns
+
+
+def chosen(run: RecordedRun, names: Sequence[str]) -> list[RecordedField]:
+    """The signals that ``names`` mean, in file order, all for none. Raises ``KeyError``."""
+    known = run.signals()
+    if not names:
+        return list(known.values())
+    for name in names:
+        if not any(_means(name, signal) for signal in known):
+            run.nearest(name)
+    return [known[s] for s in known if any(_means(name, s) for name in names)]
+
+
+def _means(name: str, signal: str) -> bool:
+    return signal == name or signal.startswith((f"{name}.", f"{name}/"))
+
+
+def column_name(field: RecordedField, place: Sequence[int]) -> str:
+    """What one number of a field is called."""
+    return f"{field.name}[{', '.join(map(str, place))}]" if len(place) else field.name
+
+
+def units(run: RecordedRun, names: Sequence[str] = ()) -> Mapping[str, str]:
+    """The unit of every column that has one, as text."""
+    found = {TIME: "s"}
+    for field in chosen(run, names):
+        if field.unit is not None:
+            found |= {column_name(field, place): field.unit for place in np.ndindex(field.shape)}
+    return found

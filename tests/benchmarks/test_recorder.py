@@ -1,0 +1,14 @@
+"""The recorder's benchmark: that it is complete; how fast is for ``aloft bench``."""
+
+from aloft.benchmarks.recorder import COST_GOAL, recorder
+
+
+def test_rows_are_complete_and_nothing_is_dropped() -> None:
+    rows = {row.name: row for row in recorder(duration=1.0, rounds=2)}
+    assert rows["recording a tick"].goal == COST_GOAL == 2.0
+    assert rows["array allocations of recording"].value == 0.0
+    assert rows["rows dropped"].value == 0.0
+    size = rows["size of the file"].value
+    assert size is not None and size > 100.0  # 8896 bytes at 500 Hz are 267 MB/min
+    memory = rows["memory of the recorder, at most"].value
+    assert memory is not None and memory > 10.0

@@ -1,0 +1,96 @@
+"""``aloft log``: what is said of a recording, what is exported, what is mended."""
+
+import csv
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import aloft.logs
+
+Call = Callable[..., Any]
+CallJson = Callable[..., dict[str, Any]]
+
+
+@pytest.fixture
+def recorded(folder: Path, call: Call) -> Path:
+    """A folder with ``count.rrd``."""
+    call("run", "count.yaml", "--record", "count.rrd", "--quiet")
+    return folder
+
+
+def test_the_whole_way(recorded: Path, call: Call, call_json: CallJson) -> None:
+    """One test, as a recording takes a second to make."""
+    run = aloft.logs.read("count.rrd")
+    (name,) = [name for name in run.signals() if name.startswith("counter.")]
+    shown = call("log", "info", "count.rrd").stdout
+    for text in ("count", "run_hash", name, "running", "ran to its end"):
+        assert text in shown
+    found = call_json("log", "info", "count.rrd")
+    assert found["whole"] is True and found["ticks"] == 100
+    assert {"name", "dtype", "shape", "unit", "frame", "text"} <= set(found["signals"][0])
+
+    call("log", "export", "count.rrd", "--csv", "--signal", "counter")
+    with open("count.csv", newline="") as file:
+        header, *lines = list(csv.reader(file))
+    assert header[:2] == ["tick", "t"] and header[2].startswith(name)
+    values = [float(line[2]) for line in lines]
+    assert np.array(values).tobytes() == run[name].reshape(100, -1)[:, 0].tobytes()
+
+    call_json("log", "export", "count.rrd", "--parquet", "-o", "all.parquet")
+    from pyarrow import parquet
+
+    table = parquet.read_table("all.parquet")
+    assert table.schema.field("t").metadata == {b"unit": b"s"}
+    assert table.schema.metadata[b"aloft.graph"].decode() == run.header.graph
+    assert table[header[2]].to_numpy().tobytes() == np.array(values).tobytes()
+
+    problem = call_json("log", "export", "count.rrd", "--csv", "--signal", "countr", code=2)
+    assert "no signal 'countr'; the nearest are counter." in problem["reason"]
+    problem = call_json("log", "export", "count.rrd", code=2)
+    assert problem["reason"] == "say one of --csv, --parquet and --mcap"
+    problem = call_json("log", "export", "count.rrd", "--csv", "-o", "no/a.csv", code=2)
+    assert problem["reason"].startswith("no/a.csv cannot be written")
+    assert "none.rrd cannot be read" in call_json("log", "info", "none.rrd", code=2)["reason"]
+
+    assert "is whole: nothing was done" in call("log", "repair", "count.rrd").stdout
+    data = Path("count.rrd").read_bytes()
+    Path("count.rrd").write_bytes(data[: len(data) * 2 // 3])
+    assert "aloft log repair count.rrd" in call_json("log", "info", "count.rrd", code=2)["reason"]
+    done = call("log", "repair", "count.rrd").stdout
+    assert "bytes of an incomplete message were removed" in done
+    done = call_json("log", "repair", "count.rrd")
+    assert done["closed"] is False and done["removed_bytes"] == 0
+    assert call_json("log", "info", "count.rrd")["ticks"] == done["ticks"] <= 100
+
+
+def test_mcap(recorded: Path, call: Call) -> None:
+    pytest.importorskip("mcap")
+    from mcap.reader import make_reader
+
+    call("log", "export", "count.rrd", "--mcap")
+    run = aloft.logs.read("count.rrd")
+    found: dict[str, list[Any]] = {}
+    with open("count.mcap", "rb") as file:
+        for schema, channel, message in make_reader(file).iter_messages():
+            assert schema is not None and schema.encoding == "jsonschema"
+            found.setdefault(channel.topic, []).append((message.log_time, json.loads(message.data)))
+    name = next(iter(run.signals()))
+    port, _, field = name.rpartition(".")
+    messages = found[port.replace(".", "/")]
+    assert [values[field] for _, values in messages] == run[name].tolist()
+    assert [instant for instant, _ in messages] == [k * 10_000_000 for k in range(100)]
+
+
+def test_without_mcap_it_says_what_to_install(
+    recorded: Path, call_json: CallJson, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    import sys
+
+    monkeypatch.setitem(sys.modules, "mcap", None)
+    monkeypatch.setitem(sys.modules, "mcap.writer", None)
+    problem = call_json("log", "export", "count.rrd", "--mcap", code=2)
+    assert problem["reason"] == "MCAP needs the library mcap; pip install 'aloft[mcap]'"
