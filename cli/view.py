@@ -88,3 +88,11 @@ def open_page(page: str) -> None:
 
     if sys.stdout.isatty():
         webbrowser.open(page)
+
+
+def how_to_view(recording: Path) -> str:
+    """What to type to see a recording, as short as it can be said."""
+    program = Path(sys.argv[0])
+    here = Path.cwd()
+    name = program.relative_to(here) if program.is_relative_to(here) else program
+    return f"{name if program.name == 'aloft' else 'aloft'} view {recording}"

@@ -11,7 +11,7 @@ from .plot_views import Shown, block_tabs, main_plots
 from .scene_ports import scene_ports
 from .state_lanes import Lane, lanes_of
 
-LANES = ("active", "solved", "contact_touched")
+LANES = ("active", "solved")
 """The truth values that have lanes in the first picture; named numbers such as phases all have."""
 HIDDEN_LANES = ("mode",)
 
@@ -80,5 +80,10 @@ def states_view(header: Header, shown: Sequence[Shown]) -> Any:
     """Phases, contacts and whether the problem was solved, a lane each."""
     import rerun.blueprint as rrb
 
-    lanes = [f"/{run.root}{lane.entity}" for run in shown for lane in main_lanes(header)]
+    lanes = [
+        f"/{run.root}{lane.entity}"
+        for run in shown
+        for lane in main_lanes(header)
+        if len(shown) == 1 or lane.told  # contacts of two runs would fill the view
+    ]
     return rrb.StateTimelineView(origin="/", contents=lanes or ["states/**"], name="States")

@@ -97,6 +97,20 @@ class LiveFeed:
                 if work is None:
                     break
                 work(run)
+                _raise_if_severed(stream)
             stream.flush(timeout_sec=LAST_WAIT)
         except Exception as error:  # noqa: BLE001  # whatever it is, the recording goes on
             self.problem = describe(error)
+
+
+def _raise_if_severed(stream: Any) -> None:
+    """Sending to a viewer that has gone is silent; only a flush says it."""
+    try:
+        stream.flush(timeout_sec=1.0)
+    except RuntimeError as error:
+        if "severed" in str(error):
+            raise ViewerGoneError("the viewer has been closed") from error
+
+
+class ViewerGoneError(Exception):
+    """The viewer was closed, or died."""

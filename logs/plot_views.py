@@ -51,6 +51,8 @@ def plot(header: Header, name: str, lines: Sequence[Line], shown: Sequence[Shown
     """Several fields of one unit in one view, of every run."""
     import rerun.blueprint as rrb
 
+    if len(shown) > 1 and len(lines) > 1:
+        lines = lines[:1]  # of several runs only what is true, or else nobody could tell them apart
     first = lines[0].field
     unit = f" [{first.unit}]" if first.unit not in (None, "", "1") else ""
     frame = f", {first.frame}" if first.frame else ""
@@ -59,7 +61,7 @@ def plot(header: Header, name: str, lines: Sequence[Line], shown: Sequence[Shown
         for line in lines:
             entity = run.root + entity_of(SIGNALS, line.field.name)
             entities.append(entity)
-            label = " ".join(part for part in (run.label, line.label) if part)
+            label = run.label or line.label
             if label:
                 overrides[entity] = _series(header, line, label, other=k > 0)
     if limits_of(first, header):
@@ -74,9 +76,9 @@ def _series(header: Header, line: Line, label: str, *, other: bool) -> Any:
     import rerun as rr
 
     names = [f"{label} {name}" for name in element_names(line.field, header.robot)]
-    colors = PALE if other else AXES if line.colors is None else line.colors
-    if line.field.shape != (3,):
-        colors = None
+    colors = None
+    if line.field.shape == (3,):
+        colors = PALE if other else AXES if line.colors is None else line.colors
     widths = [1.0 if other or line.label in ("estimated", "planned") else 2.0] * len(names)
     return rr.SeriesLines(names=names, colors=colors, widths=widths)
 

@@ -47,6 +47,7 @@ class RunStream:
         rate: of the signals that are written [1/s]; by default those of every tick.
         most: fields with more elements than this are left out; by default none is.
         colors: of what belongs to this run.
+        label: what the run is called in events, where a stream holds several.
     """
 
     def __init__(
@@ -58,7 +59,9 @@ class RunStream:
         rate: float | None = None,
         most: int | None = None,
         colors: Colors | None = None,
+        label: str = "",
     ) -> None:
+        self._label = f"{label}: " if label else ""
         self.stream, self.header, self._root = stream, header, root
         self._layout = header.bus.layout()
         self._every = 1 if rate is None else max(1, round(header.base_rate / rate))
@@ -178,5 +181,6 @@ class RunStream:
     def _write_events(self, times: Sequence[Any], texts: list[str], levels: list[str]) -> None:
         import rerun as rr
 
+        texts = [self._label + text for text in texts]
         columns = rr.TextLog.columns(text=texts, level=levels)
         self.stream.send_columns(f"{self._root}{EVENTS}", times, columns)

@@ -65,7 +65,7 @@ class ContactPart(ScenePart):
 
     def _write_polygon(self, moments: Moments, position: Array, loaded: NDArray[np.bool_]) -> None:
         polygons = [
-            convex_hull(points[carry]) + (0.0, 0.0, ABOVE_GROUND)
+            convex_hull(points[carry]) + np.array([0.0, 0.0, ABOVE_GROUND])
             for points, carry in zip(position, loaded, strict=True)
         ]
         counts = np.array([len(polygon) > 0 for polygon in polygons], np.int64)

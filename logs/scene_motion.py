@@ -128,8 +128,8 @@ def foot_outline(part: ScenePart, foot: int, color: int) -> object:
     contacts = [c for c in robot.contacts if c.foot == robot.feet[foot].name]
     points = np.array([c.position for c in contacts]).reshape(-1, 3) - robot.feet[foot].sole
     radius = max([c.radius for c in contacts], default=0.01)
-    low = points.min(axis=0, initial=0.0) - (radius, radius, 0.0)
-    high = points.max(axis=0, initial=0.0) + (radius, radius, 0.0)
+    low = points.min(axis=0, initial=0.0) - np.array([radius, radius, 0.0])
+    high = points.max(axis=0, initial=0.0) + np.array([radius, radius, 0.0])
     corners = [(low[0], low[1]), (high[0], low[1]), (high[0], high[1]), (low[0], high[1])]
     strip = [(x, y, ABOVE_GROUND) for x, y in [*corners, corners[0]]]
     return rr.LineStrips3D([strip], colors=[color], radii=[0.0015])
