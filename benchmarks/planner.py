@@ -1,4 +1,5 @@
-"""What a plan costs: CPU time of the ten basic tasks, cold and warm, and whether they are valid."""
+"""What a plan costs: CPU time of the ten basic tasks, cold and warm, whether they are valid, the other
+formulations, and other solvers on the same problem."""
 
 from __future__ import annotations
 
@@ -13,6 +14,7 @@ from ..blocks.planner.solve import solve_jump
 from ..blocks.planner.task import JumpTask, make_task
 from ..blocks.planner.validity import check_plan
 from ..runtime.description import find_robot
+from .planner_solvers import solver_rows
 from .rows import Row
 
 BASIC: dict[str, dict[str, Any]] = {
@@ -33,7 +35,14 @@ NEAR: dict[str, dict[str, Any]] = {
     "forward 2 cm": {"rise": 0.15, "distance_x": 0.02},
 }
 """Tasks started from the plan in situ of 15 cm."""
-MEDIAN_GOAL, WORST_GOAL, WARM_GOAL = 0.35, 1.0, 0.15
+GRIDS: dict[str, tuple[dict[str, int], float]] = {
+    "33": ({"squat": 4, "thrust": 8, "flight": 14, "landing": 7}, 0.10),
+    "66": ({"squat": 8, "thrust": 16, "flight": 28, "landing": 14}, 0.15),
+}
+"""Intervals a warm start is measured with, and its goal [s]."""
+BESIDE = ("in situ 15 cm", "forward 10 cm")
+"""The tasks that other solvers solve too."""
+MEDIAN_GOAL, WORST_GOAL = 0.35, 1.0
 
 
 def planner(rounds: int = 3) -> list[Row]:
@@ -58,11 +67,23 @@ def planner(rounds: int = 3) -> list[Row]:
     rows.append(Row("plan, median of basic tasks", float(np.median(times)), "s", goal=MEDIAN_GOAL))
     rows.append(Row("plan, worst of basic tasks", float(max(times)), "s", goal=WORST_GOAL))
     rows.append(Row("basic tasks without a valid plan", float(len(BASIC) - valid), "", goal=0.0))
-    first = solve_jump(make_task({"name": "first", **BASIC["in situ 15 cm"]}), robot)
-    for name, values in NEAR.items():
-        seconds, plan = _measure(make_task({"name": name, **values}), rounds, first)
-        note = "" if plan is None else f"{plan.statistics['iterations']} iterations"
-        rows.append(Row(f"plan {name}, warm", seconds, "s", goal=WARM_GOAL, note=note))
+    for count, (knots, goal) in GRIDS.items():
+        first = make_task({"name": "first", **BASIC["in situ 15 cm"], "knots": knots})
+        plan = solve_jump(first, robot)
+        for name, values in NEAR.items():
+            near = make_task({"name": name, **values, "knots": knots})
+            seconds, found = _measure(near, rounds, plan)
+            note = "" if found is None else f"{found.statistics['iterations']} iterations"
+            title = f"plan {name}, warm, {count} intervals"
+            rows.append(Row(title, seconds, "s", goal=goal, note=note))
+    for formulation in ("paper", "srbm"):
+        task = make_task(
+            {"name": formulation, **BASIC["in situ 15 cm"], "formulation": formulation}
+        )
+        seconds, plan_of = _measure(task, 1)
+        note = "no plan" if plan_of is None else f"{plan_of.statistics['iterations']} iterations"
+        rows.append(Row(f"plan in situ 15 cm, formulation {formulation}", seconds, "s", note=note))
+    rows += solver_rows({name: BASIC[name] for name in BESIDE}, rounds)
     return rows
 
 

@@ -249,7 +249,8 @@ def _stream(path: Path, content: str, *, static: bool = False) -> Iterator[tuple
             reader = RrdReader(path)
         for chunk in reader.stream().filter(content=content):
             if chunk.is_static == static:
-                yield str(chunk.entity_path), chunk.to_record_batch()
+                # Rerun escapes what is no letter, as in the names of blocks that loading inserts
+                yield str(chunk.entity_path).replace("\\", ""), chunk.to_record_batch()
     except (RuntimeError, ValueError, OSError) as error:
         raise RecordingError(
             f"{path} cannot be read ({error}); if a recording was cut off, mend it with "

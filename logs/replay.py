@@ -126,9 +126,8 @@ def replay(
         on_ready=follower.ready,
     ).run(end - start)  # fmt: skip
     notes = list(follower.notes)
-    missing = end - start - result.ticks
-    if missing > recorded.failed:
-        notes.append(f"it ended after {result.ticks} of {end - start} ticks: {result.reason}")
+    if end - start - follower.seen > recorded.failed:
+        notes.append(f"it ended after {follower.seen} of {end - start} ticks: {result.reason}")
     return Replayed(
         result, bound, follower.signals, follower.states, start, follower.ran, tuple(notes),
         *follower.kept(),
@@ -224,7 +223,7 @@ class Follower:
         self._rows = np.zeros((PIECE, memory.bus.layout.size), np.uint8)
         self._expected = np.zeros((PIECE, recorded.bus.size), np.uint8)
         self._ticks = np.zeros(PIECE, np.int64)
-        self._used = 0
+        self._used = self.seen = 0
         self._cursor = RowCursor(recorded)
         self._keyframes = dict.fromkeys(recorded.keyframes)
         self._changes = list(recorded.changes)
@@ -250,6 +249,7 @@ class Follower:
 
     def record(self, tick: int) -> None:
         """Keep the tick for comparison, and prepare the next one."""
+        self.seen += 1
         row = self._cursor.at(tick)
         if row is not None:
             self._expected[self._used] = row

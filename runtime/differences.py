@@ -157,7 +157,8 @@ def block_of(name: str) -> str:
 
 def bits(values: NDArray[Any]) -> NDArray[Any]:
     """The numbers' bit patterns, so that NaN equals itself and -0.0 differs from 0.0."""
-    return np.ascontiguousarray(values).view(f"u{values.dtype.itemsize}")
+    patterns = np.ascontiguousarray(values).view(f"u{values.dtype.itemsize}")
+    return patterns.reshape(values.shape)  # which a scalar has lost
 
 
 def ulp_distances(one: NDArray[np.float64], other: NDArray[np.float64]) -> NDArray[np.uint64]:

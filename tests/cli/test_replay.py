@@ -68,6 +68,9 @@ def test_the_same_bytes(recording: Path, call: Call, call_json: CallJson) -> Non
         answer = call_json("replay", str(recording), "--check", "--inputs", inputs)
         assert answer["success"] and answer["ticks"] == 300
         assert answer["first_difference"] is None and answer["fields"] == {}
+    assert answer["keyframes"] == 3
+    answer = call_json("replay", str(recording), "--check", "--from", "250")
+    assert answer["first_tick"] == 200 and answer["ticks"] == 100
     answer = call_json("replay", str(recording), "--until", "50")
     assert answer["ticks"] == 50 and answer["success"]
 

@@ -70,6 +70,15 @@ class Remembering(Gain):
         self.last.value[...] = self.u.value
 
 
+class Spoilt(Gain):
+    """A gain that gives no number."""
+
+    def step(self) -> None:
+        super().step()
+        if self.tick == 612:
+            self.y.value[0] = math.nan
+
+
 class Failing(Gain):
     """A gain that breaks."""
 
@@ -213,6 +222,16 @@ def test_a_run_that_failed_fails_again() -> None:
     assert done.result.reason == "block 'gain' failed at tick 612 (1.224 s): the spring broke"
     mended = replay(failed, graph=graph())
     assert mended.identical and mended.result.success
+
+
+def test_a_run_that_ended_with_a_value_that_is_not_finite() -> None:
+    failed = record(graph(Spoilt))
+    assert failed.ticks[-1] == 612 and not failed.failed  # the last row holds that value
+    done = replay(failed)
+    assert done.identical and "wrote a value that is not finite" in done.result.reason
+    mended = replay(failed, graph=graph())
+    assert mended.first is not None and math.isnan(mended.first.recorded)
+    assert mended.first.ulps is None
 
 
 def test_a_replay_that_ends_early(recorded: KeptRun) -> None:

@@ -5,8 +5,24 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from aloft.runtime.block import Block, Output
 from aloft.runtime.primitives import Gain, UnitDelay
+from aloft.runtime.signals import Field, Signal
 from aloft.runtime.testing.stretch import Setting, Stretch, StretchError
+
+
+class Number(Signal):
+    value = Field(text="a number")
+
+
+class Count(Block):
+    """Counts from five."""
+
+    y = Output(Number, text="the count")
+
+    def step(self) -> None:
+        self.y.value[()] = self.tick + 5.0
+
 
 RNG = np.random.default_rng(0)
 INPUT = RNG.standard_normal((5, 2))
@@ -51,3 +67,11 @@ def test_state_ticks_and_live_changes(tmp_path: Path) -> None:
 def test_a_shape_that_has_changed() -> None:
     with pytest.raises(StretchError, match=r"y\.value has shape \(2,\), expected \(3,\)"):
         gain(outputs={"y.value": np.zeros((5, 3))}).check(Gain, {"n": 2})
+
+
+def test_a_scalar_output() -> None:
+    found = Stretch(
+        Setting(500.0, 1, {}, ()), np.arange(2), {}, {}, {}, {"y.value": np.array([5.0, 6.5])}
+    )
+    with pytest.raises(StretchError, match=r"tick 1: y\.value is 6\.0, recorded was 6\.5, "):
+        found.check(Count, {})

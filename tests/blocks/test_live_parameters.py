@@ -1,0 +1,152 @@
+"""Every live parameter of a shipped block makes a difference when it is changed in a run.
+
+That the difference is the right one, the conformance suite checks: after a change a block goes on
+as one that had the new value from the start.
+"""
+
+import zlib
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from itertools import zip_longest
+from typing import Any
+
+import numpy as np
+import pytest
+
+from aloft.blocks.signals import Phase
+from aloft.runtime.block import Block
+from aloft.runtime.live_parameters import Adjustment, LiveParameters
+from aloft.runtime.parameters import Parameters, is_live
+from aloft.runtime.registry import find_block, known_names
+from aloft.runtime.testing import BlockBench
+from aloft.runtime.testing.examples import live_changes, random_inputs
+
+TICKS = 150
+BEFORE = 3
+"""Ticks before the change."""
+
+Inputs = Mapping[str, Mapping[str, Any]]
+
+
+@dataclass(frozen=True)
+class Scene:
+    """Parameters that make the live ones count, and what goes on: by default anything at random."""
+
+    params: Mapping[str, Any] = field(default_factory=dict)
+    inputs: Callable[[int], Inputs] | None = None
+
+
+def jumping(lost: int) -> Callable[[int], Inputs]:
+    """Thrust, a flight that contacts end, a teetering stance, and in the end no ground at all."""
+
+    def inputs(tick: int) -> Inputs:
+        now, active = 0.002 * tick, np.ones(4, np.bool_)
+        if lost <= tick < 60 or tick >= 115:
+            active[:] = False
+        elif tick >= 90:
+            active[0], active[1] = tick >= 95, False
+        planned = Phase.THRUST if tick >= 20 else Phase.SQUAT
+        heights = np.array([0.05, 0.005, 0.0, 0.0])
+        return {
+            "reference": {"time": now, "phase": planned, "lift_off_time": 0.1,
+                          "touchdown_time": 0.2, "com": [0, 0, 0.3]},
+            "contacts": {"active": active},
+            "terms": {"com": [0, 0, 0.3], "com_velocity": [0, 0, 0.25],
+                      "contact_position": np.outer(heights, [0, 0, 1])},
+        }  # fmt: skip
+
+    return inputs
+
+
+def standing(rate: float, force: float = 9.81) -> Callable[[int], Inputs]:
+    """All points on the ground, the base turning slowly."""
+    return lambda tick: {
+        "imu": {"angular_velocity": [rate, 0, 0], "specific_force": [0.1, 0.05, force]},
+        "contacts": {"active": True},
+        "joints": {"position": 0.1, "velocity": 0.0},
+    }
+
+
+def flying(tick: int) -> Inputs:
+    """A flight of 0.3 s from the first tick on."""
+    now = 0.002 * tick
+    times = {"time_in_phase": now, "time_to_touchdown": 0.3 - now}
+    return {"reference": {"phase": Phase.FLIGHT}, "phase": {"phase": Phase.FLIGHT, **times}}
+
+
+def hopping(tick: int) -> Inputs:
+    """In the air for ten ticks, on the ground for ten."""
+    phase = {"phase": Phase.FLIGHT, "stance": tick // 10 % 2 == 0}
+    return {"reference": {"phase": Phase.FLIGHT}, "phase": phase}
+
+
+SCENES: Mapping[str, list[Scene]] = {
+    "blocks.JointPD": [
+        Scene({"stance_feedback": True, "friction": 0.1, "stance_stiffness": [1.0] * 5}),
+        Scene({}, hopping),
+    ],
+    "blocks.BalanceTarget": [Scene({"trim_limit": 0.01, "trim_rate": 20.0})],
+    "blocks.LandingHeuristic": [Scene({"p_max": (0.1, 0.1)}), Scene({}, flying)],
+    "blocks.LegInverseKinematics": [Scene({"speed_limit": 0.5})],
+    "blocks.WholeBodyController": [
+        Scene({"force_max": 20.0, "force_min": 1.0}),
+        # no force is both, so the solver fails and the last torque fades
+        Scene(
+            {"force_max": 20.0, "force_min": 50.0, "fallback_ticks": 50},
+            lambda tick: {"phase": {"stance": True}, "memory": {"torque": 1.0} if tick < 1 else {}},
+        ),
+    ],
+    "blocks.JumpPhase": [
+        Scene({"landing_time": 0.05, "lost_contact": 0.04}, jumping(lost)) for lost in (40, 55)
+    ],
+    "blocks.StateEstimator": [
+        Scene(),
+        Scene({"law": "complementary"}, standing(0.01)),
+        Scene({}, standing(0.07)),
+        Scene({}, standing(1.3)),
+        Scene({}, standing(0.01, 2.5)),
+    ],
+    "hal.Push": [Scene({"trigger": "start", "delay": 0.02, "duration": 0.05})],
+}
+
+
+def blocks_with_live_parameters() -> Iterator[str]:
+    for name in known_names():
+        if any(is_live(info) for info in find_block(name).Params.model_fields.values()):
+            yield name
+
+
+def trace(
+    kind: type[Block], scene: Scene, params: Parameters, changed: Parameters | None
+) -> Iterator[int]:
+    """A checksum of all memory after each tick, with a change of parameters on the way."""
+    bench = BlockBench(kind, params, robot="bruce")
+    live = LiveParameters({"block": bench.block})
+    rng = np.random.default_rng(0)
+    for tick in range(TICKS):
+        if tick == BEFORE and changed is not None:
+            live.apply(Adjustment({"block": changed}, ()), tick)
+        if tick == 0 or (tick % 7 == 0 and scene.inputs is None):
+            for port, fields in random_inputs(kind, bench.block.context.dimensions, rng).items():
+                bench.set(port, **fields)
+        for port, fields in (scene.inputs(tick) if scene.inputs is not None else {}).items():
+            bench.set(port, **fields)
+        bench.step()
+        yield zlib.crc32(bench.memory.state.buffer, zlib.crc32(bench.memory.bus.buffer))
+
+
+@pytest.mark.parametrize("name", list(blocks_with_live_parameters()))
+def test_every_live_parameter_counts(name: str) -> None:
+    kind = find_block(name)
+    silent: dict[str, None] | None = None
+    for scene in SCENES.get(name, [Scene()]):
+        params = kind.Params.model_validate({**kind.example_parameters(), **scene.params})
+        plain = list(trace(kind, scene, params, None))
+        here = {
+            path: None
+            for path, changed in live_changes(params)
+            if (silent is None or path in silent)
+            and all(a == b for a, b in zip_longest(plain, trace(kind, scene, params, changed)))
+        }
+        silent = here
+    assert silent == {}
