@@ -19,6 +19,7 @@ ADVICE = {
     "footholds": "ask for a place within reach: a smaller distance, or a greater rise",
     "apex": "ask for a smaller rise or a longer thrust_time",
     "flight time": "leave flight_time to the planner",
+    "impact": "use impact: false, or ask for a smaller jump",
 }
 
 
