@@ -13,6 +13,7 @@ from ...runtime.description import RobotDescription
 from .compilation import Progress, load_pieces
 from .contact_rows import is_mirrored
 from .coordinates import Coordinates
+from .easing import EASES, eased, from_eased, tighten, with_impacts
 from .guess import USUAL_TIMES, ballistic_guess, displaced_guess
 from .layout import Stretch, layout
 from .outcome import failure, versions
@@ -23,7 +24,7 @@ from .refinement import asks_for_finer, finer_knots, with_knots
 from .rigid_body_plan import solve_rigid_body
 from .robot_model import model_of
 from .sequence import PHASES
-from .solver import solve
+from .solver import Solution, solve
 from .stage_functions import PIECES, make_coordinates
 from .stance import Stance, stances_of
 from .symbolic_model import SymbolicModel
@@ -103,6 +104,9 @@ def solve_full(
         solution = solve(problem, pack(problem, warm_start, guess), warm=True, solver="fatrop")
     if solution is None or not solution.solved:
         warm = False
+        turns = any(hop.rotation for hop in task.hops()) and not solver
+        solution = _turning(problem, robot, guess) if turns else None
+    if solution is None or not solution.solved:
         solution = solve(
             problem, guess, solver=solver, other_guess=lambda: _displaced(problem, robot)
         )
@@ -158,7 +162,7 @@ def make_problem(
     if free and chosen.name == "full" and not coordinates:
         given = with_ground_times(task, robot, compiled=compiled, progress=progress)
         return make_problem(given, robot, compiled=compiled, progress=progress)
-    used = {"contact", "take_off", "air", *(stretch.piece for stretch in stretches)}
+    used = {"contact", "take_off", "air", "obstacle", *(stretch.piece for stretch in stretches)}
     names = tuple(name for name in PIECES if name in used)
     pieces = load_pieces(
         model, chosen, profile=task.profile, names=names, compiled=compiled, progress=progress
@@ -231,3 +235,21 @@ def _displaced(problem: Problem, robot: RobotDescription) -> Array | None:
         return None
     solution = solve(straight, ballistic_guess(straight), solver="fatrop")
     return displaced_guess(problem, straight, solution.values) if solution.solved else None
+
+
+def _turning(problem: Problem, robot: RobotDescription, guess: Array) -> Solution | None:
+    """A somersault by way of stronger motors; one with impacts also by way of one without."""
+    found = from_eased(problem, guess)
+    if found is not None or not problem.task.impact:
+        return found
+    task = problem.task.model_copy(update={"impact": False})
+    gentle = make_problem(task, robot, compiled=not problem.assembly.interpreted)
+    for ease in EASES:
+        first = solve(eased(gentle, ease), ballistic_guess(gentle), solver="fatrop")
+        if not first.solved:
+            continue
+        plan = with_impacts(JumpPlan(task=task, **unpack(gentle, first.values)))
+        found = tighten(problem, pack(problem, plan, guess), ease)
+        if found is not None:
+            return found
+    return None
