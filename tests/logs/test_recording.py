@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from aloft.logs.format import RecordedField
 from aloft.logs.flights import Flights
+from aloft.logs.format import RecordedField
 from aloft.logs.header import make_header
 from aloft.logs.recording import write_recording
 from aloft.logs.robot_shapes import quaternion_from_z
