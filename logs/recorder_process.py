@@ -28,6 +28,7 @@ from ..runtime.life_cycle import describe
 from ..runtime.memory import Snapshot
 from ..runtime.notes import Note
 from .format import Header
+from .live_feed import LiveFeed
 from .repair import RepairError, repair
 from .ring import Record, RingReader
 from .tail import TailWriter, record_type
@@ -37,6 +38,8 @@ HEADER, ROW, KEYFRAME, NOTE = 1, 2, 3, 4
 """The kinds of records in the ring; a keyframe is the bytes of the bus, then of the state."""
 POLL = 0.02
 """Seconds between two looks at the ring."""
+LIVE_PERIOD = 0.1
+"""Seconds after which a viewer is shown what has come."""
 LAST_SYNC = 2.0
 """Seconds that the end waits for the disk."""
 BATCH, BATCH_BYTES = 4096, 1 << 25
@@ -49,25 +52,29 @@ BATCH_TIME = 10.0
 class Task:
     """What to write: the ring's ``descriptor`` and ``capacity``, the file, and how many seconds may
     pass before what has come is handed to the operating system (``flush_period``), and before that
-    is told to put it on the disk (``sync_period``)."""
+    is told to put it on the disk (``sync_period``); an empty path stands for no file. ``live`` is
+    where a viewer listens that shows the run while it goes on, if one does."""
 
     descriptor: int
     capacity: int
     path: str
     flush_period: float
     sync_period: float
+    live: str = ""
 
 
 @dataclass
 class Report:
     """What was done: rows surely written, the file's size [bytes], the most memory used [bytes], and
-    what went wrong, if anything; then ``lost`` rows may not be in the file."""
+    what went wrong, if anything; then ``lost`` rows may not be in the file. ``live_problem`` says why
+    the viewer did not show all of the run."""
 
     rows: int = 0
     size: int = 0
     memory: int = 0
     problem: str = ""
     lost: int = 0
+    live_problem: str = ""
 
 
 class RecorderProcess:
@@ -90,12 +97,16 @@ class RecorderProcess:
         self._dirty = False
         self._syncing = threading.Thread()
         self._writer: RecordingWriter | None = None
+        self._broken: RecordingWriter | None = None
         self._tail: TailWriter | None = None
-        self._guard(lambda: self._open(header))
-        self._flushed = self._synced = self._written = time.monotonic()
+        warm_up()
+        if task.path:
+            self._guard(lambda: self._open(header))
+        self.feed = LiveFeed(task.live, header) if task.live else None
+        self._fed_rows = 0
+        self._flushed = self._synced = self._written = self._fed = time.monotonic()
 
     def _open(self, header: Header) -> None:
-        warm_up()
         self._tail = TailWriter(Path(self._task.path))
         self._writer = RecordingWriter(self._task.path, header)
         self._writer.flush()
@@ -105,6 +116,9 @@ class RecorderProcess:
         for record in self._ring.records():
             self._take_one(record)
         now = time.monotonic()
+        if now - self._fed >= LIVE_PERIOD:
+            self._feed_rows()
+            self._fed = now
         if now - self._flushed >= self._task.flush_period:
             self.flush()
             self._flushed = now
@@ -123,7 +137,10 @@ class RecorderProcess:
             bus, state = bytes(record.data[: self._bus_size]), bytes(record.data[self._bus_size :])
             self._write(lambda writer: writer.write_keyframe(Snapshot(record.tick, bus, state)))
         elif record.kind == NOTE:
-            self._notes.append(Note(**json.loads(bytes(record.data))))
+            note = Note(**json.loads(bytes(record.data)))
+            self._notes.append(note)
+            if self.feed is not None:
+                self.feed.note(note)
 
     def flush(self) -> None:
         """Hand to the operating system all that was taken."""
@@ -173,13 +190,33 @@ class RecorderProcess:
                 self._syncing.join(LAST_SYNC)
         if self._tail is not None and (self._writer is not None or not self._tail.count):
             self._tail.remove()  # all is in the recording
-        if Path(self._task.path).is_file():
+        if self.feed is not None:
+            self.feed.finish(outcome)
+            self.report.live_problem = self.feed.problem
+        if self._task.path and Path(self._task.path).is_file():
             self.report.size = Path(self._task.path).stat().st_size
         self.report.memory = _memory()
         return self.report
 
+    def problems(self) -> list[str]:
+        """What has gone wrong up to now."""
+        found = []
+        if self.report.problem:
+            found.append(f"nothing more is recorded: {self.report.problem}")
+        if self.feed is not None and self.feed.problem:
+            found.append(f"nothing more is shown live: {self.feed.problem}")
+        return found
+
+    def _feed_rows(self) -> None:
+        """Show the rows that have come since the last time."""
+        first, self._fed_rows = self._fed_rows, self._filled
+        if self.feed is not None and self._filled > first:
+            ticks, rows = self._ticks[first : self._filled], self._rows[first : self._filled]
+            self.feed.rows(ticks.copy(), rows.copy())
+
     def _write_batch(self) -> None:
         """Write the ticks that wait for it, and wait until the operating system has them."""
+        self._feed_rows()
         if self._filled and self._writer is not None:
             ticks = self._ticks[: self._filled].copy()
             rows = self._rows[: self._filled]
@@ -189,7 +226,7 @@ class RecorderProcess:
         self._settle()
         if self._writer is not None and self._tail is not None:
             self._guard(self._tail.clear)
-        self._filled = self._flushed_rows = 0
+        self._filled = self._flushed_rows = self._fed_rows = 0
         self._written = time.monotonic()
 
     def _write_notes(self) -> None:
@@ -201,7 +238,7 @@ class RecorderProcess:
         """Count the rows that were handed over as written or, where that failed, as lost."""
         count = self._filled - self._flushed_rows
         if self._writer is None:
-            self.report.lost += count
+            self.report.lost += count if self._task.path else 0
         else:
             self.report.rows += count
         self._flushed_rows = self._filled
@@ -226,7 +263,8 @@ class RecorderProcess:
             work()
         except Exception as error:  # noqa: BLE001  # whatever it is, the robot goes on
             self.report.problem = describe(error)
-            self._writer = None
+            # kept, as Rerun may wait for ever when a stream whose file failed is let go
+            self._broken, self._writer = self._writer, None
             with suppress(OSError, RepairError):
                 repair(self._task.path)  # so that what was written before can be read
             self._rescue()
@@ -249,7 +287,8 @@ def main(task: str) -> None:
         signal.signal(number, signal.SIG_IGN)
     recorder = RecorderProcess(Task(**json.loads(task)))
     _say({"ready": True})
-    told, text, source = False, b"", sys.stdin.fileno()
+    told: set[str] = set()
+    text, source = b"", sys.stdin.fileno()
     while True:
         if select.select([source], [], [], POLL)[0]:
             part = os.read(source, 65536)
@@ -257,10 +296,13 @@ def main(task: str) -> None:
                 break
             text += part
         recorder.take()
-        if recorder.report.problem and not told:
-            told = True  # now, as the run may go on for hours
-            print(f"warning: nothing more is recorded: {recorder.report.problem}", file=sys.stderr)
+        for problem in recorder.problems():
+            if problem not in told:
+                told.add(problem)  # now, as the run may go on for hours
+                print(f"warning: {problem}", file=sys.stderr)
     _say(asdict(recorder.finish(json.loads(text) if text else None)))
+    sys.stderr.flush()
+    os._exit(0)  # a thread that a viewer or a full disk holds would keep this process from ending
 
 
 def _say(data: dict[str, Any]) -> None:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from dataclasses import asdict
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -19,27 +18,8 @@ from numpy.typing import NDArray
 from ..runtime.memory import Snapshot
 from ..runtime.notes import Note
 from .blueprint import recording_blueprint
-from .changed_rows import ChangedRows
-from .format import (
-    BUS,
-    EVENTS,
-    EXACT,
-    KEYFRAMES,
-    NOTE,
-    NOTES,
-    RECORDED,
-    SIGNALS,
-    SPAN,
-    STATE,
-    STATES,
-    Header,
-    RecordedField,
-    RecordedRows,
-    entity_of,
-    spans,
-)  # fmt: skip
-from .robot_view import RobotWriter, port_with_pose
-from .signal_names import element_names
+from .format import BUS, KEYFRAMES, NOTE, RECORDED, SPAN, STATE, Header, spans
+from .run_stream import RunStream
 from .time_columns import time_columns
 
 FLUSH_TIMEOUT = 30.0
@@ -63,25 +43,20 @@ class RecordingWriter:
         import rerun as rr
 
         self.path, self.header = Path(path), header
-        self._layout = header.bus.layout()
-        self._last_states: dict[str, int] = {}
-        self._changed = {field.name: ChangedRows() for field in header.bus.fields}
         self.path.parent.mkdir(parents=True, exist_ok=True)
         self.path.open("wb").close()  # Rerun would only warn, so find out here
         self._stream = rr.RecordingStream(
             "aloft", recording_id=recording_id or header.name, send_properties=False
         )
         rr.set_log_time_enabled(False, recording=self._stream)
-        port = port_with_pose(header)
-        self._robot = RobotWriter(self._stream, header, port) if port is not None else None
-        self._stream.save(self.path, default_blueprint=recording_blueprint(header, port))
+        self._run = RunStream(self._stream, header, changes_only=True)
+        self._stream.save(self.path, default_blueprint=recording_blueprint(header))
         self._write_start()
 
     def _write_start(self) -> None:
         import rerun as rr
 
-        header, stream = self.header, self._stream
-        stream.log("graph", rr.TextDocument(header.graph, media_type="text/plain"), static=True)
+        header = self.header
         about = {
             "header": header.to_json(),
             "name": header.name,
@@ -93,25 +68,20 @@ class RecordingWriter:
             "machine": json.dumps(dict(header.machine)),
             "schema_hashes": json.dumps(header.schema_hashes),
         }
-        stream.send_property("aloft", rr.AnyValues(**about))
-        for field in header.bus.fields:
-            names = element_names(field, header.robot)
-            if names and not field.constant:
-                entity = entity_of(SIGNALS, field.name)
-                stream.log(entity, rr.SeriesLines(names=names), static=True)
-        if self._robot is not None:
-            self._robot.write_static()
+        self._stream.send_property("aloft", rr.AnyValues(**about))
+        self._run.write_start()
 
     def write_rows(self, ticks: NDArray[np.int64], rows: NDArray[np.uint8]) -> None:
         """Write the bus (n, bytes) after each of ``ticks`` (n,), which come in order."""
+        import rerun as rr
+
         if not len(ticks):
             return
-        batch = RecordedRows(self.header, ticks, rows, self._layout)
-        self._write_signals(batch)
-        self._write_states(batch)
-        if self._robot is not None:
-            self._robot.write(batch)
-        self._write_spans(ticks)  # last, so that what it speaks of is there
+        self._run.write_rows(ticks, rows)
+        found = spans(ticks)  # last, so that what they speak of is there
+        columns = rr.DynamicArchetype.columns("aloft", components={SPAN: found.reshape(-1)})
+        partitions = columns.partition(np.full(len(found), 2))
+        self._stream.send_columns(RECORDED, time_columns(self.header, found[:, 0]), partitions)
 
     def write_keyframe(self, snapshot: Snapshot) -> None:
         """Write all that the graph remembered before ``snapshot.tick`` ran."""
@@ -123,29 +93,24 @@ class RecordingWriter:
             if len(flat):
                 column = rr.DynamicArchetype.columns("aloft", components={name: flat})
                 columns += list(column.partition([len(flat)]))
-        self._stream.send_columns(KEYFRAMES, self._times(np.array([snapshot.tick])), columns)
+        self._stream.send_columns(
+            KEYFRAMES, time_columns(self.header, np.array([snapshot.tick])), columns
+        )
 
     def write_note(self, note: Note) -> None:
         """Write a note, for machines and for people."""
-        self.write_notes([note])
+        self._run.write_notes([note])
 
     def write_notes(self, notes: Sequence[Note]) -> None:
         """Write notes, in order, at once: a run that is late in each tick has many."""
-        import rerun as rr
-
-        if not notes:
-            return
-        times = self._times(np.array([note.tick for note in notes]))
-        texts = [json.dumps(asdict(note)) for note in notes]
-        columns = rr.DynamicArchetype.columns("aloft", components={NOTE: texts})
-        self._stream.send_columns(NOTES, times, columns)
-        self._write_events(times, [note.text for note in notes], [note.level for note in notes])
+        self._run.write_notes(notes)
 
     def write_outcome(self, outcome: dict[str, Any]) -> None:
         """Write what came of the run, last of all."""
         import rerun as rr
 
         values = {"outcome": json.dumps(outcome), "run_hash": str(outcome.get("run_hash", ""))}
+        self._run.write_times(outcome)
         self._stream.send_property("outcome", rr.AnyValues(**values))
 
     def flush(self) -> None:
@@ -157,74 +122,11 @@ class RecordingWriter:
 
     def close(self) -> None:
         """Flush and close the file. Raises ``OSError`` as ``flush`` does."""
-        self._write_rest()
+        self._run.write_rest()
         try:
             self.flush()
         finally:
             self._stream.disconnect()
-
-    def _times(self, ticks: NDArray[np.int64]) -> list[Any]:
-        return time_columns(self.header, ticks)
-
-    def _write_signals(self, batch: RecordedRows) -> None:
-        for field in batch.fields():
-            values = batch.signal(field.name)
-            flat = np.ascontiguousarray(values.reshape(len(values), -1))
-            ticks, changed = self._changed[field.name].pick(batch.ticks, flat)
-            if len(ticks):
-                self._write_signal(field, ticks, changed)
-
-    def _write_rest(self) -> None:
-        """Write the last value of the signals that were constant in the end, for the viewer."""
-        for field in self.header.bus.fields:
-            rest = self._changed[field.name].rest()
-            if rest is not None:
-                self._write_signal(field, *rest)
-
-    def _write_signal(
-        self, field: RecordedField, ticks: NDArray[np.int64], flat: NDArray[Any]
-    ) -> None:
-        import rerun as rr
-
-        columns = list(rr.Scalars.columns(scalars=flat.astype(np.float64, copy=False)))
-        if field.dtype == "int64":
-            exact = rr.DynamicArchetype.columns("aloft", components={EXACT: flat.reshape(-1)})
-            columns += list(exact.partition(np.full(len(flat), flat.shape[1])))
-        self._stream.send_columns(entity_of(SIGNALS, field.name), self._times(ticks), columns)
-
-    def _write_spans(self, ticks: NDArray[np.int64]) -> None:
-        import rerun as rr
-
-        found = spans(ticks)
-        columns = rr.DynamicArchetype.columns("aloft", components={SPAN: found.reshape(-1)})
-        partitions = columns.partition(np.full(len(found), 2))
-        self._stream.send_columns(RECORDED, self._times(found[:, 0]), partitions)
-
-    def _write_states(self, batch: RecordedRows) -> None:
-        """Write each change of a number whose values have names, and the same as text."""
-        import rerun as rr
-
-        for field in batch.fields():
-            if not field.values or field.shape:
-                continue
-            numbers = batch.signal(field.name)
-            last = self._last_states.get(field.name, int(numbers[0]) - 1)
-            self._last_states[field.name] = int(numbers[-1])
-            changes = np.flatnonzero(np.diff(numbers, prepend=last))
-            if not len(changes):
-                continue
-            labels = [field.values.get(int(n), str(n)) for n in numbers[changes]]
-            times = self._times(batch.ticks[changes])
-            states = rr.StateChange.columns(state=labels)
-            self._stream.send_columns(entity_of(STATES, field.name), times, states)
-            texts = [f"{field.name}: {label}" for label in labels]
-            self._write_events(times, texts, ["INFO"] * len(texts))
-
-    def _write_events(self, times: Sequence[Any], texts: list[str], levels: list[str]) -> None:
-        import rerun as rr
-
-        columns = rr.TextLog.columns(text=texts, level=levels)
-        self._stream.send_columns(EVENTS, times, columns)
 
 
 def warm_up() -> None:
@@ -239,6 +141,7 @@ def warm_up() -> None:
         rr.Transform3D.columns(translation=points, mat3x3=turns),
         rr.Arrows3D.columns(origins=points, vectors=points),
         rr.Points3D.columns(positions=points),
+        rr.LineStrips3D.columns(strips=[points, points]),
         rr.StateChange.columns(state=["a", "b"]),
         rr.TextLog.columns(text=["a", "b"], level=["INFO", "INFO"]),
         rr.DynamicArchetype.columns("aloft", components={NOTE: ["a", "b"]}),
