@@ -245,6 +245,7 @@ def report_stop(
     stopped: signal.Signals, runs: Sequence[Run], journal: Journal, screen: Console, as_json: bool
 ) -> ExitCode:
     """Say how far it came."""
+    journal.read_back()
     keys = {run.key for run in runs}
     done, all_runs = len(keys & journal.outcomes.keys()), len(keys)
     reason = f"stopped by {stopped.name} after {done} of {all_runs} runs, which are kept"

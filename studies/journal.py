@@ -67,6 +67,13 @@ class Journal:
         os.fsync(self._file.fileno())  # to the disk, which outlives the system
         self.outcomes[key] = outcome
 
+    def read_back(self) -> None:
+        """Know exactly what is kept, after a signal that may have come in the middle of ``add``."""
+        assert self._file is not None
+        self._file.flush()
+        self.outcomes.clear()
+        self._read(self._file)
+
     def _lock(self, file: IO[bytes]) -> None:
         try:
             import fcntl

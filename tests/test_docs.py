@@ -57,7 +57,7 @@ def test_the_tutorial_works(tutorial: Path, command: list[str]) -> None:
         cwd=tutorial,
         capture_output=True,
         text=True,
-        timeout=60,
+        timeout=240,
         check=False,
     )
     assert done.returncode == 0, done.stdout + done.stderr

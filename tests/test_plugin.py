@@ -68,7 +68,7 @@ def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     options = ["--quiet", "--no-deps", "--no-index", "--no-build-isolation"]
     subprocess.run(
         [sys.executable, "-m", "pip", "install", *options, "--target", target, folder / "project"],
-        check=True, capture_output=True, timeout=120,
+        check=True, capture_output=True, timeout=240,
     )  # fmt: skip
     (folder / "graph.yaml").write_text(GRAPH)
     return target
@@ -80,7 +80,7 @@ def aloft(installed: Path, *arguments: str, code: int = 0) -> str:
     done = subprocess.run(
         [sys.executable, "-c", "from aloft.cli import main; main()", *arguments],
         cwd=installed.parent, env={**os.environ, "PYTHONPATH": path},
-        capture_output=True, text=True, check=False, timeout=60,
+        capture_output=True, text=True, check=False, timeout=240,
     )  # fmt: skip
     assert done.returncode == code, done.stdout + done.stderr
     return done.stdout

@@ -28,7 +28,7 @@ FLAGS = ("-O1", "-fPIC", "-shared", "-ffp-contract=off")
 """No flags of one machine's: its libraries may be kept where other machines find them, and plans
 are the same everywhere. Higher optimisation takes twice as long to compile and gains nothing."""
 
-SOURCES = ("symbolic_model.py", "coordinates.py", "stage_functions.py")
+SOURCES = ("symbolic_model.py", "coordinates.py", "stage_functions.py", "obstacles.py")
 KINDS = ("value", "jacobian", "hessian")
 Progress = Callable[[str, int, int], None]
 """Called with what is being done, steps done and steps in all."""

@@ -25,7 +25,7 @@ SHIPPED = Path(__file__).parents[2] / "graphs" / "plans"
 SCALES = {
     "rise": 0.05, "take_off_speed": 0.3, "distance_x": 0.1, "distance_y": 0.1, "twist": 0.5,
     "landing_height": 0.05, "step_edge": 0.2, "rotation": 1.0, "squat_time": 0.2,
-    "thrust_time": 0.1, "flight_time": 0.1, "landing_time": 0.2, "effort": 0.1, "friction": 0.2,
+    "thrust_time": 0.1, "flight_time": 0.1, "landing_time": 0.2, "contact_time": 0.2, "effort": 0.1, "friction": 0.2,
     "foot_clearance": 0.02, "leg_clearance": 0.02,
 }  # fmt: skip
 """How much of each parameter [its unit] is a distance of 1 between two tasks."""

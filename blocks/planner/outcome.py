@@ -18,7 +18,9 @@ ADVICE = {
     "joint limits": "ask for a smaller jump",
     "footholds": "ask for a place within reach: a smaller distance, or a greater rise",
     "apex": "ask for a smaller rise or a longer thrust_time",
+    "angular momentum": "allow more lift_off_momentum or touchdown_momentum",
     "flight time": "leave flight_time to the planner",
+    "impact": "use impact: false, or ask for a smaller jump",
 }
 
 

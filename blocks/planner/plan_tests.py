@@ -204,6 +204,20 @@ def _impact(e: Evidence, knot: int) -> tuple[float, float]:
     return float(error), float(np.abs(e.robot.torque_to_motor @ kept).max())
 
 
+def momentum(e: Evidence) -> Iterator[Found]:
+    """The angular momentum at lift-offs and touchdowns is no more than the task allows."""
+    task, r = e.plan.task, e.replay
+    lasting = np.diff(e.plan.time, append=np.inf) > 0.0
+    ends = [stop + int(not lasting[stop]) for _, stop in r.flights]
+    for name, knots, most in (
+        ("lift_off_momentum", [start for start, _ in r.flights], task.lift_off_momentum),
+        ("touchdown_momentum", ends, task.touchdown_momentum),
+    ):
+        if most is not None:
+            found = float(np.abs(r.angular_momentum[knots]).max())
+            yield Found(name, found, most + 1e-3, "N m s", "the angular momentum about an axis")
+
+
 def machine(e: Evidence) -> Iterator[Found]:
     """Joints stay within their limits, motors within what they can do at their speed."""
     robot, task, s = e.robot, e.plan.task, e.replay.samples
@@ -266,7 +280,7 @@ def clearances(e: Evidence) -> Iterator[Found]:
 
 
 PLAN_TESTS: tuple[Callable[[Evidence], Iterator[Found]], ...] = (
-    start_and_end, states, interval_defects, discretisation, flight, task_done, contacts, touchdown, machine,
-    clearances,
+    start_and_end, states, interval_defects, discretisation, flight, task_done, contacts, touchdown,
+    momentum, machine, clearances,
 )  # fmt: skip
 """All tests, in the order of the report."""

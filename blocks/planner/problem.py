@@ -19,6 +19,7 @@ from .assembly import Assembly
 from .coordinates import Coordinates
 from .layout import Stretch
 from .margins import Margins, joint_bounds
+from .obstacles import step_parameters
 from .stage_functions import Piece, body_points, parameter_sizes
 from .stance import Stance
 from .structure import STEP_DOWN_SHARE, STEP_UP_SHARE, Structure
@@ -280,14 +281,27 @@ class ProblemBuilder:
         feet = self.pieces["contact"].rows // 2
         self._rows("contact", k, [("foot velocity", feet, 0.0, 0.0), ("footholds", feet, 0.0, 0.0)])
 
+    def _fill_obstacle(self, k: int) -> None:
+        hop, place, edge = self.structure.hop_at(k)
+        stretch, obstacles = self.of_knot[k], self.structure.obstacles
+        share = self.structure.flight_share(k) if stretch.flies else float(stretch.place > 0)
+        self._set("obstacle", k, **step_parameters(hop, edge, place.z, share))
+        floor = self.task.foot_clearance * np.sin(np.pi * share)
+        self._rows("obstacle", k, [
+            ("ground clearance", obstacles.feet, floor, np.inf),
+            ("ground clearance", obstacles.count - obstacles.feet, 0.0, np.inf),
+        ])  # fmt: skip
+
     def _fill_take_off(self, k: int) -> None:
-        place = self.of_knot[k].place
-        hop = self.hops[place]
-        rise = self.stances[place].com[2] + (hop.rise or 0.0)
+        hop, stretch = self.structure.hop_at(k)[0], self.of_knot[k]
+        rise = self.stances[stretch.place].com[2] + (hop.rise or 0.0)
         speed = hop.take_off_speed or 0.0
+        lift_off, touchdown = self.task.lift_off_momentum, self.task.touchdown_momentum
+        given = lift_off if stretch.flies else touchdown
+        most = np.inf if given is None else given
         self._rows("take_off", k, [
             ("apex", 1, rise, rise), ("take-off speed", 1, speed, speed),
-            ("angular momentum", 3, -np.inf, np.inf),
+            ("angular momentum", 3, -most, most),
         ])  # fmt: skip
 
     def _fill_air(self, k: int) -> None:

@@ -13,7 +13,8 @@ from ...runtime.description import RobotDescription
 from .compilation import Progress, load_pieces
 from .contact_rows import is_mirrored
 from .coordinates import Coordinates
-from .guess import ballistic_guess, displaced_guess
+from .easing import EASES, eased, from_eased, tighten, with_impacts
+from .guess import USUAL_TIMES, ballistic_guess, displaced_guess
 from .layout import Stretch, layout
 from .outcome import failure, versions
 from .paper_plan import solve_paper
@@ -22,12 +23,13 @@ from .problem import Problem, ProblemBuilder
 from .refinement import asks_for_finer, finer_knots, with_knots
 from .rigid_body_plan import solve_rigid_body
 from .robot_model import model_of
-from .solver import solve
+from .sequence import PHASES
+from .solver import Solution, solve
 from .stage_functions import PIECES, make_coordinates
 from .stance import Stance, stances_of
 from .symbolic_model import SymbolicModel
 from .task import JumpTask, Knots
-from .unpacking import can_start, pack, unpack
+from .unpacking import can_start, knot_times, pack, unpack
 
 Array = NDArray[np.float64]
 
@@ -102,6 +104,9 @@ def solve_full(
         solution = solve(problem, pack(problem, warm_start, guess), warm=True, solver="fatrop")
     if solution is None or not solution.solved:
         warm = False
+        turns = any(hop.rotation for hop in task.hops()) and not solver
+        solution = _turning(problem, robot, guess) if turns else None
+    if solution is None or not solution.solved:
         solution = solve(
             problem, guess, solver=solver, other_guess=lambda: _displaced(problem, robot)
         )
@@ -144,13 +149,20 @@ def make_problem(
 ) -> Problem:
     """The problem of a task in the ``full`` formulation, in the sagittal plane where the task stays in it.
 
+    Elsewhere times on the ground that are free are those of the same jumps straight ahead and
+    without impacts: with all coordinates and such times fatrop does not come to an end.
+
     Raises ``PlanError`` and ``TaskError`` as ``solve_jump`` does.
     """
     model, finder = model_of(robot, task.profile)
     stances = stances_of(task, robot, finder)
     stretches = layout(task, robot)
     chosen = _choose(model, task, stances, stretches, coordinates)
-    used = {"contact", "take_off", "air", *(stretch.piece for stretch in stretches)}
+    free = any(stretch.timed and not stretch.flies for stretch in stretches)
+    if free and chosen.name == "full" and not coordinates:
+        given = with_ground_times(task, robot, compiled=compiled, progress=progress)
+        return make_problem(given, robot, compiled=compiled, progress=progress)
+    used = {"contact", "take_off", "air", "obstacle", *(stretch.piece for stretch in stretches)}
     names = tuple(name for name in PIECES if name in used)
     pieces = load_pieces(
         model, chosen, profile=task.profile, names=names, compiled=compiled, progress=progress
@@ -178,17 +190,66 @@ def _choose(
     return make_coordinates(model, "full")
 
 
+def with_ground_times(
+    task: JumpTask, robot: RobotDescription, *, compiled: bool = True,
+    progress: Progress | None = None,
+) -> JumpTask:  # fmt: skip
+    """The task with all times on the ground given: those that are free are found for the same
+    jumps straight ahead, or are usual ones where these cannot be planned."""
+    times = [USUAL_TIMES.get(PHASES[span.phase], 0.0) for span in task.spans()]
+    straight = straight_ahead(task).model_copy(update={"impact": False})
+    usual = with_times(straight, times)
+    if make_problem(usual, robot, compiled=compiled, progress=progress).coordinates.name != "full":
+        problem = make_problem(straight, robot, compiled=compiled, progress=progress)
+        solution = solve(problem, ballistic_guess(problem), solver="fatrop")
+        if solution.solved:
+            knots = knot_times(problem, solution.values)
+            times = [float(knots[s.stop] - knots[s.first]) for s in problem.stretches]
+    return with_times(task, times)
+
+
+def with_times(task: JumpTask, times: list[float]) -> JumpTask:
+    """The task with those times [s] of its phases where they are free, except for flights."""
+    phases = tuple(
+        span if span.phase == "flight" or span.time is not None
+        else span.model_copy(update={"time": round(time, 6)})
+        for span, time in zip(task.spans(), times, strict=True)
+    )  # fmt: skip
+    return task.model_copy(update={"phases": phases})
+
+
+def straight_ahead(task: JumpTask) -> JumpTask:
+    """The same jumps without their sideways displacements and twists."""
+    ahead = {"distance_y": 0.0, "twist": 0.0}
+    jumps = task.jumps and tuple(hop.model_copy(update=ahead) for hop in task.jumps)
+    return task.model_copy(update={**ahead, "jumps": jumps})
+
+
 def _displaced(problem: Problem, robot: RobotDescription) -> Array | None:
     """A guess from the same jump straight ahead, where there is one and it can be solved."""
     if problem.coordinates.name == "sagittal":
         return None
-    ahead = {"distance_y": 0.0, "twist": 0.0}
-    task = problem.task.model_copy(update=ahead)
-    if task.jumps is not None:
-        jumps = tuple(hop.model_copy(update=ahead) for hop in task.jumps)
-        task = task.model_copy(update={"jumps": jumps})
+    task = straight_ahead(problem.task)
     straight = make_problem(task, robot, compiled=not problem.assembly.interpreted)
     if straight.coordinates.name != "sagittal":
         return None
     solution = solve(straight, ballistic_guess(straight), solver="fatrop")
     return displaced_guess(problem, straight, solution.values) if solution.solved else None
+
+
+def _turning(problem: Problem, robot: RobotDescription, guess: Array) -> Solution | None:
+    """A somersault by way of stronger motors; one with impacts also by way of one without."""
+    found = from_eased(problem, guess)
+    if found is not None or not problem.task.impact:
+        return found
+    task = problem.task.model_copy(update={"impact": False})
+    gentle = make_problem(task, robot, compiled=not problem.assembly.interpreted)
+    for ease in EASES:
+        first = solve(eased(gentle, ease), ballistic_guess(gentle), solver="fatrop")
+        if not first.solved:
+            continue
+        plan = with_impacts(JumpPlan(task=task, **unpack(gentle, first.values)))
+        found = tighten(problem, pack(problem, plan, guess), ease)
+        if found is not None:
+            return found
+    return None

@@ -18,6 +18,8 @@ reduced coordinates of ``Coordinates``:
 ``air``     z = q.              Rows: height of the points of feet and calves, how far ahead they
             are, and how far on their own leg's side of the torso's middle plane, each point's
             height and side less its radius.
+``obstacle`` z = q.             Rows: how high the points of ``obstacle_points`` are above ground
+            with a step, rounded, less their radii.
 
 Over an interval of h seconds accelerations are constant: v+ = v + h a, q+ = q + h v + h^2 a / 2, and
 the dynamics hold in its middle (second order). Gap rows hold minus the next state. ``w`` is named
@@ -32,12 +34,13 @@ from typing import Any
 import numpy as np
 
 from .coordinates import Coordinates, full_coordinates, sagittal_coordinates
+from .obstacles import heights_above_step
 from .symbolic_model import GRAVITY, SymbolicModel, base_rotation
 
 DRIFT_RATE = 10.0
 """1/s, how fast the place error of a foot on the ground dies out."""
 
-PIECES = ("stance", "free_stance", "flight", "impact", "contact", "take_off", "air")
+PIECES = ("stance", "free_stance", "flight", "impact", "contact", "take_off", "air", "obstacle")
 
 
 @dataclass(frozen=True)
@@ -70,6 +73,7 @@ def parameter_sizes(coordinates: Coordinates) -> dict[str, dict[str, int]]:
         "contact": {"place": 3 * contacts, "heading": 2},
         "take_off": {},
         "air": {},
+        "obstacle": {"ground": 1, "step": 1, "edge": 1, "onwards": 1, "early": 1},
     }
 
 
@@ -166,9 +170,12 @@ def piece_expressions(
         linear, angular = model.momentum(whole, speeds)
         rise = linear[2] / model.robot.total_mass
         rows = [model.com(whole)[2] + rise * rise / (2.0 * GRAVITY), rise, angular]
-    else:
+    elif name == "air":
         z = [q]
         rows = _air_rows(model, coordinates, q)
+    else:
+        z = [q]
+        rows = heights_above_step(model, coordinates, q, w)
     return ca.vertcat(*z), ca.vertcat(*w.values()), cost, ca.vertcat(*rows)
 
 

@@ -15,7 +15,8 @@ from .assembly import Knot
 from .contact_rows import ContactRows, reduced_contacts
 from .coordinates import Coordinates
 from .layout import Stretch, layout
-from .sequence import edge_of
+from .obstacles import ObstacleRows
+from .sequence import Hop, Place, edge_of
 from .stage_functions import Piece
 from .stance import Stance
 from .symbolic_model import SymbolicModel
@@ -48,6 +49,7 @@ class Structure:
         self.stretches = layout(task, model.robot)
         self.of_knot = [stretch for stretch in self.stretches for _ in range(stretch.count)]
         self.contact_rows = ContactRows(model.robot, coordinates)
+        self.obstacles = ObstacleRows(model, coordinates)
         self.given: dict[int, list[tuple[int, float, str]]] = {}
         self.knots = self._knots()
 
@@ -67,12 +69,16 @@ class Structure:
             q_and_v = np.arange(2 * n)
             if stretch.flies and k > stretch.first:
                 knot.pieces["air"] = (np.arange(n), self._air_rows(k))
-            if stretch.flies and k == stretch.first:
-                knot.pieces["take_off"] = (q_and_v, self._take_off_rows(k))
+            moment = self._moment_rows(before, stretch, k)
+            if moment is not None:
+                knot.pieces["take_off"] = (q_and_v, moment)
             if before is not None:
                 kept = self._contact_rows(before, stretch)
                 if len(kept):
                     knot.pieces["contact"] = (q_and_v, kept)
+            obstacle = self._obstacle_rows(k)
+            if k and len(obstacle):
+                knot.pieces["obstacle"] = (np.arange(n), obstacle)
             idle = self.idle(stretch)
             if idle and k and not stretch.impact:
                 knot.pieces["air"] = (np.arange(n), np.array(idle))
@@ -144,15 +150,47 @@ class Structure:
         feet = len(self.coordinates.contacts)
         ahead = np.arange(points, points + feet)
         step, edge = self.step_under(k)
+        if self.hops[self.of_knot[k].place].rotation:
+            return np.arange(2 * points, 3 * points)
         if edge is None or (step > 0.0) is (
             self.flight_share(k) > (STEP_UP_SHARE if step > 0.0 else STEP_DOWN_SHARE)):  # fmt: skip
             ahead = ahead[:0]
         return np.concatenate([np.arange(points), ahead, np.arange(2 * points, 3 * points)])
 
-    def _take_off_rows(self, k: int) -> NDArray[np.int64]:
-        hop = self.hops[self.of_knot[k].place]
-        kept = [0] if hop.rise is not None else [1] if hop.take_off_speed is not None else []
+    def hop_at(self, k: int) -> tuple[Hop, Place, float | None]:
+        """The jump under way at a knot, or the last one; where it began, and its step's edge."""
+        number = min(self.of_knot[k].place, len(self.hops) - 1)
+        hop, place = self.hops[number], self.places[number]
+        return hop, place, edge_of(hop, place)
+
+    def _obstacle_rows(self, k: int) -> NDArray[np.int64]:
+        hop, _, edge = self.hop_at(k)
+        stretch = self.of_knot[k]
+        return self.obstacles.rows(hop, edge, stretch, k == stretch.first)
+
+    def _moment_rows(
+        self, before: Stretch | None, stretch: Stretch, k: int
+    ) -> NDArray[np.int64] | None:
+        """What is asked for at a lift-off (apex or speed, angular momentum) or at a touchdown
+        (angular momentum); ``None`` at any other knot."""
+        lift_off = stretch.flies and k == stretch.first
+        kept = []
+        if lift_off:
+            hop = self.hops[stretch.place]
+            kept = [0] if hop.rise is not None else [1] if hop.take_off_speed is not None else []
+        elif not self.is_touchdown(before, stretch) or self.task.touchdown_momentum is None:
+            return None
+        most = self.task.lift_off_momentum if lift_off else self.task.touchdown_momentum
+        if most is not None:
+            # The momentum about an axis is a base moment's: zero by symmetry, or to be bounded.
+            kept += [row - 1 for row in self.coordinates.rows if row >= 3]
         return np.array(kept, dtype=np.int64)
+
+    @staticmethod
+    def is_touchdown(before: Stretch | None, stretch: Stretch) -> bool:
+        """Whether a knot between two intervals is the first on the ground, behind any impact."""
+        landed = before is not None and (before.flies or before.impact)
+        return landed and not stretch.flies and not stretch.impact
 
     def step_under(self, k: int) -> tuple[float, float | None]:
         """The step's height and its edge under a flight."""

@@ -128,6 +128,15 @@ class JumpTask(FreeTimes):
         None, unit="rad", ge=0.0, le=1.5,
         text="most the torso may lean forwards or backwards at touchdown; None: any",
     )  # fmt: skip
+    lift_off_momentum: float | None = parameter(
+        None, unit="N*m*s", ge=0.0, le=20.0,
+        text="most angular momentum about the centre of mass at lift-off, about each axis; "
+        "None: any",
+    )  # fmt: skip
+    touchdown_momentum: float | None = parameter(
+        None, unit="N*m*s", ge=0.0, le=20.0,
+        text="the same at touchdown, after the impact if there is one; None: any",
+    )  # fmt: skip
     impact: bool = parameter(
         False, text="feet may hit the ground with speed and stop by an impulse; else they "
         "arrive at rest"

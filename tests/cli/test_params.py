@@ -38,13 +38,13 @@ def running(sockets: Path, start: Start) -> Iterator[subprocess.Popen[str]]:
     """A paced run called ``tune``."""
     process = start("run", "tune.yaml", "--no-record", "--json")
     path = sockets / "aloft" / "tune.sock"
-    end = time.monotonic() + 30
+    end = time.monotonic() + 240.0
     while not path.exists() and process.poll() is None and time.monotonic() < end:
         time.sleep(0.02)
     yield process
     if process.poll() is None:
         process.send_signal(signal.SIGINT)
-        process.communicate(timeout=30)
+        process.communicate(timeout=240)
 
 
 def test_list_get_set(running: subprocess.Popen[str], call: Call, call_json: CallJson) -> None:
@@ -64,7 +64,7 @@ def test_list_get_set(running: subprocess.Popen[str], call: Call, call_json: Cal
     values = call_json("params", "get", "gain.gain", "wave.frequency")["values"]
     assert values == {"gain.gain": 2.0, "wave.frequency": 0.5}
     running.send_signal(signal.SIGINT)
-    output, _ = running.communicate(timeout=30)
+    output, _ = running.communicate(timeout=240)
     changes = json.loads(output)["parameter_changes"]
     assert [(c["path"], c["old"], c["new"]) for c in changes] == [
         ("gain.gain", 1.0, 2.0), ("wave.frequency", 1.0, 0.5),

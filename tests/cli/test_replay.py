@@ -49,7 +49,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / "gains.py").write_text(GAINS)
     subprocess.run(
         [sys.executable, "-m", "aloft", "run", "wave.yaml", "--quiet"],
-        cwd=folder, check=True, timeout=60, env={**os.environ, "PYTHONHASHSEED": "7"},
+        cwd=folder, check=True, timeout=240, env={**os.environ, "PYTHONHASHSEED": "7"},
     )  # fmt: skip
     return folder
 
@@ -80,7 +80,7 @@ def test_code_that_changed_by_one_ulp(recording: Path, call: Call, start: Start)
     swapped = GAINS.replace("class Gain", "class Base").replace("(Gain)", "(Base)")
     source.write_text(swapped.replace("class OneUlp", "class Gain"))
     process = start("replay", str(recording), "--check", PYTHONHASHSEED="8")
-    output, errors = process.communicate(timeout=60)
+    output, errors = process.communicate(timeout=240)
     assert process.returncode == 1
     assert "differs first at tick 123: block 'gain': gain.y.value[1] was " in errors
     assert ", 1 ULP apart" in errors

@@ -50,7 +50,7 @@ def test_the_hash_is_the_same_everywhere(folder: Path, call_json: CallJson, star
     }
     for hash_seed in ("0", "1"):
         options = ("run", "count.yaml", "--json", "--no-record", "--set", "double.seed=5")
-        output, _ = start(*options, PYTHONHASHSEED=hash_seed).communicate(timeout=60)
+        output, _ = start(*options, PYTHONHASHSEED=hash_seed).communicate(timeout=240)
         here.add(json.loads(output)["run_hash"])
     here.add(call_json("run", "count.yaml", "--seeds", "5")["rows"][0]["run_hash"])
     assert len(here) == 1
@@ -155,11 +155,11 @@ def test_signals_stop_a_run_cleanly(
     sign = "        open('running', 'w').close()\n        self.count.value += 1.0"
     (folder / "counter.py").write_text(block.replace("        self.count.value += 1.0", sign))
     process = start("run", "endless.yaml", "--json")
-    deadline = time.monotonic() + 30.0
+    deadline = time.monotonic() + 240.0
     while not (folder / "running").exists() and time.monotonic() < deadline:
         time.sleep(0.01)
     process.send_signal(number)
-    output, errors = process.communicate(timeout=30)
+    output, errors = process.communicate(timeout=240)
     assert process.returncode == code, output + errors
     result = json.loads(output)
     assert result["success"] is False
@@ -176,7 +176,7 @@ def leave_a_sign(folder: Path) -> None:
 
 
 def wait_for_the_sign(folder: Path) -> None:
-    deadline = time.monotonic() + 30.0
+    deadline = time.monotonic() + 240.0
     while not (folder / "running").exists() and time.monotonic() < deadline:
         time.sleep(0.01)
 
@@ -189,7 +189,7 @@ def test_a_signal_stops_all_seeds(folder: Path, start: Start) -> None:
     process = start("run", "endless.yaml", "--seeds", "0:4", "--json")
     wait_for_the_sign(folder)
     process.send_signal(signal.SIGTERM)
-    output, errors = process.communicate(timeout=30)  # also ends only when the workers have
+    output, errors = process.communicate(timeout=240)  # also ends only when the workers have
     assert process.returncode == 143, output + errors
     assert json.loads(output)["reason"] == "stopped by SIGTERM after 0 of 4 seeds"
     assert "Traceback" not in errors
@@ -202,7 +202,7 @@ def test_a_signal_between_two_runs_stops_all_seeds(folder: Path, start: Start) -
     wait_for_the_sign(folder)
     time.sleep(0.5)
     process.send_signal(signal.SIGINT)
-    output, errors = process.communicate(timeout=60)
+    output, errors = process.communicate(timeout=240)
     assert process.returncode == 130, output + errors
     assert json.loads(output)["reason"].startswith("stopped by SIGINT after ")
     assert "Traceback" not in errors

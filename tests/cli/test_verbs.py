@@ -141,7 +141,7 @@ def complete(start: Start, words: str) -> list[str]:
     position = str(len(words.split(" ")) - 1)
     process = start(_ALOFT_COMPLETE="complete_bash", COMP_WORDS=words, COMP_CWORD=position,
                     before="import sys; sys.argv = ['aloft']")  # fmt: skip
-    return process.communicate(timeout=60)[0].split()
+    return process.communicate(timeout=240)[0].split()
 
 
 def test_the_tab_key_completes(folder: Path, start: Start) -> None:
@@ -169,7 +169,7 @@ def test_check_answers_at_once(start: Start) -> None:
     times = []
     for _ in range(3):
         before = resource.getrusage(resource.RUSAGE_CHILDREN)
-        output, _ = start("check", str(ROOT / "graphs" / "jump.yaml")).communicate(timeout=60)
+        output, _ = start("check", str(ROOT / "graphs" / "jump.yaml")).communicate(timeout=240)
         after = resource.getrusage(resource.RUSAGE_CHILDREN)
         times.append(after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime)
         assert "no problems" in output

@@ -80,7 +80,7 @@ def run_pytest(path: Path) -> subprocess.CompletedProcess[str]:
     """Run one file, in a process of its own as a user would."""
     return subprocess.run(
         [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", str(path)],
-        env={**os.environ, "PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1"}, capture_output=True, text=True, timeout=60, check=False, cwd=path.parent,
+        env={**os.environ, "PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1"}, capture_output=True, text=True, timeout=240, check=False, cwd=path.parent,
     )  # fmt: skip
 
 

@@ -33,7 +33,7 @@ def run_program(seed: str, log: str) -> str:
     environment = {**os.environ, "PYTHONHASHSEED": seed}
     return subprocess.run(
         [sys.executable, "-c", PROGRAM, log],
-        env=environment, capture_output=True, text=True, check=True, timeout=60,
+        env=environment, capture_output=True, text=True, check=True, timeout=240,
     ).stdout  # fmt: skip
 
 

@@ -34,7 +34,7 @@ def running(pid: int) -> bool:
 
 
 def wait_until(condition: Any) -> None:
-    end = time.monotonic() + 30.0
+    end = time.monotonic() + 240.0
     while not condition():
         assert time.monotonic() < end, "it never happened"
         time.sleep(0.01)
@@ -112,8 +112,8 @@ def test_what_on_result_raises_stops_the_jobs() -> None:
 
     started = time.monotonic()
     with pytest.raises(KeyboardInterrupt):
-        run_jobs(time.sleep, [0.0, 60.0, 60.0, 60.0], workers=2, on_result=refuse)
-    assert time.monotonic() - started < 30.0
+        run_jobs(time.sleep, [0.0, 300.0, 300.0, 300.0], workers=2, on_result=refuse)
+    assert time.monotonic() - started < 300.0
 
 
 def test_a_function_that_has_no_name_is_refused() -> None:
@@ -132,7 +132,7 @@ def test_a_script_without_a_guard_is_told(tmp_path: Path) -> None:
         "run_jobs(math.sqrt, [1.0] * 50, workers=2, on_result=print)\n"
     )
     done = subprocess.run(
-        [sys.executable, script], capture_output=True, check=False, text=True, timeout=60
+        [sys.executable, script], capture_output=True, check=False, text=True, timeout=240
     )
     assert done.returncode == 1
     assert "a worker process cannot start" in done.stderr
@@ -153,7 +153,7 @@ from work import work
 if __name__ == "__main__":
     try:
         print("go", flush=True)
-        run_jobs(work, [60.0] * 4, workers=2, on_result=print)
+        run_jobs(work, [600.0] * 4, workers=2, on_result=print)
     except KeyboardInterrupt:
         sys.exit(130)
 """
@@ -179,7 +179,7 @@ def test_workers_end_with_the_process_that_wants_their_results(
     pids = tmp_path / "pids"
     wait_until(lambda: pids.is_file() and len(pids.read_text().split()) == 2)
     parent.send_signal(number)
-    _, errors = parent.communicate(timeout=30)
+    _, errors = parent.communicate(timeout=240)
     workers = [int(pid) for pid in pids.read_text().split()]
     wait_until(lambda: not any(map(running, workers)))
     assert errors == ""
@@ -192,7 +192,7 @@ def test_interrupting_while_processes_start_prints_nothing(tmp_path: Path) -> No
         parent = start_parent(tmp_path)
         time.sleep(pause)
         os.killpg(parent.pid, signal.SIGINT)
-        _, errors = parent.communicate(timeout=30)
+        _, errors = parent.communicate(timeout=240)
         assert parent.returncode == 130
         assert errors == ""
 

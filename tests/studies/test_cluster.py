@@ -39,7 +39,7 @@ def cluster(folder: Path) -> Iterator[str]:
     ) as process:  # fmt: skip
         assert process.stdout is not None
         yield process.stdout.readline().strip()
-        process.communicate(timeout=60)  # the end of its input ends it
+        process.communicate(timeout=240)  # the end of its input ends it
 
 
 def test_the_table_is_the_same_on_a_cluster(folder: Path, cluster: str) -> None:

@@ -43,6 +43,24 @@ def test_a_line_that_was_cut_off_is_made_again_and_the_next_is_whole(
     assert path.read_bytes().count(b"\n") == 2
 
 
+def test_an_interruption_between_the_file_and_the_memory_of_it_loses_no_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def interrupt(_: int) -> None:
+        raise KeyboardInterrupt
+
+    with Journal(tmp_path / "runs.jsonl") as journal:
+        journal.add("a", FIRST)
+        with monkeypatch.context() as patch, pytest.raises(KeyboardInterrupt):
+            patch.setattr("os.fsync", interrupt)
+            journal.add("b", FIRST)
+        assert set(journal.outcomes) == {"a"}
+        journal.read_back()
+        assert set(journal.outcomes) == {"a", "b"}
+        journal.add("c", FIRST)
+    assert (tmp_path / "runs.jsonl").read_bytes().count(b"\n") == 3
+
+
 def test_a_damaged_line_costs_only_itself(tmp_path: Path) -> None:
     path = tmp_path / "runs.jsonl"
     with Journal(path) as journal:

@@ -14,7 +14,7 @@ from aloft.blocks.planner.guess import ballistic_guess
 from aloft.blocks.planner.picture import plan_picture
 from aloft.blocks.planner.plan import JumpPlan, read_plan, write_plan
 from aloft.blocks.planner.reference_table import reference_table
-from aloft.blocks.planner.solve import make_problem, solve_jump
+from aloft.blocks.planner.solve import make_problem, solve_jump, with_ground_times, with_times
 from aloft.blocks.planner.task import make_task
 from aloft.blocks.planner.validity import check_plan
 from aloft.blocks.signals import Phase
@@ -141,7 +141,7 @@ def test_an_impact_stops_the_feet_by_an_impulse() -> None:
     "task", [STEPS, {"rise": 0.1, "phases": TOES}, {"rise": 0.1, "impact": True, "distance_y": 0.1}]
 )
 def test_equations_are_independent_at_the_guess(task: dict[str, Any]) -> None:
-    few = {"squat": 3, "thrust": 5, "flight": 7, "landing": 5}
+    few = {"squat": 2, "thrust": 4, "flight": 5, "landing": 4}
     problem = make_problem(make_task({"name": "rank", "knots": few, **task}), ROBOT)
     functions = problem.assembly.functions()
     rng = np.random.default_rng(3)
@@ -152,3 +152,27 @@ def test_equations_are_independent_at_the_guess(task: dict[str, Any]) -> None:
     sizes = np.linalg.norm(jacobian, axis=1, keepdims=True)
     smallest = np.linalg.svd(jacobian / sizes, compute_uv=False)[-1]
     assert smallest > 1e-7
+
+
+def test_free_times_out_of_the_plane_are_those_straight_ahead() -> None:
+    free = {"rise": 0.1, "squat_time": "free", "thrust_time": "free"}
+    ahead, aside = (
+        make_task({"name": name, **free, "distance_y": y}) for name, y in (("a", 0.0), ("b", 0.05))
+    )
+    straight = solve_jump(ahead, ROBOT)
+    plan = solve_jump(aside, ROBOT)
+    assert check_plan(plan, ROBOT).explain() == ""
+    assert plan.statistics["coordinates"] == "full"
+    assert plan.task == aside, "its hash is that of what was asked for"
+    assert plan.lift_off_time == pytest.approx(straight.lift_off_time, abs=1e-5)
+
+
+def test_several_jumps_aside_and_round() -> None:
+    task = make_task({"name": "aside", "rise": 0.08, "jumps": [{"distance_y": 0.05}, {"twist": 0.3}],
+                      "contact_time": 0.3})  # fmt: skip
+    given = with_ground_times(task, ROBOT)
+    assert given == with_times(task, [0.0] * 7), "there is nothing to be found"
+    problem = make_problem(task, ROBOT)
+    assert problem.coordinates.name == "full"
+    assert [stance.heading for stance in problem.stances] == [0.0, 0.0, 0.3]
+    assert problem.end.points[:, 1].mean() == pytest.approx(0.05)

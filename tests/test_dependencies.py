@@ -1,0 +1,73 @@
+"""What is imported is asked for: by the package in its dependencies, by the tests in the dev group."""
+
+from __future__ import annotations
+
+import ast
+import re
+import sys
+import tomllib
+from collections.abc import Iterator
+from pathlib import Path
+
+ROOT = Path(__file__).parent.parent
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
+NOT_SHIPPED = ("tests", "docs", "scripts")
+BY = {
+    "dask": "distributed",
+    "mujoco": "mujoco-core",
+    "pinocchio": "pin",
+    "pydantic_core": "pydantic",
+    "pydrake": "drake",
+    "rerun": "rerun-sdk",
+    "yaml": "pyyaml",
+}
+"""Who brings a module, where that is not a distribution of its name."""
+
+
+def distributions(*lists: list[str]) -> set[str]:
+    return {re.split(r"[^\w.-]", text)[0].lower() for found in lists for text in found}
+
+
+EXTRAS = PROJECT["project"]["optional-dependencies"].values()
+PACKAGE = distributions(PROJECT["project"]["dependencies"], *EXTRAS)
+TESTS = PACKAGE | distributions(PROJECT["dependency-groups"]["dev"])
+
+
+def others_modules(path: Path) -> Iterator[str]:
+    """The top-level modules that a file imports and that are neither Python's nor the project's."""
+    near = {other.stem for other in path.parent.glob("*.py")}
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        names: list[str] = []
+        if isinstance(node, ast.Import):
+            names = [alias.name for alias in node.names]
+        elif isinstance(node, ast.ImportFrom) and node.level == 0 and node.module:
+            names = [node.module]
+        for name in {name.partition(".")[0] for name in names}:
+            if name not in sys.stdlib_module_names and name != "aloft" and name not in near:
+                yield name
+
+
+def python_files(folder: Path) -> list[Path]:
+    return [p for p in sorted(folder.glob("**/*.py")) if "__pycache__" not in p.parts]
+
+
+def undeclared(folders: list[Path], declared: set[str]) -> list[str]:
+    return [
+        f"{path.relative_to(ROOT)} imports {name}"
+        for folder in folders
+        for path in python_files(folder)
+        for name in others_modules(path)
+        if BY.get(name, name).lower() not in declared
+    ]
+
+
+def test_the_package_asks_for_what_it_imports() -> None:
+    listed = PROJECT["tool"]["setuptools"]["packages"]
+    folders = {name.split(".")[1] for name in listed if "." in name}
+    assert {"blocks", "runtime", "cli"} <= folders
+    assert not undeclared([ROOT / folder for folder in sorted(folders)], PACKAGE)
+
+
+def test_the_tests_ask_for_what_they_import() -> None:
+    assert not undeclared([ROOT / folder for folder in NOT_SHIPPED], TESTS)
+    assert undeclared([ROOT / "tests"], PACKAGE), "pytest is not the package's"
