@@ -7,6 +7,7 @@ reduced, which smooths it.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import hypot, isfinite
@@ -19,7 +20,6 @@ from ..studies.svg import FAINT, INK, PALE, round_values
 
 if TYPE_CHECKING:
     from PIL.Image import Image
-    from PIL.ImageDraw import ImageDraw
 
 Array = NDArray[np.float64]
 
@@ -153,7 +153,7 @@ def dashes(points: Sequence[tuple[float, float]]) -> list[list[tuple[float, floa
     """The pieces of a line that a dashed one shows."""
     pieces: list[list[tuple[float, float]]] = []
     drawn, left, current = True, DASH, [points[0]]
-    for (x, y), (end_x, end_y) in zip(points[:-1], points[1:], strict=True):
+    for (x, y), (end_x, end_y) in itertools.pairwise(points):
         length = hypot(end_x - x, end_y - y)
         while length > left:
             share = left / length
@@ -176,7 +176,7 @@ class Pen:
 
         self._size = (width, height)
         self._image = Image.new("RGB", (width * ENLARGED, height * ENLARGED), "white")
-        self._draw: ImageDraw = ImageDraw.Draw(self._image)
+        self._draw = ImageDraw.Draw(self._image)
 
     def text(
         self, x: float, y: float, words: str, size: int, colour: str = INK, anchor: str = "la"

@@ -44,6 +44,10 @@ def draw_jump(trace: Trace, robot: RobotDescription) -> Image:
         Curve(f"l_{axis}", t, mass * trace.truth("com_velocity")[:, k], colour(k))
         for k, axis in enumerate(AXES)
     ]
+    angular = [
+        Curve(f"k_{axis}", t, trace.truth("angular_momentum")[:, k], colour(k))
+        for k, axis in enumerate(AXES)
+    ]
     pitch, _ = pitch_and_roll(trace.truth("base_orientation"))
     planned_pitch, _ = pitch_and_roll(trace.plan("orientation"))
     force = trace.truth("contact_force")[:, :, 2].sum(axis=1)
@@ -71,6 +75,7 @@ def draw_jump(trace: Trace, robot: RobotDescription) -> Image:
                 Curve("simulated", t, np.degrees(pitch), MEASURED),
                 Curve("plan", t, np.degrees(planned_pitch), PLANNED, True),
             ),
+            panel("contact force, vertical [N]", Curve("", t, force, MEASURED)),
         ],
         "time [s]",
     )
@@ -78,6 +83,7 @@ def draw_jump(trace: Trace, robot: RobotDescription) -> Image:
         "",
         [
             panel("linear momentum [kg m/s]", *momentum),
+            panel("angular momentum about the CoM, all axes [N m s]", *angular),
             both("angular momentum about the CoM, k_y [N m s]", "angular_momentum", 1),
             panel("joint velocity, left leg [rad/s]", *velocity),
             panel(
@@ -87,17 +93,6 @@ def draw_jump(trace: Trace, robot: RobotDescription) -> Image:
         ],
         "time [s]",
     )
-    body.panels[-1:] = [*body.panels[-1:], panel("contact force, vertical [N]",
-        Curve("", t, force, MEASURED))]  # fmt: skip
-    legs.panels[1:1] = [
-        panel(
-            "angular momentum about the CoM, all axes [N m s]",
-            *(
-                Curve(f"k_{axis}", t, trace.truth("angular_momentum")[:, k], colour(k))
-                for k, axis in enumerate(AXES)
-            ),
-        )
-    ]
     verdict = "succeeded" if trace.outcome.success else f"no success: {trace.outcome.reason}"
     notes = [f"Closed loop in the standard trial, seed {trace.seed}: {verdict}. Flight shaded."]
     return draw_columns("In-situ jump", notes, [body, legs])

@@ -19,7 +19,7 @@ from .push_curves import draw_push, push_numbers
 from .strip import Moment, Motion, draw_strip, moments_of
 
 if TYPE_CHECKING:
-    from PIL.Image import Image
+    from PIL.Image import Image as Picture
 
     from ..hal.scenes import Scene
     from ..runtime.description import RobotDescription
@@ -27,11 +27,12 @@ if TYPE_CHECKING:
     from ..studies.summary import Row
     from .trace import Trace
 
-JUMP, STEP = "in-situ jump", "step up"
+JUMP, FORWARD, TURN, STEP = "in-situ jump", "forward jump", "turn", "step up"
+SOMERSAULT = "somersault off a platform"
 ARMS = ("heuristic off", "the paper's law", "deviation law")
 SOMERSAULTS = {
     "somersault": ("somersault_forward_35cm", "off the 35 cm platform"),
-    "somersault_in_place": ("somersault_in_place", "in place, relaxed motors"),
+    "somersault_in_place": ("somersault_in_place", "in place"),
 }
 FILES = {
     "jump": "paper_jump.png",
@@ -42,7 +43,7 @@ FILES = {
 }
 KEPT = (
     "apex_above_standing_m", "apex_from_squat_m", "flight_time_s", "lift_off_speed_m_s",
-    "peak_tilt_deg", "jump_distance_x_m", "peak_motor_torque_nm", "peak_motor_speed_rad_s",
+    "peak_tilt_deg", "jump_distance_x_m", "jump_yaw_deg", "peak_motor_torque_nm", "peak_motor_speed_rad_s",
 )  # fmt: skip
 
 
@@ -55,9 +56,11 @@ def draw(
     traces: Mapping[str, Trace], rows: Sequence[Row], seeds: Sequence[int], out: Path
 ) -> dict[str, Any]:
     """Draw everything into the folder ``out``; what cannot be drawn says why in ``reason``."""
+    from PIL import Image
+
     robot = find_robot("bruce")
     by_task = {row.cell.task: row for row in rows}
-    drawings: dict[str, Callable[[], tuple[Image, Mapping[str, Any]]]] = {
+    drawings: dict[str, Callable[[], tuple[Picture, Mapping[str, Any]]]] = {
         "jump": lambda: (draw_jump(traces[JUMP], robot), jump_numbers(traces[JUMP])),
         "push": lambda: _push(traces),
         "step": lambda: _step(traces[STEP], by_task[STEP], robot),
@@ -71,8 +74,8 @@ def draw(
         except (NoRendererError, NotThereError) as error:
             figures[name] |= {"drawn": False, "reason": str(error)}
             continue
-        # 128 colours are enough for lines and capsules, and a third of the bytes
-        small = picture.quantize(128, dither=0) if name in ("jump", "push") else picture.quantize(256)
+        # few colours are enough for lines and capsules: a third of the bytes
+        small = picture.quantize(256, dither=Image.Dither.NONE)
         small.save(out / FILES[name], optimize=True)
         figures[name] |= {"size": list(picture.size), "numbers": rounded(numbers)}
     return {
@@ -100,7 +103,7 @@ def _row_json(row: Row, trace: Trace) -> dict[str, Any]:
     }
 
 
-def _push(traces: Mapping[str, Trace]) -> tuple[Image, Mapping[str, Any]]:
+def _push(traces: Mapping[str, Trace]) -> tuple[Picture, Mapping[str, Any]]:
     arms = {arm: [traces[push_task(way, arm)] for way in ("+x", "+y")] for arm in ARMS}
     numbers = {
         push_task(way, arm): rounded(push_numbers(found[axis], axis))
@@ -110,14 +113,13 @@ def _push(traces: Mapping[str, Trace]) -> tuple[Image, Mapping[str, Any]]:
     return draw_push(arms), numbers
 
 
-def _step(trace: Trace, row: Row, robot: RobotDescription) -> tuple[Image, Mapping[str, Any]]:
+def _step(trace: Trace, row: Row, robot: RobotDescription) -> tuple[Picture, Mapping[str, Any]]:
     names = ("base_position", "base_orientation", "joint_position")
     motion = Motion(trace.time, *(trace.truth(name) for name in names))
     end = float(trace.time[-1])
     flight = trace.flight_times
-    phase = trace.plan("phase")
     if flight:
-        moments = moments_of(0.4, *flight, end, phase, trace.time)
+        moments = moments_of(min(0.4, flight[0]), *flight, end)
     else:
         moments = [Moment(t, f"{t:.2f} s") for t in np.linspace(0.0, end, 8).tolist()]
     verdict = "succeeds" if trace.outcome.success else f"no success: {trace.outcome.reason}"
@@ -132,10 +134,10 @@ def _step(trace: Trace, row: Row, robot: RobotDescription) -> tuple[Image, Mappi
 
 def _somersault(
     name: str, robot: RobotDescription
-) -> Callable[[], tuple[Image, Mapping[str, Any]]]:
+) -> Callable[[], tuple[Picture, Mapping[str, Any]]]:
     """Draws frames of a planned somersault."""
 
-    def drawing() -> tuple[Image, Mapping[str, Any]]:
+    def drawing() -> tuple[Picture, Mapping[str, Any]]:
         from ..blocks.planner.library import SHIPPED, PlanLibrary
         from ..blocks.planner.task import read_task
         from ..hal.scenes import flat, platform
@@ -161,12 +163,19 @@ def _somersault(
         middle = 0.5 * (motion.base[0] + motion.base[-1])
         view = View((float(middle[0]), 0.0, float(motion.base[:, 2].mean())), 1.7 + height)
         apex = float(plan.com[:, 2].max() - plan.com[0, 2])
-        valid = "valid" if plan.valid else "NOT valid"
+        verdict = "passes" if plan.valid else "does NOT pass"
         notes = [
-            "The PLAN, not a run: its knots posed by the simulator's model. "
-            f"{valid} by the check with exact dynamics."
+            (
+                "The PLAN, not a run: its knots posed by the simulator's model. "
+                f"It {verdict} the check with exact dynamics, motors '{task.profile}'."
+            )
         ]
-        numbers = {"flight_s": touchdown - lift_off, "apex_above_start_cm": 100.0 * apex}
+        numbers = {
+            "profile": task.profile,
+            "valid": plan.valid,
+            "flight_s": touchdown - lift_off,
+            "apex_above_start_cm": 100.0 * apex,
+        }
         title = f"Somersault {words}"
         return draw_strip(title, notes, motion, moments, robot, scene, view), numbers
 

@@ -28,8 +28,10 @@ def draw_push(arms: Mapping[str, Sequence[Trace]]) -> Image:
         traces = {arm: found[number] for arm, found in arms.items() if len(found) > number}
         columns.append(_column(header, number, traces))
     notes = [
-        "Closed loop in the standard trial, flight only; the push is shaded. Landing places and feet "
-        "are seen from the CoM, world axes.",
+        (
+            "Closed loop in the standard trial, flight only; the push is shaded. Landing places and feet "
+            "are seen from the CoM, world axes."
+        ),
         "; ".join(
             f"{arm}: " + ", ".join("stood" if run.outcome.success else "fell" for run in found)
             for arm, found in arms.items()
@@ -76,7 +78,9 @@ def _column(header: str, axis: int, traces: Mapping[str, Trace]) -> Column:
         f"torso {lean} [deg]",
     )
     panels = [
-        Panel(title, named if k == 0 else [unnamed(c) for c in named], (0.0, longest or 1.0), shades)
+        Panel(
+            title, named if k == 0 else [unnamed(c) for c in named], (0.0, longest or 1.0), shades
+        )
         for k, (title, named) in enumerate(zip(titles, rows, strict=True))
     ]
     return Column(header, panels, "time since lift-off [ms]")

@@ -1,4 +1,4 @@
-"""A motion as a strip of frames, each with its time and phase."""
+"""A motion as a strip of frames, each with its time and what happens then."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ..blocks.signals import Phase
 from ..studies.svg import FAINT, INK
 from .canvas import font
 from .offscreen import Offscreen, View
@@ -78,7 +77,7 @@ def draw_strip(
     pen.text((MARGIN, 12), title, fill=INK, font=font(19))
     for number, note in enumerate(notes):
         pen.text((MARGIN, HEAD - 4 + LINE * number), note, fill=FAINT, font=font(13))
-    with Offscreen(robot, scene, 2 * width, 2 * height) as renderer:
+    with Offscreen(robot, scene, width * 3 // 2, height * 3 // 2) as renderer:
         for number, moment in enumerate(moments):
             left = MARGIN + (number % columns) * (width + MARGIN)
             top = head + (number // columns) * (height + CAPTION + MARGIN)
@@ -89,19 +88,17 @@ def draw_strip(
     return picture
 
 
-def moments_of(
-    start: float, lift_off: float, touchdown: float, end: float, phase: Sequence[int], time: Array
-) -> list[Moment]:
-    """Two frames before lift-off, three in flight around it, and the landing until rest."""
+def moments_of(start: float, lift_off: float, touchdown: float, end: float) -> list[Moment]:
+    """Two frames before lift-off, two between it and touchdown, two of the landing until rest."""
     flight = touchdown - lift_off
-    chosen = [
-        start, 0.35 * start + 0.65 * lift_off, lift_off, lift_off + 0.3 * flight,
-        lift_off + 0.6 * flight, touchdown, min(touchdown + 0.15, end), end,
-    ]  # fmt: skip
-    return [Moment(t, _caption(t, phase, time)) for t in chosen]
-
-
-def _caption(instant: float, phase: Sequence[int], time: Array) -> str:
-    k = int(np.argmin(np.abs(time - instant)))
-    name = Phase(int(phase[k])).name.lower().replace("_", " ")
-    return f"{instant:.2f} s  {name}"
+    chosen = (
+        (start, "stand"),
+        (0.35 * start + 0.65 * lift_off, "squat"),
+        (lift_off, "lift-off"),
+        (lift_off + 0.35 * flight, "flight"),
+        (lift_off + 0.7 * flight, "flight"),
+        (touchdown, "touchdown"),
+        (min(touchdown + 0.15, end), "landing"),
+        (end, "end"),
+    )
+    return [Moment(time, f"{time:.2f} s  {words}") for time, words in chosen]

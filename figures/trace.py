@@ -18,7 +18,7 @@ from ..studies.journal import Outcome
 
 Array = NDArray[np.float64]
 
-TRUTH = (
+TRUTH: tuple[str, ...] = (
     "base_position", "base_orientation", "joint_position", "joint_velocity", "com", "com_velocity",
     "angular_momentum", "contact_position", "contact_force", "contact_touched",
 )  # fmt: skip
@@ -55,9 +55,9 @@ class Trace:
     @property
     def flight(self) -> slice | None:
         """The ticks of the first flight, from the first without load; ``None`` without one."""
-        loaded = self.truth("contact_touched").any(axis=1)
+        loaded: list[bool] = np.atleast_1d(self.truth("contact_touched").any(axis=1)).tolist()
         start: int | None = None
-        for tick, standing in enumerate([*loaded.tolist(), True]):
+        for tick, standing in enumerate([*loaded, True]):
             if not standing:
                 start = tick if start is None else start
             elif start is not None:

@@ -60,9 +60,7 @@ def build_mujoco_model(
         ValueError: the description's joints are not in depth-first order, or its transmission
             couples a joint more strongly to others than fixed tendons can express.
     """
-    spec = mujoco_spec(
-        robot, profile=profile, scene=scene, timestep=timestep, variation=variation
-    )
+    spec = mujoco_spec(robot, profile=profile, scene=scene, timestep=timestep, variation=variation)
     model = spec.compile()
     names = [model.joint(k).name for k in range(1, model.njnt)]
     if names != [joint.name for joint in robot.joints]:
