@@ -1,0 +1,39 @@
+"""Every task's graph: planned jumps in closed loop in the robust trial, one seed each.
+
+How often they succeed is a study's matter (graphs/studies/tasks.yaml); here each shall not break.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+import aloft
+from aloft.runtime.loading import check
+
+GRAPHS = Path(aloft.__file__).parent / "graphs"
+TASKS = {
+    "forward_15cm": ("jump_distance_x_m", 0.15, 0.02),
+    "backward_12cm": ("jump_distance_x_m", -0.12, 0.02),
+    "sideways_10cm": ("jump_distance_y_m", 0.10, 0.02),
+    "turn_30deg": ("jump_yaw_deg", 30.0, 5.0),
+    "up_5cm": ("jump_distance_x_m", 0.14, 0.02),
+    "down_5cm": ("jump_distance_x_m", 0.15, 0.02),
+}
+SEED = {"turn_30deg": 22, "up_5cm": 1}
+
+
+@pytest.mark.parametrize("name", TASKS)
+def test_it_succeeds_in_the_robust_trial(name: str, tmp_path: Path) -> None:
+    path = tmp_path / "robust.yaml"
+    path.write_text(f"include: [{GRAPHS / name}.yaml, {GRAPHS / 'trials' / 'robust'}.yaml]\n")
+    result = aloft.load(path, {"robot.seed": SEED.get(name, 32)}).run(log=False)
+    assert result.success, result.reason
+    metric, asked, tolerance = TASKS[name]
+    assert result.metrics[metric] == pytest.approx(asked, abs=tolerance)
+
+
+@pytest.mark.parametrize("name", TASKS)
+def test_the_graph_has_no_problems(name: str) -> None:
+    assert check(GRAPHS / f"{name}.yaml").ok
