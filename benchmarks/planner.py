@@ -15,6 +15,8 @@ from ..blocks.planner.task import JumpTask, make_task
 from ..blocks.planner.validity import check_plan
 from ..runtime.description import find_robot
 from .planner_solvers import solver_rows
+from .random_tasks import random_rows
+from .reach import reach_rows
 from .rows import Row
 
 BASIC: dict[str, dict[str, Any]] = {
@@ -84,7 +86,7 @@ def planner(rounds: int = 3) -> list[Row]:
         note = "no plan" if plan_of is None else f"{plan_of.statistics['iterations']} iterations"
         rows.append(Row(f"plan in situ 15 cm, formulation {formulation}", seconds, "s", note=note))
     rows += solver_rows({name: BASIC[name] for name in BESIDE}, rounds)
-    return rows
+    return [*rows, *reach_rows(), *random_rows()]
 
 
 def _measure(task: JumpTask, rounds: int, warm: Any = None) -> tuple[float, Any]:

@@ -22,6 +22,7 @@ from .replay import replay
 from .run import run
 from .study import study
 from .test import test
+from .view import view
 
 EXIT_CODES = """\b
 Exit codes:
@@ -41,7 +42,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
-for _verb in (run, replay, check, graph, blocks, plan, bench, study, test):
+for _verb in (run, view, replay, check, graph, blocks, plan, bench, study, test):
     app.command(epilog=EXIT_CODES if _verb is run else None)(_verb)
 app.add_typer(params)
 app.add_typer(log)

@@ -21,7 +21,7 @@ from .plan_output import (
     recorded_motion,
     summary,
 )
-from .run import viewer
+from .view import how_to_view
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -219,5 +219,5 @@ def write_pictures(
     picture = write_picture(out / f"{name}.svg", found, robot)
     recording = write_motion(out / f"{name}.rrd", recorded_motion(found, robot), name)
     say(screen, f"picture: {picture}")
-    say(screen, f"recording: {recording}; to see it: {viewer()} {recording}")
+    say(screen, f"recording: {recording}; to see it: {how_to_view(recording)}")
     return {"picture": str(picture), "recording": str(recording)}

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 from contextlib import closing
+from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -27,6 +28,7 @@ from .stopping import stopped_by_signals
 if TYPE_CHECKING:
     from rich.console import Console
 
+    from ..logs.viewer import Viewer
     from ..runtime.graph import Graph
     from ..runtime.parameter_endpoint import ParameterEndpoint
     from ..runtime.run_result import RunResult
@@ -34,6 +36,14 @@ if TYPE_CHECKING:
     from ..runtime.sinks import Sink
 
 MOST_METRIC_COLUMNS = 5
+
+
+class Live(StrEnum):
+    """Where a run is shown while it goes on."""
+
+    NONE = "none"
+    LIVE = "live"
+    WEB = "web"
 
 
 def run(
@@ -52,6 +62,9 @@ def run(
         Path | None,
         typer.Option(help="Where the recording goes; by default recordings/NAME.rrd."),
     ] = None,
+    rerun: Annotated[
+        Live, typer.Option(help="Show the run while it goes on: in a window, in a browser.")
+    ] = Live.NONE,
     no_record: Annotated[bool, typer.Option("--no-record", help="Write no recording.")] = False,
     params: Annotated[
         str,
@@ -74,6 +87,8 @@ def run(
     with errors_reported(as_json):
         if seeds and record is not None:
             raise AloftError("--record is for one run; with --seeds nothing is recorded")
+        if seeds and rerun is not Live.NONE:
+            raise AloftError("--rerun is for one run; with --seeds nothing is shown")
         if seeds:
             code = run_many(graph, settings, parse_seeds(seeds), out, as_json)
         else:
@@ -81,8 +96,42 @@ def run(
             default = Path("recordings") / f"{loaded.checked.name}.rrd"
             endpoint = open_endpoint(loaded, params)
             sinks = [endpoint] if endpoint is not None else []
-            code = run_once(loaded, None if no_record else record or default, out, as_json, sinks)
+            place = None if no_record else record or default
+            viewer = open_viewer(rerun)
+            code = run_once(loaded, place, out, as_json, sinks, viewer)
+            if viewer is not None:
+                leave_viewer(viewer, wait=not as_json and sys.stdin.isatty())
     raise typer.Exit(code)
+
+
+def open_viewer(live: Live) -> Viewer | None:
+    """The viewer that shows the run; where there is none, the run is not shown."""
+    from ..logs.viewer import ViewerError, start_viewer
+    from .view import open_page
+
+    if live is Live.NONE:
+        return None
+    try:
+        viewer = start_viewer("web" if live is Live.WEB else "window")
+    except ViewerError as error:
+        print_warning(f"the run is not shown: {error}")
+        return None
+    if live is Live.WEB:
+        typer.echo(f"live view: {viewer.page}", err=True)
+        open_page(viewer.page)
+    return viewer
+
+
+def leave_viewer(viewer: Viewer, *, wait: bool) -> None:
+    """A window stays until somebody closes it; a page as long as somebody waits for it."""
+    from .view import keep_open
+
+    if viewer.kind != "web":
+        return
+    if wait and viewer.lives():
+        keep_open(viewer)
+    else:
+        viewer.stop()
 
 
 def open_endpoint(graph: Graph, name: str) -> ParameterEndpoint | None:
@@ -101,14 +150,23 @@ def open_endpoint(graph: Graph, name: str) -> ParameterEndpoint | None:
 
 
 def run_once(
-    graph: Graph, record: Path | None, out: Console, as_json: bool, sinks: Sequence[Sink] = ()
+    graph: Graph,
+    record: Path | None,
+    out: Console,
+    as_json: bool,
+    sinks: Sequence[Sink] = (),
+    viewer: Viewer | None = None,
 ) -> ExitCode:
-    """Run the graph, record it, print what came of it."""
+    """Run the graph, record and show it, print what came of it."""
     from ..logs.recorder import Recorder
     from .progress import TickCounter, progress_bar
+    from .view import how_to_view
 
     name = graph.checked.name
-    recorder = Recorder(record, on_warning=print_warning) if record is not None else None
+    recorder = None
+    if record is not None or viewer is not None:
+        live = viewer.source if viewer is not None else ""
+        recorder = Recorder(record, live=live, on_warning=print_warning)
     with progress_bar(out, f"running {name}", graph.checked.ticks) as (progress, task):
         counter = TickCounter(progress, task)
         recorders = [recorder] if recorder is not None else []
@@ -116,7 +174,7 @@ def run_once(
     recording = recorder.recording if recorder is not None else None
     print_result(out, name, result)
     if recording is not None:
-        say(out, f"recording: {recording}; to see it: {viewer()} {recording}")
+        say(out, f"recording: {recording}; to see it: {how_to_view(recording)}")
     for problem in result.stop_problems:
         print_warning(problem)
     if as_json:
@@ -126,13 +184,6 @@ def run_once(
     else:
         print_verdict(result)
     return result.exit_code
-
-
-def viewer() -> str:
-    """How to call the viewer that came with this Python, as short as it can be said."""
-    program = Path(sys.executable).with_name("rerun")
-    here = Path.cwd()
-    return str(program.relative_to(here) if program.is_relative_to(here) else program)
 
 
 def print_result(out: Console, name: str, result: RunResult) -> None:

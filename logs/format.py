@@ -15,9 +15,12 @@ output and a field. All but the static ones are on the timelines ``t`` (exact na
                      tick k ran, from which a run can go on
 ``notes``            ``aloft:note``: JSON of a ``Note``: life cycle, overruns, faults, parameter
                      changes, dropped ticks
-``states/B/P/F``     each change of a number whose values have names, for the viewer
+``states/B/P/F``     each change of a number whose values have names, and of a truth value, for
+                     the viewer; of several truth values each is in ``states/B/P/F/<its name>``
+``limits/B/P/F``     what bounds a field by the robot's description, for the viewer
 ``events``           notes, changes of state, lift-off and touchdown as text, for the viewer
-``world``            the robot in 3D, for the viewer
+``world``            the robot in 3D, for the viewer; see ``scene``
+``times``            the time each block took, as text, for the viewer; written last
 ===================  ===============================================================================
 
 Row k of a signal is its value after all outputs of tick k were written. Unwired inputs never
@@ -44,6 +47,7 @@ from ..runtime.signals import Slot
 FORMAT = 1
 """The number of this format; a reader refuses a greater one."""
 SIGNALS, STATES, KEYFRAMES, NOTES, EVENTS = "signals", "states", "keyframes", "notes", "events"
+LIMITS, TIMES, WORLD, GRAPH = "limits", "times", "world", "graph"
 EXACT, BUS, STATE, NOTE = "exact", "bus", "state", "note"
 
 
@@ -129,6 +133,7 @@ class Header:
         ticks: how many the graph runs by itself, if it says so.
         overrides: what was set beside the graph file.
         seeds: the parameters called ``seed``, as ``block.seed``.
+        parameters: every other number or text the blocks were made with, as ``block.name``.
         versions: of Python and of all that computes.
         machine: what byte-equality depends on beside: processor, system, BLAS.
         blocks: in file order.
@@ -150,6 +155,7 @@ class Header:
     ticks: int | None = None
     overrides: Mapping[str, Any] = field(default_factory=dict)
     seeds: Mapping[str, int] = field(default_factory=dict)
+    parameters: Mapping[str, float | str] = field(default_factory=dict)
     versions: Mapping[str, str] = field(default_factory=dict)
     machine: Mapping[str, str] = field(default_factory=dict)
     blocks: tuple[RecordedBlock, ...] = ()

@@ -58,6 +58,7 @@ def make_header(
             for spec in graph.blocks
             if hasattr(spec.params, "seed")
         },
+        parameters=dict(_parameters(graph)),
         versions=versions(),
         machine=machine(),
         blocks=tuple(_block(spec) for spec in graph.blocks),
@@ -70,6 +71,13 @@ def make_header(
 def _block(spec: BlockSpec) -> RecordedBlock:
     kind = f"{spec.block_type.__module__}:{spec.block_type.__qualname__}"
     return RecordedBlock(spec.path, kind, spec.period_ticks, spec.offset_ticks, str(spec.folder))
+
+
+def _parameters(graph: CheckedGraph) -> Iterator[tuple[str, float | str]]:
+    for spec in graph.blocks:
+        for name, value in spec.params:
+            if name != "seed" and isinstance(value, bool | int | float | str):
+                yield f"{spec.path}.{name}", value
 
 
 def _outputs(graph: CheckedGraph) -> Iterator[tuple[str, tuple[Field, bool]]]:

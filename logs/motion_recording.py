@@ -16,9 +16,12 @@ from numpy.typing import NDArray
 
 from ..runtime.description import RobotDescription
 from ..runtime.kinematics import link_poses
-from .robot_view import FORCE, FORCE_SCALE, MASS_CENTRE, capsules, shapes_of
+from .robot_shapes import capsules, shapes_of
+from .scene_contacts import FORCE_SCALE
+from .scene_part import Colors
 
 Array = NDArray[np.float64]
+COLORS = Colors()
 
 
 @dataclass(frozen=True)
@@ -127,18 +130,18 @@ def _write_world(stream: Any, motion: RecordedMotion) -> None:
     )  # fmt: skip
     for link in robot.links:
         entity = f"world/robot/{link.name}"
-        stream.log(entity, capsules(shapes_of(robot, link)), static=True)
+        stream.log(entity, capsules(shapes_of(robot, link), COLORS.robot), static=True)
         position, rotation = poses.of(link.name)
         transforms = rr.Transform3D.columns(translation=position, mat3x3=rotation)
         stream.send_columns(entity, times, transforms)
     forces, count = motion.contact_force * FORCE_SCALE, len(robot.contacts)
-    stream.log("world/contact_forces", rr.Arrows3D.from_fields(colors=[FORCE]), static=True)
+    stream.log("world/contact_forces", rr.Arrows3D.from_fields(colors=[COLORS.force]), static=True)
     arrows = rr.Arrows3D.columns(
         origins=motion.contact_position.reshape(-1, 3), vectors=forces.reshape(-1, 3)
     )
     stream.send_columns("world/contact_forces", times, arrows.partition([count] * len(forces)))
-    point = rr.Points3D.from_fields(colors=[MASS_CENTRE], radii=[0.012])
+    point = rr.Points3D.from_fields(colors=[COLORS.com], radii=[0.012])
     stream.log("world/com", point, static=True)
     stream.send_columns("world/com", times, rr.Points3D.columns(positions=motion.com))
-    way = rr.LineStrips3D([motion.com], colors=[MASS_CENTRE], radii=[0.002])
+    way = rr.LineStrips3D([motion.com], colors=[COLORS.com], radii=[0.002])
     stream.log("world/com_path", way, static=True)

@@ -35,7 +35,7 @@ class Recorder:
     """A sink that records into one file, replacing what was there.
 
     Args:
-        path: the file; its folder is made.
+        path: the file; its folder is made. ``None`` writes none and only shows the run live.
         when_full: what to do when the process cannot keep up: ``wait``, which costs a simulation in
             virtual time nothing but a while, or ``drop`` ticks, which are counted. By default what
             suits the graph's clock: a run in real time never waits.
@@ -44,6 +44,8 @@ class Recorder:
             process that is killed loses no more than that.
         sync_period: seconds after which it is put on the disk; a power cut takes no more than that.
         ring_time: seconds of the run that fit into the ring.
+        live: where a viewer listens (``viewer.Viewer.source``) that is to show the run while it
+            goes on; a viewer that dies or hangs is a warning.
         on_warning: called with each warning at once, where ``warnings`` is looked at in the end.
 
     Attributes:
@@ -54,16 +56,17 @@ class Recorder:
 
     def __init__(
         self,
-        path: str | PathLike[str],
+        path: str | PathLike[str] | None,
         *,
         when_full: WhenFull | None = None,
         keyframe_period: float = 1.0,
         flush_period: float = 0.5,
         sync_period: float = 5.0,
         ring_time: float = 4.0,
+        live: str = "",
         on_warning: Callable[[str], object] | None = None,
     ) -> None:
-        self.path = Path(path)
+        self.path = Path(path) if path is not None else None
         self.warnings: list[str] = []
         self.dropped = 0
         self.report: Report | None = None
@@ -72,6 +75,7 @@ class Recorder:
         self._keyframe_period = keyframe_period
         self._periods = flush_period, sync_period
         self._ring_time = ring_time
+        self._live = live
         self._on_warning = on_warning
         self._gap: tuple[int, int, int] | None = None
 
@@ -112,9 +116,10 @@ class Recorder:
         capacity = ticks * space_of(len(self._bus)) + 4 * space_of(len(self._frame))
         header = header_of(self._bound).to_json()
         try:
-            self.path.parent.mkdir(parents=True, exist_ok=True)
-            self.path.open("wb").close()
-            self.link = RecorderLink(self.path, header, capacity, *self._periods)
+            if self.path is not None:
+                self.path.parent.mkdir(parents=True, exist_ok=True)
+                self.path.open("wb").close()
+            self.link = RecorderLink(self.path, header, capacity, *self._periods, self._live)
         except OSError as error:
             return f"{self.path} cannot be written ({error.strerror or error})"
         return ""
@@ -207,6 +212,8 @@ class Recorder:
                 f"the recording is not whole: {self.report.problem}; {self.report.rows} ticks were "
                 f"written, {self.report.lost} were not"
             )
+        if self.report is not None and self.report.live_problem:
+            self._warn(f"the viewer did not show all of the run: {self.report.live_problem}")
         return self.warnings
 
 

@@ -30,17 +30,23 @@ class RecorderLink:
     """A recorder's process that was started for one file, and the ring it reads.
 
     Args:
-        path: the file.
+        path: the file, if there is to be one.
         header: of the recording, as text.
         capacity: least size of the ring [bytes].
-        flush_period, sync_period: see ``Task``.
+        flush_period, sync_period, live: see ``Task``.
 
     Raises:
         OSError: the process cannot be started.
     """
 
     def __init__(
-        self, path: Path, header: str, capacity: int, flush_period: float, sync_period: float
+        self,
+        path: Path | None,
+        header: str,
+        capacity: int,
+        flush_period: float,
+        sync_period: float,
+        live: str = "",
     ) -> None:
         text = header.encode()
         capacity = max(1 << 16, capacity + space_of(len(text)))
@@ -49,7 +55,8 @@ class RecorderLink:
         try:
             self.ring = RingWriter(descriptor, capacity)
             self.ring.write(HEADER, 0, text)
-            task = Task(descriptor, capacity, str(path.absolute()), flush_period, sync_period)
+            place = str(path.absolute()) if path is not None else ""
+            task = Task(descriptor, capacity, place, flush_period, sync_period, live)
             folders = json.dumps([str(Path(folder).absolute()) for folder in sys.path])
             # not forked, as a copy of this process would hold its robot; and in a session of its
             # own, so that nobody's Ctrl-C ends it before the run has come to rest

@@ -28,6 +28,7 @@ from ..runtime.life_cycle import describe
 from ..runtime.memory import Snapshot
 from ..runtime.notes import Note
 from .format import Header
+from .live_feed import LiveFeed
 from .repair import RepairError, repair
 from .ring import Record, RingReader
 from .writer import RecordingWriter, warm_up
@@ -36,6 +37,8 @@ HEADER, ROW, KEYFRAME, NOTE = 1, 2, 3, 4
 """The kinds of records in the ring; a keyframe is the bytes of the bus, then of the state."""
 POLL = 0.02
 """Seconds between two looks at the ring."""
+LIVE_PERIOD = 0.1
+"""Seconds after which a viewer is shown what has come."""
 LAST_SYNC = 2.0
 """Seconds that the end waits for the disk."""
 BATCH = 512
@@ -46,25 +49,29 @@ BATCH = 512
 class Task:
     """What to write: the ring's ``descriptor`` and ``capacity``, the file, and how many seconds may
     pass before what has come is handed to the operating system (``flush_period``), and before that
-    is told to put it on the disk (``sync_period``)."""
+    is told to put it on the disk (``sync_period``); an empty path stands for no file. ``live`` is
+    where a viewer listens that shows the run while it goes on, if one does."""
 
     descriptor: int
     capacity: int
     path: str
     flush_period: float
     sync_period: float
+    live: str = ""
 
 
 @dataclass
 class Report:
     """What was done: rows surely written, the file's size [bytes], the most memory used [bytes], and
-    what went wrong, if anything; then ``lost`` rows may not be in the file."""
+    what went wrong, if anything; then ``lost`` rows may not be in the file. ``live_problem`` says why
+    the viewer did not show all of the run."""
 
     rows: int = 0
     size: int = 0
     memory: int = 0
     problem: str = ""
     lost: int = 0
+    live_problem: str = ""
 
 
 class RecorderProcess:
@@ -84,11 +91,14 @@ class RecorderProcess:
         self._dirty = False
         self._syncing = threading.Thread()
         self._writer: RecordingWriter | None = None
-        self._guard(lambda: self._open(header))
-        self._flushed = self._synced = time.monotonic()
+        warm_up()
+        if task.path:
+            self._guard(lambda: self._open(header))
+        self.feed = LiveFeed(task.live, header) if task.live else None
+        self._fed_rows = 0
+        self._flushed = self._synced = self._fed = time.monotonic()
 
     def _open(self, header: Header) -> None:
-        warm_up()
         self._writer = RecordingWriter(self._task.path, header)
         self._writer.flush()
 
@@ -97,6 +107,9 @@ class RecorderProcess:
         for record in self._ring.records():
             self._take_one(record)
         now = time.monotonic()
+        if now - self._fed >= LIVE_PERIOD:
+            self._feed_rows()
+            self._fed = now
         if now - self._flushed >= self._task.flush_period:
             self.flush()
             self._flushed = now
@@ -117,6 +130,8 @@ class RecorderProcess:
         elif record.kind == NOTE:
             note = Note(**json.loads(bytes(record.data)))
             self._write(lambda writer: writer.write_note(note))
+            if self.feed is not None:
+                self.feed.note(note)
 
     def flush(self) -> None:
         """Hand to the operating system all that was taken."""
@@ -157,13 +172,33 @@ class RecorderProcess:
             self.sync()
             if self._syncing.is_alive():
                 self._syncing.join(LAST_SYNC)
-        if Path(self._task.path).is_file():
+        if self.feed is not None:
+            self.feed.finish(outcome)
+            self.report.live_problem = self.feed.problem
+        if self._task.path and Path(self._task.path).is_file():
             self.report.size = Path(self._task.path).stat().st_size
         self.report.memory = _memory()
         return self.report
 
+    def problems(self) -> list[str]:
+        """What has gone wrong up to now."""
+        found = []
+        if self.report.problem:
+            found.append(f"nothing more is recorded: {self.report.problem}")
+        if self.feed is not None and self.feed.problem:
+            found.append(f"nothing more is shown live: {self.feed.problem}")
+        return found
+
+    def _feed_rows(self) -> None:
+        """Show the rows that have come since the last time."""
+        first, self._fed_rows = self._fed_rows, self._waiting
+        if self.feed is not None and self._waiting > first:
+            ticks, rows = self._ticks[first : self._waiting], self._rows[first : self._waiting]
+            self.feed.rows(ticks.copy(), rows.copy())
+
     def _write_rows(self) -> None:
-        count, self._waiting = self._waiting, 0
+        self._feed_rows()
+        count, self._waiting, self._fed_rows = self._waiting, 0, 0
         if not count:
             return
         self._last_tick = int(self._ticks[count - 1])
@@ -176,7 +211,7 @@ class RecorderProcess:
     def _settle(self, *, flushed: bool) -> None:
         """Count the rows that were handed over as written or, where that failed, as lost."""
         if self._writer is None:
-            self.report.lost += self._unflushed
+            self.report.lost += self._unflushed if self._task.path else 0
         elif flushed:
             self.report.rows += self._unflushed
         else:
@@ -217,7 +252,8 @@ def main(task: str) -> None:
         signal.signal(number, signal.SIG_IGN)
     recorder = RecorderProcess(Task(**json.loads(task)))
     _say({"ready": True})
-    told, text, source = False, b"", sys.stdin.fileno()
+    told: set[str] = set()
+    text, source = b"", sys.stdin.fileno()
     while True:
         if select.select([source], [], [], POLL)[0]:
             part = os.read(source, 65536)
@@ -225,10 +261,13 @@ def main(task: str) -> None:
                 break
             text += part
         recorder.take()
-        if recorder.report.problem and not told:
-            told = True  # now, as the run may go on for hours
-            print(f"warning: nothing more is recorded: {recorder.report.problem}", file=sys.stderr)
+        for problem in recorder.problems():
+            if problem not in told:
+                told.add(problem)  # now, as the run may go on for hours
+                print(f"warning: {problem}", file=sys.stderr)
     _say(asdict(recorder.finish(json.loads(text) if text else None)))
+    if recorder.feed is not None:
+        os._exit(0)  # a thread that a viewer holds would keep this process from ending
 
 
 def _say(data: dict[str, Any]) -> None:

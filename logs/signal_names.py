@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from itertools import product
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ..runtime.description import RobotDescription
 from .format import RecordedField
 
@@ -40,3 +43,12 @@ def element_names(field: RecordedField, robot: RobotDescription | None) -> list[
     ]
     names = [" ".join(parts) for parts in product(*axes)]
     return names if len(names) <= MOST_NAMES else []
+
+
+AXES = np.array([0xEF5350FF, 0x66BB6AFF, 0x42A5F5FF], np.uint32)
+"""x, y and z are red, green and blue wherever they are drawn."""
+
+
+def axis_colors(field: RecordedField) -> NDArray[np.uint32] | None:
+    """The colours of a vector's three lines; ``None`` where the viewer may choose."""
+    return AXES if field.shape == (3,) else None

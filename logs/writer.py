@@ -7,8 +7,6 @@ system: a process killed after it loses nothing of that.
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
-from dataclasses import asdict
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -19,22 +17,8 @@ from numpy.typing import NDArray
 from ..runtime.memory import Snapshot
 from ..runtime.notes import Note
 from .blueprint import recording_blueprint
-from .format import (
-    BUS,
-    EVENTS,
-    EXACT,
-    KEYFRAMES,
-    NOTE,
-    NOTES,
-    SIGNALS,
-    STATE,
-    STATES,
-    Header,
-    RecordedRows,
-    entity_of,
-)  # fmt: skip
-from .robot_view import RobotWriter, port_with_pose
-from .signal_names import element_names
+from .format import BUS, KEYFRAMES, NOTE, STATE, Header
+from .run_stream import RunStream
 from .time_columns import time_columns
 
 FLUSH_TIMEOUT = 30.0
@@ -58,24 +42,20 @@ class RecordingWriter:
         import rerun as rr
 
         self.path, self.header = Path(path), header
-        self._layout = header.bus.layout()
-        self._last_states: dict[str, int] = {}
         self.path.parent.mkdir(parents=True, exist_ok=True)
         self.path.open("wb").close()  # Rerun would only warn, so find out here
         self._stream = rr.RecordingStream(
             "aloft", recording_id=recording_id or header.name, send_properties=False
         )
         rr.set_log_time_enabled(False, recording=self._stream)
-        port = port_with_pose(header)
-        self._robot = RobotWriter(self._stream, header, port) if port is not None else None
-        self._stream.save(self.path, default_blueprint=recording_blueprint(header, port))
+        self._run = RunStream(self._stream, header)
+        self._stream.save(self.path, default_blueprint=recording_blueprint(header))
         self._write_start()
 
     def _write_start(self) -> None:
         import rerun as rr
 
-        header, stream = self.header, self._stream
-        stream.log("graph", rr.TextDocument(header.graph, media_type="text/plain"), static=True)
+        header = self.header
         about = {
             "header": header.to_json(),
             "name": header.name,
@@ -87,24 +67,12 @@ class RecordingWriter:
             "machine": json.dumps(dict(header.machine)),
             "schema_hashes": json.dumps(header.schema_hashes),
         }
-        stream.send_property("aloft", rr.AnyValues(**about))
-        for field in header.bus.fields:
-            names = element_names(field, header.robot)
-            if names and not field.constant:
-                entity = entity_of(SIGNALS, field.name)
-                stream.log(entity, rr.SeriesLines(names=names), static=True)
-        if self._robot is not None:
-            self._robot.write_static()
+        self._stream.send_property("aloft", rr.AnyValues(**about))
+        self._run.write_start()
 
     def write_rows(self, ticks: NDArray[np.int64], rows: NDArray[np.uint8]) -> None:
         """Write the bus (n, bytes) after each of ``ticks`` (n,), which come in order."""
-        if not len(ticks):
-            return
-        batch = RecordedRows(self.header, ticks, rows, self._layout)
-        self._write_signals(batch)
-        self._write_states(batch)
-        if self._robot is not None:
-            self._robot.write(batch)
+        self._run.write_rows(ticks, rows)
 
     def write_keyframe(self, snapshot: Snapshot) -> None:
         """Write all that the graph remembered before ``snapshot.tick`` ran."""
@@ -116,23 +84,20 @@ class RecordingWriter:
             if len(flat):
                 column = rr.DynamicArchetype.columns("aloft", components={name: flat})
                 columns += list(column.partition([len(flat)]))
-        self._stream.send_columns(KEYFRAMES, self._times(np.array([snapshot.tick])), columns)
+        self._stream.send_columns(
+            KEYFRAMES, time_columns(self.header, np.array([snapshot.tick])), columns
+        )
 
     def write_note(self, note: Note) -> None:
         """Write a note, for machines and for people."""
-        import rerun as rr
-
-        times = self._times(np.array([note.tick]))
-        text = json.dumps(asdict(note))
-        columns = rr.DynamicArchetype.columns("aloft", components={NOTE: [text]})
-        self._stream.send_columns(NOTES, times, columns)
-        self._write_events(times, [note.text], [note.level])
+        self._run.write_note(note)
 
     def write_outcome(self, outcome: dict[str, Any]) -> None:
         """Write what came of the run, last of all."""
         import rerun as rr
 
         values = {"outcome": json.dumps(outcome), "run_hash": str(outcome.get("run_hash", ""))}
+        self._run.write_times(outcome)
         self._stream.send_property("outcome", rr.AnyValues(**values))
 
     def flush(self) -> None:
@@ -149,48 +114,6 @@ class RecordingWriter:
         finally:
             self._stream.disconnect()
 
-    def _times(self, ticks: NDArray[np.int64]) -> list[Any]:
-        return time_columns(self.header, ticks)
-
-    def _write_signals(self, batch: RecordedRows) -> None:
-        import rerun as rr
-
-        times = self._times(batch.ticks)
-        for field in batch.fields():
-            values = batch.signal(field.name)
-            flat = np.ascontiguousarray(values.reshape(len(values), -1))
-            columns = list(rr.Scalars.columns(scalars=flat.astype(np.float64, copy=False)))
-            if field.dtype == "int64":
-                exact = rr.DynamicArchetype.columns("aloft", components={EXACT: flat.reshape(-1)})
-                columns += list(exact.partition(np.full(len(flat), flat.shape[1])))
-            self._stream.send_columns(entity_of(SIGNALS, field.name), times, columns)
-
-    def _write_states(self, batch: RecordedRows) -> None:
-        """Write each change of a number whose values have names, and the same as text."""
-        import rerun as rr
-
-        for field in batch.fields():
-            if not field.values or field.shape:
-                continue
-            numbers = batch.signal(field.name)
-            last = self._last_states.get(field.name, int(numbers[0]) - 1)
-            self._last_states[field.name] = int(numbers[-1])
-            changes = np.flatnonzero(np.diff(numbers, prepend=last))
-            if not len(changes):
-                continue
-            labels = [field.values.get(int(n), str(n)) for n in numbers[changes]]
-            times = self._times(batch.ticks[changes])
-            states = rr.StateChange.columns(state=labels)
-            self._stream.send_columns(entity_of(STATES, field.name), times, states)
-            texts = [f"{field.name}: {label}" for label in labels]
-            self._write_events(times, texts, ["INFO"] * len(texts))
-
-    def _write_events(self, times: Sequence[Any], texts: list[str], levels: list[str]) -> None:
-        import rerun as rr
-
-        columns = rr.TextLog.columns(text=texts, level=levels)
-        self._stream.send_columns(EVENTS, times, columns)
-
 
 def warm_up() -> None:
     """Have Rerun import what it imports when it is first used, which takes a third of a second."""
@@ -204,6 +127,7 @@ def warm_up() -> None:
         rr.Transform3D.columns(translation=points, mat3x3=turns),
         rr.Arrows3D.columns(origins=points, vectors=points),
         rr.Points3D.columns(positions=points),
+        rr.LineStrips3D.columns(strips=[points, points]),
         rr.StateChange.columns(state=["a", "b"]),
         rr.TextLog.columns(text=["a", "b"], level=["INFO", "INFO"]),
         rr.DynamicArchetype.columns("aloft", components={NOTE: ["a", "b"]}),

@@ -8,10 +8,12 @@ from typing import Any
 import numpy as np
 import pytest
 
+from aloft.logs.flights import Flights
 from aloft.logs.format import RecordedField
 from aloft.logs.header import make_header
 from aloft.logs.recording import write_recording
-from aloft.logs.robot_view import Flights, port_with_pose, quaternion_from_z
+from aloft.logs.robot_shapes import quaternion_from_z
+from aloft.logs.scene_ports import port_with_pose
 from aloft.logs.signal_names import element_names
 from aloft.runtime.block import Block, Output, State
 from aloft.runtime.description import RobotDescription
@@ -145,7 +147,11 @@ def test_states_and_events_are_said_by_name(recorded: tuple[CheckedGraph, RunRes
     batch = states["states/robot/truth/stage"]
     assert batch["StateChange:state"].flatten().to_pylist() == ["ground", "air", "ground"]
     assert batch["tick"].to_pylist() == [0, 100, 200]
-    assert set(states) == {"states/robot/truth/stage", "states/leg/robot/truth/stage"}
+    fields = ("stage", "closed/toe", "closed/heel")
+    robots = ("robot", "leg/robot")
+    assert set(states) == {f"states/{robot}/truth/{f}" for robot in robots for f in fields}
+    toe = states["states/robot/truth/closed/toe"]
+    assert toe["StateChange:state"].flatten().to_pylist() == ["closed", "no", "closed"]
     from rerun.chunk import RrdReader
 
     lines = set()
@@ -164,7 +170,10 @@ def test_the_robot_is_posed_in_space(recorded: tuple[CheckedGraph, RunResult, Pa
     assert port_with_pose(make_header(graph, result.log.layout, b"")) == "robot.truth"
     found = batches(path, "/world/**")
     links = {f"world/robot/{name}" for name in ("body", "thigh", "shank")}
-    assert set(found) == links | {"world/contact_forces", "world/com"}
+    others = ("contact_forces", "com", "com_projection", "support_polygon")
+    assert set(found) == links | {f"world/{name}" for name in others}
+    lines = found["world/support_polygon"]["LineStrips3D:strips"]
+    assert [len(row) for row in lines] == [0] * 60  # both points are in one place
     thigh = found["world/robot/thigh"]
     assert thigh["tick"].to_pylist() == list(range(0, TICKS, 5))  # 100 Hz of 500 Hz
     places = thigh["Transform3D:translation"].flatten().flatten().to_numpy().reshape(-1, 3)

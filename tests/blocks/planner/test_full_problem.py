@@ -12,9 +12,10 @@ import pytest
 
 from aloft.blocks.planner.errors import PlanError
 from aloft.blocks.planner.guess import ballistic_guess
+from aloft.blocks.planner.library import SHIPPED
 from aloft.blocks.planner.plan import JumpPlan
 from aloft.blocks.planner.solve import make_problem, solve_jump
-from aloft.blocks.planner.task import make_task
+from aloft.blocks.planner.task import Knots, make_task, read_task
 from aloft.blocks.planner.validity import check_plan
 from aloft.runtime.description import find_robot
 
@@ -96,3 +97,18 @@ def test_a_somersault_without_angular_momentum_is_refused() -> None:
     )  # fmt: skip
     with pytest.raises(PlanError, match="no plan for 'stiff'"):
         solve_jump(task, ROBOT, solver="fatrop")
+
+
+@pytest.mark.parametrize("name", ["in_situ", "forward_10cm", "back_10cm", "step_down_5cm"])
+def test_halving_the_intervals_changes_no_peak(name: str) -> None:
+    task = read_task(SHIPPED.parent / "tasks" / f"{name}.yaml")
+    peaks = []
+    for knots in (task.knots, _doubled(task.knots)):
+        plan = solve_jump(task, ROBOT, knots=knots)
+        motor = np.abs(plan.joint_torque @ ROBOT.torque_to_motor.T).max()
+        peaks.append([motor, plan.contact_force.sum(axis=1)[:, 2].max()])
+    assert peaks[1] == pytest.approx(peaks[0], rel=0.05)
+
+
+def _doubled(knots: Knots) -> Knots:
+    return Knots(**{name: 2 * count for name, count in knots.model_dump().items()})

@@ -1,0 +1,116 @@
+"""Where the robot touches the ground: forces as arrows, friction cones, the support polygon."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .scene_part import Array, Moments, ScenePart
+
+FORCE_SCALE = 0.002
+"""Length of an arrow [m] for each newton: the weight of BRUCE is 10 cm."""
+CONE_HEIGHT = 0.06
+"""Height [m] at which a friction cone is cut: less than an arrow of the usual load."""
+CONE_SIDES = 16
+ABOVE_GROUND = 0.001
+"""Lines on the ground are drawn this far [m] above it, not to be swallowed by the grid."""
+
+
+class ContactPart(ScenePart):
+    """``contact_forces``, ``friction_cones`` and ``support_polygon``.
+
+    A cone stands on each point that carries load; its half angle is the arc tangent of the
+    friction coefficient that the controller counts with. It is not drawn where no block has one.
+    """
+
+    def write_static(self) -> None:
+        """Write the colours."""
+        import rerun as rr
+
+        if self.ports.contact_force is None:
+            return
+        self.log("contact_forces", rr.Arrows3D.from_fields(colors=[self.colors.force]))
+        cones = rr.LineStrips3D.from_fields(colors=[self.colors.cone], radii=[0.0006])
+        self.log("friction_cones", cones)
+        polygon = rr.LineStrips3D.from_fields(colors=[self.colors.support], radii=[0.002])
+        self.log("support_polygon", polygon)
+
+    def write(self, moments: Moments) -> None:
+        """Write the forces and what follows from them."""
+        import rerun as rr
+
+        if self.ports.contact_position is None or self.ports.contact_force is None:
+            return
+        position = moments[self.ports.contact_position]
+        force = moments[self.ports.contact_force]
+        arrows = rr.Arrows3D.columns(
+            origins=position.reshape(-1, 3), vectors=(force * FORCE_SCALE).reshape(-1, 3)
+        )
+        counts = np.full(len(position), position.shape[1])
+        self.send("contact_forces", moments, arrows.partition(counts))
+        loaded = (force != 0.0).any(axis=2)
+        if self.ports.friction:
+            self._write_cones(moments, position, loaded, self.ports.friction)
+        self._write_polygon(moments, position, loaded)
+
+    def _write_cones(
+        self, moments: Moments, position: Array, loaded: NDArray[np.bool_], friction: float
+    ) -> None:
+        cone = cone_lines(friction, CONE_HEIGHT)
+        self._write_lines(
+            "friction_cones", moments, position[loaded][:, None] + cone, loaded.sum(1)
+        )
+
+    def _write_polygon(self, moments: Moments, position: Array, loaded: NDArray[np.bool_]) -> None:
+        polygons = [
+            convex_hull(points[carry]) + np.array([0.0, 0.0, ABOVE_GROUND])
+            for points, carry in zip(position, loaded, strict=True)
+        ]
+        counts = np.array([len(polygon) > 0 for polygon in polygons], np.int64)
+        self._write_lines(
+            "support_polygon", moments, [polygon for polygon in polygons if len(polygon)], counts
+        )
+
+    def _write_lines(
+        self, name: str, moments: Moments, lines: Sequence[Array] | Array, counts: NDArray[np.int64]
+    ) -> None:
+        import rerun as rr
+
+        columns = rr.LineStrips3D.columns(strips=[np.asarray(line) for line in lines])
+        self.send(name, moments, columns.partition(counts))
+
+
+def cone_lines(friction: float, height: float) -> Array:
+    """One line (n, 3) that draws a friction cone on its tip: a ring with four sides to the tip."""
+    angles = np.linspace(0.0, 2.0 * np.pi, CONE_SIDES + 1)
+    ring = np.column_stack([np.cos(angles), np.sin(angles), np.full(len(angles), 1.0 / friction)])
+    ring *= friction * height
+    tip, quarter = np.zeros((1, 3)), CONE_SIDES // 4
+    sides = [np.vstack([tip, ring[k * quarter : k * quarter + 1], tip]) for k in range(1, 4)]
+    return np.vstack([*sides, tip, ring])
+
+
+def convex_hull(points: Array) -> Array:
+    """The closed convex hull (m, 3), seen from above, of points (n, 3), each at its own height.
+
+    Empty where there are fewer than two points; a line there and back where all lie on one.
+    """
+    ordered = sorted({tuple(point) for point in points.tolist()})
+    if len(ordered) < 2:
+        return np.zeros((0, 3))
+    chains = []
+    for direction in (ordered, ordered[::-1]):
+        chain: list[tuple[float, ...]] = []
+        for point in direction:
+            while len(chain) > 1 and _turn(chain[-2], chain[-1], point) <= 0.0:
+                chain.pop()
+            chain.append(point)
+        chains.append(chain)
+    return np.array([*chains[0], *chains[1][1:]])
+
+
+def _turn(a: Sequence[float], b: Sequence[float], c: Sequence[float]) -> float:
+    """Positive where the way a, b, c turns to the left."""
+    return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])

@@ -1,0 +1,37 @@
+"""The push from outside, as an arrow that ends where it acts."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .scene_contacts import FORCE_SCALE
+from .scene_part import Moments, ScenePart
+
+
+class PushPart(ScenePart):
+    """``push``: of length zero but during the push; points are posed as the solid robot is."""
+
+    def write_static(self) -> None:
+        """Write the colour."""
+        import rerun as rr
+
+        if self.ports.push is not None:
+            self.log("push", rr.Arrows3D.from_fields(colors=[self.colors.push], radii=[0.006]))
+
+    def write(self, moments: Moments) -> None:
+        """Write the force where it acts."""
+        import rerun as rr
+
+        names = list(self.robot.points)
+        if self.ports.push is None or not names:
+            return
+        force = moments[f"{self.ports.push}.force"] * FORCE_SCALE
+        point = np.clip(moments[f"{self.ports.push}.point"], 0, len(names) - 1)
+        poses = moments.poses(self.robot, self.ports.pose)
+        ends = np.zeros((len(names), len(moments), 3))
+        for k, (link, place) in enumerate(self.robot.points.values()):
+            position, rotation = poses.of(link)
+            ends[k] = position + rotation @ np.array(place)
+        there = ends[point, np.arange(len(moments))]
+        arrows = rr.Arrows3D.columns(origins=there - force, vectors=force)
+        self.send("push", moments, arrows)

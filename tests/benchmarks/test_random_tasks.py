@@ -1,0 +1,46 @@
+"""Tasks drawn by seed."""
+
+import pytest
+
+from aloft.benchmarks import random_tasks as module
+from aloft.benchmarks.random_tasks import plan_one, random_rows, random_tasks
+from aloft.blocks.planner.errors import PlanError
+from aloft.blocks.planner.task import make_task
+from aloft.runtime.description import find_robot
+
+
+def test_a_seed_is_always_the_same_tasks() -> None:
+    assert random_tasks(40, 3) == random_tasks(40, 3)
+    assert random_tasks(40, 3) == random_tasks(60, 3)[:40]
+    assert random_tasks(40, 3) != random_tasks(40, 4)
+
+
+def test_every_kind_is_drawn_within_its_range() -> None:
+    tasks = random_tasks(200, 1)
+    kinds = {task.name.rpartition(" ")[0] for task in tasks}
+    assert kinds == set(module._KINDS)
+    assert all(0.05 <= (task.rise or 0.0) <= 0.18 for task in tasks)
+    assert max(task.distance_x for task in tasks) <= 0.20
+    assert max(abs(task.distance_y) for task in tasks) <= 0.15
+    assert {task.profile for task in tasks} == {"koala"}
+    assert {task.effort for task in tasks} == {1.0}
+
+
+def test_what_fails_is_counted_and_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    def solve(task: object, robot: object) -> None:
+        if getattr(task, "distance_y", 0.0) == 0.0 and getattr(task, "twist", 0.0) == 0.0:
+            raise PlanError("no plan", family="apex")
+
+    monkeypatch.setattr(module, "solve_and_check", solve)
+    share, _, _ = random_rows(16, 2)
+    failed = [t for t in random_tasks(16, 2) if not t.distance_y and not t.twist]
+    assert share.value == len(failed) / 16 > 0.0
+    assert f"{failed[0].name} (apex)" in share.note
+    assert share.met is False
+
+
+def test_one_task_is_planned_and_checked() -> None:
+    robot = find_robot("bruce")
+    assert plan_one(random_tasks(1, 5)[0].model_copy(update={"twist": 0.0}), robot) == ""
+    crooked = make_task({"name": "crooked", "rise": 0.1, "initial": {"right_ankle": 0.1}})
+    assert plan_one(crooked, robot) == "stance"
