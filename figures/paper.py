@@ -28,12 +28,10 @@ if TYPE_CHECKING:
     from .trace import Trace
 
 JUMP, FORWARD, TURN, STEP = "in-situ jump", "forward jump", "turn", "step up"
-SOMERSAULT = "somersault off a platform"
+SOMERSAULT = "somersault in place"
 ARMS = ("heuristic off", "the paper's law", "deviation law")
-SOMERSAULTS = {
-    "somersault": ("somersault_forward_35cm", "off the 35 cm platform"),
-    "somersault_in_place": ("somersault_in_place", "in place"),
-}
+PLANNED = "somersault_forward_35cm"
+"""The task of the somersault that is shown as a plan."""
 FILES = {
     "jump": "paper_jump.png",
     "push": "paper_push.png",
@@ -63,8 +61,21 @@ def draw(
     drawings: dict[str, Callable[[], tuple[Picture, Mapping[str, Any]]]] = {
         "jump": lambda: (draw_jump(traces[JUMP], robot), jump_numbers(traces[JUMP])),
         "push": lambda: _push(traces),
-        "step": lambda: _step(traces[STEP], by_task[STEP], robot),
-        **{name: _somersault(name, robot) for name in SOMERSAULTS},
+        "step": lambda: _frames(
+            "Jump onto a 5 cm step",
+            traces[STEP],
+            by_task[STEP],
+            View((0.06, 0.0, 0.27), 1.25),
+            robot,
+        ),
+        "somersault": lambda: _plan(robot),
+        "somersault_in_place": lambda: _frames(
+            "Somersault in place, relaxed motors",
+            traces[SOMERSAULT],
+            by_task[SOMERSAULT],
+            View((0.05, 0.0, 0.32), 1.6),
+            robot,
+        ),
     }
     figures: dict[str, Any] = {}
     for name, drawing in drawings.items():
@@ -113,7 +124,10 @@ def _push(traces: Mapping[str, Trace]) -> tuple[Picture, Mapping[str, Any]]:
     return draw_push(arms), numbers
 
 
-def _step(trace: Trace, row: Row, robot: RobotDescription) -> tuple[Picture, Mapping[str, Any]]:
+def _frames(
+    title: str, trace: Trace, row: Row, view: View, robot: RobotDescription
+) -> tuple[Picture, Mapping[str, Any]]:
+    """Frames of a run."""
     names = ("base_position", "base_orientation", "joint_position")
     motion = Motion(trace.time, *(trace.truth(name) for name in names))
     end = float(trace.time[-1])
@@ -127,59 +141,44 @@ def _step(trace: Trace, row: Row, robot: RobotDescription) -> tuple[Picture, Map
         f"Closed loop, standard trial, seed {trace.seed}: {verdict}.",
         f"{row.successes} of {row.n} tuning seeds succeed.",
     ]
-    view = View((0.06, 0.0, 0.27), 1.25)
-    scene = scene_of(row.cell)
-    return draw_strip("Jump onto a 5 cm step", notes, motion, moments, robot, scene, view), {}
+    numbers = {"flight_s": flight[1] - flight[0]} if flight else {}
+    picture = draw_strip(title, notes, motion, moments, robot, scene_of(row.cell), view)
+    return picture, numbers
 
 
-def _somersault(
-    name: str, robot: RobotDescription
-) -> Callable[[], tuple[Picture, Mapping[str, Any]]]:
-    """Draws frames of a planned somersault."""
+def _plan(robot: RobotDescription) -> tuple[Picture, Mapping[str, Any]]:
+    """Frames of a planned somersault."""
+    from ..blocks.planner.library import SHIPPED, PlanLibrary
+    from ..blocks.planner.task import read_task
+    from ..hal.scenes import flat, platform
 
-    def drawing() -> tuple[Picture, Mapping[str, Any]]:
-        from ..blocks.planner.library import SHIPPED, PlanLibrary
-        from ..blocks.planner.task import read_task
-        from ..hal.scenes import flat, platform
-
-        file, words = SOMERSAULTS[name]
-        path = SHIPPED.parent / "tasks" / f"{file}.yaml"
-        if not path.is_file():
-            raise NotThereError(f"there is no task {path.name} yet")
-        task = read_task(path)
-        plan = PlanLibrary(robot).find(task)
-        if plan is None:
-            raise NotThereError(f"there is no plan of {path.name}; make it with 'aloft plan'")
-        height = -float(task.landing_height)
-        scene = platform(height, float(task.step_edge or 0.1)) if height > 0.0 else flat()
-        motion = Motion(
-            plan.time, plan.position[:, :3], plan.position[:, 3:7], plan.position[:, 7:]
+    task = read_task(SHIPPED.parent / "tasks" / f"{PLANNED}.yaml")
+    plan = PlanLibrary(robot).find(task)
+    if plan is None:
+        raise NotThereError(f"there is no plan of {PLANNED}; make it with 'aloft plan'")
+    height = -float(task.landing_height)
+    scene = platform(height, float(task.step_edge or 0.1)) if height > 0.0 else flat()
+    motion = Motion(plan.time, plan.position[:, :3], plan.position[:, 3:7], plan.position[:, 7:])
+    lift_off, touchdown = plan.lift_off_time, plan.touchdown_time
+    times = [
+        0.7 * lift_off,
+        *np.linspace(lift_off, touchdown, 6).tolist(),
+        float(plan.time[-1]),
+    ]
+    names = ["thrust", "lift-off", *["flight"] * 4, "touchdown", "end of the plan"]
+    moments = [Moment(t, f"{t:.2f} s  {text}") for t, text in zip(times, names, strict=True)]
+    middle = 0.5 * (motion.base[0] + motion.base[-1])
+    view = View((float(middle[0]), 0.0, float(motion.base[:, 2].mean())), 1.7 + height)
+    verdict = "passes" if plan.valid else "does NOT pass"
+    notes = [
+        (
+            "The PLAN, not a run: its knots posed by the simulator's model. "
+            f"It {verdict} the check with exact dynamics, motors '{task.profile}'."
         )
-        lift_off, touchdown = plan.lift_off_time, plan.touchdown_time
-        end = float(plan.time[-1])
-        times = [0.7 * lift_off, *np.linspace(lift_off, touchdown, 6).tolist(), end]
-        names = ["thrust", "lift-off", *["flight"] * 4, "touchdown", "end of the plan"]
-        moments = [Moment(t, f"{t:.2f} s  {text}") for t, text in zip(times, names, strict=True)]
-        middle = 0.5 * (motion.base[0] + motion.base[-1])
-        view = View((float(middle[0]), 0.0, float(motion.base[:, 2].mean())), 1.7 + height)
-        apex = float(plan.com[:, 2].max() - plan.com[0, 2])
-        verdict = "passes" if plan.valid else "does NOT pass"
-        notes = [
-            (
-                "The PLAN, not a run: its knots posed by the simulator's model. "
-                f"It {verdict} the check with exact dynamics, motors '{task.profile}'."
-            )
-        ]
-        numbers = {
-            "profile": task.profile,
-            "valid": plan.valid,
-            "flight_s": touchdown - lift_off,
-            "apex_above_start_cm": 100.0 * apex,
-        }
-        title = f"Somersault {words}"
-        return draw_strip(title, notes, motion, moments, robot, scene, view), numbers
-
-    return drawing
+    ]
+    numbers = {"profile": task.profile, "valid": plan.valid, "flight_s": touchdown - lift_off}
+    title = "Somersault off the 35 cm platform"
+    return draw_strip(title, notes, motion, moments, robot, scene, view), numbers
 
 
 def scene_of(cell: Cell) -> Scene:
