@@ -23,6 +23,7 @@ FOLDER = Path(__file__).parent
 JUMP = FOLDER.parent / "graphs" / "jump.yaml"
 THRUST = 0.98
 """An instant [s] late in the thrust, when the forces are large."""
+PATIENCE = 300.0
 MISTAKES = """rate: 500 Hz
 duration: 1 s
 robot: bruce
@@ -50,7 +51,10 @@ def save_view(recording: Path, instant: float, path: Path) -> None:
     viewer = start_viewer("headless", [recording], size="1600x900")
     try:
         client = ViewerClient.connect(viewer.source)
+        end = time.monotonic() + PATIENCE
         while not (state := client.get_state()).recordings or state.loading or not state.views:
+            if time.monotonic() > end:
+                raise TimeoutError(f"the recording is not shown after {PATIENCE:g} s")
             time.sleep(0.2)
         client.set_time("t", duration=instant, play_state="paused")
         time.sleep(3.0)  # for what comes into view to be drawn
