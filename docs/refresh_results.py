@@ -9,7 +9,7 @@ from statistics import median
 from aloft.runtime.seeds import SeedRow, run_seeds
 
 ROOT = Path(__file__).parent.parent
-SEEDS = range(2000, 2020)  # chosen before looking, and never run while anything was tuned
+SEEDS = range(6000, 6020)  # chosen before looking, and never run while anything was tuned
 FIGURES = (
     ("apex_above_standing_m", "apex above standing", 100.0, "cm", "10.8 to 13.2"),
     ("apex_from_squat_m", "apex from squat", 100.0, "cm", "at least 15"),
