@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +14,7 @@ from ..runtime.kernel import kernel
 from ..runtime.parameters import Parameters, live_parameter, parameter
 from ..runtime.signals import Field, Signal
 from .leg_kinematics import forward, inverse, inverse_velocity, jacobian, read_leg
-from .signals import FootTarget, JointState, JointTarget
+from .signals import FootTarget, JointState, JointTarget, JumpReference, Phase
 
 Array = NDArray[np.float64]
 
@@ -45,6 +46,10 @@ class LegInverseKinematics(Block):
     with u the target's line. They are limited to ``speed_limit``, and are zero for a joint held at
     its limit. A line that turns by more than 0.1 rad in one tick is a new target, not a motion.
 
+    With ``follow: plan`` the targets are the plan's joints while the plan flies, and the landing
+    law has no say: a somersault turns as fast as its legs are tucked, so its rotation is right
+    only if all joints are where they should be.
+
     Joints that belong to no leg keep their measured angle. Does not avoid collisions between the
     legs. Raises ``BlockError`` at load for a leg that is not a hip yaw, pitch and roll with
     intersecting axes, a knee and an ankle.
@@ -63,10 +68,15 @@ class LegInverseKinematics(Block):
             0.005, unit="m", ge=0.0, le=0.05, text="over which a stretching leg slows down"
         )
 
+        follow: Literal["feet", "plan"] = parameter(
+            "feet", text="the feet's targets, or the plan's joints as long as the plan flies"
+        )
+
     params: Params
 
     feet = Input(FootTarget, text="where the feet should be, from the base")
     joints = Input(JointState, text="measured joints: where to stay where any angle will do")
+    reference = Input(JumpReference, default={}, text="the plan, where its joints are followed")
     target = Output(JointTarget, text="joint angles and velocities to track")
     lines = State(FootLines, text="to difference the lines")
 
@@ -91,6 +101,14 @@ class LegInverseKinematics(Block):
         self._normal = np.zeros((5, 5))
 
     def step(self) -> None:
+        self._reach()
+        if self.params.follow == "plan" and int(self.reference.phase) == Phase.FLIGHT:
+            self.target.position[...] = self.reference.joint_position
+            self.target.velocity[...] = self.reference.joint_velocity
+            self.target.reachable[...] = True
+
+    def _reach(self) -> None:
+        """Joint angles and velocities for the feet's targets."""
         feet, target, lines = self.feet, self.target, self.lines
         angles, speeds, turn = self._angles, self._speeds, self._turn
         target.position[...] = self.joints.position

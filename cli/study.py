@@ -26,7 +26,9 @@ if TYPE_CHECKING:
 
 
 def study(
-    file: Annotated[Path, typer.Argument(help="The study file.")],
+    file: Annotated[
+        Path, typer.Argument(help="The study file; or 'paper': redraw the paper's figures.")
+    ],
     seeds: Annotated[
         str, typer.Option(help="Other seeds than the study's: 0:4 for a quick look.")
     ] = "",
@@ -53,12 +55,20 @@ def study(
 
     Runs that were made before are not made again, so a study that was stopped or killed goes on
     where it was. Exits with 0 when all goals are met, 1 when one is missed, 3 when a run broke.
+
+    'aloft study paper' makes the runs of the paper's figures, draws them into docs (or --out), and
+    writes the page about them there.
     """
     from ..runtime.seeds import parse_seeds
     from ..studies.reading import part_of, read_study
+    from .paper import NAME, draw_paper
 
     screen = console(to_stderr=as_json)
     with errors_reported(as_json):
+        if file == Path(NAME) and not file.exists():
+            if where or tune or dry_run or cluster:
+                raise AloftError(f"'aloft study {NAME}' takes --out, --seeds, --workers and --json")
+            raise typer.Exit(draw_paper(out, seeds, workers, screen, as_json))
         found = read_study(file)
         chosen = parse_seeds(seeds) if seeds else list(found.seeds)
         folder = out or Path("results") / found.name

@@ -1,8 +1,13 @@
-"""Makes the terminal pictures of the README: ``python docs/make_pictures.py`` from the root."""
+"""Makes the pictures of the README: ``python docs/make_pictures.py`` from the root.
+
+That of the viewer needs software Vulkan (Debian's mesa-vulkan-drivers), or a graphics card.
+"""
 
 from __future__ import annotations
 
 import io
+import tempfile
+import time
 from pathlib import Path
 
 from rich.console import Console
@@ -11,9 +16,14 @@ from aloft import LoadError, load
 from aloft.cli.graph import print_table
 from aloft.cli.output import say
 from aloft.cli.run import print_result
+from aloft.logs.recorder import Recorder
+from aloft.logs.viewer import ViewerError, start_viewer
 
 FOLDER = Path(__file__).parent
 JUMP = FOLDER.parent / "graphs" / "jump.yaml"
+THRUST = 0.98
+"""An instant [s] late in the thrust, when the forces are large."""
+PATIENCE = 300.0
 MISTAKES = """rate: 500 Hz
 duration: 1 s
 robot: bruce
@@ -34,10 +44,35 @@ def save(out: Console, name: str, title: str) -> None:
     out.save_svg(str(FOLDER / name), title=title)
 
 
+def save_view(recording: Path, instant: float, path: Path) -> None:
+    """What `aloft view` shows of a recording at an instant [s]."""
+    from rerun.experimental import ViewerClient
+
+    viewer = start_viewer("headless", [recording], size="1600x900")
+    try:
+        client = ViewerClient.connect(viewer.source)
+        end = time.monotonic() + PATIENCE
+        while not (state := client.get_state()).recordings or state.loading or not state.views:
+            if time.monotonic() > end:
+                raise TimeoutError(f"the recording is not shown after {PATIENCE:g} s")
+            time.sleep(0.2)
+        client.set_time("t", duration=instant, play_state="paused")
+        time.sleep(3.0)  # for what comes into view to be drawn
+        client.save_screenshot(str(path.absolute()))
+    finally:
+        viewer.stop()
+
+
 def main() -> None:
     """Make all pictures."""
     graph = load(JUMP)
-    result = graph.run()
+    with tempfile.TemporaryDirectory() as folder:
+        recording = Path(folder) / "jump.rrd"
+        result = graph.run(sinks=[Recorder(recording)])
+        try:
+            save_view(recording, THRUST, FOLDER / "jump.png")
+        except (ViewerError, TimeoutError) as error:
+            print(f"warning: docs/jump.png is the old one: {error}")
     out = console(90)
     print_result(out, graph.checked.name, result)
     say(out, f"{'success' if result.success else 'no success'}: {result.reason}")

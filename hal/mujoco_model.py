@@ -60,6 +60,27 @@ def build_mujoco_model(
         ValueError: the description's joints are not in depth-first order, or its transmission
             couples a joint more strongly to others than fixed tendons can express.
     """
+    spec = mujoco_spec(robot, profile=profile, scene=scene, timestep=timestep, variation=variation)
+    model = spec.compile()
+    names = [model.joint(k).name for k in range(1, model.njnt)]
+    if names != [joint.name for joint in robot.joints]:
+        raise ValueError(f"{robot.name}: the joints must be listed depth first: {', '.join(names)}")
+    return model
+
+
+def mujoco_spec(
+    robot: RobotDescription,
+    *,
+    profile: str = "koala",
+    scene: Scene | None = None,
+    timestep: float = 0.0005,
+    variation: Variation | None = None,
+) -> MjSpec:
+    """The same before it is compiled, for who adds to it, such as colours.
+
+    Raises:
+        KeyError, ValueError: as ``build_mujoco_model``, but for the order of the joints.
+    """
     import mujoco
 
     variation = variation or Variation()
@@ -73,11 +94,7 @@ def build_mujoco_model(
     _add_ground(spec, scene or Scene(), variation)
     _add_robot(spec, robot, robot.profiles[profile], variation)
     _add_sensors(spec, robot)
-    model = spec.compile()
-    names = [model.joint(k).name for k in range(1, model.njnt)]
-    if names != [joint.name for joint in robot.joints]:
-        raise ValueError(f"{robot.name}: the joints must be listed depth first: {', '.join(names)}")
-    return model
+    return spec
 
 
 def rotor_inertia(robot: RobotDescription, profile: ActuatorProfile) -> NDArray[np.float64]:

@@ -60,7 +60,7 @@ def scene_view(shown: Sequence[Shown]) -> Any:
         origin=WORLD if not shown[0].root else "/",
         contents=[f"/{run.root}{WORLD}/**" for run in shown],
         name="Robot",
-        eye_controls=rrb.EyeControls3D(position=(0.8, -1.0, 0.45), look_target=(0.0, 0.0, 0.25)),
+        eye_controls=rrb.EyeControls3D(position=(0.6, -0.8, 0.4), look_target=(0.0, 0.0, 0.25)),
         line_grid=rrb.LineGrid3D(visible=True, spacing=0.1),
     )
 

@@ -29,7 +29,7 @@ WAITING = 64
 """Pieces of work that may wait for the viewer."""
 PATIENCE = 10.0
 """Seconds without any progress, though there is work, after which the viewer is given up."""
-LAST_WAIT = 5.0
+LAST_WAIT = 3.0
 """Seconds that the end of the run waits for the viewer to have everything."""
 
 

@@ -19,7 +19,7 @@ MAIN_FIELDS = ("contact_force", "motor_torque", "motor_speed")
 """Of the port that poses the robot, in the first tab beside centre of mass and base."""
 MOST_PLOTS = 5
 """Shown first of a graph without a robot."""
-PALE = np.array([0xFFCDD2FF, 0xC8E6C9FF, 0xBBDEFBFF], np.uint32)
+OTHER = np.array([0xFFA726FF, 0xC0CA33FF, 0x26C6DAFF], np.uint32)
 """x, y and z of what lies over the true values: an estimate, the other run."""
 DARK = np.array([0x8E3B38FF, 0x3E6B40FF, 0x2B628EFF], np.uint32)
 """x, y and z of a plan, below the true values."""
@@ -78,7 +78,7 @@ def _series(header: Header, line: Line, label: str, *, other: bool) -> Any:
     names = [f"{label} {name}" for name in element_names(line.field, header.robot)]
     colors = None
     if line.field.shape == (3,):
-        colors = PALE if other else AXES if line.colors is None else line.colors
+        colors = OTHER if other else AXES if line.colors is None else line.colors
     widths = [1.0 if other or line.label in ("estimated", "planned") else 2.0] * len(names)
     return rr.SeriesLines(names=names, colors=colors, widths=widths)
 
@@ -103,7 +103,7 @@ def main_plots(header: Header, ports: ScenePorts | None, shown: Sequence[Shown])
     )
     plots = []
     for name, actual, guess, plan in overlays:
-        known = (("planned", plan, DARK), ("", actual, AXES), ("estimated", guess, PALE))
+        known = (("planned", plan, DARK), ("", actual, AXES), ("estimated", guess, OTHER))
         lines = [Line(fields[n], label, c) for label, n, c in known if n in fields]
         if lines:
             lines.sort(key=lambda line: line.label != "")  # the true one first: it names the unit

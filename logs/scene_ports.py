@@ -86,7 +86,9 @@ def scene_ports(header: Header) -> ScenePorts | None:
     ports = ports_of(header)
     truth = port_with_pose(header)
     base = port_with(ports, "position", "orientation", "linear_velocity")
-    joints = port_with(ports, "position:n_joints", "velocity", "torque")
+    # measured joints: a command has gains, too
+    measured = {port: fields for port, fields in ports.items() if "stiffness" not in fields}
+    joints = port_with(measured, "position:n_joints", "velocity", "torque")
     estimate = None
     if base is not None and joints is not None:
         estimate = PoseSource(f"{base}.position", f"{base}.orientation", f"{joints}.position")

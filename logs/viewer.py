@@ -8,6 +8,7 @@ from __future__ import annotations
 import os
 import socket
 import subprocess
+import sys
 import tempfile
 import time
 from collections.abc import Sequence
@@ -86,6 +87,9 @@ def start_viewer(
         ViewerError: Rerun is not installed, or the viewer ended at once.
     """
     program = find_program()
+    screens = ("DISPLAY", "WAYLAND_DISPLAY", "WAYLAND_SOCKET")
+    if kind == "window" and sys.platform == "linux" and not any(map(os.environ.get, screens)):
+        raise ViewerError(_explained(kind, "there is no screen", b""))
     port, web_port = free_ports(2)
     command = [str(program), "--bind", ADDRESS, "--port", str(port)]
     if kind == "web":
@@ -126,12 +130,20 @@ def _wait_until_it_listens(viewer: Viewer) -> None:
             if time.monotonic() > end:
                 raise ViewerError(f"it did not listen within {START_TIME:g} s")
             time.sleep(0.05)
+    if viewer.kind == "window":
+        time.sleep(0.5)  # it listens before it opens its window, which may end it
+        if not viewer.lives():
+            raise ViewerError(f"it ended with code {viewer.process.returncode}")
 
 
 def _explained(kind: ViewerKind, what: str, output: bytes) -> str:
     lines = [line.strip() for line in output.decode(errors="replace").splitlines() if line.strip()]
     said = f" ({lines[-1]})" if lines else ""
-    hint = "; without a screen, use the viewer in a browser" if kind == "window" else ""
+    hint = (
+        "; without a screen, use the viewer in a browser: --web, or --rerun web"
+        if kind == "window"
+        else ""
+    )
     return f"the Rerun viewer cannot be shown: {what}{said}{hint}"
 
 

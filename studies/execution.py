@@ -11,6 +11,7 @@ from time import perf_counter
 from ..runtime.errors import AloftError, ExitCode
 from ..runtime.graph import Graph
 from ..runtime.jobs import job_results
+from ..runtime.run_result import RunResult
 from .expansion import Cell, Job, job, load_cell
 from .journal import Journal, Outcome
 
@@ -47,6 +48,15 @@ def run_job(work: Job) -> Outcome:
     except AloftError as error:
         text = str(error)
         return Outcome(False, text, error=text, wall_time_s=perf_counter() - begin)
+    return outcome_of(result, perf_counter() - begin)
+
+
+def outcome_of(result: RunResult, wall_time: float = 0.0) -> Outcome:
+    """What is kept of a run.
+
+    Raises:
+        AloftError: a signal ended the run, so that it is none.
+    """
     if result.exit_code in (ExitCode.INTERRUPTED, ExitCode.TERMINATED):
         raise AloftError(result.reason)
     failed = result.exit_code == ExitCode.RUN_FAILED or result.error is not None
@@ -56,7 +66,7 @@ def run_job(work: Job) -> Outcome:
         result.run_hash,
         result.to_json()["metrics"],
         result.reason if failed else "",
-        perf_counter() - begin,
+        wall_time,
     )
 
 

@@ -14,7 +14,7 @@ import pytest
 from aloft.runtime.registry import find_block, known_names
 
 ROOT = Path(__file__).parent.parent
-PACKAGES = ("runtime", "blocks", "hal", "logs", "studies", "benchmarks", "cli", "graphs")
+PACKAGES = ("runtime", "blocks", "hal", "logs", "studies", "figures", "benchmarks", "cli", "graphs")
 ALLOWED = {
     "graphs": set(),
     "runtime": {"runtime"},
@@ -22,10 +22,11 @@ ALLOWED = {
     "hal": {"hal", "runtime"},
     "logs": {"logs", "runtime"},
     "studies": {"studies", "runtime"},
+    "figures": {"figures", "studies", "runtime", "blocks", "hal"},
     "benchmarks": {"benchmarks", "runtime", "blocks", "hal", "logs"},
-    "cli": {"cli", "studies", "benchmarks", "runtime", "blocks", "hal", "logs"},
+    "cli": {"cli", "studies", "figures", "benchmarks", "runtime", "blocks", "hal", "logs"},
 }
-HEAVY = {"mujoco", "pinocchio", "qpsolvers", "daqp", "rerun", "scipy", "numba", "pyarrow"}
+HEAVY = {"mujoco", "pinocchio", "qpsolvers", "daqp", "rerun", "scipy", "numba", "pyarrow", "PIL"}
 LONGEST = 400
 
 

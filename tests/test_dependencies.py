@@ -13,6 +13,7 @@ ROOT = Path(__file__).parent.parent
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
 NOT_SHIPPED = ("tests", "docs", "scripts")
 BY = {
+    "PIL": "pillow",
     "dask": "distributed",
     "mujoco": "mujoco-core",
     "pinocchio": "pin",

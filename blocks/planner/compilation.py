@@ -13,7 +13,9 @@ import os
 import shutil
 import subprocess
 import tempfile
-from collections.abc import Callable
+from collections import deque
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -114,21 +116,58 @@ def _load(
     progress: Progress | None,
 ) -> dict[str, Piece]:  # fmt: skip
     compiler = _compiler() if compiled else None
-    pieces = {}
-    for done, name in enumerate(names):
+    pieces: dict[str, Piece] = {}
+    waiting, elsewhere = deque(names), 0
+    while waiting:
+        name = waiting.popleft()
         library = cache_folder() / key / f"{name}.so"
-        usable = compiled and library.is_file()
-        if not usable and progress is not None:
-            how = "compiling" if compiler else "building"
-            progress(f"{how} the {functions.name} {name} functions", done, len(names))
-        piece = None if usable else functions.make(name)
-        if piece is not None and compiler is not None:
-            usable = _compile(compiler, piece, library)
+        # What another process is compiling comes last, when there is nothing else to do but wait.
+        with _claimed(library, compiler, wait=elsewhere > len(waiting)) as ours:
+            if not ours:
+                waiting.append(name)
+                elsewhere += 1
+                continue
+            elsewhere = 0
+            usable = compiled and library.is_file()
+            if not usable and progress is not None:
+                how = "compiling" if compiler else "building"
+                progress(f"{how} the {functions.name} {name} functions", len(pieces), len(names))
+            piece = None if usable else functions.make(name)
+            if piece is not None and compiler is not None:
+                usable = _compile(compiler, piece, library)
         prefix = f"{functions.name}_{name}"
         pieces[name] = _external(library, prefix) if usable or piece is None else piece
     if progress is not None:
         progress(f"{functions.name} functions ready", len(names), len(names))
     return pieces
+
+
+@contextmanager
+def _claimed(library: Path, compiler: str | None, *, wait: bool) -> Iterator[bool]:
+    """Whether a library that is missing is this process's to make, so that no two make the same.
+
+    With ``wait`` it becomes so when the other process is done or has died. Where files cannot be
+    locked, and where nothing is to be made, it always is.
+    """
+    try:
+        import fcntl
+
+        missing = compiler is not None and not library.is_file()
+        if missing:
+            library.parent.mkdir(parents=True, exist_ok=True)
+        lock = library.with_suffix(".lock").open("w") if missing else None
+    except (ImportError, OSError):
+        lock = None
+    if lock is None:
+        yield True
+        return
+    with lock:
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX if wait else fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            yield False
+        else:
+            yield True
 
 
 def _external(library: Path, prefix: str) -> Piece:

@@ -12,6 +12,7 @@ from hypothesis.extra.numpy import arrays
 
 from aloft.blocks import leg_kinematics
 from aloft.blocks.leg_inverse_kinematics import LegInverseKinematics
+from aloft.blocks.signals import Phase
 from aloft.runtime.description import find_robot
 from aloft.runtime.errors import BlockError
 from aloft.runtime.testing import BlockBench
@@ -139,3 +140,16 @@ def test_the_margin_is_kept_and_the_description_is_not_changed():
 def test_needs_a_robot():
     with pytest.raises(BlockError, match="name one in the graph"):
         BlockBench(LegInverseKinematics, dimensions=dict(ROBOT.dimensions))
+
+
+def test_the_plans_joints_are_followed_as_long_as_the_plan_flies():
+    bench = BlockBench(LegInverseKinematics, {"follow": "plan"}, robot="bruce")
+    planned = {"joint_position": np.linspace(-0.5, 0.5, 10), "joint_velocity": 2.0}
+    bench.set("reference", phase=int(Phase.FLIGHT), **planned)
+    bench.step()
+    target = bench.get("target")
+    assert np.array_equal(target.position, np.linspace(-0.5, 0.5, 10))
+    assert (target.velocity == 2.0).all() and target.reachable.all()
+    bench.set("reference", phase=int(Phase.LANDING), **planned)
+    bench.step()
+    assert not np.array_equal(bench.get("target").position, np.linspace(-0.5, 0.5, 10))

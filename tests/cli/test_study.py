@@ -94,7 +94,8 @@ def test_a_wrong_study_is_refused_before_anything_runs(
 def test_killed_and_resumed_with_nothing_lost_or_made_twice(
     study: Path, folder: Path, call_json: CallJson, start: Start
 ) -> None:
-    study.write_text(STUDY.replace("1000:1004", "1000:1005"))
+    # enough runs that some are left when a busy machine lets this process see the third
+    study.write_text(STUDY.replace("1000:1004", "1000:1015"))
     journal = folder / "results" / "grid" / "runs.jsonl"
     process = start("study", "grid.yaml", "--workers", "1")
     end = time.monotonic() + 240.0
@@ -108,11 +109,11 @@ def test_killed_and_resumed_with_nothing_lost_or_made_twice(
     kept = journal.read_bytes().rpartition(b"\n")[0] + b"\n"
     journal.write_bytes(kept + kept[:40])
     before = kept.count(b"\n")
-    assert 3 <= before < 20
+    assert 3 <= before < 60
     result = call_json("study", "grid.yaml", "--workers", "2", code=1)
-    assert result["n"] == 20
+    assert result["n"] == 60
     lines = journal.read_text().splitlines()
-    assert len(lines) == 20 == len({json.loads(line)["key"] for line in lines})
+    assert len(lines) == 60 == len({json.loads(line)["key"] for line in lines})
     assert journal.read_bytes().startswith(kept)
     again = call_json("study", "grid.yaml", "--out", "fresh", "--workers", "1", code=1)
     assert {**again, "table": ""} == {**result, "table": ""}

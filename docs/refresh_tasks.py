@@ -1,0 +1,35 @@
+"""Writes the README's table of tasks from a study's summary.
+
+::
+
+    aloft study graphs/studies/tasks.yaml
+    python docs/refresh_tasks.py results/tasks/summary.json
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).parent.parent
+TABLE = re.compile(r"(<!-- tasks -->\n).*?(<!-- end of tasks -->)", re.DOTALL)
+
+
+def tasks_table(summary: dict[str, object]) -> str:
+    """One row a task: how many of its runs succeeded, and between which rates that lies."""
+    lines = ["| task | succeeded | 95 % interval | goal |", "|---|---|---|---|"]
+    for row in summary["rows"]:  # type: ignore[attr-defined]
+        low, high = (f"{100.0 * row[key]:.0f} %" for key in ("ci_low", "ci_high"))
+        goal = f"{100.0 * row['goal']:.0f} %, {'met' if row['met'] else 'missed'}"
+        lines.append(
+            f"| {row['task']} | {row['successes']} of {row['n']} | {low} to {high} | {goal} |"
+        )
+    return "\n".join(lines) + "\n"
+
+
+if __name__ == "__main__":
+    readme = ROOT / "README.md"
+    table = tasks_table(json.loads(Path(sys.argv[1]).read_text()))
+    readme.write_text(TABLE.sub(rf"\g<1>{table}\g<2>", readme.read_text()))

@@ -1,0 +1,72 @@
+"""``aloft view``: what it refuses; what it shows is tested in tests/logs/test_viewer.py."""
+
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from aloft.cli.app import app
+
+ROOT = Path(__file__).parent.parent.parent
+
+
+def view(*arguments: str | Path) -> tuple[int, str]:
+    result = CliRunner().invoke(app, ["view", *map(str, arguments)])
+    return result.exit_code, result.output
+
+
+def test_a_file_that_is_not_there(tmp_path: Path) -> None:
+    code, text = view(tmp_path / "a.rrd")
+    assert code == 2 and "there is no recording" in text and "`aloft run` writes one" in text
+
+
+def test_options_that_mean_nothing(tmp_path: Path) -> None:
+    code, text = view(tmp_path / "a.rrd", "--save", "b.rrd")
+    assert code == 2 and "add --with OTHER.rrd" in text
+    code, text = view(tmp_path / "a.rrd", "--with", "b.rrd", "--no-show")
+    assert code == 2 and "add --save FILE.rrd" in text
+
+
+def test_a_comparison_of_what_is_no_recording(tmp_path: Path) -> None:
+    path = tmp_path / "a.rrd"
+    path.write_text("nothing")
+    code, text = view(path, "--with", path, "--save", tmp_path / "both.rrd", "--no-show")
+    assert code == 2 and "cannot be read" in text
+
+
+def test_two_runs_become_one_file(tmp_path: Path) -> None:
+    runner = CliRunner()
+    paths = [tmp_path / name for name in ("a.rrd", "b.rrd")]
+    for path, seed in zip(paths, ("0", "1"), strict=True):
+        arguments = [str(ROOT / "graphs" / "jump.yaml"), "--record", str(path), "-q"]
+        runner.invoke(
+            app, ["run", *arguments, "--duration", "0.05 s", "--set", f"robot.seed={seed}"]
+        )
+    both = tmp_path / "both.rrd"
+    code, _ = view(paths[0], "--with", paths[1], "--save", both, "--no-show")
+    assert code == 0
+    from rerun.chunk import RrdReader
+
+    entities = {str(chunk.entity_path) for chunk in RrdReader(both).stream()}
+    for root in ("first", "second"):
+        assert f"/{root}/signals/robot/truth/com" in entities
+        assert any(entity.startswith(f"/{root}/world/robot/") for entity in entities)
+
+
+def test_many_seeds_are_not_shown() -> None:
+    arguments = ["run", str(ROOT / "graphs" / "jump.yaml"), "--seeds", "0:2", "--rerun", "web"]
+    result = CliRunner().invoke(app, arguments)
+    assert result.exit_code == 2 and "--rerun is for one run" in result.output
+
+
+def test_without_a_screen_the_run_goes_on(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    for name in ("DISPLAY", "WAYLAND_DISPLAY", "WAYLAND_SOCKET"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.chdir(ROOT)
+    arguments = ["run", str(ROOT / "tests/cli/count.yaml"), "--rerun", "live", "--no-record"]
+    result = CliRunner().invoke(app, arguments)
+    assert result.exit_code == 0
+    assert (
+        "the run is not shown: the Rerun viewer cannot be shown: there is no screen"
+        in result.output
+    )

@@ -1,0 +1,23 @@
+"""The jump driven by the invariant filter: it lands, and the estimate is near the truth."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import aloft
+
+GRAPH = Path(aloft.__file__).parent / "graphs" / "estimator.yaml"
+
+
+def test_a_jump_driven_by_the_invariant_filter() -> None:
+    settings = {"estimator.use": "blocks.InvariantKalmanFilter", "robot.seed": 5}
+    result = aloft.load(GRAPH, settings).run(log=False)
+    assert result.success, result.reason
+    found = result.metrics
+    assert found["estimator_flights"] == 1
+    for name, bound in (
+        ("velocity_lift_off_m_s", 0.012), ("velocity_touchdown_m_s", 0.014),
+        ("position_touchdown_m", 0.006), ("attitude_touchdown_rad", 0.008),
+    ):  # fmt: skip
+        value = found[f"estimator_{name}"]
+        assert isinstance(value, float) and 0.0 < value < bound, name
