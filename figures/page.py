@@ -179,7 +179,9 @@ def _picture(figure: Mapping[str, Any], words: str) -> str:
 
 
 def _number(numbers: Mapping[str, float], name: str) -> str:
-    return f"{numbers[name]:.3g}" if name in numbers else "-"
+    if name not in numbers:
+        return "-"
+    return f"{numbers[name]:.3g}" if abs(numbers[name]) >= 0.001 else "0"
 
 
 def _scaled(numbers: Mapping[str, float], name: str, scale: float) -> str:
