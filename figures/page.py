@@ -19,8 +19,8 @@ def page(results: Results) -> str:
             "Made by `aloft study paper`, numbers and text alike; `paper.json` beside it holds the "
             "numbers. The runs are those of `graphs/studies/paper.yaml`: the whole closed loop with "
             "noise, latency and jitter (the standard trial), seeds "
-            f"{seeds[0]} to {seeds[-1]}. These are tuning seeds: the pictures show what happens, and "
-            "success rates to compare with come from the studies with fresh seeds. All pictures show "
+            f"{seeds[0]} to {seeds[-1]}, on which nothing was tuned. There are few of them: the pictures "
+            "show what happens, and success rates to compare with are the other studies'. All pictures show "
             f"seed {results['figure_seed']}, whatever came of it. The paper's numbers are those of its "
             "section VI (Gazebo, or the robot); its pictures have no numbers that could be read off."
         ),

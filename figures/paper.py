@@ -139,7 +139,7 @@ def _frames(
     verdict = "succeeds" if trace.outcome.success else f"no success: {trace.outcome.reason}"
     notes = [
         f"Closed loop, standard trial, seed {trace.seed}: {verdict}.",
-        f"{row.successes} of {row.n} tuning seeds succeed.",
+        f"{row.successes} of {row.n} seeds succeed.",
     ]
     numbers = {"flight_s": flight[1] - flight[0]} if flight else {}
     picture = draw_strip(title, notes, motion, moments, robot, scene_of(row.cell), view)

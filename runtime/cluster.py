@@ -13,6 +13,9 @@ WAIT = 10.0
 AHEAD = 2
 """Jobs that are handed over for every thread of the cluster, so that none ever waits."""
 
+MOST_LOSSES = 10
+"""How often the result of one job may be lost with its worker before it is given up."""
+
 
 def cluster_results(
     function: Callable[[Any], Any], jobs: Iterable[Any], address: str
@@ -24,6 +27,7 @@ def cluster_results(
 
     numbered = enumerate(jobs)
     numbers: dict[Any, int] = {}
+    losses: dict[Any, int] = {}
     under_way = as_completed(loop=client.loop)
 
     def hand_over() -> None:
@@ -43,6 +47,14 @@ def cluster_results(
             elif future.status == "error":
                 # What a job raises is caught where it is done: this is the cluster's own error.
                 yield JobResult(index, None, f"the cluster gave up: {future.exception()}")
+            elif client.status == "running" and future.status in ("pending", "lost"):
+                # Its worker ended before the result was fetched: the scheduler has it done again.
+                losses[future.key] = losses.get(future.key, 0) + 1
+                if losses[future.key] <= MOST_LOSSES:
+                    numbers[future.key] = index
+                    under_way.add(future)
+                    continue
+                yield JobResult(index, None, "the cluster gave up: it lost the result every time")
             else:
                 raise AloftError(f"the Dask scheduler at {address} has gone; what is done is kept")
             future.release()
