@@ -14,7 +14,7 @@ GRAPH = Path(aloft.__file__).parent / "graphs" / "somersault.yaml"
 
 def test_it_turns_once_lands_on_its_feet_and_stands() -> None:
     """The score also asks that nothing but toes and heels touches anything, which is not reached:
-    for some milliseconds of the impact another part of a foot or calf brushes the ground."""
+    for some milliseconds of the impact the feet touch the ground between toe and heel."""
     run = aloft.load(GRAPH, {"robot.seed": 0}).run()
     phases = run.signal("phase.phase.phase")
     quaternion = run.signal("robot.truth.base_orientation")
