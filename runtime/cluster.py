@@ -21,19 +21,21 @@ def cluster_results(
     function: Callable[[Any], Any], jobs: Iterable[Any], address: str
 ) -> Generator[JobResult, None, None]:
     """See ``jobs.job_results``. A worker that is lost is the scheduler's affair: it gives the job
-    to another one, and gives up on a job that costs it several."""
+    to another one, and gives up on a job that costs it several. It cannot tell that job from
+    others that were at the same worker, so all that it gave up are done once more, one by one."""
     client = _connect(address)
     from distributed import as_completed
 
     numbered = enumerate(jobs)
-    numbers: dict[Any, int] = {}
+    numbers: dict[Any, tuple[int, Any]] = {}
+    suspects: list[tuple[int, Any]] = []
     losses: dict[Any, int] = {}
     under_way = as_completed(loop=client.loop)
 
     def hand_over() -> None:
         for index, job in numbered:
             future = client.submit(attempt, function, job, pure=False)
-            numbers[future.key] = index
+            numbers[future.key] = index, job
             under_way.add(future)
             return
 
@@ -41,17 +43,17 @@ def cluster_results(
         for _ in range(AHEAD * sum(client.nthreads().values())):
             hand_over()
         for future in under_way:
-            index = numbers.pop(future.key)
+            index, job = numbers.pop(future.key)
             if future.status == "finished":
                 yield JobResult(index, *future.result())
             elif future.status == "error":
                 # What a job raises is caught where it is done: this is the cluster's own error.
-                yield JobResult(index, None, f"the cluster gave up: {future.exception()}")
+                suspects.append((index, job))
             elif client.status == "running" and future.status in ("pending", "lost"):
                 # Its worker ended before the result was fetched: the scheduler has it done again.
                 losses[future.key] = losses.get(future.key, 0) + 1
                 if losses[future.key] <= MOST_LOSSES:
-                    numbers[future.key] = index
+                    numbers[future.key] = index, job
                     under_way.add(future)
                     continue
                 yield JobResult(index, None, "the cluster gave up: it lost the result every time")
@@ -59,6 +61,14 @@ def cluster_results(
                 raise AloftError(f"the Dask scheduler at {address} has gone; what is done is kept")
             future.release()
             hand_over()
+        for index, job in suspects:
+            future = client.submit(attempt, function, job, pure=False)
+            error = future.exception()
+            if error is None:
+                yield JobResult(index, *future.result())
+            else:
+                yield JobResult(index, None, f"the cluster gave up: {error}")
+            future.release()
     finally:
         client.close()
 
