@@ -8,11 +8,11 @@ runs a graph calls it.
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
 from ...runtime.description import RobotDescription
+from .bounded import cpu_time
 from .errors import PlanError, TaskError
 from .library import SCALES, Solver, solve_and_check
 from .plan import JumpPlan
@@ -162,13 +162,13 @@ class _Search:
     ) -> None:
         self._task, self._robot, self._solve = task, robot, solve
         self._seconds, self._progress = seconds, progress
-        self._started = time.process_time()
+        self._started = cpu_time()
         self._solves = 0
 
     @property
     def cpu(self) -> float:
         """Processor time so far [s]."""
-        return time.process_time() - self._started
+        return cpu_time() - self._started
 
     @property
     def spent(self) -> bool:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from typing import Any
 
 import numpy as np
@@ -12,6 +11,7 @@ from ...runtime.description import RobotDescription
 from ...runtime.kinematics import matrices_of_quaternions
 from ..signals import Phase
 from . import rigid_body_stages as stages
+from .bounded import cpu_time
 from .compilation import FunctionSet, Progress, load_functions
 from .exact_dynamics import ExactDynamics
 from .one_flight import joint_torques
@@ -69,7 +69,7 @@ def solve_rigid_body(
     Raises:
         PlanError: no motion was found, or the robot's legs cannot follow it.
     """
-    started = time.process_time()
+    started = cpu_time()
     if knots is not None:
         task = task.model_copy(update={"knots": knots})
     problem, body = rigid_body_problem(task, robot, compiled=compiled, progress=progress)
@@ -89,7 +89,7 @@ def solve_rigid_body(
         "compiled": not problem.assembly.interpreted,
     }
     arrays = unpack(problem, body, solution.values, robot)
-    statistics["cpu_s"] = time.process_time() - started
+    statistics["cpu_s"] = cpu_time() - started
     return JumpPlan(task=task, statistics=statistics, versions=versions(), **arrays)
 
 
