@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from .errors import PlanError
+from .program import Program
 from .solver import Solution
 from .task import JumpTask
 
@@ -22,6 +25,22 @@ ADVICE = {
     "flight time": "leave flight_time to the planner",
     "impact": "use impact: false, or ask for a smaller jump",
 }
+
+
+def statistics_of(problem: Program, solution: Solution) -> dict[str, Any]:
+    """How a problem on a fixed grid was solved, for the plan; the whole time comes to it later."""
+    return {
+        "solver": solution.solver,
+        "iterations": solution.iterations,
+        "solver_cpu_s": solution.cpu,
+        "violation": solution.violation,
+        "cost": solution.cost,
+        "warm": False,
+        "knots": problem.knots,
+        "variables": problem.assembly.variables,
+        "constraints": problem.assembly.constraints,
+        "compiled": not problem.assembly.interpreted,
+    }
 
 
 def failure(task: JumpTask, solution: Solution) -> PlanError:

@@ -15,7 +15,7 @@ from .bounded import cpu_time
 from .compilation import FunctionSet, Progress, load_functions
 from .exact_dynamics import ExactDynamics
 from .one_flight import joint_torques
-from .outcome import failure, versions
+from .outcome import failure, statistics_of, versions
 from .plan import JumpPlan
 from .program import Program
 from .quaternions import pose_of
@@ -76,18 +76,7 @@ def solve_rigid_body(
     solution = solve(problem, problem.guess, solver=solver)
     if not solution.solved:
         raise failure(task, solution)
-    statistics = {
-        "solver": solution.solver,
-        "iterations": solution.iterations,
-        "solver_cpu_s": solution.cpu,
-        "violation": solution.violation,
-        "cost": solution.cost,
-        "warm": False,
-        "knots": problem.knots,
-        "variables": problem.assembly.variables,
-        "constraints": problem.assembly.constraints,
-        "compiled": not problem.assembly.interpreted,
-    }
+    statistics = statistics_of(problem, solution)
     arrays = unpack(problem, body, solution.values, robot)
     statistics["cpu_s"] = cpu_time() - started
     return JumpPlan(task=task, statistics=statistics, versions=versions(), **arrays)
