@@ -35,6 +35,8 @@ class JumpPlan(Block):
     the formulations ``paper`` and ``srbm``, whose plans always fail: then the run's cautions say so
     with every test that failed, and the metrics have ``plan_valid`` and ``plan_tests_failed``. Of
     those formulations the reference has the centre of mass and momentum that the plan believes in.
+    ``formulation`` plans the same task in another one, without what only ``full`` has: impacts,
+    margins and limits of the motors.
 
     At the start the robot stands still for ``stand_time``; at the end it stays
     where the plan ended. Between the plan's knots the reference is read from a table of 2 ms steps
@@ -67,7 +69,7 @@ class JumpPlan(Block):
             "required", text="whether the plan must be valid, or is followed and called invalid"
         )
         formulation: Literal["full", "paper", "srbm"] | None = parameter(
-            None, text="in place of the task's: which planner makes the plan"
+            None, text="which one plans, in place of the task's"
         )
 
     params: Params
@@ -120,9 +122,11 @@ class JumpPlan(Block):
 
     def _task(self) -> JumpTask:
         task = self._named_task()
-        if self.params.formulation is None:
+        chosen = self.params.formulation
+        if chosen is None:
             return task
-        return task.model_copy(update={"formulation": self.params.formulation})
+        impact = task.impact and chosen == "full"
+        return task.model_copy(update={"formulation": chosen, "impact": impact})
 
     def _named_task(self) -> JumpTask:
         from .planner.task import TaskError, make_task, read_task

@@ -78,7 +78,7 @@ def test_a_kept_plan_that_is_not_valid_never_starts(tmp_path: Path) -> None:
         bench(task="tasks/in_situ.yaml", library=str(tmp_path))
 
 
-REDUCED = {"task": {"rise": "6 cm"}, "formulation": "srbm", "solve": True}
+REDUCED = {"task": {"rise": "6 cm", "impact": True}, "formulation": "srbm", "solve": True}
 
 
 def test_it_is_followed_where_that_is_asked_for_and_called_invalid(tmp_path: Path) -> None:
