@@ -38,6 +38,13 @@ UNUSED = {
     "aloft.blocks.rotations.skew": (np.ones(3), np.zeros((3, 3))),
     "aloft.blocks.rotations.yaw": (np.array([0.1, 0.2, 0.3, 0.9]),),
     "aloft.blocks.joint_pd.follow": (0.002, 0.02, *(np.ones(10) for _ in range(5))),
+    "aloft.blocks.joint_pd.stop": (
+        np.linspace(-1.0, 1.0, 5), np.tile([-0.8, 0.7], (5, 1)), 0.1, 2.0,
+        *(np.full(5, x) for x in (60.0, 1.5, 40.0, 0.2, 1.0, 0.3)),
+    ),
+    "aloft.blocks.leg_inverse_kinematics.keep_along": (
+        np.array([0.0, 0.6, 0.8]), np.array([0.1, 0.2, 0.3]),
+    ),
     "aloft.blocks.inertial_filter.right_up": (
         np.array([0.0, 0.0, 0.0, 1.0]), np.array([0.3, 0.2, 9.8]), 0.01, np.zeros(3),
     ),
