@@ -81,7 +81,7 @@ class LegInverseKinematics(Block):
         )
 
         beyond: Literal["turn", "slide"] = live_parameter(
-            "slide", text="what is given up first for a target out of reach"
+            "turn", text="what is given up first for a target out of reach"
         )
 
     params: Params

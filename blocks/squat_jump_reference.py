@@ -57,7 +57,7 @@ class SquatJumpReference(Block):
             0.029, unit="m", ge=0.0, le=0.1, text="height at lift-off below standing"
         )
         touchdown_drop: float = parameter(
-            0.009, unit="m", ge=0.0, le=0.1, text="height at touchdown below standing"
+            0.009, unit="m", ge=-0.02, le=0.1, text="height at touchdown below standing"
         )
         landing_depth: float = parameter(
             0.06, unit="m", ge=0.0, le=0.15, text="where the landing comes to rest below standing"

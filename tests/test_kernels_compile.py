@@ -116,7 +116,7 @@ def calls():
                 if id(value) in name_of:
                     patch.setattr(module, key, recorder(name_of[id(value)], value))
         aloft.load(ROOT / "graphs/jump.yaml").run()
-        other = {"estimator.use": "blocks.InvariantKalmanFilter"}
+        other = {"estimator.use": "blocks.InvariantKalmanFilter", "legs.beyond": "slide"}
         aloft.load(ROOT / "graphs/jump.yaml", other).run(duration=0.1)
     for name, arguments in UNUSED.items():
         samples[name].append(arguments)

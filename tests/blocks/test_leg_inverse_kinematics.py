@@ -134,7 +134,7 @@ def test_beyond_reach_the_foot_slides_in_the_plane_of_its_sole(turn, away):
 def test_sliding_is_continuous_where_reach_ends():
     """From within reach to beyond it the joints do not jump."""
     turn = tilted(-0.6, "roll")
-    bench = BlockBench(LegInverseKinematics, robot="bruce")
+    bench = BlockBench(LegInverseKinematics, {"beyond": "slide"}, robot="bruce")
     bench.set("joints", position=ROBOT.standing_position)
     last, reachable = None, []
     for aside in np.linspace(0.0, 0.14, 141):
