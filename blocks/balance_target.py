@@ -16,6 +16,7 @@ from .rotations import conjugate, exponential, from_matrix, logarithm, multiply
 from .signals import DynamicsTerms, JumpReference, Phase, PhaseState, WholeBodyTarget
 
 Array = NDArray[np.float64]
+Vector = tuple[float, float, float]
 
 
 class BalanceMemory(Signal):
@@ -42,6 +43,12 @@ class BalanceTarget(Block):
 
     about the body's x and y axes. Angular momentum and its rate are wanted zero.
 
+    A robot that is not quite the model misses the plan at lift-off, much the same way in every
+    jump of a task. ``velocity_correction`` dv and ``momentum_correction`` dk make up for what is
+    known of that: over the share u of a thrust that lasts T the plan becomes
+
+        v + u^2 dv,   a + 2 u dv / T,   p + T u^3 dv / 3,   k + u^2 dk,   k' + 2 u dk / T.
+
     Does not plan a step: the feet stay where they are.
     """
 
@@ -58,6 +65,16 @@ class BalanceTarget(Block):
         trim_limit: float = live_parameter(
             0.08, unit="rad", ge=0.0, le=0.5, text="largest trim about each axis"
         )
+        velocity_correction: Vector = live_parameter(
+            (0.0, 0.0, 0.0),
+            unit="m/s",
+            text="added to the planned velocity of the centre of mass at lift-off, in the plan's axes",
+        )
+        momentum_correction: Vector = live_parameter(
+            (0.0, 0.0, 0.0),
+            unit="N m s",
+            text="added to the planned angular momentum at lift-off, in the plan's axes",
+        )
 
     params: Params
     reference = Input(JumpReference, text="the plan")
@@ -73,6 +90,13 @@ class BalanceTarget(Block):
         self._middle = np.zeros(3)
         self._planned_middle = np.zeros(3)
         self._feet = self.context.dimensions["n_feet"]
+        self.on_parameters()
+
+    def on_parameters(self) -> None:
+        p = self.params
+        self._corrections = np.array([p.velocity_correction, p.momentum_correction])
+        self._corrects = bool(self._corrections.any())
+        self._corrections.flags.writeable = False
 
     def step(self) -> None:
         phase, reference = int(self.phase.phase), self.reference
@@ -83,11 +107,14 @@ class BalanceTarget(Block):
         heading = mean_heading(self.terms.foot_rotation)
         goes_on = float(reference.lift_off_time) > float(reference.time)
         if phase < Phase.LANDING or (phase == Phase.LANDING and goes_on):
-            self._follow(heading)
+            turn = self._follow(heading)
+            if self._corrects and phase == Phase.THRUST:
+                self._correct(turn)
         else:
             self._balance(phase, heading)
 
-    def _follow(self, heading: float) -> None:
+    def _follow(self, heading: float) -> float:
+        """The plan from the measured feet; how far that turns it [rad]."""
         reference, target, planned = self.reference, self.target, 0.0
         for foot in range(self._feet):
             planned += float(reference.foot_yaw[foot]) / self._feet
@@ -106,6 +133,20 @@ class BalanceTarget(Block):
         self._set_heading(turn)
         multiply(self._turn, reference.orientation, target.orientation)
         target.angular_velocity[...] = reference.angular_velocity
+        return turn
+
+    def _correct(self, turn: float) -> None:
+        """Add what the thrust is known to miss."""
+        target, elapsed = self.target, float(self.phase.time_in_phase)
+        left = float(self.reference.lift_off_time) - float(self.reference.time)
+        duration = max(elapsed + left, self.period)
+        share = min(elapsed / duration, 1.0)
+        turn_about_vertical(self._corrections[1], turn, self._vector)
+        grow(self._vector, share, duration, target.angular_momentum, target.angular_momentum_rate)
+        turn_about_vertical(self._corrections[0], turn, self._vector)
+        grow(self._vector, share, duration, target.com_velocity, target.com_acceleration)
+        np.multiply(self._vector, duration * share**3 / 3.0, out=self._vector)
+        np.add(target.com, self._vector, out=target.com)
 
     def _balance(self, phase: int, heading: float) -> None:
         p, target, trim = self.params, self.target, self.memory.trim
@@ -162,6 +203,15 @@ def turn_about_vertical(vector: Array, angle: float, out: Array) -> None:
     cosine, sine = math.cos(angle), math.sin(angle)
     x, y = float(vector[0]), float(vector[1])
     out[0], out[1], out[2] = cosine * x - sine * y, sine * x + cosine * y, vector[2]
+
+
+@kernel
+def grow(goal: Array, share: float, duration: float, value: Array, rate: Array) -> None:
+    """Add what grows to ``goal`` (3,) as the square of the ``share`` of ``duration`` [s]; see the
+    block's text."""
+    for k in range(3):
+        value[k] += share * share * float(goal[k])
+        rate[k] += 2.0 * share / duration * float(goal[k])
 
 
 @kernel

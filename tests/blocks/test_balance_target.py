@@ -129,3 +129,47 @@ def test_between_two_flights_it_is_the_plan_too(lift_off, height):
     bench.set("reference", time=0.8, lift_off_time=lift_off, com=[0.0, 0.0, 0.3])
     bench.step()
     assert float(bench.get("target").com[2]) == pytest.approx(height)
+
+
+def thrust(share, turn=0.0, **params):
+    """The target at that share of a thrust of 0.25 s, of a plan that is all zero."""
+    bench, rotation = make(**params), matrix(about(2, turn))
+    bench.set("terms", foot_position=FEET, foot_rotation=np.stack([rotation] * 2))
+    bench.set("phase", phase=Phase.THRUST, time_in_phase=0.25 * share)
+    bench.set("reference", time=1.0 + 0.25 * share, lift_off_time=1.25, com=np.zeros(3))
+    bench.step()
+    return bench.get("target")
+
+
+def test_corrections_grow_through_the_thrust_with_consistent_derivatives():
+    velocity, momentum, step = [0.04, -0.02, 0.01], [0.03, -0.01, 0.02], 1e-4
+    corrections = {"velocity_correction": velocity, "momentum_correction": momentum}
+    below, here, above = (thrust(share, **corrections) for share in (0.6 - step, 0.6, 0.6 + step))
+    for value, rate in (
+        ("com", "com_velocity"), ("com_velocity", "com_acceleration"),
+        ("angular_momentum", "angular_momentum_rate"),
+    ):  # fmt: skip
+        found = (getattr(above, value) - getattr(below, value)) / (0.25 * 2.0 * step)
+        assert getattr(here, rate) == pytest.approx(found, rel=1e-6)
+    start, end = thrust(0.0, **corrections), thrust(1.0, **corrections)
+    assert start.com_velocity == pytest.approx(np.zeros(3))
+    assert start.angular_momentum == pytest.approx(np.zeros(3))
+    assert end.com_velocity == pytest.approx(velocity)
+    assert end.angular_momentum == pytest.approx(momentum)
+
+
+def test_corrections_turn_with_the_feet():
+    ahead = thrust(1.0, turn=math.pi / 2, velocity_correction=[0.04, 0.0, 0.0])
+    assert ahead.com_velocity == pytest.approx([0.0, 0.04, 0.0], abs=1e-12)
+    pitch = thrust(1.0, turn=math.pi / 2, momentum_correction=[0.0, -0.01, 0.0])
+    assert pitch.angular_momentum == pytest.approx([0.01, 0.0, 0.0], abs=1e-12)
+
+
+@pytest.mark.parametrize("phase", [Phase.SQUAT, Phase.FLIGHT])
+def test_nothing_is_corrected_outside_the_thrust(phase):
+    bench = make(velocity_correction=[0.04, 0.0, 0.0], momentum_correction=[0.0, -0.01, 0.0])
+    bench.set("phase", phase=phase, time_in_phase=0.1)
+    bench.set("reference", lift_off_time=1.0, com_velocity=np.zeros(3))
+    bench.step()
+    assert (bench.get("target").com_velocity == 0.0).all()
+    assert (bench.get("target").angular_momentum == 0.0).all()
