@@ -37,6 +37,9 @@ INEXACT = {"sin", "cos", "atan2", "acos", "exp", "hypot", "dot"}
 UNUSED = {
     "aloft.blocks.rotations.skew": (np.ones(3), np.zeros((3, 3))),
     "aloft.blocks.rotations.yaw": (np.array([0.1, 0.2, 0.3, 0.9]),),
+    "aloft.blocks.balance_target.lengthen": (
+        np.array([0.01, -0.04, 0.0]), 0.7, 0.02, 0.25, 0.2, 0.6, *(np.ones(3) for _ in range(3)),
+    ),
     "aloft.blocks.joint_pd.follow": (0.002, 0.02, *(np.ones(10) for _ in range(5))),
     "aloft.blocks.joint_pd.stop": (
         np.linspace(-1.0, 1.0, 5), np.tile([-0.8, 0.7], (5, 1)), 0.1, 2.0,
