@@ -50,7 +50,8 @@ class JumpPhase(Block):
     the robot should stand, or the flight has lasted that much longer than predicted at its start
     by the plan.
 
-    Stance: before lift-off all points; in flight none; after touchdown every point that had
+    Stance: before lift-off the points that carry load in the plan, so that heels may rise while
+    the toes still push; where the plan has none of them, those of the tick before; in flight none; after touchdown every point that had
     contact within the last ``contact_hold``, and those of the same foot that are less than
     ``flat_height`` above the lowest of these; if that leaves none, those of the tick before. A
     controller that may push with a heel a hair above the ground brings it down by doing so; one
@@ -133,8 +134,8 @@ class JumpPhase(Block):
             if phase == Phase.LANDING:
                 memory.touchdown[()] = now
         choose_stance(
-            phase, unloaded, p.contact_hold, self.terms.contact_position, self._foot_of_point,
-            p.flat_height, memory.stance,
+            phase, self.reference.contact, unloaded, p.contact_hold, self.terms.contact_position,
+            self._foot_of_point, p.flat_height, memory.stance,
         )  # fmt: skip
         out.phase[()] = phase
         out.time_in_phase[()] = now - float(memory.began)
@@ -222,6 +223,7 @@ def next_phase(
 @kernel
 def choose_stance(
     phase: int,
+    planned: NDArray[np.bool_],
     unloaded: NDArray[np.float64],
     hold: float,
     position: NDArray[np.float64],
@@ -232,12 +234,16 @@ def choose_stance(
     """The points in stance, written over those of the tick before; see the block's text.
 
     Args:
+        planned: the points that carry load in the plan.
         unloaded: how long each point has been without contact [s].
         position: of the points [m, world], (n, 3).
         foot: the foot of each point.
     """
     if phase < Phase.FLIGHT:
-        stance[:] = True
+        if np.any(planned):
+            stance[:] = planned
+        elif not np.any(stance):
+            stance[:] = True
         return
     if phase == Phase.FLIGHT:
         stance[:] = False

@@ -31,6 +31,7 @@ from .whole_body_qp import (
     contact_tasks,
     friction_pyramids,
     joint_torque,
+    lifting_tasks,
     linear_task,
     motor_limits,
     share_weight,
@@ -64,7 +65,9 @@ class WholeBodyController(Block):
 
     1. Stance: contact points do not accelerate, softly. Points that are not in stance while
        others are go to the ground at their height: a task of zero acceleration never closes a
-       gap, and a program that believes in a hovering heel pushes with nothing.
+       gap, and a program that believes in a hovering heel pushes with nothing. In THRUST they
+       are free to rise instead, as the heels do while the toes still push, and damped across
+       their foot.
     2. Linear momentum: x = a_ref + K_p (p_ref - p) + K_d (v_ref - v), per kg       (linear).
     3. Torso: x = K_p Log(R' R_ref) + K_d (w_ref - w), body frame.
     4. Angular momentum: x = -K_d k, or with ``track_angular_momentum`` k_ref' + K_d (k_ref - k).
@@ -175,6 +178,7 @@ class WholeBodyController(Block):
         self._speed, self._offset = np.zeros(n_joints), np.zeros(n_joints)
         self._lower, self._upper = np.zeros(n_joints), np.zeros(n_joints)
         self._still = np.zeros(n)
+        self._foot_of_point = np.array(robot.foot_of_contact(), dtype=np.int64)
         self._active = np.zeros(n_contacts, dtype=np.int64)
         # A program of its own size for every number of points in stance: forces fixed to zero by
         # bounds would leave it without an interior.
@@ -235,6 +239,12 @@ class WholeBodyController(Block):
             p.swing_weight, p.swing_stiffness, p.swing_damping,
             rows[:first], desired[:first], weights[:first],
         )  # fmt: skip
+        if phase == Phase.THRUST:
+            lifting_tasks(
+                terms.contact_jacobian, terms.contact_drift, terms.contact_velocity,
+                self.phase.stance, self._foot_of_point, terms.foot_rotation, p.swing_weight,
+                p.swing_damping, rows[:first], desired[:first], weights[:first],
+            )  # fmt: skip
         linear_task(
             terms.centroidal_matrix, terms.centroidal_drift, self._mass, terms.com,
             terms.com_velocity, target.com, target.com_velocity, target.com_acceleration,

@@ -76,6 +76,41 @@ def contact_tasks(
 
 
 @kernel
+def lifting_tasks(
+    jacobian: Array,
+    drift: Array,
+    velocity: Array,
+    stance: NDArray[np.bool_],
+    foot: Indices,
+    foot_rotation: Array,
+    weight: float,
+    damping: float,
+    rows: Array,
+    desired: Array,
+    weights: Array,
+) -> None:
+    """Points that leave the ground before lift-off, over what ``contact_tasks`` wrote for them:
+    free to rise, their velocity across the foot damped, so that the foot rolls over its other
+    points and does not turn about them.
+
+    Args:
+        foot: of every point; foot_rotation: from foot to world, (n_feet, 3, 3).
+    """
+    for i in range(stance.shape[0]):
+        if stance[i]:
+            continue
+        row, wanted = 3 * i, 0.0
+        rows[row, :] = 0.0
+        for k in range(3):
+            across = float(foot_rotation[foot[i], k, 1])
+            wanted -= across * (damping * float(velocity[i, k]) + float(drift[i, k]))
+            for j in range(rows.shape[1]):
+                rows[row, j] += across * float(jacobian[i, k, j])
+        desired[row] = wanted
+        weights[row], weights[row + 1], weights[row + 2] = weight, 0.0, 0.0
+
+
+@kernel
 def linear_task(
     matrix: Array,
     drift: Array,

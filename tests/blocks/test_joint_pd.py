@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from aloft.blocks.joint_pd import JointPD
+from aloft.blocks.joint_pd import JointPD, stop
 from aloft.blocks.signals import CommandMode, Phase
 from aloft.runtime.description import find_robot
 from aloft.runtime.errors import BlockError
@@ -131,6 +133,52 @@ def test_friction_pushes_the_way_the_joint_moves():
     bench.set("joints", velocity=np.r_[np.full(5, 10.0), np.full(5, -10.0)])
     command = settle(bench, Phase.STAND, True)
     assert command.torque == pytest.approx(np.r_[np.full(5, 0.07), np.full(5, -0.07)])
+
+
+def test_a_soft_stop_pushes_back_from_a_limit_and_brakes():
+    """The left knee stands 20 mrad from its upper limit and moves on at 2 rad/s."""
+    knee = 3
+    limit = ROBOT.joint_limits[knee, 1]
+    joints, rates = ROBOT.standing_position.copy(), np.zeros(10)
+    joints[knee], rates[knee] = limit - 0.02, 2.0
+    torques = {}
+    for gain in (0.0, 3.0):
+        bench = make(stop_gain=gain, stop_margin=0.05)
+        bench.set("joints", position=joints, velocity=rates)
+        command = settle(bench, Phase.LANDING, True)
+        torques[gain] = (
+            command.torque
+            + command.stiffness * (command.position - joints)
+            + command.damping * (command.velocity - rates)
+        )
+    added = torques[3.0] - torques[0.0]
+    depth = 0.03
+    expected = -3.0 * FLIGHT_KP[knee] * depth - 3.0 * depth / 0.05 * FLIGHT_KD[knee] * 2.0
+    assert added[knee] == pytest.approx(expected)
+    assert np.delete(added, knee) == pytest.approx(0.0, abs=1e-12)
+
+
+@given(
+    angle=st.floats(-2.5, 2.5),
+    rate=st.floats(-20, 20),
+    gains=st.tuples(*[st.floats(0, 100)] * 4),
+    targets=st.tuples(st.floats(-3, 3), st.floats(-3, 3)),
+)
+def test_a_soft_stop_adds_its_own_torque_to_any_feedback(angle, rate, gains, targets):
+    stiffness, damping = np.array([gains[0]]), np.array([gains[1]])
+    position, velocity = np.array([targets[0]]), np.array([targets[1]])
+    before = gains[0] * (targets[0] - angle) + gains[1] * (targets[1] - rate)
+    limits, springs, dampers = np.array([[-1.0, 0.5]]), np.array([gains[2]]), np.array([gains[3]])
+    stop(
+        np.array([angle]), limits, 0.1, 2.0, springs, dampers, stiffness, position, damping,
+        velocity,
+    )  # fmt: skip
+    after = stiffness[0] * (position[0] - angle) + damping[0] * (velocity[0] - rate)
+    edge = min(max(angle, -0.9), 0.4)
+    depth = abs(angle - edge) / 0.1
+    added = 2.0 * gains[2] * (edge - angle) - 2.0 * min(depth, 1.0) * gains[3] * rate
+    if stiffness[0] > 1e-9 and damping[0] > 1e-9:
+        assert after - before == pytest.approx(added, abs=1e-6, rel=1e-9)
 
 
 def test_gains_must_fit_the_leg():

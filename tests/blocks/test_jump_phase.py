@@ -106,6 +106,23 @@ def test_late_lift_off_waits_for_the_feet_but_not_for_ever():
     assert phase(bench) == Phase.FLIGHT
 
 
+def test_heels_rise_before_lift_off_where_the_plan_says_so():
+    bench, toes = make(late_lift_off=0.01), [True, False, True, False]
+    bench.set("reference", contact=True)
+    run(bench, 0.4)
+    assert bench.get("phase").stance.all()
+    bench.set("reference", contact=toes)
+    run(bench, LIFT_OFF)
+    assert bench.get("phase").stance.tolist() == toes
+    bench.set("reference", contact=False)  # the plan flies, the robot does not yet
+    run(bench, LIFT_OFF + 0.006)
+    assert phase(bench) == Phase.THRUST
+    assert bench.get("phase").stance.tolist() == toes
+    run(bench, LIFT_OFF + 0.016)
+    assert phase(bench) == Phase.FLIGHT
+    assert not bench.get("phase").stance.any()
+
+
 def test_a_flight_without_end_is_a_fault_for_good():
     bench = make(lost_contact=0.2)
     run(bench, LIFT_OFF)

@@ -47,6 +47,23 @@ def test_points_without_load_fall_to_the_mean_height_of_the_others():
     assert desired[[6, 7]] == pytest.approx(-40.0 * velocity[2, :2])
 
 
+def test_points_that_lift_are_free_but_across_their_foot():
+    rows, desired, weights = np.ones((12, N)), np.ones(12), np.ones(12)
+    drift, velocity = RANDOM.normal(size=(4, 3)), RANDOM.normal(size=(4, 3))
+    turns = np.array([[[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]], np.eye(3)])
+    qp.lifting_tasks(
+        JACOBIAN, drift, velocity, np.array([True, False, True, False]), np.array([0, 0, 1, 1]),
+        turns, 10.0, 40.0, rows, desired, weights,
+    )  # fmt: skip
+    assert weights.tolist() == [1.0] * 3 + [10.0, 0.0, 0.0] + [1.0] * 3 + [10.0, 0.0, 0.0]
+    assert rows[3] == pytest.approx(-JACOBIAN[1, 0])  # the left foot's y is the world's -x
+    assert desired[3] == pytest.approx(40.0 * velocity[1, 0] + drift[1, 0])
+    assert rows[9] == pytest.approx(JACOBIAN[3, 1])
+    assert desired[9] == pytest.approx(-40.0 * velocity[3, 1] - drift[3, 1])
+    assert (rows[[0, 1, 2, 6, 7, 8]] == 1.0).all()
+    assert (desired[[0, 1, 2, 6, 7, 8]] == 1.0).all()
+
+
 def test_linear_task():
     rows, desired = np.zeros((3, N)), np.zeros(3)
     com, speed, goal, goal_speed, push = RANDOM.normal(size=(5, 3))
