@@ -14,7 +14,6 @@ from aloft.runtime.errors import AloftError, ExitCode
 from aloft.runtime.executor import Executor, run
 from aloft.runtime.graph import load
 from aloft.runtime.memory import BoundGraph
-from aloft.runtime.notes import Note
 from aloft.runtime.parameters import Parameters
 from aloft.runtime.primitives import Constant, Gain, Integrator, SineWave, Sum, UnitDelay, Vector
 from aloft.runtime.stages import CheckedGraph, Wire
@@ -384,30 +383,3 @@ def test_a_block_that_writes_its_input_is_told_so(tmp_path: Path) -> None:
     )
     reason = load(tmp_path / "g.yaml").run().reason
     assert reason.startswith("block 'bad' failed at tick 0 ") and "read-only; an input" in reason
-
-
-def test_what_a_block_cautions_of_is_in_the_result_and_told_to_the_sinks() -> None:
-    class Waiver(Filter):
-        def cautions(self) -> list[str]:
-            return ["the check was waived"]
-
-    class Listener:
-        def __init__(self) -> None:
-            self.notes: list[Note] = []
-
-        def open(self, bound: object) -> None: ...
-
-        def record(self, tick: int) -> None: ...
-
-        def note(self, note: Note) -> None:
-            self.notes.append(note)
-
-        def close(self) -> None: ...
-
-    listener = Listener()
-    result = run(chain(Waiver, 1), sinks=[listener])
-    assert result.success
-    assert result.cautions == ("b0: the check was waived",)
-    assert result.to_json()["cautions"] == ["b0: the check was waived"]
-    (note,) = (note for note in listener.notes if note.kind == "caution")
-    assert (note.tick, note.level, note.text) == (0, "WARN", "b0: the check was waived")
