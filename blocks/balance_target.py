@@ -133,6 +133,9 @@ class BalanceTarget(Block):
         self._set_heading(turn)
         multiply(self._turn, reference.orientation, target.orientation)
         target.angular_velocity[...] = reference.angular_velocity
+        target.joint_position[...] = reference.joint_position
+        target.joint_velocity[...] = reference.joint_velocity
+        target.joint_acceleration[...] = reference.joint_acceleration
         return turn
 
     def _correct(self, turn: float) -> None:

@@ -36,6 +36,7 @@ INEXACT = {"sin", "cos", "atan2", "acos", "exp", "hypot", "dot"}
 
 UNUSED = {
     "aloft.blocks.rotations.skew": (np.ones(3), np.zeros((3, 3))),
+    "aloft.blocks.leg_inverse_kinematics.pitched_line": (np.eye(3), 0.4, np.zeros(3)),
     "aloft.blocks.rotations.yaw": (np.array([0.1, 0.2, 0.3, 0.9]),),
     "aloft.blocks.joint_pd.follow": (0.002, 0.02, *(np.ones(10) for _ in range(5))),
     "aloft.blocks.inertial_filter.right_up": (
