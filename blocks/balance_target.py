@@ -25,6 +25,9 @@ class BalanceMemory(Signal):
     standing_height = Field(unit="m", text="planned height of the centre of mass in the first tick")
     started = Field(dtype="bool", text="whether that height is known")
     trim = Field(3, unit="rad", frame="body", text="rotation added to the level target")
+    origin = Field(3, unit="m", frame="world", text="where the plan's origin is")
+    heading = Field(unit="rad", frame="world", text="where its x axis points")
+    off_place = Field(3, unit="m", frame="world", text="feet from their planned place")
 
 
 class BalanceTarget(Block):
@@ -33,6 +36,19 @@ class BalanceTarget(Block):
     Before the last touchdown positions and heading are the plan's, shifted and turned with the measured
     feet: the plan is relative to where the feet stand, so a drift of the estimated position or
     heading does not matter.
+
+    So every error of a landing is carried on to the next, unless ``place_gain`` feeds back the
+    place. In the last T_p = ``place_time`` before a lift-off the jump is lengthened: with e how far
+    the feet's middle then is, by the estimated position, from where the plan has it, and T_f the
+    planned flight,
+
+        d = -place_gain e, of a length of at most place_limit
+        v(t) = v_d s(u),   s = 10 u^3 - 15 u^4 + 6 u^5,   u = 1 - (t_lo - t) / T_p,
+        v_d = d / (T_f + T_p / 2)
+
+    is added to the velocity, its integral to the place and its derivative to the acceleration of
+    the centre of mass: at touchdown these are worth d. The plan's place in the world is that of
+    the first tick. Feet that land at their heading's error stay there.
 
     After that touchdown the centre of mass goes over the middle of the sole centres, at
     ``landing_depth`` below standing height; when the phase is RECOVER it rises to standing height
@@ -76,6 +92,19 @@ class BalanceTarget(Block):
             text="added to the planned angular momentum at lift-off, in the plan's axes",
         )
 
+        place_gain: float = live_parameter(
+            0.0,
+            ge=0.0,
+            le=1.0,
+            text="share of the feet's error of place the next jump makes up for",
+        )
+        place_limit: float = live_parameter(
+            0.03, unit="m", ge=0.0, le=0.2, text="by how much it lengthens a jump at most"
+        )
+        place_time: float = live_parameter(
+            0.2, unit="s", gt=0.0, le=1.0, text="how long before lift-off it begins to"
+        )
+
     params: Params
     reference = Input(JumpReference, text="the plan")
     phase = Input(PhaseState, text="the phase the robot is in")
@@ -100,11 +129,10 @@ class BalanceTarget(Block):
 
     def step(self) -> None:
         phase, reference = int(self.phase.phase), self.reference
-        if not self.memory.started:
-            self.memory.standing_height[()] = reference.com[2]
-            self.memory.started[()] = True
         middle_point(self.terms.foot_position, self._middle)
         heading = mean_heading(self.terms.foot_rotation)
+        if not self.memory.started:
+            self._begin(heading)
         goes_on = float(reference.lift_off_time) > float(reference.time)
         if phase < Phase.LANDING or (phase == Phase.LANDING and goes_on):
             turn = self._follow(heading)
@@ -113,13 +141,27 @@ class BalanceTarget(Block):
         else:
             self._balance(phase, heading)
 
+    def _begin(self, heading: float) -> None:
+        """Note how high it stands by the plan, and where the plan's world is."""
+        memory, reference = self.memory, self.reference
+        memory.standing_height[()] = reference.com[2]
+        memory.heading[()] = heading - self._planned_heading()
+        middle_point(reference.foot_position, self._planned_middle)
+        turn_about_vertical(self._planned_middle, float(memory.heading), self._vector)
+        np.subtract(self._middle, self._vector, out=memory.origin)
+        memory.started[()] = True
+
+    def _planned_heading(self) -> float:
+        planned = 0.0
+        for foot in range(self._feet):
+            planned += float(self.reference.foot_yaw[foot]) / self._feet
+        return planned
+
     def _follow(self, heading: float) -> float:
         """The plan from the measured feet; how far that turns it [rad]."""
-        reference, target, planned = self.reference, self.target, 0.0
-        for foot in range(self._feet):
-            planned += float(reference.foot_yaw[foot]) / self._feet
+        reference, target = self.reference, self.target
         middle_point(reference.foot_position, self._planned_middle)
-        turn = heading - planned
+        turn = heading - self._planned_heading()
         for name in ("com", "com_velocity", "com_acceleration", "angular_momentum",
                      "angular_momentum_rate"):  # fmt: skip
             out = getattr(target, name)
@@ -133,7 +175,25 @@ class BalanceTarget(Block):
         self._set_heading(turn)
         multiply(self._turn, reference.orientation, target.orientation)
         target.angular_velocity[...] = reference.angular_velocity
+        if self.params.place_gain > 0.0:
+            self._make_up()
         return turn
+
+    def _make_up(self) -> None:
+        """Lengthen the next jump by what the feet are off their place."""
+        p, reference, target, memory = self.params, self.reference, self.target, self.memory
+        lift_off = float(reference.lift_off_time)
+        flight = float(reference.touchdown_time) - lift_off
+        share = 1.0 - (lift_off - float(reference.time)) / p.place_time
+        if share <= 0.0:
+            turn_about_vertical(self._planned_middle, float(memory.heading), self._vector)
+            np.add(memory.origin, self._vector, out=self._vector)
+            np.subtract(self._middle, self._vector, out=memory.off_place)
+            return
+        lengthen(
+            memory.off_place, p.place_gain, p.place_limit, flight, p.place_time, share,
+            target.com, target.com_velocity, target.com_acceleration,
+        )  # fmt: skip
 
     def _correct(self, turn: float) -> None:
         """Add what the thrust is known to miss."""
@@ -203,6 +263,37 @@ def turn_about_vertical(vector: Array, angle: float, out: Array) -> None:
     cosine, sine = math.cos(angle), math.sin(angle)
     x, y = float(vector[0]), float(vector[1])
     out[0], out[1], out[2] = cosine * x - sine * y, sine * x + cosine * y, vector[2]
+
+
+@kernel
+def lengthen(
+    off_place: Array,
+    gain: float,
+    limit: float,
+    flight: float,
+    duration: float,
+    share: float,
+    place: Array,
+    velocity: Array,
+    acceleration: Array,
+) -> None:
+    """Add to a jump's motion (3,) what makes up for feet off their place; see the block's text.
+
+    Args:
+        off_place: horizontally, how far the feet are from their place (3,) [m].
+        limit: of the lengthening [m].
+        flight: how long the flight behind the lift-off lasts [s].
+        duration, share: how long before lift-off it begins [s], and how much of that is over.
+    """
+    u = min(max(share, 0.0), 1.0)
+    grown, rate, _ = minimum_jerk(u)
+    size = gain * math.hypot(float(off_place[0]), float(off_place[1]))
+    kept = 1.0 if size <= limit else limit / size
+    for k in range(2):
+        speed = -kept * gain * float(off_place[k]) / (flight + 0.5 * duration)
+        place[k] += speed * duration * u * u * u * u * (2.5 + u * (u - 3.0))
+        velocity[k] += speed * grown
+        acceleration[k] += speed * rate / duration
 
 
 @kernel

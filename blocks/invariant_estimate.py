@@ -57,6 +57,12 @@ class InvariantFilterParameters(Parameters):
     slide_noise: float = parameter(
         1e-3, unit="m", ge=0, text="how far a standing foot slides in a second, per axis"
     )
+    impact_slide: float = parameter(
+        0.0,
+        unit="s^2",
+        ge=0,
+        text="by how much it slides more, by the specific force beyond gravity",
+    )
     gate: float = parameter(16.3, gt=0, text="a residual less likely than this is refused")
     support: float = parameter(
         4.0, unit="m/s^2", text="upward specific force below which no contact is believed"

@@ -52,9 +52,11 @@ class InvariantKalmanFilter(Block):
 
     **Contacts** are measured, never assumed. A point that is reported active, while the IMU feels
     support, enters the state where leg kinematics see it and then stands still but for
-    ``contact_noise``; while it stands, R h(q) + p - d = 0 corrects everything. A residual that is
-    too unlikely (``gate``, chi-squared of three degrees) says that the point has slipped or
-    lifted: it leaves the state and enters again where it is now, so nothing is learnt from it.
+    ``contact_noise`` and what its foot slides as a whole, sqrt(slide_noise^2 + (impact_slide (|f| -
+    g))^2): feet slide a little where they are hit or push hardest. While it stands,
+    R h(q) + p - d = 0 corrects everything. A residual that is too unlikely (``gate``, chi-squared
+    of three degrees) says that the point has slipped or lifted: it leaves the state and enters
+    again where it is now, so nothing is learnt from it.
     While all points are refused, the velocity's own variance grows until one is believed.
 
     **Ground.** ``level``: points that stand are at one height; ``flat``: at the height zero they
@@ -185,10 +187,11 @@ class InvariantKalmanFilter(Block):
             self._transition, self._reach, self._bias, self._noise, covariance,
             self._scaled, self._product,
         )  # fmt: skip
+        pressed = max(math.hypot(*self._force.tolist()) - GRAVITY, 0.0)
+        slide = math.hypot(params.slide_noise, params.impact_slide * pressed)
         creep(
-            self._foot_of_point, estimate.present, params.contact_noise, params.slide_noise, period,
-            covariance,
-        )  # fmt: skip
+            self._foot_of_point, estimate.present, params.contact_noise, slide, period, covariance
+        )
         for first, walk in (
             (self._bias, params.gyro_bias_walk), (self._bias + 3, params.accelerometer_bias_walk),
         ):  # fmt: skip

@@ -41,9 +41,10 @@ def flat() -> Scene:
     return Scene()
 
 
-def step(height: float, distance: float) -> Scene:
-    """A step of ``height`` whose front edge is ``distance`` [m] ahead of the origin."""
-    return Scene(boxes=(Box((distance, distance + 1.5), (-0.75, 0.75), height, 0.0),))
+def step(height: float, distance: float, depth: float = 1.5) -> Scene:
+    """A step of ``height`` whose front edge is ``distance`` [m] ahead of the origin, and whose back
+    edge, where it goes down again, is ``depth`` behind that."""
+    return Scene(boxes=(Box((distance, distance + depth), (-0.75, 0.75), height, 0.0),))
 
 
 def platform(height: float, edge: float) -> Scene:

@@ -26,6 +26,9 @@ class SimulatorParameters(Parameters):
     step_distance: float = parameter(
         0.1, unit="m", text="scene step: from the start to its front edge"
     )
+    step_depth: float = parameter(
+        1.5, unit="m", gt=0, text="scene step: from there to where it goes down again"
+    )
     platform_height: float = parameter(
         0.35, unit="m", gt=0, text="scene platform: its height above the floor"
     )
@@ -105,7 +108,7 @@ class SimulatorParameters(Parameters):
     def build_scene(self) -> scenes.Scene:
         """The ground these parameters describe."""
         if self.scene == "step":
-            return scenes.step(self.step_height, self.step_distance)
+            return scenes.step(self.step_height, self.step_distance, self.step_depth)
         if self.scene == "platform":
             return scenes.platform(self.platform_height, self.platform_edge)
         return scenes.flat()

@@ -37,7 +37,17 @@ INEXACT = {"sin", "cos", "atan2", "acos", "exp", "hypot", "dot"}
 UNUSED = {
     "aloft.blocks.rotations.skew": (np.ones(3), np.zeros((3, 3))),
     "aloft.blocks.rotations.yaw": (np.array([0.1, 0.2, 0.3, 0.9]),),
+    "aloft.blocks.balance_target.lengthen": (
+        np.array([0.01, -0.04, 0.0]), 0.7, 0.02, 0.25, 0.2, 0.6, *(np.ones(3) for _ in range(3)),
+    ),
     "aloft.blocks.joint_pd.follow": (0.002, 0.02, *(np.ones(10) for _ in range(5))),
+    "aloft.blocks.joint_pd.stop": (
+        np.linspace(-1.0, 1.0, 5), np.tile([-0.8, 0.7], (5, 1)), 0.1, 2.0,
+        *(np.full(5, x) for x in (60.0, 1.5, 40.0, 0.2, 1.0, 0.3)),
+    ),
+    "aloft.blocks.leg_inverse_kinematics.keep_along": (
+        np.array([0.0, 0.6, 0.8]), np.array([0.1, 0.2, 0.3]),
+    ),
     "aloft.blocks.inertial_filter.right_up": (
         np.array([0.0, 0.0, 0.0, 1.0]), np.array([0.3, 0.2, 9.8]), 0.01, np.zeros(3),
     ),
@@ -110,7 +120,7 @@ def calls():
                 if id(value) in name_of:
                     patch.setattr(module, key, recorder(name_of[id(value)], value))
         aloft.load(ROOT / "graphs/jump.yaml").run()
-        other = {"estimator.use": "blocks.InvariantKalmanFilter"}
+        other = {"estimator.use": "blocks.InvariantKalmanFilter", "legs.beyond": "slide"}
         aloft.load(ROOT / "graphs/jump.yaml", other).run(duration=0.1)
     for name, arguments in UNUSED.items():
         samples[name].append(arguments)

@@ -6,8 +6,10 @@ import math
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from aloft.blocks.balance_target import BalanceTarget
+from aloft.blocks.balance_target import BalanceTarget, lengthen
 from aloft.blocks.rotations import to_matrix
 from aloft.blocks.signals import Phase
 from aloft.runtime.testing import BlockBench
@@ -173,3 +175,84 @@ def test_nothing_is_corrected_outside_the_thrust(phase):
     bench.step()
     assert (bench.get("target").com_velocity == 0.0).all()
     assert (bench.get("target").angular_momentum == 0.0).all()
+
+
+def before_lift_off(bench, time, place):
+    """A tick of a thrust that lifts off at 1 s for 0.25 s, the feet at ``place`` and turned a bit."""
+    bench.set("phase", phase=Phase.THRUST)
+    bench.set("reference", time=time, lift_off_time=1.0, touchdown_time=1.25)
+    bench.set("reference", com=[0.0, 0.0, 0.3], com_velocity=[0.1, 0.0, 0.8])
+    bench.set("terms", foot_position=np.add(FEET, [*place, 0.0]))
+    bench.step()
+    return bench.get("target")
+
+
+@pytest.mark.parametrize("time", [0.5, 0.85, 0.95, 1.0])
+def test_feet_in_their_place_leave_the_plan_as_it_is(time):
+    plain, fed_back = (
+        before_lift_off(make(place_gain=gain), time, (0.0, 0.0)) for gain in (0.0, 1.0)
+    )
+    for name in type(fed_back).fields:
+        assert getattr(fed_back, name).tobytes() == getattr(plain, name).tobytes(), name
+
+
+@pytest.mark.parametrize(("place", "limit"), [((0.01, -0.02), 0.1), ((-0.2, 0.1), 0.03)])
+def test_a_jump_is_lengthened_by_what_the_feet_are_off_their_place(place, limit):
+    """At touchdown, after the change of place and velocity at lift-off, by the gain or the limit."""
+    bench = make(place_gain=0.5, place_limit=limit, place_time=0.2)
+    before_lift_off(bench, 0.7, place)
+    target = before_lift_off(bench, 1.0, place)
+    moved = target.com[:2] - place + 0.25 * (target.com_velocity[:2] - [0.1, 0.0])
+    size = min(0.5 * math.hypot(*place), limit)
+    assert moved == pytest.approx(-size * np.array(place) / math.hypot(*place), abs=1e-12)
+    assert target.com[2] == 0.3
+    assert target.com_velocity[2] == 0.8
+
+
+def test_what_is_made_up_for_is_settled_when_it_begins():
+    bench = make(place_gain=0.5, place_time=0.2)
+    before_lift_off(bench, 0.7, (0.01, 0.0))
+    speed = float(before_lift_off(bench, 1.0, (0.01, 0.0)).com_velocity[0])
+    assert float(before_lift_off(bench, 1.0, (0.02, 0.0)).com_velocity[0]) == speed
+
+
+def test_the_place_is_the_plans_in_the_world_of_the_first_tick():
+    """A start turned and away from the origin; a plan that has come ahead of it by 0.1 m."""
+    turn, start = matrix(about(2, 0.5)), np.array([0.3, -0.2, 0.0])
+    bench = BlockBench(BalanceTarget, {"place_gain": 1.0, "place_time": 0.2}, robot="bruce")
+    bench.set("reference", com=[0.0, 0.0, STANDING], orientation=LEVEL, foot_position=FEET)
+    feet = FEET @ turn.T + start
+    bench.set("terms", foot_position=feet, base_rotation=turn, foot_rotation=np.stack([turn] * 2))
+    bench.step()
+    ahead = turn @ [0.1, 0.0, 0.0]
+    bench.set("reference", foot_position=np.add(FEET, [0.1, 0.0, 0.0]))
+    bench.set("terms", foot_position=feet + ahead)
+    bench.set("reference", time=0.7, lift_off_time=1.0, touchdown_time=1.25)
+    bench.set("phase", phase=Phase.THRUST)
+    bench.step()
+    assert bench.get("memory").off_place == pytest.approx(np.zeros(3), abs=1e-12)
+    bench.set("terms", foot_position=feet + ahead + [0.01, 0.02, 0.0])
+    bench.step()
+    assert bench.get("memory").off_place == pytest.approx([0.01, 0.02, 0.0], abs=1e-12)
+
+
+@given(
+    share=st.floats(0.01, 0.99),
+    x=st.floats(-0.5, 0.5),
+    y=st.floats(-0.5, 0.5),
+    gain=st.floats(0.0, 1.0),
+)
+def test_the_lengthening_is_one_motion_and_bounded(share, x, y, gain):
+    """Velocity and acceleration are the derivatives of the place; no way is beyond the limit."""
+    step, flight, duration, limit = 1e-5, 0.25, 0.2, 0.03
+
+    def added(u):
+        motion = np.zeros((3, 3))
+        lengthen(np.array([x, y, 0.0]), gain, limit, flight, duration, u, *motion)
+        return motion
+
+    before, now, after = (added(share + k * step / duration) for k in (-1, 0, 1))
+    for k in range(2):
+        assert now[k + 1] == pytest.approx((after[k] - before[k]) / (2 * step), abs=1e-4)
+    place, velocity, _ = added(1.0)
+    assert math.hypot(*(place + flight * velocity)) <= limit + 1e-12

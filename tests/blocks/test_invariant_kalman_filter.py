@@ -304,6 +304,16 @@ def test_restores_exactly():
     assert run.to(0.45).bench.snapshot().state == first.state
 
 
+def test_feet_that_press_harder_are_taken_to_slide():
+    """At rest nothing presses beyond gravity; in a squat the place on the ground is less sure."""
+    for motion, pressed in ((STAND, False), (SQUAT, True)):
+        plain, told = Run(motion), Run(motion, impact_slide=3e-3)
+        for run in (plain, told):
+            run.to(0.55)
+        wider = told.covariance()[9:21, 9:21].diagonal() - plain.covariance()[9:21, 9:21].diagonal()
+        assert (wider > 1e-8).all() if pressed else np.abs(wider).max() < 1e-15
+
+
 def test_needs_a_robot():
     with pytest.raises(BlockError, match="name one in the graph"):
         BlockBench(InvariantKalmanFilter, dimensions=dict(ROBOT.dimensions))

@@ -74,6 +74,15 @@ def flying(tick: int) -> Inputs:
     return {"reference": {"phase": Phase.FLIGHT}, "phase": {"phase": Phase.FLIGHT, **times}}
 
 
+def displaced(tick: int) -> Inputs:
+    """A thrust until 0.3 s, with feet that are off their place behind the first tick."""
+    feet = np.full((2, 3), 0.02 if tick else 0.0)
+    times = {"time": 0.002 * tick, "lift_off_time": 0.3, "touchdown_time": 0.5}
+    return {
+        "reference": times, "phase": {"phase": Phase.THRUST}, "terms": {"foot_position": feet}
+    }  # fmt: skip
+
+
 def hopping(tick: int) -> Inputs:
     """In the air for ten ticks, on the ground for ten."""
     phase = {"phase": Phase.FLIGHT, "stance": tick // 10 % 2 == 0}
@@ -82,10 +91,15 @@ def hopping(tick: int) -> Inputs:
 
 SCENES: Mapping[str, list[Scene]] = {
     "blocks.JointPD": [
-        Scene({"stance_feedback": True, "friction": 0.1, "stance_stiffness": [1.0] * 5}),
+        Scene({"stance_targets": "acceleration", "friction": 0.1, "stance_stiffness": [1.0] * 5}),
+        Scene({"stop_gain": 1.0}, lambda tick: {"joints": {"position": 0.9, "velocity": 1.0}}),
         Scene({}, hopping),
     ],
-    "blocks.BalanceTarget": [Scene({"trim_limit": 0.01, "trim_rate": 20.0})],
+    "blocks.BalanceTarget": [
+        Scene({"trim_limit": 0.01, "trim_rate": 20.0}),
+        Scene({"place_gain": 0.5, "place_limit": 0.005}, displaced),
+        Scene({"place_gain": 0.5}, displaced),
+    ],
     "blocks.LandingHeuristic": [Scene({"p_max": (0.1, 0.1)}), Scene({}, flying)],
     "blocks.LegInverseKinematics": [Scene({"speed_limit": 0.5})],
     "blocks.WholeBodyController": [
