@@ -17,6 +17,7 @@ TASKS = {
     "in_situ_15cm": ("apex_above_standing_m", 0.15, 0.015),
     "forward_15cm": ("jump_distance_x_m", 0.15, 0.02),
     "forward_20cm": ("jump_distance_x_m", 0.20, 0.02),
+    "forward_25cm": ("jump_distance_x_m", 0.25, 0.02),
     "backward_12cm": ("jump_distance_x_m", -0.12, 0.02),
     "sideways_10cm": ("jump_distance_y_m", 0.10, 0.02),
     "sideways_15cm": ("jump_distance_y_m", 0.15, 0.02),
