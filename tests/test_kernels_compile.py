@@ -39,7 +39,7 @@ INEXACT = {"sin", "cos", "atan2", "acos", "exp", "hypot", "dot"}
 LEG = read_leg(find_robot("bruce"), 0)
 UNUSED = {
     "aloft.blocks.leg_inverse_kinematics.slide": (
-        LEG.hip, LEG.plane, LEG.signs, LEG.limits, [*LEG.hip, 0.25, 0.02, -0.3], np.eye(3), 0.005,
+        LEG.hip, LEG.plane, LEG.signs, LEG.limits, np.add(LEG.hip, [0.25, 0.02, -0.3]), np.eye(3), 0.005,
         0.1, np.zeros(3), np.zeros(5),
     ),
     "aloft.blocks.rotations.skew": (np.ones(3), np.zeros((3, 3))),
