@@ -75,9 +75,7 @@ def gains_table(tuned: Mapping[str, Any]) -> str:
             f"`{key.removeprefix('landing.')}` {_rounded(value)}"
             for key, value in found["set"].items()
         )
-        lines.append(
-            f"| {arm} | {found['successes']} of {found['n']} | {gains or 'as written'} |"
-        )
+        lines.append(f"| {arm} | {found['successes']} of {found['n']} | {gains or 'as written'} |")
     return "\n".join(lines) + "\n"
 
 
