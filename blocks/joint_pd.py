@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -46,11 +48,12 @@ class JointPD(Block):
     need not lag behind by what moves it; a leg that lands late keeps swinging while the other already stands. Between the
     two everything moves linearly within ``blend``.
 
-    Stance gains are zero by default: the feedforward alone carries the robot. With
-    ``stance_feedback`` their targets are the whole-body controller's accelerations integrated
-    twice, pulled back to the measured joints with time constant ``leak``; without, the measured
-    joints, so that only the damping acts, towards zero velocity. ``friction`` adds that torque in
-    the direction each joint moves.
+    Stance gains are zero by default: the feedforward alone carries the robot. Where they are not,
+    ``stance_targets`` says towards what they act: ``measured`` are the measured joints, so that only
+    the damping acts, towards zero velocity; ``acceleration`` the whole-body controller's
+    accelerations integrated twice, pulled back to the measured joints with time constant ``leak``;
+    ``legs``, the paper's, the inverse kinematics of the planned feet seen from the centre of mass.
+    ``friction`` adds that torque in the direction each joint moves.
 
     A joint nearer than ``stop_margin`` to its limit, on the ground or in the air, is also held
     back by a soft stop: ``stop_gain`` times its flight stiffness towards that margin and, growing
@@ -81,8 +84,8 @@ class JointPD(Block):
         blend: float = live_parameter(
             0.004, unit="s", ge=0.0, text="from one set of gains to another"
         )
-        stance_feedback: bool = parameter(
-            False, text="integrate the whole-body accelerations to stance targets"
+        stance_targets: Literal["measured", "acceleration", "legs"] = parameter(
+            "measured", text="what the stance gains act towards"
         )
         leak: float = live_parameter(0.02, unit="s", gt=0.0, text="how fast those forget")
         stop_margin: float = live_parameter(
@@ -101,7 +104,7 @@ class JointPD(Block):
     params: Params
 
     wbc = Input(WholeBodyCommand, text="feedforward torques and accelerations")
-    legs = Input(JointTarget, text="joint targets of the legs in the air")
+    legs = Input(JointTarget, text="joint targets of the legs, by default for those in the air")
     phase = Input(PhaseState, text="the phase and which points may push")
     joints = Input(JointState, text="measured joints")
     reference = Input(JumpReference, default={}, text="the planned torques, if they are known")
@@ -189,11 +192,15 @@ class JointPD(Block):
         np.subtract(1.0, self._airborne, out=self._grounded)
 
     def _follow(self) -> None:
-        """The stance targets: the measured joints at rest, or the integrated accelerations."""
-        follower, joints = self.follower, self.joints
-        if not self.params.stance_feedback:
+        """The stance targets: the measured joints at rest, the legs', or integrated accelerations."""
+        follower, joints, kind = self.follower, self.joints, self.params.stance_targets
+        if kind == "measured":
             self._stance_position[...] = joints.position
             self._stance_velocity[...] = 0.0
+            return
+        if kind == "legs":
+            self._stance_position[...] = self.legs.position
+            self._stance_velocity[...] = self.legs.velocity
             return
         if not follower.started[()]:
             follower.position[...] = joints.position

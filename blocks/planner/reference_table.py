@@ -5,6 +5,10 @@ and joints, which is the cubic through both knots. In flight it is within a mill
 dynamics has, or the plan would not be valid. The rate of change of momentum
 comes from the contact forces, which are taken to hold in the middle of their interval and to
 change linearly from there to the next, never across lift-off or touchdown.
+
+The formulations ``paper`` and ``srbm`` have a centre of mass and a momentum of their own, which their
+motions do not quite have (the ``srbm``'s legs turn without any): whoever follows such a plan, which
+never is valid, is told what the plan believes, as its forces do.
 """
 
 from __future__ import annotations
@@ -27,6 +31,8 @@ from .task import GRAVITY
 Array = NDArray[np.float64]
 State = tuple[float, int, Array, Array]
 """Time, interval, q and v."""
+
+CENTROIDAL = ("com", "com_velocity", "angular_momentum")
 
 STEP = 0.002
 """Longest time between two rows [s]."""
@@ -51,6 +57,10 @@ def reference_table(plan: JumpPlan, robot: RobotDescription, stand_time: float) 
     for foot in range(len(robot.feet)):
         columns["foot_yaw"][:, foot] = np.unwrap(columns["foot_yaw"][:, foot])
     _follow_one_sign(columns["orientation"])
+    if plan.task.formulation != "full":
+        for name in CENTROIDAL:
+            own = getattr(plan, name)
+            columns[name] = np.stack([np.interp(times, plan.time, own[:, i]) for i in range(3)], 1)
     for name in ("com_acceleration", "angular_momentum_rate"):
         columns[name][-1] = 0.0  # the plan has come to rest, and the last row stays
     standing = {name: values[:1] for name, values in columns.items()}

@@ -104,9 +104,9 @@ def test_half_way_the_torque_is_the_mean_of_both_controllers():
     assert torque == pytest.approx(0.5 * flight + 0.5 * stance)
 
 
-def test_stance_feedback_leads_the_joints_by_the_commanded_acceleration():
+def test_acceleration_targets_lead_the_joints_by_the_commanded_acceleration():
     """A steady acceleration a leads a joint at rest by a times leak, and leak squared."""
-    bench = make(stance_feedback=True, leak=0.02, stance_stiffness=[20.0] * 5)
+    bench = make(stance_targets="acceleration", leak=0.02, stance_stiffness=[20.0] * 5)
     bench.set("joints", velocity=0.0)
     acceleration = np.zeros(16)
     acceleration[6 + 3] = 10.0
@@ -117,6 +117,14 @@ def test_stance_feedback_leads_the_joints_by_the_commanded_acceleration():
     lead = command.position - np.linspace(-1, 1, 10)
     assert lead[3] == pytest.approx(10.0 * 0.02**2, rel=0.15)
     assert np.abs(np.delete(lead, 3)).max() < 1e-12
+
+
+def test_the_legs_kinematics_can_be_what_the_stance_gains_act_towards():
+    gains = {"stance_stiffness": [20.0] * 5, "stance_damping": [1.0] * 5}
+    command = settle(make(stance_targets="legs", **gains), Phase.THRUST, True)
+    assert np.array_equal(command.torque, np.arange(1.0, 11.0))
+    assert (command.stiffness == 20.0).all() and (command.damping == 1.0).all()
+    assert (command.position == 0.1).all() and (command.velocity == 0.2).all()
 
 
 def test_friction_pushes_the_way_the_joint_moves():

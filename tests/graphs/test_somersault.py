@@ -13,8 +13,6 @@ GRAPH = Path(aloft.__file__).parent / "graphs" / "somersault.yaml"
 
 
 def test_it_turns_once_lands_on_its_feet_and_stands() -> None:
-    """The score also asks that nothing but toes and heels touches anything, which is not reached:
-    for some milliseconds of the impact the feet touch the ground between toe and heel."""
     run = aloft.load(GRAPH, {"robot.seed": 0}).run()
     phases = run.signal("phase.phase.phase")
     quaternion = run.signal("robot.truth.base_orientation")
@@ -23,7 +21,6 @@ def test_it_turns_once_lands_on_its_feet_and_stands() -> None:
     assert phases[-1] == Phase.RECOVER
     assert abs(pitch[-1] - pitch[0] - 2.0 * np.pi) < 0.1
     assert pitch[int(np.argmax(phases == Phase.LANDING))] - pitch[lift_off] > np.radians(300.0)
-    tilt = 1.0 - 2.0 * (quaternion[-1, 0] ** 2 + quaternion[-1, 1] ** 2)
-    assert np.arccos(tilt) < np.radians(5.0)
-    assert run.signal("robot.truth.com")[-1, 2] > 0.28
-    assert run.metrics["qp_failures"] == 0
+    assert run.success, run.reason
+    assert run.metrics["peak_motor_torque_nm"] <= 10.5
+    assert run.metrics["forbidden_contacts"] == run.metrics["qp_failures"] == 0
