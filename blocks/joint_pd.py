@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -46,11 +48,16 @@ class JointPD(Block):
     need not lag behind by what moves it; a leg that lands late keeps swinging while the other already stands. Between the
     two everything moves linearly within ``blend``.
 
-    Stance gains are zero by default: the feedforward alone carries the robot. With
-    ``stance_feedback`` their targets are the whole-body controller's accelerations integrated
-    twice, pulled back to the measured joints with time constant ``leak``; without, the measured
-    joints, so that only the damping acts, towards zero velocity. ``friction`` adds that torque in
-    the direction each joint moves.
+    Stance gains are zero by default: the feedforward alone carries the robot. Where they are not,
+    ``stance_targets`` says towards what they act: ``measured`` are the measured joints, so that only
+    the damping acts, towards zero velocity; ``acceleration`` the whole-body controller's
+    accelerations integrated twice, pulled back to the measured joints with time constant ``leak``;
+    ``legs``, the paper's, the inverse kinematics of the planned feet seen from the centre of mass.
+    ``friction`` adds that torque in the direction each joint moves.
+
+    A joint nearer than ``stop_margin`` to its limit, on the ground or in the air, is also held
+    back by a soft stop: ``stop_gain`` times its flight stiffness towards that margin and, growing
+    from none there to ``stop_gain`` times its flight damping at the limit, towards rest.
 
     Gains are per leg joint from the hip outwards, the same for every leg. For a sampled drive keep
     Kd times its period below half the joint's inertia (ankle: 1.8e-3 kg m^2). Limits no torque:
@@ -77,10 +84,16 @@ class JointPD(Block):
         blend: float = live_parameter(
             0.004, unit="s", ge=0.0, text="from one set of gains to another"
         )
-        stance_feedback: bool = parameter(
-            False, text="integrate the whole-body accelerations to stance targets"
+        stance_targets: Literal["measured", "acceleration", "legs"] = parameter(
+            "measured", text="what the stance gains act towards"
         )
         leak: float = live_parameter(0.02, unit="s", gt=0.0, text="how fast those forget")
+        stop_margin: float = live_parameter(
+            0.05, unit="rad", gt=0.0, le=0.3, text="distance from a joint's limit of its soft stop"
+        )
+        stop_gain: float = live_parameter(
+            0.0, ge=0.0, le=20.0, text="gains of the soft stops, in those of flight; zero: none"
+        )
         friction: float = live_parameter(
             0.0, unit="N m", ge=0.0, text="joint friction to compensate"
         )
@@ -91,7 +104,7 @@ class JointPD(Block):
     params: Params
 
     wbc = Input(WholeBodyCommand, text="feedforward torques and accelerations")
-    legs = Input(JointTarget, text="joint targets of the legs in the air")
+    legs = Input(JointTarget, text="joint targets of the legs, by default for those in the air")
     phase = Input(PhaseState, text="the phase and which points may push")
     joints = Input(JointState, text="measured joints")
     reference = Input(JumpReference, default={}, text="the planned torques, if they are known")
@@ -105,6 +118,7 @@ class JointPD(Block):
         self._chains = [leg_joints(robot, foot) for foot in range(len(robot.feet))]
         self._foot_of_point = robot.foot_of_contact()
         self.on_parameters()
+        self._limits = robot.joint_limits
         n = len(robot.joints)
         self._airborne = np.zeros(n)
         self._grounded = np.zeros(n)
@@ -155,6 +169,12 @@ class JointPD(Block):
             legs.velocity, self._stance_velocity, joints.velocity,
             command.damping, command.velocity,
         )  # fmt: skip
+        if self.params.stop_gain > 0.0:
+            stop(
+                joints.position, self._limits, self.params.stop_margin, self.params.stop_gain,
+                self._flight_stiffness, self._flight_damping,
+                command.stiffness, command.position, command.damping, command.velocity,
+            )  # fmt: skip
 
     def _blend(self) -> None:
         """Move every leg's weight towards flight where none of its points may push."""
@@ -172,11 +192,15 @@ class JointPD(Block):
         np.subtract(1.0, self._airborne, out=self._grounded)
 
     def _follow(self) -> None:
-        """The stance targets: the measured joints at rest, or the integrated accelerations."""
-        follower, joints = self.follower, self.joints
-        if not self.params.stance_feedback:
+        """The stance targets: the measured joints at rest, the legs', or integrated accelerations."""
+        follower, joints, kind = self.follower, self.joints, self.params.stance_targets
+        if kind == "measured":
             self._stance_position[...] = joints.position
             self._stance_velocity[...] = 0.0
+            return
+        if kind == "legs":
+            self._stance_position[...] = self.legs.position
+            self._stance_velocity[...] = self.legs.velocity
             return
         if not follower.started[()]:
             follower.position[...] = joints.position
@@ -227,6 +251,41 @@ def superpose(
             target[i] = share * float(first_target[i]) + (1.0 - share) * float(second_target[i])
         else:
             target[i] = measured[i]
+
+
+@kernel
+def stop(
+    measured: Array,
+    limits: Array,
+    margin: float,
+    gain: float,
+    stop_stiffness: Array,
+    stop_damping: Array,
+    stiffness: Array,
+    position: Array,
+    damping: Array,
+    velocity: Array,
+) -> None:
+    """Add soft stops to a feedback of ``stiffness`` to ``position`` and ``damping`` to ``velocity``.
+
+    Springs of ``gain`` times ``stop_stiffness`` begin ``margin`` inside the ``limits`` (n, 2);
+    dampers of ``gain`` times ``stop_damping`` grow from none there to all at the limit.
+    """
+    for i in range(measured.shape[0]):
+        angle = float(measured[i])
+        edge = min(max(angle, float(limits[i, 0]) + margin), float(limits[i, 1]) - margin)
+        depth = abs(angle - edge) / margin
+        if depth > 0.0:
+            spring = gain * float(stop_stiffness[i])
+            total = spring + float(stiffness[i])
+            if total > 0.0:
+                position[i] = (spring * edge + float(stiffness[i]) * float(position[i])) / total
+            stiffness[i] = total
+            damper = gain * min(depth, 1.0) * float(stop_damping[i])
+            total = damper + float(damping[i])
+            if total > 0.0:
+                velocity[i] = float(damping[i]) * float(velocity[i]) / total
+            damping[i] = total
 
 
 @kernel

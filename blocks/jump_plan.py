@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
-from ..runtime.block import Block, Output
+from ..runtime.block import Block, Metric, Output
 from ..runtime.errors import BlockError
 from ..runtime.parameters import Parameters, parameter
 from .jump_table import JumpTableReader
@@ -14,7 +14,9 @@ from .signals import JumpReference
 
 if TYPE_CHECKING:
     from ..runtime.description import RobotDescription
+    from .planner.plan import JumpPlan as Plan
     from .planner.task import JumpTask
+    from .planner.validity import ValidityReport
 
 SHIPPED = Path(__file__).parents[1] / "graphs"
 """Where tasks are looked for that are not beside the graph."""
@@ -29,13 +31,20 @@ class JumpPlan(Block):
     solved while the graph loads, from the nearest plan of the library, and kept.
 
     Every plan, also a kept one, first passes the validity check (``blocks/planner/validity``) with
-    exact dynamics. At the start the robot stands still for ``stand_time``; at the end it stays
+    exact dynamics. With ``check: reported`` one that fails it is followed all the same, to compare
+    the formulations ``paper`` and ``srbm``, whose plans always fail: then the run's cautions say so
+    with every test that failed, and the metrics have ``plan_valid`` and ``plan_tests_failed``. Of
+    those formulations the reference has the centre of mass and momentum that the plan believes in.
+    ``formulation`` plans the same task in another one, without what only ``full`` has: impacts,
+    margins and limits of the motors.
+
+    At the start the robot stands still for ``stand_time``; at the end it stays
     where the plan ended. Between the plan's knots the reference is read from a table of 2 ms steps
     (``blocks/planner/reference_table``), what is fed forward ``lead`` ahead of time.
 
     It follows time alone and knows nothing of what the robot really does. Raises ``BlockError`` at
     load where the task cannot be read or is for another robot, cannot be planned, or its plan is
-    not valid; the message says which constraint or which test.
+    not valid and must be; the message says which constraint or which test.
     """
 
     class Params(Parameters):
@@ -56,6 +65,12 @@ class JumpPlan(Block):
             "", text="folder where new plans are kept; the user's cache if empty"
         )
         solve: bool = parameter(True, text="whether a plan that is not there may be solved")
+        check: Literal["required", "reported"] = parameter(
+            "required", text="whether the plan must be valid, or is followed and called invalid"
+        )
+        formulation: Literal["full", "paper", "srbm"] | None = parameter(
+            None, text="which one plans, in place of the task's"
+        )
 
     params: Params
     reference = Output(JumpReference, text="the plan at the present instant")
@@ -72,12 +87,48 @@ class JumpPlan(Block):
                 f"the task {task.name!r} is for {task.robot}, but the graph's robot is {robot.name}"
             )
         plan = self._plan(task, robot)
+        self._report = self._look_at(plan)
         self._reader = JumpTableReader(reference_table(plan, robot, self.params.stand_time))
 
     def step(self) -> None:
         self._reader.read(self.time, self.reference, self.params.lead)
 
+    def metrics(self) -> Mapping[str, Metric]:
+        report = self._report
+        if report is None:
+            return {}
+        return {"plan_valid": report.valid, "plan_tests_failed": len(report.failed)}
+
+    def cautions(self) -> Sequence[str]:
+        report = self._report
+        if report is None or report.valid:
+            return ()
+        return (
+            "THE PLAN IS NOT VALID and is followed all the same (check: reported):\n"
+            + report.explain(),
+        )
+
+    def _look_at(self, plan: Plan) -> ValidityReport | None:
+        """What the check says of a plan that need not be valid; ``None`` where it must be."""
+        if self.params.check == "required":
+            return None
+        from .planner.validity import PlanTest, ValidityReport
+
+        report = ValidityReport(tuple(PlanTest(**test) for test in plan.report["tests"]))
+        broken = [test for test in report.failed if test.name in ("arrays", "phases")]
+        if broken:
+            raise BlockError(f"the plan {plan.task.name!r} is broken: {broken[0].where}")
+        return report
+
     def _task(self) -> JumpTask:
+        task = self._named_task()
+        chosen = self.params.formulation
+        if chosen is None:
+            return task
+        impact = task.impact and chosen == "full"
+        return task.model_copy(update={"formulation": chosen, "impact": impact})
+
+    def _named_task(self) -> JumpTask:
         from .planner.task import TaskError, make_task, read_task
 
         wanted = self.params.task
@@ -96,7 +147,7 @@ class JumpPlan(Block):
         except TaskError as error:
             raise BlockError(str(error)) from error
 
-    def _plan(self, task: JumpTask, robot: RobotDescription) -> Any:
+    def _plan(self, task: JumpTask, robot: RobotDescription) -> Plan:
         from .planner.errors import TaskError
         from .planner.library import PlanLibrary
 
@@ -108,6 +159,8 @@ class JumpPlan(Block):
                 "solve: true"
             )
         try:
+            if self.params.check == "reported":
+                return library.attempt(task)
             plan, _ = library.plan(task)
         except TaskError as error:
             raise BlockError(str(error)) from error

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
+from annotated_types import Ge, Le
 from numpy.typing import NDArray
+from pydantic import BeforeValidator
 
 from ..runtime.block import Block, Input, Output, State
 from ..runtime.description import RobotDescription
@@ -19,6 +21,15 @@ from .rotations import conjugate, cross, exponential, from_matrix, logarithm, mu
 from .signals import DynamicsTerms, FootTarget, JumpReference, Phase, PhaseState
 
 Array = NDArray[np.float64]
+
+
+def _three(value: object) -> object:
+    """One number stands for all three axes."""
+    return (value,) * 3 if isinstance(value, int | float) else value
+
+
+Share = Annotated[float, Ge(0.0), Le(1.0)]
+Shares = Annotated[tuple[Share, Share, Share], BeforeValidator(_three)]
 
 
 class LandingMemory(Signal):
@@ -82,8 +93,9 @@ class LandingHeuristic(Block):
         p_max: tuple[float, float] = live_parameter(
             (0.15, 0.16), unit="m", text="farthest places ahead and aside the leg can reach"
         )
-        alpha: float = live_parameter(
-            1.0, ge=0.0, le=1.0, text="share of the torso's rotation that the legs make up for"
+        alpha: Shares = live_parameter(
+            (1.0, 1.0, 1.0),
+            text="share of the torso's rotation about x, y and z that the legs make up for",
         )
         reach_share: float = live_parameter(
             0.7, gt=0.0, le=1.0, text="share of the predicted flight by which the feet are there"
@@ -120,6 +132,8 @@ class LandingHeuristic(Block):
     def on_parameters(self) -> None:
         p = self.params
         self._w_l, self._w_k, self._p_max = np.array(p.w_l), np.array(p.w_k), np.array(p.p_max)
+        self._alpha = np.array(p.alpha)
+        self._beta = 1.0 - self._alpha
 
     def step(self) -> None:
         p, reference, terms, memory = self.params, self.reference, self.terms, self.memory
@@ -138,7 +152,7 @@ class LandingHeuristic(Block):
         share, rate, _ = minimum_jerk(elapsed / reach)
         lift, lift_rate = retraction(left, p.retraction, p.retraction_time)
         lowest = lowest_height(terms.foot_position)
-        self._turn_frame(p.alpha, overdue)
+        self._turn_frame(overdue)
         for foot in range(len(self._sides)):
             planned, place = memory.planned[foot], self.feet.landing[foot]
             landing_place(
@@ -180,20 +194,20 @@ class LandingHeuristic(Block):
             np.subtract(self._linear, self.memory.linear, out=self._linear)
             np.subtract(self._angular, self.memory.angular, out=self._angular)
 
-    def _turn_frame(self, alpha: float, overdue: bool) -> None:
+    def _turn_frame(self, overdue: bool) -> None:
         """The frame the targets are fixed in, its rate, and the centre of mass in the body's."""
         terms, planned, turn = self.terms, self.memory.orientation, self._other
         from_matrix(terms.base_rotation, self._quaternion)
         conjugate(planned, turn)
         multiply(turn, self._quaternion, turn)
         logarithm(turn, self._vector)
-        np.multiply(self._vector, alpha, out=self._vector)
+        np.multiply(self._vector, self._alpha, out=self._vector)
         exponential(self._vector, turn)
         multiply(planned, turn, turn)
         to_matrix(turn, self._rotation)
-        np.multiply(terms.velocity[3:6], alpha, out=self._rate)
+        np.multiply(terms.velocity[3:6], self._alpha, out=self._rate)
         if not overdue:
-            np.multiply(self.reference.angular_velocity, 1.0 - alpha, out=self._vector)
+            np.multiply(self.reference.angular_velocity, self._beta, out=self._vector)
             np.add(self._rate, self._vector, out=self._rate)
         np.subtract(terms.com, terms.base_position, out=self._vector)
         np.dot(terms.base_rotation.T, self._vector, self._com_body)

@@ -20,6 +20,12 @@ Array = NDArray[np.float64]
 
 _FASTEST = 100.0
 """Foot velocities [m/s] are brought within this, so that no square overflows."""
+_LEVEL = 0.3
+"""A sole whose normal leans farther than this cosine from the base's z axis does not slide."""
+_HALVINGS = 8
+"""The place in reach is found to within a 256th of the way."""
+_FARTHEST = 10.0
+"""Places [m] are brought within this to slide from."""
 _JUMP = 0.1
 """A line that turns by more than this [rad] in a tick has been given anew."""
 
@@ -36,17 +42,20 @@ class LegInverseKinematics(Block):
 
     Five joints reach a sole position and a direction of the foot's line, that is pitch and yaw;
     the target's roll about the line is ignored. Positions are in closed form
-    (``leg_kinematics.inverse``), exact where the leg reaches. Elsewhere the foot's pitch is given
-    up first, then the distance, and every angle stays ``margin`` inside the joint limits; the
-    answer moves continuously, and within ``softness`` of a full stretch the leg slows down. There
-    the foot is not quite where it should be, and ``reachable`` says so. Velocities solve the 5 x 5 Jacobian by damped least squares::
+    (``leg_kinematics.inverse``), exact where the leg reaches. Elsewhere, with ``beyond: slide``, the
+    foot slides in the plane of its sole towards the place below the hip, as far as it must: it keeps its height above the ground and lands flat, though not where it should. With
+    ``beyond: turn``, and where sliding does not help, the foot's pitch is given up first, then the
+    distance. Every angle stays ``margin`` inside the joint limits, and within ``softness`` of a
+    full stretch the leg slows down. ``reachable`` says whether the foot is where it should be.
+    Velocities solve the 5 x 5 Jacobian by damped least squares::
 
         q' = (A'A + damping^2 I)^-1 A'(p', u'),   u' = (u - u_last) / period
 
     with u the target's line. They are limited to ``speed_limit``, and are zero for a joint held at
     its limit. A line that turns by more than 0.1 rad in one tick is a new target, not a motion.
 
-    With ``follow: plan`` the targets are the plan's joints while the plan flies, and the landing
+    With ``follow: pitch`` the soles have the pitch they have in the plan, so that heels that rose
+    before lift-off come down as planned and not at once. With ``follow: plan`` the targets are the plan's joints while the plan flies, and the landing
     law has no say: a somersault turns as fast as its legs are tucked, so its rotation is right
     only if all joints are where they should be.
 
@@ -68,8 +77,13 @@ class LegInverseKinematics(Block):
             0.005, unit="m", ge=0.0, le=0.05, text="over which a stretching leg slows down"
         )
 
-        follow: Literal["feet", "plan"] = parameter(
-            "feet", text="the feet's targets, or the plan's joints as long as the plan flies"
+        follow: Literal["feet", "pitch", "plan"] = parameter(
+            "feet", text="the feet's targets; those with the soles' planned pitch; or the plan's "
+            "joints as long as the plan flies"
+        )  # fmt: skip
+
+        beyond: Literal["turn", "slide"] = live_parameter(
+            "turn", text="what is given up first for a target out of reach"
         )
 
     params: Params
@@ -93,7 +107,8 @@ class LegInverseKinematics(Block):
         self._speeds = np.zeros(5)
         self._sole = np.zeros(3)
         self._turn = np.zeros((3, 3))
-        self._velocity = np.zeros(3)
+        self._velocity, self._place = np.zeros(3), np.zeros(3)
+        self._line = np.zeros(3)
         self._rate = np.zeros(3)
         self._jacobian = np.zeros((6, 5))
         self._rows = np.zeros((5, 5))
@@ -117,15 +132,29 @@ class LegInverseKinematics(Block):
         limit = self.params.speed_limit
         for foot, leg in enumerate(self._legs):
             wanted = feet.rotation[foot, :, 0]
+            if self.params.follow == "pitch":
+                pitched_line(
+                    feet.rotation[foot], float(self.reference.foot_pitch[foot]), self._line
+                )
+                wanted = self._line
+            yaw = float(self.joints.position[leg.joints[0]])
             inside, share = inverse(
                 leg.hip, leg.plane, leg.signs, leg.limits, feet.position[foot], wanted,
-                self.params.softness, float(self.joints.position[leg.joints[0]]), angles,
+                self.params.softness, yaw, angles,
             )  # fmt: skip
             target.reachable[foot] = inside
+            np.clip(feet.velocity[foot], -_FASTEST, _FASTEST, out=self._velocity)
+            if not inside and self.params.beyond == "slide":
+                slid, kept = slide(
+                    leg.hip, leg.plane, leg.signs, leg.limits, feet.position[foot],
+                    feet.rotation[foot], self.params.softness, yaw, self._place, angles,
+                )  # fmt: skip
+                if slid:
+                    share = kept
+                    keep_along(feet.rotation[foot, :, 2], self._velocity)
             forward(leg.hip, leg.plane, leg.signs, angles, self._sole, turn)
             jacobian(leg.plane, leg.signs, angles, self._jacobian)
             line_rate(wanted, lines.direction[foot], self.period, known, self._rate)
-            np.clip(feet.velocity[foot], -_FASTEST, _FASTEST, out=self._velocity)
             slow_stretch(leg.hip, leg.plane, self._sole, turn, share, self._velocity)
             inverse_velocity(
                 self._jacobian, turn, self._velocity, self._rate, self.params.damping,
@@ -137,6 +166,89 @@ class LegInverseKinematics(Block):
                 target.position[joint] = angle
                 target.velocity[joint] = 0.0 if held else min(max(speed, -limit), limit)
         lines.known[()] = True
+
+
+@kernel
+def pitched_line(rotation: Array, pitch: float, out: Array) -> None:
+    """The x axis of ``rotation`` (3, 3), turned by ``pitch`` [rad] about its y axis."""
+    cosine, sine = math.cos(pitch), math.sin(pitch)
+    for i in range(3):
+        out[i] = cosine * float(rotation[i, 0]) - sine * float(rotation[i, 2])
+
+
+@kernel
+def slide(
+    hip: Array,
+    plane: Array,
+    signs: Array,
+    limits: Array,
+    sole: Array,
+    rotation: Array,
+    softness: float,
+    present_yaw: float,
+    place: Array,
+    angles: Array,
+) -> tuple[bool, float]:
+    """Draw a ``sole`` out of reach, in its own plane, towards a place that is in reach.
+
+    That is the one straight below the hip, seen from the sole, or where even that is out of reach
+    the one on the base's z axis through the hip, where every angle of the hip is small. The place
+    in reach that is nearest to the target on this way is found by bisection, to within a 256th
+    of the way.
+
+    Args:
+        hip, plane, signs, limits, softness, present_yaw: as for ``inverse``.
+        sole, rotation: the target's place and axes, of which the third is normal to the sole.
+        place: scratch (3,).
+        angles: out, the joint angles (5,) for that place; as they were where there is none.
+
+    Returns:
+        Whether there is such a place, and the second result of ``inverse`` for it.
+    """
+    nx, ny, nz = float(rotation[0, 2]), float(rotation[1, 2]), float(rotation[2, 2])
+    if nz < _LEVEL or not abs(nx * nx + ny * ny + nz * nz - 1.0) < 0.1:
+        return False, 1.0
+    hx, hy, hz = float(hip[0]), float(hip[1]), float(hip[2])
+    sx = min(max(float(sole[0]), -_FARTHEST), _FARTHEST)
+    sy = min(max(float(sole[1]), -_FARTHEST), _FARTHEST)
+    sz = min(max(float(sole[2]), -_FARTHEST), _FARTHEST)
+    depth = nx * (hx - sx) + ny * (hy - sy) + nz * (hz - sz)
+    line = rotation[:, 0]
+    for axis in range(2):
+        ax, ay, az = hx - depth * nx, hy - depth * ny, hz - depth * nz
+        if axis == 1:
+            ax, ay, az = hx, hy, hz - depth / nz
+        near, far, share = 0.0, 1.0, 1.0
+        for step in range(_HALVINGS + 2):
+            # First the end of the way, whether it is in reach; halves of it; the answer again.
+            last = step == _HALVINGS + 1
+            part = near if step == 0 or last else 0.5 * (near + far)
+            place[0] = ax + part * (sx - ax)
+            place[1] = ay + part * (sy - ay)
+            place[2] = az + part * (sz - az)
+            inside, kept = inverse(
+                hip, plane, signs, limits, place, line, softness, present_yaw, angles
+            )
+            if inside:
+                near, share = part, kept
+            elif step == 0:
+                break
+            else:
+                far = part
+            if last:
+                return True, share
+    inverse(hip, plane, signs, limits, sole, line, softness, present_yaw, angles)
+    return False, 1.0
+
+
+@kernel
+def keep_along(axis: Array, vector: Array) -> None:
+    """Keep of ``vector`` (3,) only its part along ``axis`` (3,), of unit length."""
+    part = 0.0
+    for i in range(3):
+        part += float(axis[i]) * float(vector[i])
+    for i in range(3):
+        vector[i] = part * float(axis[i])
 
 
 @kernel

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 from ..runtime.block import Block, Output
+from ..runtime.description import RobotDescription
 from ..runtime.errors import BlockError
 from ..runtime.parameters import Parameters, parameter
-from .jump_table import JumpTableReader
+from .jump_table import JumpTable, JumpTableReader
 from .pinocchio_model import build_pinocchio_model
 from .signals import JumpReference
 from .squat_jump import SquatJumpTask, plan_squat_jump
@@ -54,7 +57,7 @@ class SquatJumpReference(Block):
             0.029, unit="m", ge=0.0, le=0.1, text="height at lift-off below standing"
         )
         touchdown_drop: float = parameter(
-            0.009, unit="m", ge=0.0, le=0.1, text="height at touchdown below standing"
+            0.009, unit="m", ge=-0.02, le=0.1, text="height at touchdown below standing"
         )
         landing_depth: float = parameter(
             0.06, unit="m", ge=0.0, le=0.15, text="where the landing comes to rest below standing"
@@ -95,8 +98,15 @@ class SquatJumpReference(Block):
             )
         names = set(SquatJumpTask.__dataclass_fields__)
         task = SquatJumpTask(**{k: v for k, v in p.model_dump().items() if k in names})
-        model = build_pinocchio_model(robot, p.actuators)
-        self._reader = JumpTableReader(plan_squat_jump(model, robot, task, p.actuators))
+        self._reader = JumpTableReader(_plan(robot.model_dump_json(), task, p.actuators))
 
     def step(self) -> None:
         self._reader.read(self.time, self.reference, self.params.lead)
+
+
+@lru_cache(maxsize=8)
+def _plan(robot: str, task: SquatJumpTask, actuators: str) -> JumpTable:
+    """The plan for a robot given as JSON: the same for all runs of a process."""
+    description = RobotDescription.model_validate_json(robot)
+    model = build_pinocchio_model(description, actuators)
+    return plan_squat_jump(model, description, task, actuators)

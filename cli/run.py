@@ -175,7 +175,7 @@ def run_once(
     print_result(out, name, result)
     if recording is not None:
         say(out, f"recording: {recording}; to see it: {how_to_view(recording)}")
-    for problem in result.stop_problems:
+    for problem in (*result.cautions, *result.stop_problems):
         print_warning(problem)
     if as_json:
         shown = str(recording) if recording else None

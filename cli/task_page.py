@@ -13,6 +13,7 @@ BEGIN, END = "<!-- task parameters -->\n", "<!-- end of task parameters -->"
 
 def task_tables() -> str:
     """The tables of everything a task file may say, from the declarations."""
+    from ..blocks.planner.margins import Margins
     from ..blocks.planner.sequence import Hop, Span
     from ..blocks.planner.task import JumpTask, Knots, Weights
 
@@ -23,6 +24,7 @@ def task_tables() -> str:
         ("One of `phases`", Span),
         ("`knots`", Knots),
         ("`weights`", Weights),
+        ("`margins`", Margins),
     ):
         head = [f"{title}:", ""] if title else []
         rows = ["| parameter | unit | default | bounds | |", "|---|---|---|---|---|"]

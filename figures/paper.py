@@ -70,7 +70,7 @@ def draw(
         ),
         "somersault": lambda: _plan(robot),
         "somersault_in_place": lambda: _frames(
-            "Somersault in place, relaxed motors",
+            "Somersault in place",
             traces[SOMERSAULT],
             by_task[SOMERSAULT],
             View((0.05, 0.0, 0.32), 1.6),

@@ -55,7 +55,8 @@ class JumpScore(Block):
 
     The run ends 0.1 s after the rest has been judged. Not judged, but counted: solver failures,
     share of saturated motor samples, peak torque and speed. Metrics: ``success``, ``reason`` (the
-    first failed criterion with its figures) and the figures themselves.
+    first failed criterion with its figures) and the figures themselves; of the angular momentum at
+    lift-off its magnitude and its part about the world's y axis, the robot's pitch as it stood.
 
     Of several ``jumps`` in a row all the figures above are of the last; those before it must be
     real flights too, with their lift-off speed and apex as planned, and land within
@@ -148,6 +149,8 @@ class JumpScore(Block):
                 "apex_above_standing_m": float(record.apex_height - record.standing_height),
                 "apex_from_squat_m": float(record.apex_height - record.squat_height),
                 "lift_off_speed_m_s": float(record.lift_off_speed),
+                "lift_off_angular_momentum_nms": hypot(*record.lift_off_momentum.tolist()),
+                "lift_off_pitch_momentum_nms": record.lift_off_momentum.item(1),
             }
         if landed:
             values |= {
@@ -263,10 +266,12 @@ class JumpScore(Block):
                 # Nothing touched during the whole of the tick before.
                 record.unloaded_time[()] = max(0.0, time - self.period)
                 record.unloaded_speed[()] = record.vertical_speed if time > 0.0 else speed
+                record.unloaded_momentum[:] = truth.angular_momentum
                 record.apex_height[()] = height
             if time - record.unloaded_time.item() >= self.params.flight_confirmation - 1e-9:
                 record.lift_off_time[()] = record.unloaded_time
                 record.lift_off_speed[()] = record.unloaded_speed
+                record.lift_off_momentum[:] = record.unloaded_momentum
                 if self.series.made:
                     keep_place(self.series)
         elif record.touchdown_time == NEVER and touched:

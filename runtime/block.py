@@ -26,7 +26,7 @@ A small one::
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, ClassVar, Generic, Literal, Self, TypeVar, overload
@@ -288,6 +288,11 @@ class Block:
     def metrics(self) -> Mapping[str, Metric]:
         """The block's results at the end of a run, with units in their names."""
         return {}
+
+    def cautions(self) -> Sequence[str]:
+        """What whoever reads a run's results must know of how they came about, such as a check that
+        was waived; asked once, when every block has started."""
+        return ()
 
 
 _RESERVED = frozenset(name for name in vars(Block) if not name.startswith("__"))

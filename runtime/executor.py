@@ -76,6 +76,7 @@ class Executor:
         self._sinks: list[Sink] = [*own, *sinks]
         self._opened: list[Sink] = []
         self._on_ready = on_ready
+        self._cautions: list[str] = []
 
     def run(self, ticks: int | None = None) -> RunResult:
         """The whole life of the graph, once: start, tick, stop cycles, close.
@@ -104,6 +105,7 @@ class Executor:
                     self._open_sinks(limit)
                     self.life.start()
                     self._note("life", "ready: every block has started")
+                    self._ask_for_cautions()
                     if self._on_ready is not None:
                         self._on_ready()
                     self.life.move(LifeState.RUNNING)
@@ -165,6 +167,12 @@ class Executor:
     def _note(self, kind: str, text: str, level: str = "INFO") -> None:
         self.ticker.tell(Note(self.bound.clock.tick, kind, text, level))
 
+    def _ask_for_cautions(self) -> None:
+        for path, block in self.bound.blocks.items():
+            self._cautions += [f"{path}: {text}" for text in block.cautions()]
+        for caution in self._cautions:
+            self._note("caution", caution, "WARN")
+
     def _pause(self) -> None:
         """The time between stop cycles: a period, so that a bus can carry each."""
         self._time.sleep(self.bound.clock.base_period)
@@ -205,6 +213,7 @@ class Executor:
             skipped_periods=pacer.skipped_periods if pacer is not None else 0,
             error=error,
             stop_problems=tuple(problems),
+            cautions=tuple(self._cautions),
             parameter_changes=tuple(self.bound.parameters.changes),
             log=self._log,
             graph=self.bound.graph,

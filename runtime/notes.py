@@ -1,8 +1,8 @@
 """Notes: what happens in a run beside its signals, as said by the runtime to whoever keeps the run.
 
 Kinds the runtime writes: ``life`` (a change of the life cycle), ``overrun`` (a late tick),
-``fault`` (what ended a run before its time) and ``parameter`` (a live change). Recorders add
-``dropped`` (ticks that were not kept).
+``fault`` (what ended a run before its time), ``caution`` (what a block wants its readers to know)
+and ``parameter`` (a live change). Recorders add ``dropped`` (ticks that were not kept).
 """
 
 from __future__ import annotations

@@ -44,6 +44,8 @@ class RunResult:
     skipped_periods: int = 0
     error: RunError | None = None
     stop_problems: tuple[str, ...] = ()
+    cautions: tuple[str, ...] = ()
+    """What a block says that whoever reads the result must know, such as a check that was waived."""
     parameter_changes: tuple[ParameterChange, ...] = ()
     warnings: tuple[str, ...] = ()
     """What does not touch the run itself, such as a recording that is not whole."""
@@ -106,6 +108,7 @@ class RunResult:
             "metrics": {name: _plain(value) for name, value in self.metrics.items()},
             "blocks": {path: asdict(times) for path, times in self.blocks.items()},
             "stop_problems": list(self.stop_problems),
+            "cautions": list(self.cautions),
             "warnings": list(self.warnings),
             "parameter_changes": [asdict(change) for change in self.parameter_changes],
         }

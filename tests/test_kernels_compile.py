@@ -18,6 +18,8 @@ import numpy as np
 import pytest
 
 import aloft
+from aloft.blocks.leg_kinematics import read_leg
+from aloft.runtime.description import find_robot
 from aloft.runtime.kernel import kernel, kernels
 
 ROOT = Path(__file__).parent.parent
@@ -34,13 +36,26 @@ NOT_HOT = {
 INEXACT = {"sin", "cos", "atan2", "acos", "exp", "hypot", "dot"}
 """What another library, or another order of sums, may round differently."""
 
+LEG = read_leg(find_robot("bruce"), 0)
 UNUSED = {
+    "aloft.blocks.leg_inverse_kinematics.slide": (
+        LEG.hip, LEG.plane, LEG.signs, LEG.limits, np.add(LEG.hip, [0.25, 0.02, -0.3]), np.eye(3), 0.005,
+        0.1, np.zeros(3), np.zeros(5),
+    ),
     "aloft.blocks.rotations.skew": (np.ones(3), np.zeros((3, 3))),
+    "aloft.blocks.leg_inverse_kinematics.pitched_line": (np.eye(3), 0.4, np.zeros(3)),
     "aloft.blocks.rotations.yaw": (np.array([0.1, 0.2, 0.3, 0.9]),),
     "aloft.blocks.balance_target.lengthen": (
         np.array([0.01, -0.04, 0.0]), 0.7, 0.02, 0.25, 0.2, 0.6, *(np.ones(3) for _ in range(3)),
     ),
     "aloft.blocks.joint_pd.follow": (0.002, 0.02, *(np.ones(10) for _ in range(5))),
+    "aloft.blocks.joint_pd.stop": (
+        np.linspace(-1.0, 1.0, 5), np.tile([-0.8, 0.7], (5, 1)), 0.1, 2.0,
+        *(np.full(5, x) for x in (60.0, 1.5, 40.0, 0.2, 1.0, 0.3)),
+    ),
+    "aloft.blocks.leg_inverse_kinematics.keep_along": (
+        np.array([0.0, 0.6, 0.8]), np.array([0.1, 0.2, 0.3]),
+    ),
     "aloft.blocks.inertial_filter.right_up": (
         np.array([0.0, 0.0, 0.0, 1.0]), np.array([0.3, 0.2, 9.8]), 0.01, np.zeros(3),
     ),
@@ -113,7 +128,7 @@ def calls():
                 if id(value) in name_of:
                     patch.setattr(module, key, recorder(name_of[id(value)], value))
         aloft.load(ROOT / "graphs/jump.yaml").run()
-        other = {"estimator.use": "blocks.InvariantKalmanFilter"}
+        other = {"estimator.use": "blocks.InvariantKalmanFilter", "legs.beyond": "slide"}
         aloft.load(ROOT / "graphs/jump.yaml", other).run(duration=0.1)
     for name, arguments in UNUSED.items():
         samples[name].append(arguments)

@@ -48,6 +48,12 @@ class ContactRows:
         """Rows of the velocities of points on the ground."""
         return self._rows(points, set())
 
+    def speeds(self, points: set[int], axes: Iterable[int]) -> Indices:
+        """Rows of the velocities of points that hit the ground, in those of their axes: the last
+        one is upwards, those before it along the foot and across it."""
+        rows = [self._each * i + axis for i in sorted(points) for axis in axes]
+        return np.array(rows, dtype=np.int64)
+
     def places(self, points: set[int], held: set[int]) -> Indices:
         """Rows of the places of points that come to the ground while others are ``held`` there."""
         return self._rows(points - held, points & held) + self._errors

@@ -22,6 +22,9 @@ from .validity import InvalidPlanError, checked, require_valid
 SHIPPED = Path(__file__).parents[2] / "graphs" / "plans"
 """The plans that come with aloft; ``make plans`` makes them anew."""
 
+INVALID = "invalid"
+"""The folder, within a library's, of plans that failed the validity check."""
+
 SCALES = {
     "rise": 0.05, "take_off_speed": 0.3, "distance_x": 0.1, "distance_y": 0.1, "twist": 0.5,
     "landing_height": 0.05, "step_edge": 0.2, "rotation": 1.0, "squat_time": 0.2,
@@ -97,6 +100,25 @@ class PlanLibrary:
             if found:
                 return found[0]
         return None
+
+    def attempt(self, task: JumpTask, solve: Solver | None = None) -> JumpPlan:
+        """A plan of a task, valid or not, with its report, which is made anew.
+
+        As ``plan``, but one that fails the validity check is kept too, in a folder of its own
+        where ``plan`` and everybody else never look: it must be asked for in this way.
+
+        Raises:
+            TaskError, PlanError: as ``plan``.
+        """
+        invalid = PlanLibrary(self.robot, self.folder / INVALID, ())
+        found = self.find(task) or invalid.find(task)
+        if found is not None:
+            return checked(found, self.robot)
+        try:
+            return self.plan(task, solve)[0]
+        except InvalidPlanError as error:
+            invalid.add(error.plan)
+            return error.plan
 
     def hashes(self) -> frozenset[str]:
         """The hashes of all tasks that have a file, in one look at the folders."""

@@ -43,6 +43,15 @@ class Margins(Parameters):
     pressure: float = parameter(
         0.0, ge=0.0, lt=0.5, text="least share of a foot's load on each of its contact points"
     )
+    touchdown_speed: float | None = parameter(
+        None, unit="m/s", gt=0.0, le=20.0,
+        text="most that a contact point moves downwards where it hits the ground with an impact; "
+        "None: any",
+    )  # fmt: skip
+    touchdown_slide: float | None = parameter(
+        None, unit="m/s", gt=0.0, le=20.0,
+        text="most that it moves there along the foot, and across it; None: any",
+    )  # fmt: skip
 
 
 def unknown_joints(margins: Margins, names: list[str]) -> list[str]:

@@ -167,7 +167,7 @@ def contacts(e: Evidence) -> Iterator[Found]:
 
 
 def touchdown(e: Evidence) -> Iterator[Found]:
-    """Feet that are to arrive at rest do, and every foot arrives on the ground."""
+    """Feet that are to arrive at rest do, and those that may hit the ground are slow enough."""
     plan, r, s = e.plan, e.replay, e.replay.samples
     knots = [touchdown for _, touchdown in r.flights]
     if plan.task.impact:
@@ -181,6 +181,7 @@ def touchdown(e: Evidence) -> Iterator[Found]:
         peak = e.effort * e.robot.profiles[plan.task.profile].peak_torque
         yield Found("held_joints", found[k, 1], peak * SHORTEST_IMPACT, "N m s",
                     "the impulse of a motor whose joint keeps still", _which(e, k))  # fmt: skip
+        yield from _hits(e, knots)
         return
     samples = np.searchsorted(s.time, plan.time[knots] - 1e-9)
     speeds = np.linalg.norm(s.point_velocity[samples], axis=2)
@@ -188,6 +189,28 @@ def touchdown(e: Evidence) -> Iterator[Found]:
     yield Found(
         "touchdown_speed", float(speeds.max()), 0.05, "m/s", "the feet's speed at touchdown"
     )
+
+
+def _hits(e: Evidence, knots: list[int]) -> Iterator[Found]:
+    """How fast points hit the ground, downwards and along or across their foot, where bounded."""
+    margins, r, s = e.plan.task.margins, e.replay, e.replay.samples
+    if margins is None:
+        return
+    fast = np.zeros(2)
+    for knot in knots:
+        speeds = s.point_velocity[np.searchsorted(s.time, e.plan.time[knot] - 1e-9)]
+        for point, foot in enumerate(e.robot.foot_of_contact()):
+            x, y, z = speeds[point] if e.plan.contact[knot + 1, point] else np.zeros(3)
+            cosine, sine = np.cos(r.heading[knot, foot]), np.sin(r.heading[knot, foot])
+            slides = abs(cosine * x + sine * y), abs(cosine * y - sine * x)
+            fast = np.maximum(fast, [-z, max(slides)])
+    for name, found, most, what in (
+        ("touchdown_speed", fast[0], margins.touchdown_speed, "downwards"),
+        ("touchdown_slide", fast[1], margins.touchdown_slide, "along or across the foot"),
+    ):
+        if most is not None:
+            text = f"how fast a point hits the ground {what}"
+            yield Found(name, float(found), most + 0.05, "m/s", text)
 
 
 def _impact(e: Evidence, knot: int) -> tuple[float, float]:

@@ -279,7 +279,13 @@ class ProblemBuilder:
         heading = [np.cos(stance.heading), np.sin(stance.heading)]
         self._set("contact", k, place=places, heading=heading)
         feet = self.pieces["contact"].rows // 2
-        self._rows("contact", k, [("foot velocity", feet, 0.0, 0.0), ("footholds", feet, 0.0, 0.0)])
+        speeds = [("foot velocity", feet, 0.0, 0.0)]
+        if stretch.impact:  # hits the ground from above
+            *along, down = [most or np.inf for most in self.structure.touchdown_speeds()]
+            of_point = [("foot velocity", 1, -most, most) for most in along]
+            of_point.append(("foot velocity", 1, -down, np.inf))
+            speeds = of_point * len(self.coordinates.contacts)
+        self._rows("contact", k, [*speeds, ("footholds", feet, 0.0, 0.0)])
 
     def _fill_obstacle(self, k: int) -> None:
         hop, place, edge = self.structure.hop_at(k)

@@ -138,11 +138,24 @@ class Structure:
             for s in (before, stretch)
         )  # fmt: skip
         if stretch.impact:
-            return self.contact_rows.places(now, set())
+            bounded = [
+                axis for axis, most in enumerate(self.touchdown_speeds()) if most is not None
+            ]
+            return np.concatenate(
+                [self.contact_rows.speeds(now, bounded), self.contact_rows.places(now, set())]
+            )
         if before.impact:
             return self.contact_rows.velocities(now)
         velocities = self.contact_rows.velocities(held | now)
         return np.concatenate([velocities, self.contact_rows.places(now, held)])
+
+    def touchdown_speeds(self) -> list[float | None]:
+        """The most [m/s] that a point may move where it hits the ground: along the foot, across it
+        (not in the sagittal plane) and downwards."""
+        margins, sideways = self.task.margins, len(self.coordinates.axes) - 1
+        if margins is None:
+            return [None] * (sideways + 1)
+        return [*[margins.touchdown_slide] * sideways, margins.touchdown_speed]
 
     def _air_rows(self, k: int) -> NDArray[np.int64]:
         """Which rows are needed: how far ahead only where there is an edge."""

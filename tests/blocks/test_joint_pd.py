@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from aloft.blocks.joint_pd import JointPD
+from aloft.blocks.joint_pd import JointPD, stop
 from aloft.blocks.signals import CommandMode, Phase
 from aloft.runtime.description import find_robot
 from aloft.runtime.errors import BlockError
@@ -102,9 +104,9 @@ def test_half_way_the_torque_is_the_mean_of_both_controllers():
     assert torque == pytest.approx(0.5 * flight + 0.5 * stance)
 
 
-def test_stance_feedback_leads_the_joints_by_the_commanded_acceleration():
+def test_acceleration_targets_lead_the_joints_by_the_commanded_acceleration():
     """A steady acceleration a leads a joint at rest by a times leak, and leak squared."""
-    bench = make(stance_feedback=True, leak=0.02, stance_stiffness=[20.0] * 5)
+    bench = make(stance_targets="acceleration", leak=0.02, stance_stiffness=[20.0] * 5)
     bench.set("joints", velocity=0.0)
     acceleration = np.zeros(16)
     acceleration[6 + 3] = 10.0
@@ -117,12 +119,66 @@ def test_stance_feedback_leads_the_joints_by_the_commanded_acceleration():
     assert np.abs(np.delete(lead, 3)).max() < 1e-12
 
 
+def test_the_legs_kinematics_can_be_what_the_stance_gains_act_towards():
+    gains = {"stance_stiffness": [20.0] * 5, "stance_damping": [1.0] * 5}
+    command = settle(make(stance_targets="legs", **gains), Phase.THRUST, True)
+    assert np.array_equal(command.torque, np.arange(1.0, 11.0))
+    assert (command.stiffness == 20.0).all() and (command.damping == 1.0).all()
+    assert (command.position == 0.1).all() and (command.velocity == 0.2).all()
+
+
 def test_friction_pushes_the_way_the_joint_moves():
     bench = make(friction=0.07)
     bench.set("wbc", torque=0.0)
     bench.set("joints", velocity=np.r_[np.full(5, 10.0), np.full(5, -10.0)])
     command = settle(bench, Phase.STAND, True)
     assert command.torque == pytest.approx(np.r_[np.full(5, 0.07), np.full(5, -0.07)])
+
+
+def test_a_soft_stop_pushes_back_from_a_limit_and_brakes():
+    """The left knee stands 20 mrad from its upper limit and moves on at 2 rad/s."""
+    knee = 3
+    limit = ROBOT.joint_limits[knee, 1]
+    joints, rates = ROBOT.standing_position.copy(), np.zeros(10)
+    joints[knee], rates[knee] = limit - 0.02, 2.0
+    torques = {}
+    for gain in (0.0, 3.0):
+        bench = make(stop_gain=gain, stop_margin=0.05)
+        bench.set("joints", position=joints, velocity=rates)
+        command = settle(bench, Phase.LANDING, True)
+        torques[gain] = (
+            command.torque
+            + command.stiffness * (command.position - joints)
+            + command.damping * (command.velocity - rates)
+        )
+    added = torques[3.0] - torques[0.0]
+    depth = 0.03
+    expected = -3.0 * FLIGHT_KP[knee] * depth - 3.0 * depth / 0.05 * FLIGHT_KD[knee] * 2.0
+    assert added[knee] == pytest.approx(expected)
+    assert np.delete(added, knee) == pytest.approx(0.0, abs=1e-12)
+
+
+@given(
+    angle=st.floats(-2.5, 2.5),
+    rate=st.floats(-20, 20),
+    gains=st.tuples(*[st.floats(0, 100)] * 4),
+    targets=st.tuples(st.floats(-3, 3), st.floats(-3, 3)),
+)
+def test_a_soft_stop_adds_its_own_torque_to_any_feedback(angle, rate, gains, targets):
+    stiffness, damping = np.array([gains[0]]), np.array([gains[1]])
+    position, velocity = np.array([targets[0]]), np.array([targets[1]])
+    before = gains[0] * (targets[0] - angle) + gains[1] * (targets[1] - rate)
+    limits, springs, dampers = np.array([[-1.0, 0.5]]), np.array([gains[2]]), np.array([gains[3]])
+    stop(
+        np.array([angle]), limits, 0.1, 2.0, springs, dampers, stiffness, position, damping,
+        velocity,
+    )  # fmt: skip
+    after = stiffness[0] * (position[0] - angle) + damping[0] * (velocity[0] - rate)
+    edge = min(max(angle, -0.9), 0.4)
+    depth = abs(angle - edge) / 0.1
+    added = 2.0 * gains[2] * (edge - angle) - 2.0 * min(depth, 1.0) * gains[3] * rate
+    if stiffness[0] > 1e-9 and damping[0] > 1e-9:
+        assert after - before == pytest.approx(added, abs=1e-6, rel=1e-9)
 
 
 def test_gains_must_fit_the_leg():

@@ -193,7 +193,7 @@ def test_alpha_decides_what_the_target_is_fixed_in():
     turned = np.zeros((3, 3))
     to_matrix(rotation_vector([0.0, 0.3, 0.0]), turned)
     for alpha in (0.0, 0.5, 1.0):
-        bench = make(alpha=alpha)
+        bench = make(alpha=[0.3, alpha, 0.7])
         fly(bench, 0.0, 0.3)
         bench.set("terms", base_rotation=turned)
         feet = fly(bench, 0.25, 0.05)

@@ -97,6 +97,61 @@ def test_a_stretched_leg_is_not_reachable_and_its_knee_does_not_move():
     assert target.velocity[3] == pytest.approx(0.0, abs=1e-3)
 
 
+def tilted(angle, axis):
+    """The axes of a level sole, seen from a base that has turned by ``angle``."""
+    cosine, sine = math.cos(angle), math.sin(angle)
+    if axis == "roll":
+        return np.array([[1.0, 0, 0], [0, cosine, sine], [0, -sine, cosine]])
+    return np.array([[cosine, 0, -sine], [0, 1.0, 0], [sine, 0, cosine]])
+
+
+@pytest.mark.parametrize(
+    ("turn", "away"),
+    [(tilted(-0.6, "roll"), [0.0, 0.12, 0.0]), (tilted(-0.6, "pitch"), [-0.12, 0.0, 0.0])],
+)
+def test_beyond_reach_the_foot_slides_in_the_plane_of_its_sole(turn, away):
+    """The torso has tilted, so the hip's limit keeps the leg from going as far as it should."""
+    hip = LEGS[0].hip
+    soles = {}
+    for beyond in ("slide", "turn"):
+        bench = BlockBench(LegInverseKinematics, {"beyond": beyond}, robot="bruce")
+        wanted = np.array([0.0, 0.0, -0.30]) + away
+        position = np.tile(hip + turn @ wanted, (2, 1))
+        bench.set("feet", position=position, rotation=np.tile(turn, (2, 1, 1)), velocity=0.0)
+        bench.set("joints", position=ROBOT.standing_position)
+        bench.step()
+        assert not bench.get("target").reachable[0]
+        place, rotation = (x[0] for x in feet_of(bench.get("target").position))
+        soles[beyond] = turn.T @ (place - hip), turn.T @ rotation[:, 0]
+    (place, line), (turned_place, turned_line) = soles["slide"], soles["turn"]
+    assert place[2] == pytest.approx(wanted[2], abs=1e-9)
+    assert line == pytest.approx([1.0, 0.0, 0.0], abs=1e-9)
+    side = np.abs(away).argmax()
+    assert 0.0 < place[side] / wanted[side] < 1.0
+    assert abs(turned_place[2] - wanted[2]) > 1e-3 or abs(turned_line[2]) > 1e-2
+
+
+def test_sliding_is_continuous_where_reach_ends():
+    """From within reach to beyond it the joints do not jump."""
+    turn = tilted(-0.6, "roll")
+    bench = BlockBench(LegInverseKinematics, {"beyond": "slide"}, robot="bruce")
+    bench.set("joints", position=ROBOT.standing_position)
+    last, reachable = None, []
+    for aside in np.linspace(0.0, 0.14, 141):
+        place = LEGS[0].hip + turn @ np.array([0.0, aside, -0.31])
+        bench.set(
+            "feet", position=np.tile(place, (2, 1)), rotation=np.tile(turn, (2, 1, 1)), velocity=0.0
+        )
+        bench.step()
+        joints = bench.get("target").position[:5].copy()
+        reachable.append(bool(bench.get("target").reachable[0]))
+        if last is not None:
+            assert np.abs(joints - last).max() < 0.03
+        last = joints
+    assert reachable[0]
+    assert not reachable[-1]
+
+
 def test_a_leg_that_stretches_slows_down_and_its_velocity_is_that_of_its_position():
     """Through the soft zone and beyond, at 0.3 m/s: no jump, and the rates are the derivatives."""
     bench = BlockBench(LegInverseKinematics, robot="bruce", rate=500.0)
@@ -140,6 +195,22 @@ def test_the_margin_is_kept_and_the_description_is_not_changed():
 def test_needs_a_robot():
     with pytest.raises(BlockError, match="name one in the graph"):
         BlockBench(LegInverseKinematics, dimensions=dict(ROBOT.dimensions))
+
+
+def test_the_soles_have_the_planned_pitch_where_asked_for():
+    position, flat = feet_of(ROBOT.standing_position)
+    found = {}
+    for follow in ("feet", "pitch"):
+        bench = BlockBench(LegInverseKinematics, {"follow": follow}, robot="bruce")
+        bench.set("feet", position=position, rotation=flat)
+        bench.set("reference", foot_pitch=[0.3, -0.1])
+        bench.step()
+        found[follow] = feet_of(bench.get("target").position)
+    assert found["feet"][1] == pytest.approx(flat, abs=1e-9)
+    places, turned = found["pitch"]
+    assert places == pytest.approx(position, abs=1e-9)
+    for foot, pitch in enumerate((0.3, -0.1)):
+        assert turned[foot, :, 0] == pytest.approx([math.cos(pitch), 0.0, -math.sin(pitch)])
 
 
 def test_the_plans_joints_are_followed_as_long_as_the_plan_flies():

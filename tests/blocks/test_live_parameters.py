@@ -91,7 +91,8 @@ def hopping(tick: int) -> Inputs:
 
 SCENES: Mapping[str, list[Scene]] = {
     "blocks.JointPD": [
-        Scene({"stance_feedback": True, "friction": 0.1, "stance_stiffness": [1.0] * 5}),
+        Scene({"stance_targets": "acceleration", "friction": 0.1, "stance_stiffness": [1.0] * 5}),
+        Scene({"stop_gain": 1.0}, lambda tick: {"joints": {"position": 0.9, "velocity": 1.0}}),
         Scene({}, hopping),
     ],
     "blocks.BalanceTarget": [

@@ -56,6 +56,12 @@ def test_the_hash_is_the_same_everywhere(folder: Path, call_json: CallJson, star
     assert len(here) == 1
 
 
+def test_a_caution_is_printed_even_where_all_else_is_quiet(folder: Path, call: Call) -> None:
+    setting = ("--set", "counter.caution=counted by hand")
+    done = call("run", "count.yaml", "--quiet", "--no-record", *setting)
+    assert "warning: counter: counted by hand" in done.stderr
+
+
 def test_quiet_prints_the_verdict_only(folder: Path, call: Call) -> None:
     assert call("run", "count.yaml", "--quiet", "--no-record").stdout == "success: ran to its end\n"
 

@@ -21,3 +21,12 @@ def test_a_jump_driven_by_the_invariant_filter() -> None:
     ):  # fmt: skip
         value = found[f"estimator_{name}"]
         assert isinstance(value, float) and 0.0 < value < bound, name
+
+
+def test_an_onlooker_is_wrong_without_a_fall() -> None:
+    settings = {"estimator.law": "complementary", "robot.seed": 5}
+    path = GRAPH.with_name("estimator_watching.yaml")
+    result = aloft.load(path, settings).run(log=False)
+    assert result.success, result.reason
+    error = result.metrics["estimator_velocity_touchdown_m_s"]
+    assert isinstance(error, float) and error > 0.1, "it would not land a jump of its own"

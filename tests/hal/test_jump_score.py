@@ -54,6 +54,7 @@ def perfect(time: float) -> Fields:
         "base_orientation": quaternion(0.01),
         "com": [0.0, 0.0, height],
         "com_velocity": [0.0, 0.0, speed],
+        "angular_momentum": [0.0, time, 0.0] if time < LIFT_OFF else [0.03, -0.04, 0.0],
         "contact_position": np.column_stack([FEET, np.full(4, 0.05 if air else 0.0)]),
         "contact_force": np.tile([0.0, 0.0, 0.0 if air else WEIGHT / 4], (4, 1)),
         "contact_touched": np.full(4, not air),
@@ -108,6 +109,8 @@ def test_a_perfect_jump_succeeds_with_the_right_figures() -> None:
     assert metrics["apex_above_standing_m"] == pytest.approx(rise, abs=1e-4)
     assert metrics["apex_from_squat_m"] == pytest.approx(rise + 0.08, abs=1e-4)
     assert metrics["lift_off_speed_m_s"] == pytest.approx(SPEED, abs=1e-9)
+    assert metrics["lift_off_angular_momentum_nms"] == pytest.approx(0.05)
+    assert metrics["lift_off_pitch_momentum_nms"] == pytest.approx(-0.04)
     assert metrics["touchdown_speed_m_s"] == pytest.approx(SPEED, abs=0.03)
     assert metrics["flight_time_s"] == pytest.approx(TOUCHDOWN - LIFT_OFF, abs=PERIOD)
     assert metrics["planned_flight_time_s"] == pytest.approx(TOUCHDOWN - LIFT_OFF)

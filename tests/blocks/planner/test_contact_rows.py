@@ -31,6 +31,14 @@ def test_rows_are_independent_and_all_there_are(points: tuple[int, ...], count: 
     assert np.linalg.matrix_rank(jacobian[all_rows]) == count
 
 
+def test_speeds_of_points_that_hit_the_ground() -> None:
+    rows = ContactRows(ROBOT, coordinates("full"))
+    assert rows.speeds({0, 2}, [2]).tolist() == [2, 8]
+    assert rows.speeds({1}, [0, 1, 2]).tolist() == [3, 4, 5]
+    assert ContactRows(ROBOT, coordinates("sagittal")).speeds({0, 1}, [1]).tolist() == [1, 3]
+    assert len(rows.speeds({0, 1}, [])) == 0
+
+
 def test_a_point_that_comes_down_beside_another() -> None:
     rows = ContactRows(ROBOT, coordinates("full"))
     errors = 12

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -73,3 +75,19 @@ def test_a_plan_keeps_them() -> None:
     feet = plan.contact_force[stands][:, :, 2].reshape(-1, 2, 2)
     share = feet.min(axis=2) / np.maximum(feet.sum(axis=2), 1e-9)
     assert share.min() >= 0.2 - 1e-4
+
+
+def test_a_plan_hits_the_ground_no_faster_than_it_may() -> None:
+    jump = {"name": "a", "rise": 0.09, "impact": True, "weights": {"impulse": 1e-6}}
+    free = solve_jump(make_task(jump), ROBOT)
+    names = {test.name for test in check_plan(free, ROBOT).tests}
+    assert not names & {"touchdown_speed", "touchdown_slide"}
+    wanted = {"touchdown_speed": 0.4, "touchdown_slide": 0.1}
+    plan = solve_jump(make_task({**jump, "margins": wanted}), ROBOT)
+    report = check_plan(plan, ROBOT)
+    assert report.explain() == ""
+    found = {test.name: test.value for test in report.tests}
+    assert found["touchdown_speed"] == pytest.approx(0.4, abs=0.01)
+    assert found["touchdown_slide"] <= 0.11
+    faster = make_task({**jump, "margins": {"touchdown_speed": 0.2}})
+    assert "touchdown_speed" in check_plan(replace(plan, task=faster), ROBOT).explain()
