@@ -140,6 +140,9 @@ class BalanceTarget(Block):
                 self._correct(turn)
         else:
             self._balance(phase, heading)
+        self.target.joint_position[...] = reference.joint_position
+        self.target.joint_velocity[...] = reference.joint_velocity
+        self.target.joint_acceleration[...] = reference.joint_acceleration
 
     def _begin(self, heading: float) -> None:
         """Note how high it stands by the plan, and where the plan's world is."""

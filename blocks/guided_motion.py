@@ -164,7 +164,8 @@ class MotionRecorder:
             "angular_momentum_rate": rate, "foot_position": body.feet(q),
             "foot_velocity": motion.foot_velocity, "foot_yaw": np.zeros(len(body.soles)),
             "joint_position": q[7:], "joint_velocity": v[6:],
-            "joint_torque": np.zeros(len(v) - 6),
+            "joint_torque": np.zeros(len(v) - 6), "joint_acceleration": np.zeros(len(v) - 6),
+            "foot_pitch": np.zeros(len(body.soles)),
         }  # fmt: skip
         self.time.append(time)
         for name, value in values.items():

@@ -13,7 +13,9 @@ from .signals import JumpReference, Phase
 
 Array = NDArray[np.float64]
 
-_FED_FORWARD = ("com_acceleration", "angular_momentum_rate", "joint_torque")
+_FED_FORWARD = (
+    "com_acceleration", "angular_momentum_rate", "joint_acceleration", "joint_torque",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)

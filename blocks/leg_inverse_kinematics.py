@@ -54,7 +54,8 @@ class LegInverseKinematics(Block):
     with u the target's line. They are limited to ``speed_limit``, and are zero for a joint held at
     its limit. A line that turns by more than 0.1 rad in one tick is a new target, not a motion.
 
-    With ``follow: plan`` the targets are the plan's joints while the plan flies, and the landing
+    With ``follow: pitch`` the soles have the pitch they have in the plan, so that heels that rose
+    before lift-off come down as planned and not at once. With ``follow: plan`` the targets are the plan's joints while the plan flies, and the landing
     law has no say: a somersault turns as fast as its legs are tucked, so its rotation is right
     only if all joints are where they should be.
 
@@ -76,9 +77,10 @@ class LegInverseKinematics(Block):
             0.005, unit="m", ge=0.0, le=0.05, text="over which a stretching leg slows down"
         )
 
-        follow: Literal["feet", "plan"] = parameter(
-            "feet", text="the feet's targets, or the plan's joints as long as the plan flies"
-        )
+        follow: Literal["feet", "pitch", "plan"] = parameter(
+            "feet", text="the feet's targets; those with the soles' planned pitch; or the plan's "
+            "joints as long as the plan flies"
+        )  # fmt: skip
 
         beyond: Literal["turn", "slide"] = live_parameter(
             "turn", text="what is given up first for a target out of reach"
@@ -106,6 +108,7 @@ class LegInverseKinematics(Block):
         self._sole = np.zeros(3)
         self._turn = np.zeros((3, 3))
         self._velocity, self._place = np.zeros(3), np.zeros(3)
+        self._line = np.zeros(3)
         self._rate = np.zeros(3)
         self._jacobian = np.zeros((6, 5))
         self._rows = np.zeros((5, 5))
@@ -129,6 +132,11 @@ class LegInverseKinematics(Block):
         limit = self.params.speed_limit
         for foot, leg in enumerate(self._legs):
             wanted = feet.rotation[foot, :, 0]
+            if self.params.follow == "pitch":
+                pitched_line(
+                    feet.rotation[foot], float(self.reference.foot_pitch[foot]), self._line
+                )
+                wanted = self._line
             yaw = float(self.joints.position[leg.joints[0]])
             inside, share = inverse(
                 leg.hip, leg.plane, leg.signs, leg.limits, feet.position[foot], wanted,
@@ -158,6 +166,14 @@ class LegInverseKinematics(Block):
                 target.position[joint] = angle
                 target.velocity[joint] = 0.0 if held else min(max(speed, -limit), limit)
         lines.known[()] = True
+
+
+@kernel
+def pitched_line(rotation: Array, pitch: float, out: Array) -> None:
+    """The x axis of ``rotation`` (3, 3), turned by ``pitch`` [rad] about its y axis."""
+    cosine, sine = math.cos(pitch), math.sin(pitch)
+    for i in range(3):
+        out[i] = cosine * float(rotation[i, 0]) - sine * float(rotation[i, 2])
 
 
 @kernel

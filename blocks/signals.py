@@ -137,8 +137,10 @@ class JumpReference(Signal):
     foot_position = Field(("n_feet", 3), unit="m", frame="world", text="sole centres")
     foot_velocity = Field(("n_feet", 3), unit="m/s", frame="world", text="their velocities")
     foot_yaw = Field("n_feet", unit="rad", frame="world", text="heading of each foot")
+    foot_pitch = Field("n_feet", unit="rad", frame="world", text="of each foot, toes down positive")
     joint_position = Field("n_joints", unit="rad", text="planned joint angles")
     joint_velocity = Field("n_joints", unit="rad/s", text="planned joint velocities")
+    joint_acceleration = Field("n_joints", unit="rad/s^2", text="planned; zero if not known")
     joint_torque = Field("n_joints", unit="N m", text="planned joint torques; zero if not known")
 
 
@@ -162,6 +164,9 @@ class WholeBodyTarget(Signal):
     angular_velocity = Field(3, unit="rad/s", frame="body", text="base angular velocity")
     angular_momentum = Field(3, unit="N m s", frame="world", text="k about the com")
     angular_momentum_rate = Field(3, unit="N m", frame="world", text="its feedforward rate")
+    joint_position = Field("n_joints", unit="rad", text="planned angles, for feet that roll")
+    joint_velocity = Field("n_joints", unit="rad/s", text="their velocities")
+    joint_acceleration = Field("n_joints", unit="rad/s^2", text="their accelerations")
 
 
 class FootTarget(Signal):

@@ -22,6 +22,11 @@ class TaskGains(Parameters):
     swing_weight: float = parameter(10.0, ge=0.0, text="unloaded points to the ground, per m/s^2")
     swing_stiffness: float = parameter(3000.0, unit="1/s^2", ge=0.0, text="of that")
     swing_damping: float = parameter(110.0, unit="1/s", ge=0.0, text="of that")
+    rolling_weight: float = parameter(
+        0.1, ge=0.0, text="ankle of a foot that rolls over its toes, per rad/s^2"
+    )
+    rolling_stiffness: float = parameter(1000.0, unit="1/s^2", ge=0.0, text="of that")
+    rolling_damping: float = parameter(60.0, unit="1/s", ge=0.0, text="of that")
     linear_weight: Vector = parameter((100.0, 100.0, 100.0), text="centre of mass, per m/s^2")
     linear_stiffness: Vector = parameter((100.0, 100.0, 100.0), unit="1/s^2", text="K_p of it")
     linear_damping: Vector = parameter((20.0, 20.0, 20.0), unit="1/s", text="K_d of it")

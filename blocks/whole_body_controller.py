@@ -67,7 +67,7 @@ class WholeBodyController(Block):
        others are go to the ground at their height: a task of zero acceleration never closes a
        gap, and a program that believes in a hovering heel pushes with nothing. In THRUST they
        are free to rise instead, as the heels do while the toes still push, and damped across
-       their foot.
+       their foot; the foot's last joint then follows the plan, feedforward and feedback.
     2. Linear momentum: x = a_ref + K_p (p_ref - p) + K_d (v_ref - v), per kg       (linear).
     3. Torso: x = K_p Log(R' R_ref) + K_d (w_ref - w), body frame.
     4. Angular momentum: x = -K_d k, or with ``track_angular_momentum`` k_ref' + K_d (k_ref - k).
@@ -179,6 +179,9 @@ class WholeBodyController(Block):
         self._lower, self._upper = np.zeros(n_joints), np.zeros(n_joints)
         self._still = np.zeros(n)
         self._foot_of_point = np.array(robot.foot_of_contact(), dtype=np.int64)
+        last = [[joint.child for joint in robot.joints].index(foot.link) for foot in robot.feet]
+        self._ankles = 6 + np.array(last, dtype=np.int64)
+        self._ankle_acceleration = np.zeros(len(last))
         self._active = np.zeros(n_contacts, dtype=np.int64)
         # A program of its own size for every number of points in stance: forces fixed to zero by
         # bounds would leave it without an interior.
@@ -240,10 +243,12 @@ class WholeBodyController(Block):
             rows[:first], desired[:first], weights[:first],
         )  # fmt: skip
         if phase == Phase.THRUST:
+            self._follow_ankles(p)
             lifting_tasks(
                 terms.contact_jacobian, terms.contact_drift, terms.contact_velocity,
                 self.phase.stance, self._foot_of_point, terms.foot_rotation, p.swing_weight,
-                p.swing_damping, rows[:first], desired[:first], weights[:first],
+                p.swing_damping, self._ankles, self._ankle_acceleration, p.rolling_weight,
+                rows[:first], desired[:first], weights[:first],
             )  # fmt: skip
         linear_task(
             terms.centroidal_matrix, terms.centroidal_drift, self._mass, terms.com,
@@ -263,6 +268,20 @@ class WholeBodyController(Block):
             p.track_angular_momentum, rows[first + 6 :], desired[first + 6 :],
         )  # fmt: skip
         weights[first:] = gains.weights
+
+    def _follow_ankles(self, gains: TaskGains) -> None:
+        """The acceleration that keeps every foot's last joint on the plan."""
+        terms, target = self.terms, self.target
+        for foot in range(self._ankles.shape[0]):
+            velocity = int(self._ankles[foot])
+            joint = velocity - 6
+            self._ankle_acceleration[foot] = (
+                float(target.joint_acceleration[joint])
+                + gains.rolling_stiffness
+                * (float(target.joint_position[joint]) - float(self.joints.position[joint]))
+                + gains.rolling_damping
+                * (float(target.joint_velocity[joint]) - float(terms.velocity[velocity]))
+            )
 
     def _assemble(self, program: _Program, count: int) -> None:
         p, terms, profile = self.params, self.terms, self._profile

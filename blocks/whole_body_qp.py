@@ -85,16 +85,21 @@ def lifting_tasks(
     foot_rotation: Array,
     weight: float,
     damping: float,
+    ankle: Indices,
+    ankle_acceleration: Array,
+    ankle_weight: float,
     rows: Array,
     desired: Array,
     weights: Array,
 ) -> None:
     """Points that leave the ground before lift-off, over what ``contact_tasks`` wrote for them:
     free to rise, their velocity across the foot damped, so that the foot rolls over its other
-    points and does not turn about them.
+    points and does not turn about them. How fast it rolls is the ankle's task: the motion of
+    centre of mass and torso leaves it open.
 
     Args:
         foot: of every point; foot_rotation: from foot to world, (n_feet, 3, 3).
+        ankle: the velocity of every foot's last joint; ankle_acceleration: wanted, by foot.
     """
     for i in range(stance.shape[0]):
         if stance[i]:
@@ -107,7 +112,10 @@ def lifting_tasks(
             for j in range(rows.shape[1]):
                 rows[row, j] += across * float(jacobian[i, k, j])
         desired[row] = wanted
-        weights[row], weights[row + 1], weights[row + 2] = weight, 0.0, 0.0
+        rows[row + 1, :] = 0.0
+        rows[row + 1, ankle[foot[i]]] = 1.0
+        desired[row + 1] = ankle_acceleration[foot[i]]
+        weights[row], weights[row + 1], weights[row + 2] = weight, ankle_weight, 0.0
 
 
 @kernel

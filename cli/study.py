@@ -73,8 +73,10 @@ def study(
         chosen = parse_seeds(seeds) if seeds else list(found.seeds)
         folder = out or Path("results") / found.name
         if tune:
-            if seeds or where:
-                raise AloftError("--seeds and --where are for runs; see the study's 'tune'")
+            if seeds or where or dry_run:
+                raise AloftError(
+                    "--seeds, --where and --dry-run are for runs; see the study's 'tune'"
+                )
             code = tune_study(found, folder, workers, cluster, screen, as_json)
         else:
             part = part_of(found, where or [])

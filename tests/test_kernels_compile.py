@@ -18,6 +18,8 @@ import numpy as np
 import pytest
 
 import aloft
+from aloft.blocks.leg_kinematics import read_leg
+from aloft.runtime.description import find_robot
 from aloft.runtime.kernel import kernel, kernels
 
 ROOT = Path(__file__).parent.parent
@@ -34,8 +36,14 @@ NOT_HOT = {
 INEXACT = {"sin", "cos", "atan2", "acos", "exp", "hypot", "dot"}
 """What another library, or another order of sums, may round differently."""
 
+LEG = read_leg(find_robot("bruce"), 0)
 UNUSED = {
+    "aloft.blocks.leg_inverse_kinematics.slide": (
+        LEG.hip, LEG.plane, LEG.signs, LEG.limits, np.add(LEG.hip, [0.25, 0.02, -0.3]), np.eye(3), 0.005,
+        0.1, np.zeros(3), np.zeros(5),
+    ),
     "aloft.blocks.rotations.skew": (np.ones(3), np.zeros((3, 3))),
+    "aloft.blocks.leg_inverse_kinematics.pitched_line": (np.eye(3), 0.4, np.zeros(3)),
     "aloft.blocks.rotations.yaw": (np.array([0.1, 0.2, 0.3, 0.9]),),
     "aloft.blocks.balance_target.lengthen": (
         np.array([0.01, -0.04, 0.0]), 0.7, 0.02, 0.25, 0.2, 0.6, *(np.ones(3) for _ in range(3)),

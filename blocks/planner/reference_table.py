@@ -29,8 +29,8 @@ from .replay import flight_knots
 from .task import GRAVITY
 
 Array = NDArray[np.float64]
-State = tuple[float, int, Array, Array]
-"""Time, interval, q and v."""
+State = tuple[float, int, Array, Array, Array]
+"""Time, interval, q, v and the joints' accelerations."""
 
 CENTROIDAL = ("com", "com_velocity", "angular_momentum")
 
@@ -46,11 +46,11 @@ def reference_table(plan: JumpPlan, robot: RobotDescription, stand_time: float) 
     rows: dict[str, list[Array]] = {}
     times: list[float] = []
     intervals: list[int] = []
-    for time, k, q, v in _states(plan, dynamics):
+    for time, k, q, v, bend in _states(plan, dynamics):
         times.append(time)
         intervals.append(k)
         row = _row(dynamics, q, v, forces.at(time, k))
-        row["joint_torque"] = torques.at(time, k)
+        row["joint_torque"], row["joint_acceleration"] = torques.at(time, k), bend
         for name, value in row.items():
             rows.setdefault(name, []).append(value)
     columns = {name: np.array(values) for name, values in rows.items()}
@@ -66,6 +66,7 @@ def reference_table(plan: JumpPlan, robot: RobotDescription, stand_time: float) 
     standing = {name: values[:1] for name, values in columns.items()}
     standing["com_acceleration"] = np.zeros((1, 3))
     standing["angular_momentum_rate"] = np.zeros((1, 3))
+    standing["joint_acceleration"] = np.zeros_like(standing["joint_acceleration"])
     start = {
         phase: stand_time + float(plan.time[plan.phase == phase][0])
         for phase in (Phase.SQUAT, Phase.THRUST, Phase.RECOVER)
@@ -109,7 +110,7 @@ def _states(plan: JumpPlan, dynamics: ExactDynamics) -> Iterator[State]:
     last = len(plan.time) - 1
     for k in range(last):
         start, h = float(plan.time[k]), float(plan.time[k + 1] - plan.time[k])
-        yield start, k, plan.position[k], plan.velocity[k]
+        yield start, k, plan.position[k], plan.velocity[k], plan.acceleration[k, 6:]
         if h <= 0.0:
             continue
         joints = joint_motion(plan.position, plan.velocity, plan.time, k)
@@ -117,7 +118,8 @@ def _states(plan: JumpPlan, dynamics: ExactDynamics) -> Iterator[State]:
         count = math.ceil(h / STEP - 1e-9)
         for i in range(1, count):
             yield start + i * h / count, k, *_between(base, joints, i * h / count, dynamics)
-    yield float(plan.time[last]), last - 1, plan.position[last], plan.velocity[last]
+    still = np.zeros(plan.velocity.shape[1] - 6)
+    yield float(plan.time[last]), last - 1, plan.position[last], plan.velocity[last], still
 
 
 def _base_motion(
@@ -135,16 +137,17 @@ def _base_motion(
 
 def _between(
     base: JointMotion, joints: JointMotion, time: float, dynamics: ExactDynamics
-) -> tuple[Array, Array]:
-    """Pinocchio's q and v of a stance between two knots."""
+) -> tuple[Array, Array, Array]:
+    """Pinocchio's q and v between two knots, and the joints' accelerations."""
     place, rate, bend = base.at(time)
-    position, velocity, _ = joints.at(time)
+    position, velocity, acceleration = joints.at(time)
     turn = rotation(place[3:])
     spin, _ = angular_motion(place[3:], rate[3:], bend[3:])
     quaternion = dynamics.pin.Quaternion(turn).coeffs()
     return (
         np.concatenate([place[:3], quaternion, position]),
         np.concatenate([turn.T @ rate[:3], spin, velocity]),
+        acceleration,
     )
 
 
@@ -178,12 +181,14 @@ def _row(dynamics: ExactDynamics, q: Array, v: Array, force: Array) -> dict[str,
     pin, model, data = dynamics.pin, dynamics.model, dynamics.data
     points, _ = dynamics.contact_jacobians(q)
     axes = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
-    soles, sole_velocities, yaws = [], [], []
+    soles, sole_velocities, yaws, pitches = [], [], [], []
     for frame in dynamics.sole_frames:
         place = data.oMf[frame]
         soles.append(place.translation.copy())
         sole_velocities.append(pin.getFrameJacobian(model, data, frame, axes)[:3] @ v)
-        yaws.append(math.atan2(place.rotation[1, 0], place.rotation[0, 0]))
+        ahead = place.rotation[:, 0]
+        yaws.append(math.atan2(ahead[1], ahead[0]))
+        pitches.append(math.atan2(-ahead[2], math.hypot(ahead[0], ahead[1])))
     return {
         "com": com,
         "com_velocity": com_velocity,
@@ -195,6 +200,7 @@ def _row(dynamics: ExactDynamics, q: Array, v: Array, force: Array) -> dict[str,
         "foot_position": np.array(soles),
         "foot_velocity": np.array(sole_velocities),
         "foot_yaw": np.array(yaws),
+        "foot_pitch": np.array(pitches),
         "joint_position": q[7:].copy(),
         "joint_velocity": v[6:].copy(),
     }

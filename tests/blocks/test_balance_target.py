@@ -47,6 +47,8 @@ def test_before_lift_off_it_is_the_plan():
         "com": [0.01, 0.0, 0.25], "com_velocity": [0.1, 0.2, 1.0],
         "com_acceleration": [1.0, 2.0, 20.0], "angular_velocity": [0.0, -9.0, 0.0],
         "angular_momentum": [0.0, 0.02, 0.0], "angular_momentum_rate": [0.0, 0.3, 0.0],
+        "joint_position": np.arange(10.0), "joint_velocity": -np.arange(10.0),
+        "joint_acceleration": 3.0 * np.arange(10.0),
     }  # fmt: skip
     bench.set("phase", phase=Phase.THRUST)
     bench.set("reference", orientation=about(1, 0.4), **values)

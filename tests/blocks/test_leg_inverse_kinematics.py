@@ -197,6 +197,22 @@ def test_needs_a_robot():
         BlockBench(LegInverseKinematics, dimensions=dict(ROBOT.dimensions))
 
 
+def test_the_soles_have_the_planned_pitch_where_asked_for():
+    position, flat = feet_of(ROBOT.standing_position)
+    found = {}
+    for follow in ("feet", "pitch"):
+        bench = BlockBench(LegInverseKinematics, {"follow": follow}, robot="bruce")
+        bench.set("feet", position=position, rotation=flat)
+        bench.set("reference", foot_pitch=[0.3, -0.1])
+        bench.step()
+        found[follow] = feet_of(bench.get("target").position)
+    assert found["feet"][1] == pytest.approx(flat, abs=1e-9)
+    places, turned = found["pitch"]
+    assert places == pytest.approx(position, abs=1e-9)
+    for foot, pitch in enumerate((0.3, -0.1)):
+        assert turned[foot, :, 0] == pytest.approx([math.cos(pitch), 0.0, -math.sin(pitch)])
+
+
 def test_the_plans_joints_are_followed_as_long_as_the_plan_flies():
     bench = BlockBench(LegInverseKinematics, {"follow": "plan"}, robot="bruce")
     planned = {"joint_position": np.linspace(-0.5, 0.5, 10), "joint_velocity": 2.0}

@@ -235,6 +235,26 @@ def test_a_hovering_point_falls_to_the_height_of_the_others(dynamics):
     assert drop[2] == pytest.approx(-3000.0 * 0.004, rel=0.3)
 
 
+def test_the_ankle_of_a_foot_on_its_toes_follows_the_plan(dynamics):
+    """Feedforward and feedback, while the other foot's ankle does what keeps it flat."""
+    terms = model(dynamics)
+    joints = [joint.name for joint in ROBOT.joints]
+    ankle = joints.index("left_ankle")
+    planned, rates, bends = ROBOT.standing_position.copy(), np.zeros(10), np.zeros(10)
+    planned[ankle] += 0.01
+    rates[ankle], bends[ankle] = 0.5, -40.0
+    target = {"joint_position": planned, "joint_velocity": rates, "joint_acceleration": bends}
+    stance = [True] * 4
+    stance[[c.name for c in ROBOT.contacts].index("left_heel")] = False
+    bench = make(terms, phase=Phase.THRUST, stance=stance, target=target)
+    bench.set("joints", position=ROBOT.standing_position)
+    bench.step()
+    acceleration = bench.get("command").acceleration
+    assert acceleration[6 + ankle] == pytest.approx(-40.0 + 1000.0 * 0.01 + 60.0 * 0.5, abs=1.0)
+    heel = terms["contact_jacobian"][[c.name for c in ROBOT.contacts].index("right_heel")]
+    assert np.abs(heel @ acceleration).max() < 0.1
+
+
 def test_in_the_air_it_asks_for_nothing(dynamics):
     terms = model(dynamics)
     bench = make(terms)

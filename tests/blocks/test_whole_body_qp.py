@@ -53,9 +53,12 @@ def test_points_that_lift_are_free_but_across_their_foot():
     turns = np.array([[[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]], np.eye(3)])
     qp.lifting_tasks(
         JACOBIAN, drift, velocity, np.array([True, False, True, False]), np.array([0, 0, 1, 1]),
-        turns, 10.0, 40.0, rows, desired, weights,
+        turns, 10.0, 40.0, np.array([10, 15]), np.array([-3.0, 7.0]), 0.5, rows, desired, weights,
     )  # fmt: skip
-    assert weights.tolist() == [1.0] * 3 + [10.0, 0.0, 0.0] + [1.0] * 3 + [10.0, 0.0, 0.0]
+    assert weights.tolist() == [1.0] * 3 + [10.0, 0.5, 0.0] + [1.0] * 3 + [10.0, 0.5, 0.0]
+    assert rows[4].tolist() == np.eye(N)[10].tolist()
+    assert rows[10].tolist() == np.eye(N)[15].tolist()
+    assert desired[[4, 10]].tolist() == [-3.0, 7.0]
     assert rows[3] == pytest.approx(-JACOBIAN[1, 0])  # the left foot's y is the world's -x
     assert desired[3] == pytest.approx(40.0 * velocity[1, 0] + drift[1, 0])
     assert rows[9] == pytest.approx(JACOBIAN[3, 1])

@@ -180,7 +180,7 @@ def test_tuning_writes_a_file_that_the_runs_take(
     result = call_json("study", "grid.yaml", "--workers", "1", code=1)
     assert result["tuned"] == {arm: found["set"] for arm, found in said["arms"].items()}
     assert (
-        "--seeds and --where are for runs"
+        "--seeds, --where and --dry-run are for runs"
         in call("study", "grid.yaml", "--tune", "--seeds", "1", code=2).stderr
     )
 

@@ -24,8 +24,10 @@ def test_a_push_in_the_air_is_landed(angle):
 
 
 def test_without_the_landing_heuristic_the_push_from_behind_ends_in_a_fall():
-    off = {"landing.w_l": [0.0, 0.0], "landing.w_c": 0.0}
-    result = aloft.load(PUSH, {"robot.seed": 70, **off}).run(log=False)
+    strong = {"robot.seed": 70, "push.force": 100.0}
+    off = {"landing.w_l": [0.0, 0.0], "landing.w_k": [0.0, 0.0], "landing.w_c": 0.0}
+    assert aloft.load(PUSH, strong).run(log=False).success
+    result = aloft.load(PUSH, strong | off).run(log=False)
     assert not result.success
     assert result.metrics["peak_tilt_deg"] > 60.0
 
