@@ -49,5 +49,6 @@ def step(height: float, distance: float, depth: float = 1.5) -> Scene:
 
 def platform(height: float, edge: float) -> Scene:
     """A platform that the robot starts on, ``height`` above the floor, which ends ``edge`` [m]
-    ahead of the origin."""
-    return Scene(-height, (Box((edge - 0.6, edge), (-0.4, 0.4), 0.0, -height),))
+    ahead of the origin, or behind it where that is negative."""
+    x = (edge - 0.6, edge) if edge >= 0.0 else (edge, edge + 0.6)
+    return Scene(-height, (Box(x, (-0.4, 0.4), 0.0, -height),))

@@ -33,8 +33,9 @@ class SimulatorParameters(Parameters):
         0.35, unit="m", gt=0, text="scene platform: its height above the floor"
     )
     platform_edge: float = parameter(
-        0.15, unit="m", text="scene platform: from the start to its front edge"
-    )
+        0.15, unit="m",
+        text="scene platform: from the start to the edge that is jumped off; negative: behind it",
+    )  # fmt: skip
 
     friction: float = parameter(0.7, gt=0, text="friction coefficient of the ground")
     friction_range: list[float] | None = parameter(

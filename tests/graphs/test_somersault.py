@@ -5,15 +5,17 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 import aloft
 from aloft.blocks.signals import Phase
 
-GRAPH = Path(aloft.__file__).parent / "graphs" / "somersault.yaml"
+GRAPHS = Path(aloft.__file__).parent / "graphs"
 
 
-def test_it_turns_once_lands_on_its_feet_and_stands() -> None:
-    run = aloft.load(GRAPH, {"robot.seed": 0}).run()
+@pytest.mark.parametrize("name", ["somersault", "somersault_forward_35cm"])
+def test_it_turns_once_lands_on_its_feet_and_stands(name: str) -> None:
+    run = aloft.load(GRAPHS / f"{name}.yaml", {"robot.seed": 0}).run()
     phases = run.signal("phase.phase.phase")
     quaternion = run.signal("robot.truth.base_orientation")
     pitch = np.unwrap(2.0 * np.arctan2(quaternion[:, 1], quaternion[:, 3]))

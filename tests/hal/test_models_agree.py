@@ -185,3 +185,5 @@ def test_variation_and_scenes_reach_the_model() -> None:
     off = platform(0.35, 0.1)
     assert off.ground_height(0.0, 0.0) == 0.0
     assert off.ground_height(0.2, 0.0) == -0.35
+    behind = platform(0.35, -0.1)
+    assert [behind.ground_height(x, 0.0) for x in (-0.2, 0.0, 0.2)] == [-0.35, 0.0, 0.0]
