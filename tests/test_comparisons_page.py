@@ -56,7 +56,7 @@ def test_a_table_goes_to_its_place(script: ModuleType) -> None:
         script.refreshed("", summary)
 
 
-@pytest.mark.parametrize("name", ["formulations", "estimator"])
+@pytest.mark.parametrize("name", ["formulations", "controller", "estimator"])
 def test_the_page_has_every_arm_of_every_study(script: ModuleType, name: str) -> None:
     assert name in script.COLUMNS
     study = read_study(ROOT / "graphs" / "studies" / f"{name}.yaml")

@@ -21,3 +21,14 @@ def test_ten_jumps_each_in_its_place() -> None:
     assert len(begins) == 10
     assert run.metrics["jumps"] == 10
     assert phases[-1] == Phase.RECOVER
+
+
+def test_onto_a_platform_and_off_it_again(tmp_path: Path) -> None:
+    """In the robust trial, without standing still on the platform."""
+    path = tmp_path / "robust.yaml"
+    path.write_text(
+        f"include: [{GRAPHS / 'up_and_down'}.yaml, {GRAPHS / 'trials' / 'robust'}.yaml]\n"
+    )
+    result = aloft.load(path, {"robot.seed": 6}).run(log=False)
+    assert result.success, result.reason
+    assert result.metrics["jumps"] == 2
