@@ -9,8 +9,13 @@ import pytest
 
 import aloft
 from aloft.blocks.signals import Phase
+from aloft.runtime.loading import check
 
 GRAPHS = Path(aloft.__file__).parent / "graphs"
+
+
+def test_the_one_backwards_has_no_problems() -> None:
+    assert check(GRAPHS / "somersault_backward_35cm.yaml").ok
 
 
 @pytest.mark.parametrize("name", ["somersault", "somersault_forward_35cm"])

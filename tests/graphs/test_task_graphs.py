@@ -26,6 +26,8 @@ TASKS = {
     "turn_60deg": ("jump_yaw_deg", 60.0, 5.0),
     "up_5cm": ("jump_distance_x_m", 0.14, 0.02),
     "down_5cm": ("jump_distance_x_m", 0.15, 0.02),
+    "up_8cm": ("jump_distance_x_m", 0.14, 0.02),
+    "down_15cm": ("jump_distance_x_m", 0.20, 0.02),
 }
 SEED = {"up_5cm": 1}
 
