@@ -31,19 +31,17 @@ def arms_of(rows: Sequence[Row]) -> list[str]:
     return list(dict.fromkeys(row["arm"] for row in rows))
 
 
-def degrees_of(row: Row) -> float:
-    """The direction of a row's push, from forward to the left."""
-    return float(str(row["direction"]).split()[0])
-
-
 def impulse_table(rows: Sequence[Row]) -> str:
     """Success over all directions, a line an arm, a column an impulse."""
-    impulses = list(dict.fromkeys(row["impulse"] for row in rows))
-    lines = ["| arm | " + " | ".join(map(str, impulses)) + " |", "|---" * (len(impulses) + 1) + "|"]
+    impulses = list(dict.fromkeys(row["impulse_n_s"] for row in rows))
+    lines = [
+        "| arm | " + " | ".join(f"{impulse:g} N s" for impulse in impulses) + " |",
+        "|---" * (len(impulses) + 1) + "|",
+    ]
     for arm in arms_of(rows):
         cells = []
         for impulse in impulses:
-            mine = [r for r in rows if r["arm"] == arm and r["impulse"] == impulse]
+            mine = [r for r in rows if r["arm"] == arm and r["impulse_n_s"] == impulse]
             done, n = sum(r["successes"] for r in mine), sum(r["n"] for r in mine)
             cells.append(f"{done} of {n} ({100 * done / n:.0f} %)")
         lines.append(f"| {arm} | " + " | ".join(cells) + " |")
@@ -58,7 +56,7 @@ def quarter_table(rows: Sequence[Row]) -> str:
         for middle in QUARTERS.values():
             done = n = 0.0
             for row in rows:
-                away = abs((degrees_of(row) - middle + 180) % 360 - 180)
+                away = abs((row["direction_deg"] - middle + 180) % 360 - 180)
                 if row["arm"] == arm and away <= 45:
                     share = 0.5 if away == 45 else 1.0
                     done, n = done + share * row["successes"], n + share * row["n"]
