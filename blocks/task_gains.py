@@ -19,7 +19,11 @@ class TaskGains(Parameters):
 
     stance_weight: float = parameter(1e3, ge=0.0, text="rest of the points in stance, per m/s^2")
     stance_damping: float = parameter(0.0, unit="1/s", ge=0.0, text="damps what they move")
-    swing_weight: float = parameter(10.0, ge=0.0, text="unloaded points to the ground, per m/s^2")
+    swing_weight: float = parameter(
+        10.0,
+        ge=0.0,
+        text="unloaded points to the ground, per m/s^2; in the thrust they are damped across the foot",
+    )
     swing_stiffness: float = parameter(3000.0, unit="1/s^2", ge=0.0, text="of that")
     swing_damping: float = parameter(110.0, unit="1/s", ge=0.0, text="of that")
     rolling_weight: float = parameter(

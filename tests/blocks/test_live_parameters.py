@@ -124,6 +124,19 @@ SCENES: Mapping[str, list[Scene]] = {
 }
 
 
+IDLE = {
+    "blocks.WholeBodyController": [
+        *(
+            f"{phase}.rolling_{name}"
+            for phase in ("landing", "stand")
+            for name in ("damping", "stiffness", "weight")
+        ),
+        "thrust.swing_stiffness",
+    ]
+}
+"""One set of gains serves all phases: feet roll off only in the thrust, and there none swings down."""
+
+
 def blocks_with_live_parameters() -> Iterator[str]:
     for name in known_names():
         if any(is_live(info) for info in find_block(name).Params.model_fields.values()):
@@ -163,4 +176,4 @@ def test_every_live_parameter_counts(name: str) -> None:
             and all(a == b for a, b in zip_longest(plain, trace(kind, scene, params, changed)))
         }
         silent = here
-    assert silent == {}
+    assert sorted(silent or {}) == IDLE.get(name, [])
