@@ -6,9 +6,8 @@ import math
 from typing import Annotated, Literal
 
 import numpy as np
-from annotated_types import Ge, Le
+import pydantic
 from numpy.typing import NDArray
-from pydantic import BeforeValidator
 
 from ..runtime.block import Block, Input, Output, State
 from ..runtime.description import RobotDescription
@@ -28,8 +27,8 @@ def _three(value: object) -> object:
     return (value,) * 3 if isinstance(value, int | float) else value
 
 
-Share = Annotated[float, Ge(0.0), Le(1.0)]
-Shares = Annotated[tuple[Share, Share, Share], BeforeValidator(_three)]
+Share = Annotated[float, pydantic.Field(ge=0.0, le=1.0)]
+Shares = Annotated[tuple[Share, Share, Share], pydantic.BeforeValidator(_three)]
 
 
 class LandingMemory(Signal):

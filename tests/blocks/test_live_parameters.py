@@ -89,6 +89,29 @@ def hopping(tick: int) -> Inputs:
     return {"reference": {"phase": Phase.FLIGHT}, "phase": phase}
 
 
+def recovering(tick: int) -> Inputs:
+    """Rising from the landing."""
+    return {"phase": {"phase": Phase.RECOVER, "time_in_phase": 0.002 * tick}}
+
+
+def pushed(tick: int) -> Inputs:
+    """A flight with more momentum than was planned."""
+    momenta = {"linear_momentum": [0.1, 0.2, 0.0], "angular_momentum": [0.02, 0.01, 0.0]}
+    inputs = flying(tick)
+    return {
+        "reference": {
+            **inputs["reference"],
+            "orientation": [0, 0, 0, 1],
+            "com": 0.0,
+            "com_velocity": 0.0,
+            "angular_momentum": 0.0,
+            "foot_position": 0.0,
+        },
+        "phase": inputs["phase"],
+        "terms": {**momenta, "base_rotation": np.eye(3)},
+    }
+
+
 SCENES: Mapping[str, list[Scene]] = {
     "blocks.JointPD": [
         Scene({"stance_targets": "acceleration", "friction": 0.1, "stance_stiffness": [1.0] * 5}),
@@ -99,8 +122,9 @@ SCENES: Mapping[str, list[Scene]] = {
         Scene({"trim_limit": 0.01, "trim_rate": 20.0}),
         Scene({"place_gain": 0.5, "place_limit": 0.005}, displaced),
         Scene({"place_gain": 0.5}, displaced),
+        Scene({}, recovering),
     ],
-    "blocks.LandingHeuristic": [Scene({"p_max": (0.1, 0.1)}), Scene({}, flying)],
+    "blocks.LandingHeuristic": [Scene({"p_max": (0.1, 0.1)}), Scene({}, flying), Scene({}, pushed)],
     "blocks.LegInverseKinematics": [Scene({"speed_limit": 0.5})],
     "blocks.WholeBodyController": [
         Scene({"force_max": 20.0, "force_min": 1.0}),
