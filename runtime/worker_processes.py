@@ -189,6 +189,8 @@ def _serve(pipe: Connection, function: Callable[[Any], Any]) -> None:
                 pipe.send((index, None, f"the result cannot be sent: {problem}"))
     except (EOFError, OSError, _StoppedError):
         pass  # nobody is there any more, or nobody wants more
+    finally:
+        signal.signal(signal.SIGTERM, signal.SIG_IGN)  # what ends anyway needs no telling
 
 
 def _told(number: int, frame: object) -> None:

@@ -41,7 +41,8 @@ def drawn(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, Any
     folder = tmp_path_factory.mktemp("paper")
     study = folder / "short.yaml"
     text = paper.STUDY.read_text()
-    text = text.replace("../", f"{paper.STUDY.parents[1]}/").replace("6000:6005", "3")
+    text = text.replace("../", f"{paper.STUDY.parents[1]}/")
+    text = re.sub(r"^seeds: .*$", "seeds: 3", text, flags=re.MULTILINE)
     study.write_text(text + "set: {duration: 40 ms}\n")
     screen = console(quiet=True)
     with pytest.MonkeyPatch.context() as patch:
