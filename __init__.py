@@ -9,26 +9,26 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from .logs.recording import write_recording
-    from .runtime.block import Block, Input, Output, State
-    from .runtime.errors import AloftError, BlockError, RunError
+    from .logs.recording.finished_run import write_recording
     from .runtime.graph import Graph, load
+    from .runtime.language.block import Block, Input, Output, State
+    from .runtime.language.errors import AloftError, BlockError, RunError
+    from .runtime.language.parameters import Parameters, live_parameter, parameter
+    from .runtime.language.signals import Field, Signal
     from .runtime.loading import LoadError
-    from .runtime.parameters import Parameters, live_parameter, parameter
-    from .runtime.run_result import RunResult
-    from .runtime.signals import Field, Signal
+    from .runtime.running.run_result import RunResult
 
 __version__ = "0.1.0"
 
 _HOMES = {
-    "write_recording": "logs.recording",
-    **dict.fromkeys(("Block", "Input", "Output", "State"), "runtime.block"),
-    **dict.fromkeys(("AloftError", "BlockError", "RunError"), "runtime.errors"),
+    "write_recording": "logs.recording.finished_run",
+    **dict.fromkeys(("Block", "Input", "Output", "State"), "runtime.language.block"),
+    **dict.fromkeys(("AloftError", "BlockError", "RunError"), "runtime.language.errors"),
     **dict.fromkeys(("Graph", "load"), "runtime.graph"),
     "LoadError": "runtime.loading",
-    **dict.fromkeys(("Parameters", "live_parameter", "parameter"), "runtime.parameters"),
-    "RunResult": "runtime.run_result",
-    **dict.fromkeys(("Field", "Signal"), "runtime.signals"),
+    **dict.fromkeys(("Parameters", "live_parameter", "parameter"), "runtime.language.parameters"),
+    "RunResult": "runtime.running.run_result",
+    **dict.fromkeys(("Field", "Signal"), "runtime.language.signals"),
 }
 
 __all__ = [

@@ -11,9 +11,9 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from ..runtime.block import Block, Input, Output, State
-from ..runtime.primitives import Vector
-from ..runtime.stages import BlockSpec, CheckedGraph, Wire
+from ..blocks.general.primitives import Vector
+from ..runtime.language.block import Block, Input, Output, State
+from ..runtime.language.stages import BlockSpec, CheckedGraph, Wire
 
 COUNT = 20
 WIDTH = 12

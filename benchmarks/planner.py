@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from ..blocks.planner.bounded import cpu_time
-from ..blocks.planner.errors import PlanError
-from ..blocks.planner.solve import solve_jump
-from ..blocks.planner.task import JumpTask, make_task
-from ..blocks.planner.validity import check_plan
-from ..runtime.description import find_robot
+from ..planner.checking.validity import check_plan
+from ..planner.errors import PlanError
+from ..planner.solving.bounded import cpu_time
+from ..planner.solving.solve import solve_jump
+from ..planner.task.task import JumpTask, make_task
+from ..robots.description import find_robot
 from .planner_solvers import solver_rows
 from .random_tasks import random_rows
 from .reach import reach_rows

@@ -11,12 +11,12 @@ from typing import Any
 
 import numpy as np
 
-from ..blocks.planner.guess import ballistic_guess
-from ..blocks.planner.problem import Problem
-from ..blocks.planner.solve import make_problem
-from ..blocks.planner.solver import Solution, solve
-from ..blocks.planner.task import make_task
-from ..runtime.description import find_robot
+from ..planner.problem.guess import ballistic_guess
+from ..planner.problem.problem import Problem
+from ..planner.solving.solve import make_problem
+from ..planner.solving.solver import Solution, solve
+from ..planner.task.task import make_task
+from ..robots.description import find_robot
 from .rows import Row
 from .snopt import SnoptProgram, SnoptResult
 

@@ -27,12 +27,12 @@ from typing import Any
 
 import numpy as np
 
-from ..blocks.planner.bounded import cpu_time
-from ..blocks.planner.errors import PlanError
-from ..blocks.planner.library import solve_and_check
-from ..blocks.planner.task import JumpTask, make_task
-from ..blocks.planner.validity import InvalidPlanError
-from ..runtime.description import RobotDescription, find_robot
+from ..planner.checking.validity import InvalidPlanError
+from ..planner.errors import PlanError
+from ..planner.library.library import solve_and_check
+from ..planner.solving.bounded import cpu_time
+from ..planner.task.task import JumpTask, make_task
+from ..robots.description import RobotDescription, find_robot
 from .rows import Row
 
 COUNT, SEED = 200, 1

@@ -6,12 +6,12 @@ import math
 from pathlib import Path
 from typing import Any
 
-from ..blocks.planner.bounded import cpu_time
-from ..blocks.planner.errors import PlanError
-from ..blocks.planner.library import PlanLibrary, solve_and_check
-from ..blocks.planner.task import make_task, read_task
-from ..blocks.planner.validity import InvalidPlanError, check_plan
-from ..runtime.description import find_robot
+from ..planner.checking.validity import InvalidPlanError, check_plan
+from ..planner.errors import PlanError
+from ..planner.library.library import PlanLibrary, solve_and_check
+from ..planner.solving.bounded import cpu_time
+from ..planner.task.task import make_task, read_task
+from ..robots.description import find_robot
 from .rows import Row
 
 REACH: dict[str, dict[str, Any]] = {

@@ -16,13 +16,13 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from ..logs.recorder import Recorder
-from ..runtime.errors import ExitCode
-from ..runtime.executor import Executor
+from ..logs.recording.recorder import Recorder
 from ..runtime.graph import load
-from ..runtime.memory import BoundGraph
-from ..runtime.run_result import RunResult
-from ..runtime.stages import CheckedGraph, ClockSpec
+from ..runtime.language.errors import ExitCode
+from ..runtime.language.stages import CheckedGraph, ClockSpec
+from ..runtime.running.executor import Executor
+from ..runtime.running.memory import BoundGraph
+from ..runtime.running.run_result import RunResult
 from ..runtime.testing.allocations import count_array_allocations
 from .rows import Row
 

@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from ..runtime.block import Block
-from ..runtime.memory import BoundGraph
-from ..runtime.pacing import WallTime
-from ..runtime.sinks import MemoryLog, RunHash, Sink
-from ..runtime.stages import ClockSpec
+from ..runtime.language.block import Block
+from ..runtime.language.stages import ClockSpec
+from ..runtime.running.memory import BoundGraph
+from ..runtime.running.pacing import WallTime
+from ..runtime.running.sinks import MemoryLog, RunHash, Sink
+from ..runtime.running.ticker import Ticker
 from ..runtime.testing.allocations import count_array_allocations
-from ..runtime.ticker import Ticker
 from .filter_chain import COUNT, Filter, PlainFilter, chain_graph, hand_loop
 from .peers import peer_chains
 from .rows import Row, compare, take_turns

@@ -16,9 +16,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..blocks.planner.assembly import Assembly
-from ..blocks.planner.problem import Problem
-from ..blocks.planner.solver import violation_of
+from ..planner.problem.assembly import Assembly
+from ..planner.problem.problem import Problem
+from ..planner.solving.solver import violation_of
 
 Array = NDArray[np.float64]
 

@@ -9,7 +9,7 @@ from typing import Annotated, Any, cast
 import typer
 
 from .. import __version__
-from ..runtime.errors import ExitCode
+from ..runtime.language.errors import ExitCode
 from .bench import bench
 from .blocks import blocks
 from .check import check

@@ -13,7 +13,7 @@ from .output import console, errors_reported, print_json, table
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from ..runtime.reference import BlockReference, PortReference
+    from ..runtime.language.reference import BlockReference, PortReference
 
 
 def blocks(
@@ -43,10 +43,10 @@ def blocks(
 
 def reference(name: str) -> BlockReference:
     """The contract of one block. Raises ``UnknownBlockError`` with the names that are alike."""
-    from ..runtime.errors import UnknownBlockError
+    from ..runtime.language.errors import UnknownBlockError
+    from ..runtime.language.reference import block_reference
+    from ..runtime.language.registry import find_block, known_names
     from ..runtime.loading.problems import nearest
-    from ..runtime.reference import block_reference
-    from ..runtime.registry import find_block, known_names
 
     here = Path.cwd()  # where a block of the user's may lie
     try:
@@ -59,8 +59,8 @@ def reference(name: str) -> BlockReference:
 
 def all_references(*, ours: bool = False) -> list[BlockReference]:
     """The contracts of all blocks by name; ``ours`` leaves out those of installed packages."""
-    from ..runtime.reference import block_reference
-    from ..runtime.registry import PACKAGES, all_blocks
+    from ..runtime.language.reference import block_reference
+    from ..runtime.language.registry import PACKAGES, all_blocks
 
     return [
         block_reference(name, block_type)

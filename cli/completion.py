@@ -7,7 +7,7 @@ import typer
 
 def block_names(incomplete: str) -> list[str]:
     """The names of blocks that begin so."""
-    from ..runtime.registry import known_names
+    from ..runtime.language.registry import known_names
 
     return [name for name in known_names() if name.startswith(incomplete)]
 

@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from ..runtime.errors import AloftError
+from ..runtime.language.errors import AloftError
 from .completion import parameter_names
 from .output import SET_HELP, console, errors_reported, print_json, say, table
 
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from ..runtime.stages import CheckedGraph
+    from ..runtime.language.stages import CheckedGraph
 
 
 def graph(
@@ -31,8 +31,7 @@ def graph(
     as_json: Annotated[bool, typer.Option("--json", help="As one JSON object.")] = False,
 ) -> None:
     """Print the order of execution, rates, offsets, delays, and every wire with its type."""
-    from ..runtime import picture
-    from ..runtime.loading import load
+    from ..runtime.loading import load, picture
 
     with errors_reported(as_json):
         if as_table + mermaid + flat + as_json > 1:
@@ -50,7 +49,7 @@ def graph(
 
 def print_table(out: Console, graph: CheckedGraph) -> None:
     """Print one row a block, in the order of execution, and one line for each of its inputs."""
-    from ..runtime.picture import table as rows_of
+    from ..runtime.loading.picture import table as rows_of
 
     robot = f", robot {graph.robot.name}" if graph.robot else ""
     length = "until stopped" if graph.ticks is None else f"{graph.ticks} ticks"

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from ..runtime.errors import AloftError
+from ..runtime.language.errors import AloftError
 from .output import console, errors_reported, number, print_json, say, table
 
 if TYPE_CHECKING:
-    from ..logs.reader import RecordedRun
+    from ..logs.file.reader import RecordedRun
 
 log = typer.Typer(
     name="log",
@@ -64,7 +64,7 @@ def export(
     as_json: AsJson = False,
 ) -> None:
     """Write the signals of a recording, every number exact, into a file of another format."""
-    from ..logs.export import EXPORTS
+    from ..logs.file.export import EXPORTS
 
     with errors_reported(as_json):
         kinds = [k for k, on in (("csv", csv), ("parquet", parquet), ("mcap", mcap)) if on]
@@ -87,8 +87,8 @@ def export(
 @log.command("repair")
 def repair(file: File, as_json: AsJson = False) -> None:
     """Mend a recording that was cut off, in place: what is incomplete at its end is removed."""
-    from ..logs.repair import repair as mend
-    from ..logs.tail_repair import take_in_tail
+    from ..logs.file.repair import repair as mend
+    from ..logs.file.tail_repair import take_in_tail
 
     with errors_reported(as_json):
         try:
@@ -118,7 +118,7 @@ def repair(file: File, as_json: AsJson = False) -> None:
 
 def read(file: Path) -> RecordedRun:
     """The recording. Raises ``AloftError`` if it cannot be read."""
-    from ..logs import reader
+    from ..logs.file import reader
 
     try:
         return reader.read(file)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from ..runtime.errors import AloftError, ExitCode, RunError
+from ..runtime.language.errors import AloftError, ExitCode, RunError
 from ..runtime.loading.problems import LoadError
 
 if TYPE_CHECKING:

@@ -8,7 +8,7 @@ from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..runtime.errors import AloftError, ExitCode
+from ..runtime.language.errors import AloftError, ExitCode
 from .output import plain, print_json, print_warning, say
 
 if TYPE_CHECKING:
@@ -16,8 +16,8 @@ if TYPE_CHECKING:
 
     from rich.console import Console
 
-    from ..figures.trace import Trace
     from ..studies.execution import Run
+    from ..studies.figures.trace import Trace
     from ..studies.journal import Journal
 
 NAME = "paper"
@@ -38,11 +38,11 @@ def draw_paper(
     The first seed's runs are what the pictures show and are made every time; all others are kept,
     in ``results/paper`` or, with ``out``, in its folder ``runs``.
     """
-    from ..figures.page import page
-    from ..figures.paper import draw
-    from ..runtime.seeds import parse_seeds
+    from ..studies.batch.seeds import parse_seeds
     from ..studies.execution import Run
     from ..studies.expansion import cells as expand
+    from ..studies.figures.page import page
+    from ..studies.figures.paper import draw
     from ..studies.journal import Journal
     from ..studies.reading import read_study
     from ..studies.summary import summarise
@@ -86,9 +86,9 @@ def traced(
     Raises:
         AloftError: one of them broke.
     """
-    from ..figures.trace import make_trace
-    from ..runtime.jobs import job_results, processors
+    from ..studies.batch.jobs import job_results, processors
     from ..studies.expansion import job
+    from ..studies.figures.trace import make_trace
     from .progress import progress_bar
 
     shown = [run for run in runs if run.seed == seed]

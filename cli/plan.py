@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from ..runtime.errors import ExitCode
+from ..runtime.language.errors import ExitCode
 from .output import console, errors_reported, print_error, print_json, say
 from .plan_grid import plan_grid
 from .plan_output import (
@@ -25,10 +25,10 @@ from .view import how_to_view
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from ..blocks.planner.library import PlanLibrary
-    from ..blocks.planner.plan import JumpPlan
-    from ..blocks.planner.task import JumpTask
-    from ..runtime.description import RobotDescription
+    from ..planner.library.library import PlanLibrary
+    from ..planner.library.plan import JumpPlan
+    from ..planner.task.task import JumpTask
+    from ..robots.description import RobotDescription
 
 
 def plan(
@@ -99,10 +99,10 @@ def plan_tasks(
     Raises:
         TaskError: what is wrong with any of them.
     """
-    from ..blocks.planner.errors import TaskError
-    from ..blocks.planner.library import PlanLibrary
-    from ..blocks.planner.task import read_task
-    from ..runtime.description import find_robot
+    from ..planner.errors import TaskError
+    from ..planner.library.library import PlanLibrary
+    from ..planner.task.task import read_task
+    from ..robots.description import find_robot
 
     tasks, wrong = [], []
     for path in paths:
@@ -133,9 +133,9 @@ def plan_task(
     screen: Console,
 ) -> dict[str, Any]:  # fmt: skip
     """Plan one task; print it, picture it, and return its row."""
-    from ..blocks.planner.bounded import cpu_time
-    from ..blocks.planner.errors import PlanError
-    from ..blocks.planner.validity import InvalidPlanError
+    from ..planner.checking.validity import InvalidPlanError
+    from ..planner.errors import PlanError
+    from ..planner.solving.bounded import cpu_time
 
     robot = library.robot
     started = cpu_time()
@@ -165,8 +165,8 @@ def plan_task(
 
 def list_plans(keep: Path | None, screen: Console, as_json: bool) -> ExitCode:
     """Every plan of the library: its task, what it does, and where it is."""
-    from ..blocks.planner.library import PlanLibrary
-    from ..runtime.description import find_robot
+    from ..planner.library.library import PlanLibrary
+    from ..robots.description import find_robot
 
     library = PlanLibrary(find_robot("bruce"), keep)
     rows = [listed_row(path, header) for path, header in library.headers()]
@@ -180,7 +180,7 @@ def search_nearest(
     task: JumpTask, library: PlanLibrary, family: str, screen: Console
 ) -> dict[str, Any]:
     """The nearest task that has a plan, which is kept; for the row of the one that has none."""
-    from ..blocks.planner.nearest_feasible import nearest_feasible
+    from ..planner.solving.nearest_feasible import nearest_feasible
 
     with screen.status("searching the nearest task that can be planned") as status:
 
@@ -197,7 +197,7 @@ def search_nearest(
 
 def solver_with_progress(tell: Any) -> Any:
     """The planner, which tells what it is compiling."""
-    from ..blocks.planner.solve import solve_jump
+    from ..planner.solving.solve import solve_jump
 
     def make(task: JumpTask, robot: RobotDescription, warm_start: JumpPlan | None) -> JumpPlan:
         def progress(text: str, done: int, total: int) -> None:
@@ -212,8 +212,8 @@ def write_pictures(
     found: JumpPlan, robot: RobotDescription, out: Path, screen: Console
 ) -> dict[str, str]:
     """The picture and the recording of a plan."""
-    from ..blocks.planner.picture import write_picture
-    from ..logs.motion_recording import write_motion
+    from ..logs.recording.motion_recording import write_motion
+    from ..planner.drawing.picture import write_picture
 
     name = found.task.name
     picture = write_picture(out / f"{name}.svg", found, robot)

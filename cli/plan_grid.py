@@ -6,7 +6,7 @@ from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..runtime.errors import ExitCode
+from ..runtime.language.errors import ExitCode
 from .output import print_json, say, table
 from .plan_output import failure_rows
 from .stopping import stopped_by_signals
@@ -14,9 +14,9 @@ from .stopping import stopped_by_signals
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from ..blocks.planner.grid import GridRow
-    from ..blocks.planner.library import PlanLibrary
-    from ..blocks.planner.task import JumpTask
+    from ..planner.library.library import PlanLibrary
+    from ..planner.task.task import JumpTask
+    from ..studies.batch.plan_grid import GridRow
 
 
 def plan_grid(
@@ -29,8 +29,8 @@ def plan_grid(
     as_json: bool,
 ) -> ExitCode:
     """Fill the library with a grid of tasks; stopped by a signal, say what is done."""
-    from ..blocks.planner.grid import fill, read_grid, robot_of
-    from ..blocks.planner.library import PlanLibrary
+    from ..planner.library.library import PlanLibrary
+    from ..studies.batch.plan_grid import fill, read_grid, robot_of
     from .progress import progress_bar
 
     tasks = read_grid(grid)
@@ -82,9 +82,9 @@ def plan_grid(
 
 def compile_once(library: PlanLibrary, tasks: list[JumpTask], screen: Console) -> None:
     """Compile before there are workers, which would else all compile the same."""
-    from ..blocks.planner.errors import PlanError
-    from ..blocks.planner.solve import make_problem
-    from ..blocks.planner.task import TaskError
+    from ..planner.errors import PlanError
+    from ..planner.solving.solve import make_problem
+    from ..planner.task.task import TaskError
 
     # In the plane and out of it there are other functions, and for every formulation.
     kinds = {(t.formulation, bool(t.distance_y or t.twist), t.impact): t for t in tasks}

@@ -15,13 +15,13 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
 
-    from ..blocks.planner.errors import PlanError
-    from ..blocks.planner.grid import GridRow
-    from ..blocks.planner.nearest_feasible import NearestFeasible
-    from ..blocks.planner.plan import JumpPlan
-    from ..blocks.planner.task import JumpTask
-    from ..logs.motion_recording import RecordedMotion
-    from ..runtime.description import RobotDescription
+    from ..logs.recording.motion_recording import RecordedMotion
+    from ..planner.errors import PlanError
+    from ..planner.library.plan import JumpPlan
+    from ..planner.solving.nearest_feasible import NearestFeasible
+    from ..planner.task.task import JumpTask
+    from ..robots.description import RobotDescription
+    from ..studies.batch.plan_grid import GridRow
 
 SHOWN_STATISTICS = ("solver", "iterations", "cpu_s", "violation", "cost", "warm")
 
@@ -150,11 +150,11 @@ def failure_rows(rows: Sequence[GridRow]) -> list[tuple[str, str]]:
 
 def recorded_motion(plan: JumpPlan, robot: RobotDescription) -> RecordedMotion:
     """The plan with its series, every 10 ms or so."""
-    from ..blocks.planner.evidence import Evidence
-    from ..blocks.planner.plan_tests import allowed_motor_torque
-    from ..blocks.planner.reference_table import reference_table
-    from ..blocks.planner.replay import replay
-    from ..logs.motion_recording import RecordedMotion
+    from ..logs.recording.motion_recording import RecordedMotion
+    from ..planner.checking.evidence import Evidence
+    from ..planner.checking.plan_tests import allowed_motor_torque
+    from ..planner.checking.replay import replay
+    from ..planner.library.reference_table import reference_table
 
     evidence = Evidence(plan, robot, replay(plan, robot))
     samples = evidence.replay.samples

@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.progress import Progress, TaskID
 
-    from ..runtime.memory import BoundGraph
+    from ..runtime.running.memory import BoundGraph
 
 TICKS_A_STEP = 100
 """Ticks between two updates of the bar: the control thread pays microseconds for each."""

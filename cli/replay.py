@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from ..runtime.errors import AloftError, ExitCode
+from ..runtime.language.errors import AloftError, ExitCode
 from .output import (
     SET_HELP,
     console,
@@ -23,8 +23,8 @@ from .output import (
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from ..logs.opened_run import OpenedRun
-    from ..logs.replay import Replayed
+    from ..logs.replay.opened_run import OpenedRun
+    from ..logs.replay.replay import Replayed
 
 MOST_ROWS = 15
 
@@ -70,7 +70,7 @@ def replay(
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print the verdict only.")] = False,
 ) -> None:
     """Execute a recorded run again and compare every byte of every tick with the recording."""
-    from ..logs.opened_run import OpenedRun
+    from ..logs.replay.opened_run import OpenedRun
 
     out = console(to_stderr=as_json, quiet=quiet)
     with errors_reported(as_json):
@@ -104,7 +104,7 @@ def replay(
 
 def changed_blocks(opened: OpenedRun, swaps: list[str], sets: list[str]) -> dict[str, list[str]]:
     """What is changed, as overrides by block. Raises ``AloftError``."""
-    from ..runtime.registry import find_block
+    from ..runtime.language.registry import find_block
 
     changed: dict[str, list[str]] = {}
     known = opened.file.header.order
@@ -138,7 +138,7 @@ def execute(
     out: Console,
 ) -> Replayed:
     """Replay, with a progress bar. Raises ``AloftError``."""
-    from ..logs.replay import replay as replay_run
+    from ..logs.replay.replay import replay as replay_run
     from .progress import TickCounter, progress_bar
 
     settings = [text for texts in changed.values() for text in texts]
@@ -160,7 +160,7 @@ def execute(
 
 def write(output: Path, opened: OpenedRun, done: Replayed) -> Path:
     """Write both runs to a file. Raises ``AloftError``."""
-    from ..logs.replay_recording import write_replay
+    from ..logs.replay.replay_recording import write_replay
 
     try:
         return write_replay(output, opened, done)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from ..runtime.errors import AloftError, ExitCode
+from ..runtime.language.errors import AloftError, ExitCode
 from .completion import parameter_names
 from .output import (
     SET_HELP,
@@ -28,12 +28,12 @@ from .stopping import stopped_by_signals
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from ..logs.viewer import Viewer
+    from ..logs.viewing.viewer import Viewer
     from ..runtime.graph import Graph
-    from ..runtime.parameter_endpoint import ParameterEndpoint
-    from ..runtime.run_result import RunResult
-    from ..runtime.seeds import SeedRow
-    from ..runtime.sinks import Sink
+    from ..runtime.running.parameter_endpoint import ParameterEndpoint
+    from ..runtime.running.run_result import RunResult
+    from ..runtime.running.sinks import Sink
+    from ..studies.batch.seeds import SeedRow
 
 MOST_METRIC_COLUMNS = 5
 
@@ -80,7 +80,7 @@ def run(
 ) -> None:
     """Run a graph; print its metrics and the time each block took; write a recording."""
     from ..runtime.graph import load
-    from ..runtime.seeds import parse_seeds
+    from ..studies.batch.seeds import parse_seeds
 
     settings = [*(overrides or []), *([f"duration={duration}"] if duration else [])]
     out = console(to_stderr=as_json, quiet=quiet)
@@ -106,7 +106,7 @@ def run(
 
 def open_viewer(live: Live) -> Viewer | None:
     """The viewer that shows the run; where there is none, the run is not shown."""
-    from ..logs.viewer import ViewerError, start_viewer
+    from ..logs.viewing.viewer import ViewerError, start_viewer
     from .view import open_page
 
     if live is Live.NONE:
@@ -158,7 +158,7 @@ def run_once(
     viewer: Viewer | None = None,
 ) -> ExitCode:
     """Run the graph, record and show it, print what came of it."""
-    from ..logs.recorder import Recorder
+    from ..logs.recording.recorder import Recorder
     from .progress import TickCounter, progress_bar
     from .view import how_to_view
 
@@ -219,7 +219,7 @@ def run_many(
     path: Path, overrides: list[str], seeds: list[int], out: Console, as_json: bool
 ) -> ExitCode:
     """Run the graph once a seed, print a row each and how many succeeded."""
-    from ..runtime.seeds import run_seeds
+    from ..studies.batch.seeds import run_seeds
     from .progress import progress_bar
 
     rows: list[SeedRow] = []

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from ..runtime.errors import AloftError, ExitCode
+from ..runtime.language.errors import AloftError, ExitCode
 from .output import console, errors_reported, print_json, print_warning, say
 from .study_output import print_rows, print_tuned, study_json, tuned_json
 
@@ -59,7 +59,7 @@ def study(
     'aloft study paper' makes the runs of the paper's figures, draws them into docs (or --out), and
     writes the page about them there.
     """
-    from ..runtime.seeds import parse_seeds
+    from ..studies.batch.seeds import parse_seeds
     from ..studies.reading import part_of, read_study
     from .paper import NAME, draw_paper
 
@@ -99,10 +99,10 @@ def run_study(
     dry_run: bool = False,
 ) -> ExitCode:
     """Make the study's runs; write and print what came of them."""
+    from ..studies.charts.plots import write_plots
     from ..studies.execution import Run
     from ..studies.expansion import cells as expand
     from ..studies.journal import Journal
-    from ..studies.plots import write_plots
     from ..studies.summary import summarise
     from ..studies.table import make_table, write_table
     from ..studies.tuning import extreme_cells, read_tuned, tuned_path, tuning_cells

@@ -6,16 +6,16 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from ..runtime.parameters import Parameters
+    from ..runtime.language.parameters import Parameters
 
 BEGIN, END = "<!-- task parameters -->\n", "<!-- end of task parameters -->"
 
 
 def task_tables() -> str:
     """The tables of everything a task file may say, from the declarations."""
-    from ..blocks.planner.margins import Margins
-    from ..blocks.planner.sequence import Hop, Span
-    from ..blocks.planner.task import JumpTask, Knots, Weights
+    from ..planner.task.margins import Margins
+    from ..planner.task.sequence import Hop, Span
+    from ..planner.task.task import JumpTask, Knots, Weights
 
     parts = []
     for title, owner in (

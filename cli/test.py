@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from ..runtime.errors import AloftError, ExitCode
+from ..runtime.language.errors import AloftError, ExitCode
 from .output import console, errors_reported, print_json, print_warning, say, table
 
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from ..runtime.block import Block
+    from ..runtime.language.block import Block
 
 Row = tuple[str, str, str]
 """A block, the name of a check, and what is wrong, empty if nothing is."""
@@ -84,9 +84,9 @@ def sort_targets(
         LoadError: a graph may not run.
         AloftError: a target is nothing that can be tested.
     """
+    from ..runtime.language.registry import find_block
     from ..runtime.loading import load
     from ..runtime.loading.adjust import plain_parameters
-    from ..runtime.registry import find_block
 
     blocks: list[tuple[str, type[Block], dict[str, Any] | None]] = []
     paths = []
@@ -167,8 +167,8 @@ def write(
     as_json: bool,
 ) -> None:
     """Write a test from a recording. Raises ``AloftError``."""
-    from ..logs.opened_run import OpenedRun
-    from ..logs.regression import write_test
+    from ..logs.replay.opened_run import OpenedRun
+    from ..logs.replay.regression import write_test
 
     if not recording.is_file():
         raise AloftError(f"there is no recording {recording}")

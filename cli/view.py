@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from ..runtime.errors import AloftError, ExitCode
+from ..runtime.language.errors import AloftError, ExitCode
 from .output import errors_reported
 
 if TYPE_CHECKING:
-    from ..logs.viewer import Viewer
+    from ..logs.viewing.viewer import Viewer
 
 
 def view(
@@ -51,8 +51,8 @@ def view(
 
 def compare(first: Path, second: Path, path: Path) -> Path:
     """Write both runs into one file."""
-    from ..logs.comparison import write_comparison
-    from ..logs.reader import read
+    from ..logs.file.reader import read
+    from ..logs.viewing.comparison import write_comparison
 
     try:
         return write_comparison(path, read(first), read(second))
@@ -62,7 +62,7 @@ def compare(first: Path, second: Path, path: Path) -> Path:
 
 def show(recording: Path, *, web: bool) -> None:
     """Show a file until the window is closed or Ctrl-C is pressed."""
-    from ..logs.viewer import start_viewer
+    from ..logs.viewing.viewer import start_viewer
 
     viewer = start_viewer("web" if web else "window", [recording])
     keep_open(viewer)

@@ -16,8 +16,8 @@ from aloft import LoadError, load
 from aloft.cli.graph import print_table
 from aloft.cli.output import say
 from aloft.cli.run import print_result
-from aloft.logs.recorder import Recorder
-from aloft.logs.viewer import ViewerError, start_viewer
+from aloft.logs.recording.recorder import Recorder
+from aloft.logs.viewing.viewer import ViewerError, start_viewer
 
 FOLDER = Path(__file__).parent
 JUMP = FOLDER.parent / "graphs" / "jump.yaml"
@@ -28,9 +28,9 @@ MISTAKES = """rate: 500 Hz
 duration: 1 s
 robot: bruce
 blocks:
-  imu:      {use: runtime.Constant, with: {value: [0, 0, 9.81]}}
+  imu:      {use: blocks.Constant, with: {value: [0, 0, 9.81]}}
   contacts: {use: blocks.ContactDetecter, in: {switches: robot.contacts}}
-  filter:   {use: runtime.Gain, with: {gian: 0.5}, in: {u: imu.z}}
+  filter:   {use: blocks.Gain, with: {gian: 0.5}, in: {u: imu.z}}
 """
 
 

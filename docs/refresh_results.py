@@ -6,7 +6,7 @@ import re
 from pathlib import Path
 from statistics import median
 
-from aloft.runtime.seeds import SeedRow, run_seeds
+from aloft.studies.batch.seeds import SeedRow, run_seeds
 
 ROOT = Path(__file__).parent.parent
 SEEDS = range(6000, 6020)  # chosen before looking, and never run while anything was tuned

@@ -6,7 +6,7 @@ from abc import ABC, abstractmethod
 from typing import ClassVar, Literal
 
 from ..blocks.signals import ContactSwitches, ImuReading, JointCommand, JointState
-from ..runtime.block import Block, Input, Output
+from ..runtime.language.block import Block, Input, Output
 
 
 class Robot(Block, ABC):

@@ -6,7 +6,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from .reader import RecordedRun, RecordingError, read
+    from .file.reader import RecordedRun, RecordingError, read
 
 __all__ = ["RecordedRun", "RecordingError", "read"]
 
@@ -14,4 +14,4 @@ __all__ = ["RecordedRun", "RecordingError", "read"]
 def __getattr__(name: str) -> Any:
     if name not in __all__:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(".reader", __name__), name)
+    return getattr(import_module(".file.reader", __name__), name)

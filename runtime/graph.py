@@ -15,12 +15,12 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from .errors import AloftError
-from .executor import Executor
+from .language.errors import AloftError
+from .language.stages import CheckedGraph, ClockSpec
 from .loading import load as load_checked
-from .run_result import RunResult
-from .sinks import Sink
-from .stages import CheckedGraph, ClockSpec
+from .running.executor import Executor
+from .running.run_result import RunResult
+from .running.sinks import Sink
 
 
 @dataclass(frozen=True)

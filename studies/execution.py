@@ -8,10 +8,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
 
-from ..runtime.errors import AloftError, ExitCode
 from ..runtime.graph import Graph
-from ..runtime.jobs import job_results
-from ..runtime.run_result import RunResult
+from ..runtime.language.errors import AloftError, ExitCode
+from ..runtime.running.run_result import RunResult
+from .batch.jobs import job_results
 from .expansion import Cell, Job, job, load_cell
 from .journal import Journal, Outcome
 
@@ -112,6 +112,6 @@ def make_runs(
 
 
 def _workers(wanted: int, jobs: int) -> int:
-    from ..runtime.jobs import processors
+    from .batch.jobs import processors
 
     return min(wanted or processors(), jobs)

@@ -8,7 +8,7 @@ from importlib import metadata
 from pathlib import Path
 
 ROOT = Path(__file__).parent.parent
-FOLDERS = ("runtime", "blocks", "hal")
+FOLDERS = ("mathematics", "robots", "runtime", "blocks", "planner", "hal")
 SUFFIXES = (".py", ".yaml")
 LIBRARIES = ("numpy", "mujoco-core", "mujoco", "pin", "daqp", "qpsolvers")
 

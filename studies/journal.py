@@ -12,7 +12,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import IO, Any, Self
 
-from ..runtime.errors import AloftError
+from ..runtime.language.errors import AloftError
 
 
 @dataclass(frozen=True)

@@ -5,8 +5,8 @@ from __future__ import annotations
 import re
 from typing import Any
 
-from ..runtime.errors import UnitError
-from ..runtime.units import parse_unit
+from ..runtime.language.errors import UnitError
+from ..runtime.language.units import parse_unit
 
 _QUANTITY = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*)$")
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..runtime.errors import AloftError
+from ..runtime.language.errors import AloftError
 from .execution import Run
 from .study import FIRST_REPORT_SEED
 

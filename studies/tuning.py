@@ -21,11 +21,11 @@ from typing import Any
 
 import numpy as np
 
-from ..runtime.errors import AloftError
+from ..runtime.language.errors import AloftError
+from ..runtime.language.stages import Position
 from ..runtime.loading.document import read_file
 from ..runtime.loading.nodes import plain, text_of
 from ..runtime.loading.problems import LoadError, Problems
-from ..runtime.stages import Position
 from .execution import Run
 from .expansion import Cell, Tuned, cells
 from .ranges import corners, draw

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from aloft.runtime.registry import find_block, known_names
+from aloft.runtime.language.registry import find_block, known_names
 
 ROOT = Path(__file__).parent.parent
 PACKAGES = ("runtime", "blocks", "hal", "logs", "studies", "figures", "benchmarks", "cli", "graphs")
@@ -41,7 +41,7 @@ def project_files() -> list[Path]:
 
 
 def module_of(path: Path) -> tuple[str, ...]:
-    """``blocks/joint_pd.py`` -> ("blocks", "joint_pd")."""
+    """``blocks/control/joint_pd.py`` -> ("blocks", "joint_pd")."""
     parts = path.relative_to(ROOT).with_suffix("").parts
     return parts[:-1] if parts[-1] == "__init__" else parts
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from aloft.runtime.registry import find_block, known_names
+from aloft.runtime.language.registry import find_block, known_names
 from aloft.runtime.testing.conformance import check_block, conformance_cases
 
 

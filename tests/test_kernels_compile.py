@@ -18,9 +18,9 @@ import numpy as np
 import pytest
 
 import aloft
-from aloft.blocks.leg_kinematics import read_leg
-from aloft.runtime.description import find_robot
-from aloft.runtime.kernel import kernel, kernels
+from aloft.mathematics.kernel import kernel, kernels
+from aloft.robots.description import find_robot
+from aloft.robots.leg_kinematics import read_leg
 
 ROOT = Path(__file__).parent.parent
 HOT = [path for folder in ("blocks", "hal") for path in sorted((ROOT / folder).glob("*.py"))]
@@ -38,43 +38,43 @@ INEXACT = {"sin", "cos", "atan2", "acos", "exp", "hypot", "dot"}
 
 LEG = read_leg(find_robot("bruce"), 0)
 UNUSED = {
-    "aloft.blocks.leg_inverse_kinematics.slide": (
+    "aloft.blocks.control.leg_inverse_kinematics.slide": (
         LEG.hip, LEG.plane, LEG.signs, LEG.limits, np.add(LEG.hip, [0.25, 0.02, -0.3]), np.eye(3), 0.005,
         0.1, np.zeros(3), np.zeros(5),
     ),
-    "aloft.blocks.rotations.skew": (np.ones(3), np.zeros((3, 3))),
-    "aloft.blocks.leg_inverse_kinematics.pitched_line": (np.eye(3), 0.4, np.zeros(3)),
-    "aloft.blocks.rotations.yaw": (np.array([0.1, 0.2, 0.3, 0.9]),),
-    "aloft.blocks.balance_target.lengthen": (
+    "aloft.mathematics.rotations.skew": (np.ones(3), np.zeros((3, 3))),
+    "aloft.blocks.control.leg_inverse_kinematics.pitched_line": (np.eye(3), 0.4, np.zeros(3)),
+    "aloft.mathematics.rotations.yaw": (np.array([0.1, 0.2, 0.3, 0.9]),),
+    "aloft.blocks.control.balance_target.lengthen": (
         np.array([0.01, -0.04, 0.0]), 0.7, 0.02, 0.25, 0.2, 0.6, *(np.ones(3) for _ in range(3)),
     ),
-    "aloft.blocks.joint_pd.follow": (0.002, 0.02, *(np.ones(10) for _ in range(5))),
-    "aloft.blocks.joint_pd.stop": (
+    "aloft.blocks.control.joint_pd.follow": (0.002, 0.02, *(np.ones(10) for _ in range(5))),
+    "aloft.blocks.control.joint_pd.stop": (
         np.linspace(-1.0, 1.0, 5), np.tile([-0.8, 0.7], (5, 1)), 0.1, 2.0,
         *(np.full(5, x) for x in (60.0, 1.5, 40.0, 0.2, 1.0, 0.3)),
     ),
-    "aloft.blocks.leg_inverse_kinematics.keep_along": (
+    "aloft.blocks.control.leg_inverse_kinematics.keep_along": (
         np.array([0.0, 0.6, 0.8]), np.array([0.1, 0.2, 0.3]),
     ),
-    "aloft.blocks.inertial_filter.right_up": (
+    "aloft.mathematics.inertial_filter.right_up": (
         np.array([0.0, 0.0, 0.0, 1.0]), np.array([0.3, 0.2, 9.8]), 0.01, np.zeros(3),
     ),
-    "aloft.blocks.invariant_contacts.forget": (1, np.full((37, 37), 0.5)),
-    "aloft.blocks.extended_pose.exponential": (
+    "aloft.mathematics.invariant_contacts.forget": (1, np.full((37, 37), 0.5)),
+    "aloft.mathematics.extended_pose.exponential": (
         np.linspace(-0.5, 0.6, 12), np.zeros(4), np.zeros((3, 3)),
     ),
-    "aloft.blocks.extended_pose.unbend": (
+    "aloft.mathematics.extended_pose.unbend": (
         np.array([0.1, -0.4, 0.3]), np.array([0.5, 0.2, -0.3]), np.zeros(3),
     ),
-    "aloft.blocks.extended_pose.logarithm": (
+    "aloft.mathematics.extended_pose.logarithm": (
         np.array([0.1, 0.2, 0.3, 0.92]), np.ones((3, 3)), np.zeros(12),
     ),
-    "aloft.blocks.extended_pose.divide": (
+    "aloft.mathematics.extended_pose.divide": (
         np.array([0.1, 0.2, 0.3, 0.92]), np.ones((3, 3)), np.array([0.6, 0.0, 0.0, 0.8]),
         np.ones((3, 3)), np.zeros(4), np.zeros((3, 3)), np.zeros(4),
     ),
-    "aloft.blocks.balance_target.grow": (np.ones(3), 0.6, 0.25, np.zeros(3), np.zeros(3)),
-    "aloft.blocks.whole_body_qp.share_weight": (
+    "aloft.blocks.control.balance_target.grow": (np.ones(3), 0.6, 0.25, np.zeros(3), np.zeros(3)),
+    "aloft.mathematics.whole_body_qp.share_weight": (
         np.array([True, False, True, True]), 50.0, np.zeros((4, 3)),
     ),
 }  # fmt: skip
@@ -247,6 +247,6 @@ def test_nothing_of_ours_needs_numba_to_run():
 
 def test_a_difference_would_be_seen(compiler):
     """The comparison is of the compiled code, not of the function with itself."""
-    wrap = kernels()["aloft.blocks.rotations.wrap"]
+    wrap = kernels()["aloft.mathematics.rotations.wrap"]
     assert compiler(wrap) is not wrap
     assert compiler(wrap)(7.0) == pytest.approx(7.0 - 2.0 * math.pi)

@@ -6,10 +6,10 @@ from typing import Any
 
 import pytest
 
-from aloft.blocks.planner.grid import read_grid
-from aloft.blocks.planner.library import SHIPPED
-from aloft.blocks.planner.task import read_task
 from aloft.cli.task_page import BEGIN, END, task_tables
+from aloft.planner.library.library import SHIPPED
+from aloft.planner.task.task import read_task
+from aloft.studies.batch.plan_grid import read_grid
 
 ROOT = Path(__file__).parent.parent
 PAGE = (ROOT / "docs" / "planning.md").read_text(encoding="utf-8")

@@ -24,9 +24,9 @@ version = "1.0"
 packages = ["springs"]
 """
 BLOCK = '''
-from aloft.runtime.block import Block, Input, Output
-from aloft.runtime.parameters import Parameters, parameter
-from aloft.runtime.primitives import Vector
+from aloft.runtime.language.block import Block, Input, Output
+from aloft.runtime.language.parameters import Parameters, parameter
+from aloft.blocks.general.primitives import Vector
 
 
 class Spring(Block):
@@ -50,7 +50,7 @@ rate: 100 Hz
 duration: 0.1 s
 dimensions: {n: 1}
 blocks:
-  stretch: {use: runtime.Constant, with: {value: [0.5]}}
+  stretch: {use: blocks.Constant, with: {value: [0.5]}}
   spring: {use: springs.Spring, with: {stiffness: 30 N/cm}, in: {stretch: stretch.y}}
 """
 

@@ -6,12 +6,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from ..block import Block
-from ..live_parameters import Adjustment
-from ..parameters import Parameters, is_live, unit_of
-from ..registry import block_name
-from ..signals import Field
-from ..stages import Position
+from ..language.block import Block
+from ..language.parameters import Parameters, is_live, unit_of
+from ..language.registry import block_name
+from ..language.signals import Field
+from ..language.stages import Position
+from ..running.live_parameters import Adjustment
 from .flat import FlatBlock
 from .nodes import MapNode, from_plain
 from .overrides import Override, Overrides, read_overrides

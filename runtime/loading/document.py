@@ -14,7 +14,7 @@ from typing import Any
 
 import yaml
 
-from ..stages import Position
+from ..language.stages import Position
 from .nodes import Entry, ListNode, MapNode, Node, Plain, ScalarNode
 from .problems import Code, Problems, nearest
 

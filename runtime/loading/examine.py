@@ -6,12 +6,12 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
-from ..block import Block
-from ..errors import UnknownBlockError
-from ..registry import BlockImportError, find_block, nearest_names
-from ..schedule import ScheduleBlock, find_loops, order_blocks
-from ..signals import Signal
-from ..stages import BlockSpec, CheckedGraph, Position, Wire
+from ..language.block import Block
+from ..language.errors import UnknownBlockError
+from ..language.registry import BlockImportError, find_block, nearest_names
+from ..language.schedule import ScheduleBlock, find_loops, order_blocks
+from ..language.signals import Signal
+from ..language.stages import BlockSpec, CheckedGraph, Position, Wire
 from .flat import FlatBlock, FlatGraph
 from .inserted import insert_constant, insert_delay, read_values
 from .parameter_check import check_parameters

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from ..stages import HasSource, Position
+from ..language.stages import HasSource, Position
 from .nodes import Entry, MapNode, Node, plain, text_of
 
 _WIDTH = 100

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from ..stages import Position
+from ..language.stages import Position
 from .document import read_file, read_mapping
 from .files import FileTree, Stack
 from .flat import FlatBlock, FlatGraph, FlatWire

@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from ..block import Block, Output
-from ..delay import DelayParameters, delay_block_type
-from ..errors import UnitError
-from ..parameters import Parameters, parameter
-from ..signals import Field, Signal
-from ..stages import BlockSpec, Wire
-from ..units import parse_quantity
+from ..language.block import Block, Output
+from ..language.delay import DelayParameters, delay_block_type
+from ..language.errors import UnitError
+from ..language.parameters import Parameters, parameter
+from ..language.signals import Field, Signal
+from ..language.stages import BlockSpec, Wire
+from ..language.units import parse_quantity
 from .flat import FlatWire
 from .nodes import MapNode, Node, ScalarNode, plain, text_of
 from .problems import Code, Problems, listing, nearest

@@ -6,7 +6,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from ..stages import Position
+from ..language.stages import Position
 from .nodes import Entry, ListNode, MapNode, Node, ScalarNode, kind, text_of
 from .problems import Code, Problems, nearest
 from .written import WIRE_KEYS, unknown_key, wrong_kind

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from ..stages import CheckedGraph
+from ..language.stages import CheckedGraph
 from .examine import examine
 from .flat import FlatGraph
 from .flatten import flatten_file, flatten_text

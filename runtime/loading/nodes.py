@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from ..stages import Position
+from ..language.stages import Position
 
 Plain = None | bool | int | float | str
 """What a scalar may be."""

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from ..stages import Position
+from ..language.stages import Position
 from .document import read_value
 from .nodes import Entry, Node, ScalarNode, from_plain, move, plain, text_of
 from .problems import Code, Problems

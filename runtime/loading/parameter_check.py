@@ -8,11 +8,11 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from ..block import Block
-from ..errors import UnitError
-from ..parameters import Parameters, unit_of
-from ..stages import Position
-from ..units import parse_quantity
+from ..language.block import Block
+from ..language.errors import UnitError
+from ..language.parameters import Parameters, unit_of
+from ..language.stages import Position
+from ..language.units import parse_quantity
 from .flat import FlatBlock
 from .nodes import Entry, ListNode, MapNode, Node, ScalarNode, kind, plain, text_of
 from .problems import Code, Problems, instead, listing, nearest

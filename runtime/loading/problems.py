@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import TYPE_CHECKING, Any
 
-from ..errors import AloftError, ExitCode
-from ..stages import Position
+from ..language.errors import AloftError, ExitCode
+from ..language.stages import Position
 
 if TYPE_CHECKING:
     from rich.text import Text

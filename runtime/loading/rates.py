@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from ..errors import AloftError
-from ..schedule import hyperperiod
-from ..stages import Position
+from ..language.errors import AloftError
+from ..language.schedule import hyperperiod
+from ..language.stages import Position
 from .flat import FlatBlock
 from .nodes import ScalarNode, kind
 from .problems import Code, Problems

@@ -10,8 +10,8 @@ import json
 from collections.abc import Mapping
 from typing import Any
 
-from ..block import Block
-from ..registry import all_blocks
+from ..language.block import Block
+from ..language.registry import all_blocks
 from .written import CLOCK_KEYS
 
 Schema = dict[str, Any]

@@ -10,10 +10,10 @@ from typing import Any
 import yaml
 from pydantic import ValidationError
 
-from ..description import RobotDescription, find_robot
-from ..errors import UnitError
-from ..stages import ClockSpec, Position
-from ..units import parse_quantity
+from ...robots.description import RobotDescription, find_robot
+from ..language.errors import UnitError
+from ..language.stages import ClockSpec, Position
+from ..language.units import parse_quantity
 from .flat import FlatGraph
 from .nodes import Entry, Node, ScalarNode, kind, plain
 from .problems import Code, Problems, listing, nearest

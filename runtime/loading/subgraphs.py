@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
-from ..stages import Position
+from ..language.stages import Position
 from .flat import FlatWire
 from .links import Link
 from .nodes import MapNode, ScalarNode, kind

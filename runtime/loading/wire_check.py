@@ -6,9 +6,9 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from ..block import Block, Input, Output
-from ..parameters import Parameters
-from ..signals import Field, Signal
+from ..language.block import Block, Input, Output
+from ..language.parameters import Parameters
+from ..language.signals import Field, Signal
 from .flat import FlatBlock, FlatGraph, FlatWire
 from .nodes import text_of
 from .problems import Code, Problems, listing, nearest

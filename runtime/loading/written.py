@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
-from ..stages import Position
+from ..language.stages import Position
 from .nodes import Entry, ListNode, MapNode, Node, ScalarNode, kind, plain, text_of
 from .problems import Code, Problems, instead, listing, nearest
 

@@ -9,12 +9,12 @@ from typing import Any, Generic, Self, TypeVar
 
 import numpy as np
 
-from ..block import Block, Clock, Context
-from ..description import RobotDescription, find_robot
-from ..memory import Memory, Snapshot
-from ..parameters import Parameters
-from ..signals import Signal
-from ..stages import BlockSpec
+from ...robots.description import RobotDescription, find_robot
+from ..language.block import Block, Clock, Context
+from ..language.parameters import Parameters
+from ..language.signals import Signal
+from ..language.stages import BlockSpec
+from ..running.memory import Memory, Snapshot
 
 B = TypeVar("B", bound=Block)
 

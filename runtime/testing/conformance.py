@@ -19,10 +19,10 @@ from typing import Any
 
 import numpy as np
 
-from ..block import Block
-from ..description import RobotDescription
-from ..finite import FiniteCheck
-from ..live_parameters import Adjustment, LiveParameters
+from ...robots.description import RobotDescription
+from ..language.block import Block
+from ..running.finite import FiniteCheck
+from ..running.live_parameters import Adjustment, LiveParameters
 from .allocations import count_array_allocations
 from .bench import BlockBench
 from .examples import live_changes, random_inputs

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ValidationError
 
-from ..block import Block
-from ..parameters import Parameters, is_live
-from ..signals import Field
+from ..language.block import Block
+from ..language.parameters import Parameters, is_live
+from ..language.signals import Field
 
 
 def random_value(

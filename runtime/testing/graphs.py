@@ -6,12 +6,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from ..block import Block
-from ..delay import delay_block_type
-from ..description import RobotDescription
-from ..schedule import ScheduleBlock, order_blocks
-from ..signals import Signal
-from ..stages import BlockSpec, CheckedGraph, ClockSpec, Wire
+from ...robots.description import RobotDescription
+from ..language.block import Block
+from ..language.delay import delay_block_type
+from ..language.schedule import ScheduleBlock, order_blocks
+from ..language.signals import Signal
+from ..language.stages import BlockSpec, CheckedGraph, ClockSpec, Wire
 
 
 @dataclass(frozen=True)

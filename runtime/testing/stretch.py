@@ -14,11 +14,11 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from ..block import Block
-from ..description import RobotDescription
-from ..differences import bits, ulp_distance
-from ..live_parameters import Adjustment, LiveParameters
+from ...robots.description import RobotDescription
+from ..language.block import Block
 from ..loading.adjust import adjust
+from ..running.differences import bits, ulp_distance
+from ..running.live_parameters import Adjustment, LiveParameters
 from .bench import BlockBench
 
 Arrays = Mapping[str, NDArray[Any]]

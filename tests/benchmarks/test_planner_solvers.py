@@ -9,11 +9,11 @@ import pytest
 
 from aloft.benchmarks.planner_solvers import INSTALL, SNOPT, SNOPT_GOAL, solver_rows
 from aloft.benchmarks.snopt import SnoptProgram
-from aloft.blocks.planner.guess import ballistic_guess
-from aloft.blocks.planner.solve import make_problem
-from aloft.blocks.planner.solver import solve
-from aloft.blocks.planner.task import make_task
-from aloft.runtime.description import find_robot
+from aloft.planner.problem.guess import ballistic_guess
+from aloft.planner.solving.solve import make_problem
+from aloft.planner.solving.solver import solve
+from aloft.planner.task.task import make_task
+from aloft.robots.description import find_robot
 
 JUMP: dict[str, Any] = {
     "rise": 0.1,

@@ -4,9 +4,9 @@ import pytest
 
 from aloft.benchmarks import random_tasks as module
 from aloft.benchmarks.random_tasks import plan_one, random_rows, random_tasks
-from aloft.blocks.planner.errors import PlanError
-from aloft.blocks.planner.task import make_task
-from aloft.runtime.description import find_robot
+from aloft.planner.errors import PlanError
+from aloft.planner.task.task import make_task
+from aloft.robots.description import find_robot
 
 
 def test_a_seed_is_always_the_same_tasks() -> None:

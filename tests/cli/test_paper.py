@@ -11,8 +11,8 @@ import pytest
 from PIL import Image
 
 from aloft.cli import paper
-from aloft.figures import offscreen
-from aloft.figures.page import page
+from aloft.studies.figures import offscreen
+from aloft.studies.figures.page import page
 from aloft.studies.reading import read_study
 
 CallJson = Callable[..., dict[str, Any]]

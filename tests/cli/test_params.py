@@ -18,8 +18,8 @@ GRAPH = """
 rate: 200 Hz
 clock: {kind: paced}
 blocks:
-  wave: {use: runtime.SineWave, with: {n: 2}}
-  gain: {use: runtime.Gain, with: {n: 2}, in: {u: wave.y}}
+  wave: {use: blocks.SineWave, with: {n: 2}}
+  gain: {use: blocks.Gain, with: {n: 2}, in: {u: wave.y}}
 """
 
 

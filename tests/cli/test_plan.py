@@ -11,13 +11,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from aloft.blocks.planner import nearest_feasible
-from aloft.blocks.planner.errors import PlanError
-from aloft.blocks.planner.library import SHIPPED, PlanLibrary
-from aloft.blocks.planner.nearest_feasible import Axis
-from aloft.blocks.planner.plan import JumpPlan
-from aloft.blocks.planner.task import JumpTask, make_task, read_task
-from aloft.runtime.description import find_robot
+from aloft.planner.errors import PlanError
+from aloft.planner.library.library import SHIPPED, PlanLibrary
+from aloft.planner.library.plan import JumpPlan
+from aloft.planner.solving import nearest_feasible
+from aloft.planner.solving.nearest_feasible import Axis
+from aloft.planner.task.task import JumpTask, make_task, read_task
+from aloft.robots.description import find_robot
 
 Call = Callable[..., subprocess.CompletedProcess[str]]
 CallJson = Callable[..., dict[str, Any]]
@@ -66,7 +66,8 @@ def test_a_plan_that_is_not_valid_says_which_test_failed(
 def test_where_there_is_no_plan_the_nearest_task_is_found_and_kept(
     folder: Path, call_json: CallJson, call: Call, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from aloft.blocks.planner import library, solve
+    from aloft.planner.library import library
+    from aloft.planner.solving import solve
 
     kept = PlanLibrary(find_robot("bruce"), Path("nowhere")).find(read_task(TASKS / "in_situ.yaml"))
 

@@ -18,9 +18,9 @@ GRAPH = """
 rate: 100 Hz
 duration: 3 s
 blocks:
-  wave: {use: runtime.SineWave, with: {n: 2, frequency: 3.0}}
+  wave: {use: blocks.SineWave, with: {n: 2, frequency: 3.0}}
   gain: {use: "gains:Gain", with: {n: 2, gain: 1.5}, in: {u: wave.y}}
-  total: {use: runtime.Integrator, with: {n: 2}, in: {u: gain.y}}
+  total: {use: blocks.Integrator, with: {n: 2}, in: {u: gain.y}}
 """
 GAINS = """
 import math

@@ -118,7 +118,7 @@ def test_seeds_that_are_none(folder: Path, seeds: str, call_json: CallJson) -> N
 
 def test_seeds_need_a_parameter_called_seed(folder: Path, call_json: CallJson) -> None:
     (folder / "plain.yaml").write_text(
-        "rate: 10 Hz\nduration: 1 s\nblocks:\n  c: {use: runtime.Constant, with: {value: [1]}}\n"
+        "rate: 10 Hz\nduration: 1 s\nblocks:\n  c: {use: blocks.Constant, with: {value: [1]}}\n"
     )
     result = call_json("run", "plain.yaml", "--seeds", "0:2", code=2)
     assert result["reason"] == "graph plain has no parameter called seed"

@@ -58,19 +58,19 @@ def test_a_wrong_command_line_is_an_input_error(
 
 def test_blocks_lists_and_describes(call: Call, call_json: CallJson) -> None:
     listing = call("blocks").stdout
-    assert "runtime.Gain" in listing
-    gain = call("blocks", "runtime.Gain").stdout
+    assert "blocks.Gain" in listing
+    gain = call("blocks", "blocks.Gain").stdout
     for text in ("y = gain u", "Inputs", "gain times u", "Parameters", "the factor", "(Mealy)"):
         assert text in gain
-    data = call_json("blocks", "runtime.Gain")
+    data = call_json("blocks", "blocks.Gain")
     assert data["parameters"][1]["name"] == "gain"
     assert data["parameters"][1]["default"] == "1.0"
     assert len(call_json("blocks")["blocks"]) > 5
 
 
 def test_blocks_names_what_is_alike(call: Call) -> None:
-    done = call("blocks", "runtime.Gian", code=2)
-    assert "there is no block called 'runtime.Gian'; the nearest are runtime.Gain" in done.stderr
+    done = call("blocks", "blocks.Gian", code=2)
+    assert "there is no block called 'blocks.Gian'; the nearest are blocks.Gain" in done.stderr
 
 
 def test_a_block_beside_the_graph_is_described(folder: Path, call: Call) -> None:
@@ -82,9 +82,9 @@ def test_graph_prints_order_rates_and_wires(folder: Path, call: Call, call_json:
 rate: 100 Hz
 duration: 2 s
 blocks:
-  wish: {use: runtime.SineWave, rate: 50 Hz}
-  error: {use: runtime.Sum, with: {weights: [1, -1]}, in: {a: wish.y, b: position.y}}
-  position: {use: runtime.Integrator, in: {u: error.y}}
+  wish: {use: blocks.SineWave, rate: 50 Hz}
+  error: {use: blocks.Sum, with: {weights: [1, -1]}, in: {a: wish.y, b: position.y}}
+  position: {use: blocks.Integrator, in: {u: error.y}}
 """)
     text = call("graph", "ring.yaml").stdout
     assert text.startswith("ring: base rate 100 Hz, 200 ticks\n")
@@ -149,7 +149,7 @@ def complete(start: Start, words: str) -> list[str]:
 def test_the_tab_key_completes(folder: Path, start: Start) -> None:
     assert complete(start, "aloft ru") == ["run"]
     assert "--seeds" in complete(start, "aloft run --se")
-    assert complete(start, "aloft blocks runtime.Ga") == ["runtime.Gain"]
+    assert complete(start, "aloft blocks blocks.Ga") == ["blocks.Gain"]
     assert complete(start, "aloft run count.yaml --set counter.s") == [
         "counter.seed=",
         "counter.stop_at=",

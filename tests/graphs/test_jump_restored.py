@@ -5,9 +5,9 @@ from pathlib import Path
 import pytest
 
 import aloft
-from aloft.runtime.executor import Executor
-from aloft.runtime.memory import BoundGraph
-from aloft.runtime.stages import CheckedGraph
+from aloft.runtime.language.stages import CheckedGraph
+from aloft.runtime.running.executor import Executor
+from aloft.runtime.running.memory import BoundGraph
 from aloft.runtime.testing import count_array_allocations
 
 JUMP = Path(aloft.__file__).parent / "graphs" / "jump.yaml"

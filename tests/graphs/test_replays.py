@@ -11,9 +11,9 @@ from pathlib import Path
 import pytest
 
 import aloft
-from aloft.logs.replay import replay
-from aloft.logs.replayable import KeptRun, Keyframes
-from aloft.runtime.executor import Executor
+from aloft.logs.replay.replay import replay
+from aloft.logs.replay.replayable import KeptRun, Keyframes
+from aloft.runtime.running.executor import Executor
 
 GRAPHS = Path(aloft.__file__).parent / "graphs"
 EXAMPLES = sorted(GRAPHS.glob("*.yaml"))
@@ -32,8 +32,8 @@ for graph, file in zip(sys.argv[1::2], sys.argv[2::2]):
 REPLAY = """
 import sys
 from pathlib import Path
-from aloft.logs.opened_run import OpenedRun
-from aloft.logs.replay import replay
+from aloft.logs.replay.opened_run import OpenedRun
+from aloft.logs.replay.replay import replay
 
 for graph, file in zip(sys.argv[1::2], sys.argv[2::2]):
     for inputs in ("seed", "recorded"):

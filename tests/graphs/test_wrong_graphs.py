@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from aloft.runtime.errors import ExitCode
+from aloft.runtime.language.errors import ExitCode
 from aloft.runtime.loading import Code, LoadError, Report, check, load
 
 FOLDER = Path(__file__).parent / "wrong"

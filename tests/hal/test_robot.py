@@ -4,9 +4,9 @@ from typing import Any
 
 import pytest
 
-from aloft.hal.mujoco_robot import MujocoRobot
 from aloft.hal.robot import Robot
-from aloft.runtime.parameters import Parameters
+from aloft.hal.simulated.mujoco_robot import MujocoRobot
+from aloft.runtime.language.parameters import Parameters
 from aloft.runtime.testing.bench import BlockBench
 
 

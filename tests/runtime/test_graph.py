@@ -11,8 +11,8 @@ GRAPH = """
 rate: 100 Hz
 duration: 0.5 s
 blocks:
-  wave: {use: runtime.SineWave, with: {amplitude: 2.0, frequency: 1.0}}
-  position: {use: runtime.Integrator, in: {u: wave.y}}
+  wave: {use: blocks.SineWave, with: {amplitude: 2.0, frequency: 1.0}}
+  position: {use: blocks.Integrator, in: {u: wave.y}}
 """
 
 

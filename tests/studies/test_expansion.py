@@ -95,7 +95,7 @@ def test_overrides_that_mean_nothing_are_reported_where_they_are_written(study: 
 
 def test_a_graph_without_seed_cannot_be_studied(folder: Path, study: Read) -> None:
     (folder / "count.yaml").write_text(
-        "rate: 1 Hz\nblocks: {c: {use: runtime.Constant, with: {value: [1]}}}\n"
+        "rate: 1 Hz\nblocks: {c: {use: blocks.Constant, with: {value: [1]}}}\n"
     )
     found = study("")
     assert isinstance(next(cells(found)), Cell)

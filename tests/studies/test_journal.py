@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from aloft.runtime.errors import AloftError
+from aloft.runtime.language.errors import AloftError
 from aloft.studies.journal import Journal, Outcome
 
 FIRST = Outcome(True, "all well", "ab", {"apex_m": 0.1, "n": 3, "none": None}, "", 1.5)

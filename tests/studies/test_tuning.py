@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from aloft.runtime.errors import AloftError
+from aloft.runtime.language.errors import AloftError
 from aloft.runtime.loading import LoadError
 from aloft.studies.execution import Run
 from aloft.studies.expansion import cells, checked_cells

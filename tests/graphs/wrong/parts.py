@@ -4,9 +4,9 @@ from typing import Literal
 
 from pydantic import model_validator
 
-from aloft.runtime.block import Block, Input, Output
-from aloft.runtime.parameters import Parameters, parameter
-from aloft.runtime.signals import Field, Signal
+from aloft.runtime.language.block import Block, Input, Output
+from aloft.runtime.language.parameters import Parameters, parameter
+from aloft.runtime.language.signals import Field, Signal
 
 
 class Imu(Signal):

@@ -2,19 +2,19 @@
 
 import pytest
 
+from aloft.runtime.language.stages import CheckedGraph
 from aloft.runtime.loading.adjust import adjust, entries
 from aloft.runtime.loading.load import load_text
 from aloft.runtime.loading.problems import LoadError
-from aloft.runtime.memory import BoundGraph
-from aloft.runtime.stages import CheckedGraph
+from aloft.runtime.running.memory import BoundGraph
 
 TEXT = """
 rate: 500 Hz
 blocks:
-  source: {use: runtime.Constant, with: {value: [1.0, 2.0]}}
-  gain: {use: runtime.Gain, with: {n: 2}, in: {u: source.y}}
+  source: {use: blocks.Constant, with: {value: [1.0, 2.0]}}
+  gain: {use: blocks.Gain, with: {n: 2}, in: {u: source.y}}
   contacts: {use: blocks.ContactDetector, in: {switches: {value: {}}}}
-  wave: {use: runtime.SineWave}
+  wave: {use: blocks.SineWave}
 robot: bruce
 """
 

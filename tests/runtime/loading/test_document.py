@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from aloft.runtime.language.stages import Position
 from aloft.runtime.loading.document import read_mapping, read_value
 from aloft.runtime.loading.nodes import MapNode, ScalarNode, plain, text_of
 from aloft.runtime.loading.problems import Problems
-from aloft.runtime.stages import Position
 
 
 def read(text: str) -> Any:

@@ -6,8 +6,8 @@ from typing import Any
 import pytest
 
 from aloft.runtime.graph import Graph
+from aloft.runtime.language.stages import CheckedGraph, ClockSpec, Position
 from aloft.runtime.loading import LoadError, check, load, load_text
-from aloft.runtime.stages import CheckedGraph, ClockSpec, Position
 
 PATH = Path("graph.yaml")
 
@@ -22,7 +22,7 @@ def problems_of(blocks: str, head: str = "rate: 100 Hz") -> list[str]:
     return [f"{p.code}: {p.message}" for p in caught.value.report.problems]
 
 
-CONSTANT = "  one: {use: runtime.Constant, with: {value: [1.0, 2.0]}}\n"
+CONSTANT = "  one: {use: blocks.Constant, with: {value: [1.0, 2.0]}}\n"
 
 
 @pytest.mark.parametrize(
@@ -56,15 +56,15 @@ def test_clock() -> None:
 )
 def test_block_rates(rate: str, offset: int, period: int) -> None:
     graph = graph_of(
-        f"  one: {{use: runtime.Constant, with: {{value: [1]}}, rate: {rate}, offset: {offset}}}"
+        f"  one: {{use: blocks.Constant, with: {{value: [1]}}, rate: {rate}, offset: {offset}}}"
     )
     assert (graph.block("one").period_ticks, graph.block("one").offset_ticks) == (period, offset)
 
 
 def test_dimensions_of_robot_graph_and_block() -> None:
     graph = graph_of(
-        "  one: {use: runtime.Gain, with: {n: 3}, in: {u: two.y}}\n"
-        "  two: {use: runtime.Constant, with: {value: [1, 2, 3]}}\n",
+        "  one: {use: blocks.Gain, with: {n: 3}, in: {u: two.y}}\n"
+        "  two: {use: blocks.Constant, with: {value: [1, 2, 3]}}\n",
         "rate: 1\nrobot: bruce\ndimensions: {n: 7, m: 5}",
     )
     assert graph.robot is not None and graph.robot.name == "bruce"
@@ -73,7 +73,7 @@ def test_dimensions_of_robot_graph_and_block() -> None:
 
 
 def test_a_robot_from_a_file_beside_the_graph(tmp_path: Path) -> None:
-    shipped = Path(__file__).parents[3] / "hal" / "bruce" / "bruce.yaml"
+    shipped = Path(__file__).parents[3] / "robots" / "bruce" / "bruce.yaml"
     (tmp_path / "mine.yaml").write_text(shipped.read_text().replace("name: bruce", "name: mine", 1))
     (tmp_path / "graph.yaml").write_text(f"rate: 1\nrobot: mine.yaml\nblocks:\n{CONSTANT}")
     graph = load(tmp_path / "graph.yaml")
@@ -91,9 +91,9 @@ def test_a_broken_robot_is_a_problem(tmp_path: Path, text: str) -> None:
 
 def test_a_delayed_wire_becomes_a_block_of_its_own() -> None:
     graph = graph_of(
-        "  one: {use: runtime.SineWave, with: {n: 2}, rate: 50 Hz, offset: 1}\n"
+        "  one: {use: blocks.SineWave, with: {n: 2}, rate: 50 Hz, offset: 1}\n"
         "  gain:\n"
-        "    use: runtime.Gain\n"
+        "    use: blocks.Gain\n"
         "    with: {n: 2}\n"
         "    in: {u: {from: one.y, delay: 3, initial: {value: [4, 5]}}}\n"
     )
@@ -110,8 +110,8 @@ def test_a_delayed_wire_becomes_a_block_of_its_own() -> None:
 
 def test_a_ring_with_a_delay_runs() -> None:
     graph = graph_of(
-        "  step: {use: runtime.Constant, with: {value: [1.0]}}\n"
-        "  sum: {use: runtime.Sum, in: {a: step.y, b: {from: sum.y, delay: 1}}}\n",
+        "  step: {use: blocks.Constant, with: {value: [1.0]}}\n"
+        "  sum: {use: blocks.Sum, in: {a: step.y, b: {from: sum.y, delay: 1}}}\n",
         "rate: 10\nduration: 0.5",
     )
     values = Graph(graph).run().signal("sum.y.value")
@@ -120,8 +120,8 @@ def test_a_ring_with_a_delay_runs() -> None:
 
 def test_a_constant_in_place_of_a_source_with_units(tmp_path: Path) -> None:
     (tmp_path / "heights.py").write_text(
-        "from aloft.runtime.block import Block, Input, Output\n"
-        "from aloft.runtime.signals import Field, Signal\n"
+        "from aloft.runtime.language.block import Block, Input, Output\n"
+        "from aloft.runtime.language.signals import Field, Signal\n"
         "class Height(Signal):\n"
         "    height = Field(unit='m')\n"
         "    others = Field(2, unit='m')\n"
@@ -145,14 +145,14 @@ def test_a_constant_in_place_of_a_source_with_units(tmp_path: Path) -> None:
 
 def test_order_is_the_schedules() -> None:
     graph = graph_of(
-        "  last: {use: runtime.Gain, with: {n: 2}, in: {u: middle.y}}\n"
-        "  middle: {use: runtime.Gain, with: {n: 2}, in: {u: one.y}}\n" + CONSTANT
+        "  last: {use: blocks.Gain, with: {n: 2}, in: {u: middle.y}}\n"
+        "  middle: {use: blocks.Gain, with: {n: 2}, in: {u: one.y}}\n" + CONSTANT
     )
     assert graph.order == ("one", "middle", "last")
 
 
 def test_text_numbers_and_truth_words() -> None:
-    graph = graph_of("  s: {use: runtime.SineWave, with: {frequency: 1e-3, phase: 180 deg}}")
+    graph = graph_of("  s: {use: blocks.SineWave, with: {frequency: 1e-3, phase: 180 deg}}")
     params: Any = graph.block("s").params
     assert params.frequency == 0.001
     assert params.phase == pytest.approx(3.14159265358979)
@@ -161,7 +161,7 @@ def test_text_numbers_and_truth_words() -> None:
 def test_follow_ups_of_one_mistake_are_left_out() -> None:
     # no such block: nothing more about its ports, parameters or readers
     blocks = "  one: {use: runtime.Nothing, with: {a: 1}, in: {b: two.c}}\n"
-    blocks += "  gain: {use: runtime.Gain, in: {u: one.y}}\n"
+    blocks += "  gain: {use: blocks.Gain, in: {u: one.y}}\n"
     assert problems_of(blocks) == ["unknown-block: there is no block called 'runtime.Nothing'"]
     # no robot: nothing about the dimensions it would have given
     blocks = "  j: {use: blocks.JointPD}\n"
@@ -170,15 +170,15 @@ def test_follow_ups_of_one_mistake_are_left_out() -> None:
 
 
 def test_bad_parameters_do_not_hide_bad_wires() -> None:
-    found = problems_of("  gain: {use: runtime.Gain, with: {n: 0}, in: {u: gain.x}}")
+    found = problems_of("  gain: {use: blocks.Gain, with: {n: 0}, in: {u: gain.x}}")
     assert [p.partition(":")[0] for p in found] == ["bad-parameter", "unknown-source"]
 
 
 def test_a_crash_in_a_users_own_check_is_a_problem(tmp_path: Path) -> None:
     (tmp_path / "crashes.py").write_text(
-        "from aloft.runtime.block import Block, Output\n"
-        "from aloft.runtime.parameters import Parameters\n"
-        "from aloft.runtime.primitives import Vector\n"
+        "from aloft.runtime.language.block import Block, Output\n"
+        "from aloft.runtime.language.parameters import Parameters\n"
+        "from aloft.blocks.general.primitives import Vector\n"
         "from pydantic import model_validator\n"
         "class Validator(Block):\n"
         "    class Params(Parameters):\n"

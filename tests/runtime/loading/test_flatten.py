@@ -14,8 +14,8 @@ inputs: {u: }
 outputs: {y: second.y, between: first.y}
 parameters: {gain: 1.0, n: 2}
 blocks:
-  first: {use: runtime.Gain, with: {gain: $gain, n: $n}, in: {u: inputs.u}}
-  second: {use: runtime.Gain, with: {gain: 10.0, n: $n}, in: {u: first.y}}
+  first: {use: blocks.Gain, with: {gain: $gain, n: $n}, in: {u: inputs.u}}
+  second: {use: blocks.Gain, with: {gain: 10.0, n: $n}, in: {u: first.y}}
 """
 BODY = """
 inputs: {u: }
@@ -24,16 +24,16 @@ parameters: {gain: }
 blocks:
   left: {use: leg.yaml, with: {gain: $gain}, in: {u: inputs.u}}
   right: {use: leg.yaml, with: {gain: 3.0}, in: {u: left.y}}
-  sum: {use: runtime.Sum, with: {n: 2}, in: {a: left.y, b: right.y}}
+  sum: {use: blocks.Sum, with: {n: 2}, in: {a: left.y, b: right.y}}
 """
 GRAPH = """
 rate: 100 Hz
 duration: 50 ms
 blocks:
-  source: {use: runtime.Constant, with: {value: [1.0, -2.0]}}
+  source: {use: blocks.Constant, with: {value: [1.0, -2.0]}}
   one: {use: body.yaml, with: {gain: 2.0}, in: {u: source.y}}
   two: {use: body.yaml, with: {gain: 5.0}, in: {u: {from: one.sum, delay: 2}}}
-  last: {use: runtime.Gain, with: {n: 2}, in: {u: two/right/first.y}}
+  last: {use: blocks.Gain, with: {n: 2}, in: {u: two/right/first.y}}
 """
 
 
@@ -77,7 +77,7 @@ def test_flat_text(tmp_path: Path) -> None:
     graph = """
 rate: 100 Hz
 blocks:
-  source: {use: runtime.Constant, with: {value: [1e-7, -2.0]}}
+  source: {use: blocks.Constant, with: {value: [1e-7, -2.0]}}
   leg: {use: leg.yaml, rate: 50 Hz, in: {u: {from: source.y, delay: 1, initial: {value: 3}}}}
 set: {leg.gain: 4, leg/second.gain: 5}
 """
@@ -85,15 +85,15 @@ set: {leg.gain: 4, leg/second.gain: 5}
         "rate: 100 Hz\n"
         "blocks:\n"
         "  source:\n"
-        "    use: runtime.Constant\n"
+        "    use: blocks.Constant\n"
         "    with: {value: [1.0e-07, -2.0]}\n"
         "  leg/first:\n"
-        "    use: runtime.Gain\n"
+        "    use: blocks.Gain\n"
         "    with: {gain: 4, n: 2}\n"
         "    in: {u: {from: source.y, delay: 1, initial: {value: 3}}}\n"
         "    rate: 50 Hz\n"
         "  leg/second:\n"
-        "    use: runtime.Gain\n"
+        "    use: blocks.Gain\n"
         "    with: {gain: 5, n: 2}\n"
         "    in: {u: leg/first.y}\n"
         "    rate: 50 Hz\n"
@@ -106,8 +106,8 @@ def gain_of(path: Path, overrides: Any = ()) -> float:
 
 def test_precedence_of_overrides(tmp_path: Path) -> None:
     block = """
-  source: {use: runtime.Constant, with: {value: [1.0]}}
-  gain: {use: runtime.Gain, in: {u: source.y}"""
+  source: {use: blocks.Constant, with: {value: [1.0]}}
+  gain: {use: blocks.Gain, in: {u: source.y}"""
     plain = f"rate: 1 Hz\nblocks:{block}}}"
     assert gain_of(write(tmp_path, graph=plain)) == 1.0
     given = f"rate: 1 Hz\nblocks:{block}, with: {{gain: 2}}}}"
@@ -133,7 +133,7 @@ def test_outer_set_wins_over_a_subgraphs_own(tmp_path: Path) -> None:
     graph = """
 rate: 1 Hz
 blocks:
-  source: {use: runtime.Constant, with: {value: [1.0, 1.0]}}
+  source: {use: blocks.Constant, with: {value: [1.0, 1.0]}}
   leg: {use: leg.yaml, in: {u: source.y}}
 set: {leg/second.gain: 10}
 """
@@ -150,7 +150,7 @@ def test_another_block_in_its_place(tmp_path: Path) -> None:
         load(path, {"one/left/second.use": "runtime.Nothing"})
     assert "--set one/left/second.use=runtime.Nothing" in str(told.value)
     replaced = flatten(path, ["last.use=leg.yaml", "last.gain=3"]).text
-    assert "  last/second:\n    use: runtime.Gain\n" in replaced
+    assert "  last/second:\n    use: blocks.Gain\n" in replaced
     assert "  last:\n    use: runtime.Delay\n" in flatten(path).text
 
 
@@ -163,9 +163,9 @@ def test_overrides_of_the_graph_itself(tmp_path: Path) -> None:
 
 def test_an_override_inside_a_nested_parameter(tmp_path: Path) -> None:
     (tmp_path / "nested.py").write_text(
-        "from aloft.runtime.block import Block, Output\n"
-        "from aloft.runtime.parameters import Parameters, parameter\n"
-        "from aloft.runtime.primitives import Vector\n"
+        "from aloft.runtime.language.block import Block, Output\n"
+        "from aloft.runtime.language.parameters import Parameters, parameter\n"
+        "from aloft.blocks.general.primitives import Vector\n"
         "class Nested(Block):\n"
         "    class Params(Parameters):\n"
         "        class Noise(Parameters):\n"
@@ -185,14 +185,14 @@ def test_wires_replace_those_of_included_files(tmp_path: Path) -> None:
     base = """
 rate: 50 Hz
 blocks:
-  one: {use: runtime.Constant, with: {value: [1.0]}}
-  gain: {use: runtime.Gain, in: {u: one.y}}
+  one: {use: blocks.Constant, with: {value: [1.0]}}
+  gain: {use: blocks.Gain, in: {u: one.y}}
 """
     graph = """
 include: base.yaml
 rate: 100 Hz
 blocks:
-  two: {use: runtime.Constant, with: {value: [2.0]}}
+  two: {use: blocks.Constant, with: {value: [2.0]}}
 wires: {gain.u: two.y}
 """
     loaded = load(write(tmp_path, base=base, graph=graph))
@@ -202,7 +202,7 @@ wires: {gain.u: two.y}
 
 
 def test_a_file_included_twice_counts_once(tmp_path: Path) -> None:
-    common = "blocks: {one: {use: runtime.Constant, with: {value: [1.0]}}}"
+    common = "blocks: {one: {use: blocks.Constant, with: {value: [1.0]}}}"
     inner = "include: common.yaml\n"
     graph = "rate: 1 Hz\ninclude: [a.yaml, b.yaml, common.yaml]\n"
     loaded = load(write(tmp_path, common=common, a=inner, b=inner, graph=graph))
@@ -214,7 +214,7 @@ def test_includes_are_found_beside_the_file_that_names_them(tmp_path: Path) -> N
     write(tmp_path / "deep", inner="include: ../other.yaml", second=LEG)
     other = """
 blocks:
-  one: {use: runtime.Constant, with: {value: [1.0, 1.0]}}
+  one: {use: blocks.Constant, with: {value: [1.0, 1.0]}}
   leg: {use: deep/second.yaml, in: {u: one.y}}
 """
     loaded = load(write(tmp_path, other=other, graph="rate: 1 Hz\ninclude: deep/inner.yaml"))
@@ -226,8 +226,8 @@ def test_anchors_and_underscore_keys(tmp_path: Path) -> None:
 rate: 1 Hz
 _gains: &gains {gain: 3.0, n: 1}
 blocks:
-  _template: &gain {use: runtime.Gain, in: {u: one.y}}
-  one: {use: runtime.Constant, with: {value: [1.0]}, _note: ignored}
+  _template: &gain {use: blocks.Gain, in: {u: one.y}}
+  one: {use: blocks.Constant, with: {value: [1.0]}, _note: ignored}
   two: {<<: *gain, with: *gains}
   three: {<<: *gain, with: {<<: *gains, gain: 4.0}}
 """
@@ -240,13 +240,13 @@ DEFAULTS = """
 inputs: {needed: , optional_one: optional, fixed: {value: [7.0, 8.0]}}
 outputs: {a: a.y, b: b.y}
 blocks:
-  a: {use: runtime.Sum, with: {n: 2}, in: {a: inputs.needed, b: inputs.fixed}}
+  a: {use: blocks.Sum, with: {n: 2}, in: {a: inputs.needed, b: inputs.fixed}}
   b: {use: defaults_parts:Optional, in: {u: inputs.optional_one}}
 """
 DEFAULTS_PARTS = """
-from aloft.runtime.block import Block, Input, Output
-from aloft.runtime.parameters import Parameters
-from aloft.runtime.primitives import Vector
+from aloft.runtime.language.block import Block, Input, Output
+from aloft.runtime.language.parameters import Parameters
+from aloft.blocks.general.primitives import Vector
 class Optional(Block):
     class Params(Parameters):
         n: int = 2
@@ -263,7 +263,7 @@ def test_defaults_of_subgraph_inputs(tmp_path: Path) -> None:
 rate: 1 Hz
 duration: 2
 blocks:
-  one: {use: runtime.Constant, with: {value: [1.0, 2.0]}}
+  one: {use: blocks.Constant, with: {value: [1.0, 2.0]}}
   free: {use: defaults.yaml, in: {needed: one.y}}
   full: {use: defaults.yaml, in: {needed: one.y, optional_one: one.y, fixed: free.a}}
 """
@@ -280,16 +280,16 @@ def test_parameters_reach_everything_inside(tmp_path: Path) -> None:
     inner = """
 inputs: {u: }
 outputs: {y: gain.y}
-parameters: {kind: runtime.Gain, rate: 50 Hz, delay: 3, start: 2.0, weights: }
+parameters: {kind: blocks.Gain, rate: 50 Hz, delay: 3, start: 2.0, weights: }
 blocks:
   gain: {use: $kind, rate: $rate, in: {u: {from: inputs.u, delay: $delay, initial: {value: $start}}}}
-  sum: {use: runtime.Sum, with: {weights: [$start, $weights]}, in: {a: gain.y, b: gain.y}}
+  sum: {use: blocks.Sum, with: {weights: [$start, $weights]}, in: {a: gain.y, b: gain.y}}
 set: {gain.gain: $start}
 """
     graph = """
 rate: 100 Hz
 blocks:
-  one: {use: runtime.Constant, with: {value: [1.0]}}
+  one: {use: blocks.Constant, with: {value: [1.0]}}
   inner: {use: inner.yaml, with: {weights: 4.5}, in: {u: one.y}}
 """
     loaded = load(write(tmp_path, inner=inner, graph=graph))
@@ -302,9 +302,9 @@ blocks:
 
 def test_dollars_in_texts_survive_the_flat_text(tmp_path: Path) -> None:
     (tmp_path / "texts.py").write_text(
-        "from aloft.runtime.block import Block, Output\n"
-        "from aloft.runtime.parameters import Parameters\n"
-        "from aloft.runtime.primitives import Vector\n"
+        "from aloft.runtime.language.block import Block, Output\n"
+        "from aloft.runtime.language.parameters import Parameters\n"
+        "from aloft.blocks.general.primitives import Vector\n"
         "class Text(Block):\n"
         "    class Params(Parameters):\n"
         "        n: int = 1\n"
@@ -324,7 +324,7 @@ def test_flatten_raises_what_it_cannot_expand(tmp_path: Path) -> None:
 
 
 def test_too_many_blocks_are_refused(tmp_path: Path) -> None:
-    files = {"level0": "blocks: {a: {use: runtime.SineWave}}"}
+    files = {"level0": "blocks: {a: {use: blocks.SineWave}}"}
     for i in range(1, 15):
         below = f"level{i - 1}.yaml"
         files[f"level{i}"] = f"blocks: {{a: {{use: {below}}}, b: {{use: {below}}}}}"

@@ -19,12 +19,12 @@ clock: {kind: paced, overrun: stop, stop_after: 2}
 include: [more.yaml]
 _gain: &gain {gain: 2.0, n: 2}
 blocks:
-  one: {use: runtime.Constant, with: {value: [1.0, -2.0]}}
-  wave: {use: runtime.SineWave, with: {n: 2, frequency: 2 Hz, phase: 90 deg}, rate: 50 Hz}
-  gain: {use: runtime.Gain, with: {<<: *gain, gain: 1e-3}, in: {u: leg.y}}
+  one: {use: blocks.Constant, with: {value: [1.0, -2.0]}}
+  wave: {use: blocks.SineWave, with: {n: 2, frequency: 2 Hz, phase: 90 deg}, rate: 50 Hz}
+  gain: {use: blocks.Gain, with: {<<: *gain, gain: 1e-3}, in: {u: leg.y}}
   leg: {use: leg.yaml, with: {gain: 3.0}, in: {u: {from: gain.y, delay: 2, initial: {value: 1}}}}
   sum:
-    use: runtime.Sum
+    use: blocks.Sum
     with: {n: 2, weights: [1.0, -1.0]}
     in: {a: one.y, b: {from: wave.y}}
     rate: 25 Hz
@@ -37,16 +37,16 @@ inputs: {u: , spare: optional}
 outputs: {y: inner.y}
 parameters: {gain: 1.0}
 blocks:
-  inner: {use: runtime.Gain, with: {gain: $gain, n: 2}, in: {u: inputs.u}}
-  second: {use: runtime.UnitDelay, with: {n: 2}, in: {u: inputs.u}}
-  third: {use: runtime.UnitDelay, with: {n: 2}, in: {u: second.y}, rate: 50 Hz}
+  inner: {use: blocks.Gain, with: {gain: $gain, n: 2}, in: {u: inputs.u}}
+  second: {use: blocks.UnitDelay, with: {n: 2}, in: {u: inputs.u}}
+  third: {use: blocks.UnitDelay, with: {n: 2}, in: {u: second.y}, rate: 50 Hz}
 """
-MORE = "blocks: {more: {use: runtime.Gain, with: {n: 2}, in: {u: one.y}}}\n"
+MORE = "blocks: {more: {use: blocks.Gain, with: {n: 2}, in: {u: one.y}}}\n"
 PIECES = (
     "{", "}", "[", "]", ": ", ", ", "\n", "\n  ", "- ", "&a ", "*a", "*gain", "<<: ", "!x ", "# ",
     "'", '"', "\t", "null", "true", "-1", "0", "1e400", "1e-3", ".nan", "99999999999999999999",
     "one.y", "leg.y", "leg", "inputs.u", "$gain", "$$", "leg.yaml", "graph.yaml", "in: ", "with: ",
-    "use: ", "delay: 1", "value: ", "runtime.Sum", "blocks.", "no_such:Block", "os:path", "../", "é", "\x07",
+    "use: ", "delay: 1", "value: ", "blocks.Sum", "blocks.", "no_such:Block", "os:path", "../", "é", "\x07",
 )  # fmt: skip
 
 

@@ -45,11 +45,11 @@ clock: {kind: paced}
 include: a.yaml
 blocks:
   _t: {}
-  wave: {use: runtime.SineWave, with: {frequency: 2 Hz, n: 3, phase: $phase}, rate: 250 Hz}
-  gain: {use: runtime.Gain, with: {n: 3}, in: {u: {from: wave.y, delay: 1, initial: {value: 0}}}}
+  wave: {use: blocks.SineWave, with: {frequency: 2 Hz, n: 3, phase: $phase}, rate: 250 Hz}
+  gain: {use: blocks.Gain, with: {n: 3}, in: {u: {from: wave.y, delay: 1, initial: {value: 0}}}}
   mine: {use: my_module:Block, with: {anything: 1}, in: {whatever: left/leg.y}}
   leg: {use: leg.yaml, in: {x: inputs.x}}
-  sum: {use: runtime.Sum, in: {a: {value: {value: 1.0}}}}
+  sum: {use: blocks.Sum, in: {a: {value: {value: 1.0}}}}
 wires: {gain.u: wave.y}
 set: {gain.gain: 3}
 """
@@ -66,12 +66,12 @@ def test_a_good_graph(validator: Draft7Validator) -> None:
         ("rate: -3", ["rate"]),
         ("clock: {kind: fast}", ["clock/kind"]),
         ("blocks: {a: {}}", ["blocks/a"]),
-        ("blocks: {a: {use: runtime.Gian}}", ["blocks/a/use"]),
-        ("blocks: {a: {use: runtime.Gain, with: {gian: 3}}}", ["blocks/a/with"]),
-        ("blocks: {a: {use: runtime.Gain, with: {n: 0}}}", ["blocks/a/with/n"]),
-        ("blocks: {a: {use: runtime.Gain, in: {v: b.y}}}", ["blocks/a/in"]),
-        ("blocks: {a: {use: runtime.Gain, in: {u: by}}}", ["blocks/a/in/u"]),
-        ("blocks: {a: {use: runtime.Gain, in: {u: {from: b.y, delay: 0}}}}", ["blocks/a/in/u"]),
+        ("blocks: {a: {use: blocks.Gian}}", ["blocks/a/use"]),
+        ("blocks: {a: {use: blocks.Gain, with: {gian: 3}}}", ["blocks/a/with"]),
+        ("blocks: {a: {use: blocks.Gain, with: {n: 0}}}", ["blocks/a/with/n"]),
+        ("blocks: {a: {use: blocks.Gain, in: {v: b.y}}}", ["blocks/a/in"]),
+        ("blocks: {a: {use: blocks.Gain, in: {u: by}}}", ["blocks/a/in/u"]),
+        ("blocks: {a: {use: blocks.Gain, in: {u: {from: b.y, delay: 0}}}}", ["blocks/a/in/u"]),
         ("set: {gain: 3}", ["set"]),
     ],
 )
@@ -81,9 +81,9 @@ def test_wrong_graphs(validator: Draft7Validator, text: str, places: list[str]) 
 
 def test_every_block_is_described(validator: Draft7Validator) -> None:
     schema = json.loads(schema_text())
-    gain = schema["definitions"]["runtime.Gain"]
+    gain = schema["definitions"]["blocks.Gain"]
     assert gain["description"] == "The input times a constant: y = gain u."
     assert gain["properties"]["with"]["properties"]["gain"]["description"] == "the factor"
     assert gain["properties"]["in"]["properties"]["u"]["description"] == "Vector: what is scaled"
-    frequency = schema["definitions"]["runtime.SineWave"]["properties"]["with"]["properties"]
+    frequency = schema["definitions"]["blocks.SineWave"]["properties"]["with"]["properties"]
     assert frequency["frequency"]["description"] == "oscillations per second [Hz]"

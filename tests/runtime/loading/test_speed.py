@@ -8,10 +8,10 @@ from aloft.runtime.loading import load
 
 def test_forty_blocks_load_in_well_under_a_tenth_of_a_second(tmp_path: Path) -> None:
     lines = ["rate: 500 Hz", "robot: bruce", "blocks:"]
-    lines.append("  b0: {use: runtime.SineWave, with: {n: 12, frequency: 2 Hz, phase: 30 deg}}")
+    lines.append("  b0: {use: blocks.SineWave, with: {n: 12, frequency: 2 Hz, phase: 30 deg}}")
     for i in range(1, 40):
         lines.append(f"  b{i}:")
-        lines.append("    use: runtime.Sum")
+        lines.append("    use: blocks.Sum")
         lines.append("    with: {n: 12, weights: [0.5, 0.5]}")
         delay = f"{{from: b{i}.y, delay: 1, initial: {{value: 0.0}}}}"
         lines.append(f"    in: {{a: b{i - 1}.y, b: {delay}}}")

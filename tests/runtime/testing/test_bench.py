@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from aloft.runtime.block import Block, Input, Output, State
-from aloft.runtime.parameters import Parameters, parameter
-from aloft.runtime.primitives import Gain, UnitDelay, Vector
+from aloft.blocks.general.primitives import Gain, UnitDelay, Vector
+from aloft.runtime.language.block import Block, Input, Output, State
+from aloft.runtime.language.parameters import Parameters, parameter
 from aloft.runtime.testing import BlockBench
 
 

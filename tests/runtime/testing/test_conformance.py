@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from aloft.runtime.block import Block, Input, Output, State
-from aloft.runtime.finite import NotFiniteError
-from aloft.runtime.parameters import Parameters, live_parameter, parameter
-from aloft.runtime.primitives import Vector
-from aloft.runtime.signals import Field, Signal
+from aloft.blocks.general.primitives import Vector
+from aloft.runtime.language.block import Block, Input, Output, State
+from aloft.runtime.language.parameters import Parameters, live_parameter, parameter
+from aloft.runtime.language.signals import Field, Signal
+from aloft.runtime.running.finite import NotFiniteError
 from aloft.runtime.testing.conformance import ConformanceError, check_block, conformance_cases
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 
 from aloft.blocks.signals import Phase
-from aloft.runtime.signals import Field
+from aloft.runtime.language.signals import Field
 from aloft.runtime.testing.examples import random_value
 
 

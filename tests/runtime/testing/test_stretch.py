@@ -5,9 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from aloft.runtime.block import Block, Output
-from aloft.runtime.primitives import Gain, UnitDelay
-from aloft.runtime.signals import Field, Signal
+from aloft.blocks.general.primitives import Gain, UnitDelay
+from aloft.runtime.language.block import Block, Output
+from aloft.runtime.language.signals import Field, Signal
 from aloft.runtime.testing.stretch import Setting, Stretch, StretchError
 
 

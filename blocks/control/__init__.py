@@ -1,0 +1,1 @@
+"""Blocks that decide what the joints do."""

@@ -1,0 +1,316 @@
+"""What the whole-body controller is to achieve: the plan, then balance over the feet."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...mathematics.kernel import kernel
+from ...mathematics.polynomials import minimum_jerk
+from ...mathematics.rotations import conjugate, exponential, from_matrix, logarithm, multiply
+from ...runtime.language.block import Block, Input, Output, State
+from ...runtime.language.parameters import Parameters, live_parameter
+from ...runtime.language.signals import Field, Signal
+from ..signals import DynamicsTerms, JumpReference, Phase, PhaseState, WholeBodyTarget
+
+Array = NDArray[np.float64]
+Vector = tuple[float, float, float]
+
+
+class BalanceMemory(Signal):
+    """What the balance remembers."""
+
+    standing_height = Field(unit="m", text="planned height of the centre of mass in the first tick")
+    started = Field(dtype="bool", text="whether that height is known")
+    trim = Field(3, unit="rad", frame="body", text="rotation added to the level target")
+    origin = Field(3, unit="m", frame="world", text="where the plan's origin is")
+    heading = Field(unit="rad", frame="world", text="where its x axis points")
+    off_place = Field(3, unit="m", frame="world", text="feet from their planned place")
+
+
+class BalanceTarget(Block):
+    """Follows the plan until its last touchdown; then rest over the middle of the measured feet.
+
+    Before the last touchdown positions and heading are the plan's, shifted and turned with the measured
+    feet: the plan is relative to where the feet stand, so a drift of the estimated position or
+    heading does not matter.
+
+    So every error of a landing is carried on to the next, unless ``place_gain`` feeds back the
+    place. In the last T_p = ``place_time`` before a lift-off the jump is lengthened: with e how far
+    the feet's middle then is, by the estimated position, from where the plan has it, and T_f the
+    planned flight,
+
+        d = -place_gain e, of a length of at most place_limit
+        v(t) = v_d s(u),   s = 10 u^3 - 15 u^4 + 6 u^5,   u = 1 - (t_lo - t) / T_p,
+        v_d = d / (T_f + T_p / 2)
+
+    is added to the velocity, its integral to the place and its derivative to the acceleration of
+    the centre of mass: at touchdown these are worth d. The plan's place in the world is that of
+    the first tick. Feet that land at their heading's error stay there.
+
+    After that touchdown the centre of mass goes over the middle of the sole centres, at
+    ``landing_depth`` below standing height; when the phase is RECOVER it rises to standing height
+    with least jerk within ``rise_time``. The torso goes level, heading as the feet do on average.
+    Joint friction leaves a small steady tilt; ``trim`` integrates it away,
+
+        trim' = trim_rate Log(R' R_level), within trim_limit,    R_target = R_level Exp(trim),
+
+    about the body's x and y axes. Angular momentum and its rate are wanted zero.
+
+    A robot that is not quite the model misses the plan at lift-off, much the same way in every
+    jump of a task. ``velocity_correction`` dv and ``momentum_correction`` dk make up for what is
+    known of that: over the share u of a thrust that lasts T the plan becomes
+
+        v + u^2 dv,   a + 2 u dv / T,   p + T u^3 dv / 3,   k + u^2 dk,   k' + 2 u dk / T.
+
+    Does not plan a step: the feet stay where they are.
+    """
+
+    class Params(Parameters):
+        landing_depth: float = live_parameter(
+            0.06, unit="m", ge=0.0, le=0.2, text="height held after touchdown, below standing"
+        )
+        rise_time: float = live_parameter(
+            0.6, unit="s", gt=0.0, text="from there to standing height"
+        )
+        trim_rate: float = live_parameter(
+            3.0, unit="1/s", ge=0.0, le=20.0, text="how fast a steady tilt is integrated away"
+        )
+        trim_limit: float = live_parameter(
+            0.08, unit="rad", ge=0.0, le=0.5, text="largest trim about each axis"
+        )
+        velocity_correction: Vector = live_parameter(
+            (0.0, 0.0, 0.0),
+            unit="m/s",
+            text="added to the planned velocity of the centre of mass at lift-off, in the plan's axes",
+        )
+        momentum_correction: Vector = live_parameter(
+            (0.0, 0.0, 0.0),
+            unit="N m s",
+            text="added to the planned angular momentum at lift-off, in the plan's axes",
+        )
+
+        place_gain: float = live_parameter(
+            0.0,
+            ge=0.0,
+            le=1.0,
+            text="share of the feet's error of place the next jump makes up for",
+        )
+        place_limit: float = live_parameter(
+            0.03, unit="m", ge=0.0, le=0.2, text="by how much it lengthens a jump at most"
+        )
+        place_time: float = live_parameter(
+            0.2, unit="s", gt=0.0, le=1.0, text="how long before lift-off it begins to"
+        )
+
+    params: Params
+    reference = Input(JumpReference, text="the plan")
+    phase = Input(PhaseState, text="the phase the robot is in")
+    terms = Input(DynamicsTerms, text="the present state")
+    target = Output(WholeBodyTarget, text="what to achieve now")
+    memory = State(BalanceMemory, text="standing height and trim")
+
+    def setup(self) -> None:
+        self._quaternion = np.zeros(4)
+        self._turn = np.zeros(4)
+        self._vector = np.zeros(3)
+        self._middle = np.zeros(3)
+        self._planned_middle = np.zeros(3)
+        self._feet = self.context.dimensions["n_feet"]
+        self.on_parameters()
+
+    def on_parameters(self) -> None:
+        p = self.params
+        self._corrections = np.array([p.velocity_correction, p.momentum_correction])
+        self._corrects = bool(self._corrections.any())
+        self._corrections.flags.writeable = False
+
+    def step(self) -> None:
+        phase, reference = int(self.phase.phase), self.reference
+        middle_point(self.terms.foot_position, self._middle)
+        heading = mean_heading(self.terms.foot_rotation)
+        if not self.memory.started:
+            self._begin(heading)
+        goes_on = float(reference.lift_off_time) > float(reference.time)
+        if phase < Phase.LANDING or (phase == Phase.LANDING and goes_on):
+            turn = self._follow(heading)
+            if self._corrects and phase == Phase.THRUST:
+                self._correct(turn)
+        else:
+            self._balance(phase, heading)
+        self.target.joint_position[...] = reference.joint_position
+        self.target.joint_velocity[...] = reference.joint_velocity
+        self.target.joint_acceleration[...] = reference.joint_acceleration
+
+    def _begin(self, heading: float) -> None:
+        """Note how high it stands by the plan, and where the plan's world is."""
+        memory, reference = self.memory, self.reference
+        memory.standing_height[()] = reference.com[2]
+        memory.heading[()] = heading - self._planned_heading()
+        middle_point(reference.foot_position, self._planned_middle)
+        turn_about_vertical(self._planned_middle, float(memory.heading), self._vector)
+        np.subtract(self._middle, self._vector, out=memory.origin)
+        memory.started[()] = True
+
+    def _planned_heading(self) -> float:
+        planned = 0.0
+        for foot in range(self._feet):
+            planned += float(self.reference.foot_yaw[foot]) / self._feet
+        return planned
+
+    def _follow(self, heading: float) -> float:
+        """The plan from the measured feet; how far that turns it [rad]."""
+        reference, target = self.reference, self.target
+        middle_point(reference.foot_position, self._planned_middle)
+        turn = heading - self._planned_heading()
+        for name in ("com", "com_velocity", "com_acceleration", "angular_momentum",
+                     "angular_momentum_rate"):  # fmt: skip
+            out = getattr(target, name)
+            source = getattr(reference, name)
+            if name == "com":
+                np.subtract(source, self._planned_middle, out=self._vector)
+                turn_about_vertical(self._vector, turn, out)
+                np.add(out, self._middle, out=out)
+            else:
+                turn_about_vertical(source, turn, out)
+        self._set_heading(turn)
+        multiply(self._turn, reference.orientation, target.orientation)
+        target.angular_velocity[...] = reference.angular_velocity
+        if self.params.place_gain > 0.0:
+            self._make_up()
+        return turn
+
+    def _make_up(self) -> None:
+        """Lengthen the next jump by what the feet are off their place."""
+        p, reference, target, memory = self.params, self.reference, self.target, self.memory
+        lift_off = float(reference.lift_off_time)
+        flight = float(reference.touchdown_time) - lift_off
+        share = 1.0 - (lift_off - float(reference.time)) / p.place_time
+        if share <= 0.0:
+            turn_about_vertical(self._planned_middle, float(memory.heading), self._vector)
+            np.add(memory.origin, self._vector, out=self._vector)
+            np.subtract(self._middle, self._vector, out=memory.off_place)
+            return
+        lengthen(
+            memory.off_place, p.place_gain, p.place_limit, flight, p.place_time, share,
+            target.com, target.com_velocity, target.com_acceleration,
+        )  # fmt: skip
+
+    def _correct(self, turn: float) -> None:
+        """Add what the thrust is known to miss."""
+        target, elapsed = self.target, float(self.phase.time_in_phase)
+        left = float(self.reference.lift_off_time) - float(self.reference.time)
+        duration = max(elapsed + left, self.period)
+        share = min(elapsed / duration, 1.0)
+        turn_about_vertical(self._corrections[1], turn, self._vector)
+        grow(self._vector, share, duration, target.angular_momentum, target.angular_momentum_rate)
+        turn_about_vertical(self._corrections[0], turn, self._vector)
+        grow(self._vector, share, duration, target.com_velocity, target.com_acceleration)
+        np.multiply(self._vector, duration * share**3 / 3.0, out=self._vector)
+        np.add(target.com, self._vector, out=target.com)
+
+    def _balance(self, phase: int, heading: float) -> None:
+        p, target, trim = self.params, self.target, self.memory.trim
+        standing = float(self.memory.standing_height)
+        share = rate = bend = 0.0
+        if phase == Phase.RECOVER:
+            share, rate, bend = minimum_jerk(float(self.phase.time_in_phase) / p.rise_time)
+        low = standing - p.landing_depth
+        target.com[...] = self._middle
+        target.com[2] += low + share * p.landing_depth
+        target.com_velocity[...] = 0.0
+        target.com_velocity[2] = rate * p.landing_depth / p.rise_time
+        target.com_acceleration[...] = 0.0
+        target.com_acceleration[2] = bend * p.landing_depth / (p.rise_time * p.rise_time)
+        target.angular_velocity[...] = 0.0
+        target.angular_momentum[...] = 0.0
+        target.angular_momentum_rate[...] = 0.0
+        self._set_heading(heading)
+        from_matrix(self.terms.base_rotation, self._quaternion)
+        conjugate(self._quaternion, self._quaternion)
+        multiply(self._quaternion, self._turn, self._quaternion)
+        logarithm(self._quaternion, self._vector)
+        integrate_trim(self._vector, p.trim_rate * self.period, p.trim_limit, trim)
+        exponential(trim, self._quaternion)
+        multiply(self._turn, self._quaternion, target.orientation)
+
+    def _set_heading(self, angle: float) -> None:
+        self._turn[0] = self._turn[1] = 0.0
+        self._turn[2], self._turn[3] = math.sin(0.5 * angle), math.cos(0.5 * angle)
+
+
+@kernel
+def middle_point(points: Array, out: Array) -> None:
+    """The mean of points (n, 3)."""
+    out[:] = 0.0
+    for i in range(points.shape[0]):
+        for k in range(3):
+            out[k] += float(points[i, k]) / points.shape[0]
+
+
+@kernel
+def mean_heading(rotations: Array) -> float:
+    """The heading [rad] of the mean of the x axes of rotations (n, 3, 3)."""
+    x = y = 0.0
+    for i in range(rotations.shape[0]):
+        x += float(rotations[i, 0, 0])
+        y += float(rotations[i, 1, 0])
+    return math.atan2(y, x)
+
+
+@kernel
+def turn_about_vertical(vector: Array, angle: float, out: Array) -> None:
+    """A vector (3,) turned about the world's z axis."""
+    cosine, sine = math.cos(angle), math.sin(angle)
+    x, y = float(vector[0]), float(vector[1])
+    out[0], out[1], out[2] = cosine * x - sine * y, sine * x + cosine * y, vector[2]
+
+
+@kernel
+def lengthen(
+    off_place: Array,
+    gain: float,
+    limit: float,
+    flight: float,
+    duration: float,
+    share: float,
+    place: Array,
+    velocity: Array,
+    acceleration: Array,
+) -> None:
+    """Add to a jump's motion (3,) what makes up for feet off their place; see the block's text.
+
+    Args:
+        off_place: horizontally, how far the feet are from their place (3,) [m].
+        limit: of the lengthening [m].
+        flight: how long the flight behind the lift-off lasts [s].
+        duration, share: how long before lift-off it begins [s], and how much of that is over.
+    """
+    u = min(max(share, 0.0), 1.0)
+    grown, rate, _ = minimum_jerk(u)
+    size = gain * math.hypot(float(off_place[0]), float(off_place[1]))
+    kept = 1.0 if size <= limit else limit / size
+    for k in range(2):
+        speed = -kept * gain * float(off_place[k]) / (flight + 0.5 * duration)
+        place[k] += speed * duration * u * u * u * u * (2.5 + u * (u - 3.0))
+        velocity[k] += speed * grown
+        acceleration[k] += speed * rate / duration
+
+
+@kernel
+def grow(goal: Array, share: float, duration: float, value: Array, rate: Array) -> None:
+    """Add what grows to ``goal`` (3,) as the square of the ``share`` of ``duration`` [s]; see the
+    block's text."""
+    for k in range(3):
+        value[k] += share * share * float(goal[k])
+        rate[k] += 2.0 * share / duration * float(goal[k])
+
+
+@kernel
+def integrate_trim(error: Array, gain: float, limit: float, trim: Array) -> None:
+    """One step of the integral about x and y, kept within the limit; none about z."""
+    for k in range(2):
+        trim[k] = min(max(float(trim[k]) + gain * float(error[k]), -limit), limit)
+    trim[2] = 0.0

@@ -1,0 +1,227 @@
+"""The last block before the drives: lets the command through, or damps for good."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from enum import IntEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...mathematics.kernel import kernel
+from ...mathematics.rotations import tilt
+from ...runtime.language.block import Block, Input, Metric, Output, State
+from ...runtime.language.errors import BlockError
+from ...runtime.language.parameters import Parameters, live_parameter, parameter
+from ...runtime.language.signals import Field, Signal
+from ..signals import BaseState, CommandMode, JointCommand, JointState, WholeBodyCommand
+
+Array = NDArray[np.float64]
+
+
+class Fault(IntEnum):
+    """Why the robot was stopped."""
+
+    NONE = 0
+    """It was not."""
+    TILT = 1
+    """The base leant too far for too long."""
+    JOINT_LIMIT = 2
+    """A joint went beyond its limits."""
+    JOINT_SPEED = 3
+    """A joint turned too fast for too long."""
+    STALE_SENSORS = 4
+    """Joint readings stopped changing."""
+    ABSURD_STATE = 5
+    """A state is not finite or beyond anything the robot can do."""
+    ABSURD_COMMAND = 6
+    """A command is not finite or beyond anything the drives can do."""
+    SOLVER = 7
+    """The whole-body controller failed too often in a row."""
+
+
+class SafetyState(Signal):
+    """What the monitor remembers."""
+
+    fault = Field(dtype="int64", values=Fault, text="why it damps; the first reason stays")
+    fault_tick = Field(dtype="int64", text="when")
+    tilted = Field(dtype="int64", text="ticks in a row the base has leant too far")
+    beyond = Field("n_joints", dtype="int64", text="ticks in a row each joint was out of limits")
+    fast = Field("n_joints", dtype="int64", text="ticks in a row each joint was too fast")
+    stale = Field(dtype="int64", text="ticks in a row without a changed joint reading")
+    unsolved = Field(dtype="int64", text="ticks in a row without a solution")
+    last_position = Field("n_joints", unit="rad", text="joint angles of the last tick")
+    last_velocity = Field("n_joints", unit="rad/s", text="joint velocities of the last tick")
+    started = Field(dtype="bool", text="whether there was a last tick")
+
+
+class SafetyMonitor(Block):
+    """Passes the joint command on until something is wrong, and from then on only damps.
+
+    A fault, once found, stays for the run; the first is kept in the state and in the metrics
+    ``safety_fault`` and ``safety_fault_time_s``. It is a fault when
+
+    * the base leans more than ``tilt_limit`` for ``tilt_hold``;
+    * a joint is more than ``limit_margin`` beyond its limits, or faster than ``speed_limit``, for
+      ``joint_hold``;
+    * joint readings have not changed by a single bit for ``stale_ticks`` ticks (zero: never;
+      a simulator without noise may stand that still);
+    * a state or a command is not finite, or beyond 10 m/s, 100 rad/s or ``torque_limit``;
+    * the whole-body controller has not solved for ``unsolved_ticks`` ticks in a row.
+
+    Damping commands zero torque and stiffness, the measured angle, zero velocity and ``damping``,
+    all finite whatever came in. Every tick is judged, also after a fault. Does not know of
+    temperature, voltage or deadlines, and does not stop the run: who scores does.
+    """
+
+    class Params(Parameters):
+        tilt_limit: float = parameter(1.2, unit="rad", gt=0.0, le=math.pi, text="largest lean")
+        tilt_hold: float = parameter(0.02, unit="s", ge=0.0, text="for how long it may be more")
+        limit_margin: float = parameter(
+            0.05, unit="rad", ge=0.0, text="how far a joint may be beyond its limits"
+        )
+        speed_limit: float = parameter(60.0, unit="rad/s", gt=0.0, text="fastest joint")
+        joint_hold: float = parameter(
+            0.02, unit="s", ge=0.0, text="for how long a joint may be further or faster"
+        )
+        torque_limit: float = parameter(
+            200.0, unit="N m", gt=0.0, text="a joint torque beyond this is a mistake, not a command"
+        )
+        stale_ticks: int = parameter(0, ge=0, text="equal joint readings in a row; zero: any")
+        unsolved_ticks: int = parameter(25, ge=0, text="ticks in a row without a solution")
+        damping: float = live_parameter(
+            0.5, unit="N m s/rad", ge=0.0, text="of every joint, when damped"
+        )
+
+    params: Params
+
+    desired = Input(JointCommand, text="what the controller wants")
+    base = Input(BaseState, text="the estimated base")
+    joints = Input(JointState, text="the measured joints")
+    wbc = Input(WholeBodyCommand, text="whether the controller has solved")
+    command = Output(JointCommand, text="what the drives get")
+    state = State(SafetyState, text="timers and the fault")
+
+    def setup(self) -> None:
+        robot = self.context.robot
+        if robot is None:
+            raise BlockError("SafetyMonitor needs a robot: name one in the graph")
+        margin = self.params.limit_margin
+        self._lower = robot.joint_limits[:, 0] - margin
+        self._upper = robot.joint_limits[:, 1] + margin
+        self._tilt_ticks = round(self.params.tilt_hold / self.period)
+        self._joint_ticks = round(self.params.joint_hold / self.period)
+        self._commands = (
+            (self.desired.torque, self.params.torque_limit),
+            (self.desired.position, 100.0),
+            (self.desired.velocity, 1000.0),
+            (self.desired.stiffness, 10000.0),
+            (self.desired.damping, 1000.0),
+        )
+
+    def step(self) -> None:
+        fault = self._judge()
+        state, desired, command = self.state, self.desired, self.command
+        if fault != Fault.NONE and state.fault[()] == Fault.NONE:
+            state.fault[()] = fault
+            state.fault_tick[()] = self.tick
+        if state.fault[()] == Fault.NONE:
+            command.mode[()] = desired.mode
+            command.torque[...] = desired.torque
+            command.position[...] = desired.position
+            command.velocity[...] = desired.velocity
+            command.stiffness[...] = desired.stiffness
+            command.damping[...] = desired.damping
+            return
+        command.mode[()] = CommandMode.DAMPING
+        command.torque.fill(0.0)
+        command.velocity.fill(0.0)
+        command.stiffness.fill(0.0)
+        command.damping.fill(self.params.damping)
+        for joint in range(command.position.shape[0]):
+            angle = float(self.joints.position[joint])
+            command.position[joint] = angle if math.isfinite(angle) else 0.0
+
+    def metrics(self) -> Mapping[str, Metric]:
+        fault = Fault(int(self.state.fault[()]))
+        result: dict[str, Metric] = {"safety_fault": fault.name.lower()}
+        if fault != Fault.NONE:
+            period = self.context.clock.base_period
+            result["safety_fault_time_s"] = int(self.state.fault_tick[()]) * period
+        return result
+
+    def _judge(self) -> Fault:
+        """The fault of this tick, the gravest first; all timers move on."""
+        state, params, joints, base = self.state, self.params, self.joints, self.base
+        for values, limit in self._commands:
+            if not within(values, limit):
+                return Fault.ABSURD_COMMAND
+        plausible = (
+            within(joints.position, 100.0)
+            and within(joints.velocity, 1000.0)
+            and within(base.orientation, 2.0)
+            and within(base.linear_velocity, 10.0)
+            and within(base.angular_velocity, 100.0)
+            and within(base.position, 1e6)
+        )
+        if not plausible:
+            return Fault.ABSURD_STATE
+
+        leans = tilt(base.orientation) > params.tilt_limit
+        state.tilted[()] = int(state.tilted[()]) + 1 if leans else 0
+        beyond = count_beyond(joints.position, self._lower, self._upper, state.beyond)
+        fast = count_faster(joints.velocity, params.speed_limit, state.fast)
+        changed = not state.started[()]
+        for joint in range(joints.position.shape[0]):
+            position, velocity = joints.position[joint], joints.velocity[joint]
+            changed = changed or bool(
+                position != state.last_position[joint] or velocity != state.last_velocity[joint]
+            )
+            state.last_position[joint] = position
+            state.last_velocity[joint] = velocity
+        state.started[()] = True
+        state.stale[()] = 0 if changed else int(state.stale[()]) + 1
+        state.unsolved[()] = 0 if self.wbc.solved[()] else int(state.unsolved[()]) + 1
+
+        if state.tilted[()] > self._tilt_ticks:
+            return Fault.TILT
+        if beyond > self._joint_ticks:
+            return Fault.JOINT_LIMIT
+        if fast > self._joint_ticks:
+            return Fault.JOINT_SPEED
+        if 0 < params.stale_ticks <= int(state.stale[()]):
+            return Fault.STALE_SENSORS
+        if 0 < params.unsolved_ticks <= int(state.unsolved[()]):
+            return Fault.SOLVER
+        return Fault.NONE
+
+
+@kernel
+def within(values: Array, limit: float) -> bool:
+    """Whether all values are finite and of no greater magnitude; NaN is not."""
+    inside = True
+    for i in range(values.shape[0]):
+        inside = inside and abs(float(values[i])) <= limit
+    return inside
+
+
+@kernel
+def count_beyond(values: Array, lower: Array, upper: Array, counts: NDArray[np.int64]) -> int:
+    """Count for each value how many times in a row it was out of bounds; the largest count."""
+    largest = 0
+    for i in range(values.shape[0]):
+        out = not float(lower[i]) <= float(values[i]) <= float(upper[i])
+        counts[i] = count = int(counts[i]) + 1 if out else 0
+        largest = max(largest, count)
+    return largest
+
+
+@kernel
+def count_faster(values: Array, limit: float, counts: NDArray[np.int64]) -> int:
+    """Count for each value how many times in a row its magnitude was above; the largest count."""
+    largest = 0
+    for i in range(values.shape[0]):
+        counts[i] = count = int(counts[i]) + 1 if abs(float(values[i])) > limit else 0
+        largest = max(largest, count)
+    return largest

@@ -1,0 +1,1 @@
+"""Blocks that find out where the robot is and how it moves."""

@@ -1,0 +1,82 @@
+"""From bouncing switches to points that carry load."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...mathematics.kernel import kernel
+from ...runtime.language.block import Block, Input, Output, State
+from ...runtime.language.parameters import Parameters, live_parameter
+from ...runtime.language.signals import Field, Signal
+from ..signals import ContactState, ContactSwitches
+
+
+class ContactTimers(Signal):
+    """How long each switch has been as it is, and what was decided."""
+
+    closed = Field("n_contacts", dtype="int64", text="ticks in a row a switch has been closed")
+    opened = Field("n_contacts", dtype="int64", text="ticks in a row it has been open")
+    active = Field("n_contacts", dtype="bool", text="whether the point is in contact")
+
+
+class ContactDetector(Block):
+    """A latch with hold for every contact point by itself (paper, II-A).
+
+    A point becomes active once its switch has been closed for ``close_samples`` ticks in a row,
+    and stays so until the switch has been open for longer than ``hold``: a bouncing switch never
+    lets go, and a foot that lands toe first is in contact at its toe only. Points never follow one
+    another: a landing foot is not taken to be flat.
+
+    The hold delays the report of a lift-off by as much; whoever needs lift-off sooner reads the
+    switches or the plan's time. Knows no forces.
+    """
+
+    class Params(Parameters):
+        hold: float = live_parameter(
+            0.03, unit="s", ge=0.0, text="how long a point stays active after its switch opens"
+        )
+        close_samples: int = live_parameter(
+            1, ge=1, text="ticks a switch must be closed before its point is active"
+        )
+
+    params: Params
+
+    switches = Input(ContactSwitches, text="the raw switches")
+    state = Output(ContactState, text="which points carry load")
+    timers = State(ContactTimers, text="one timer a point")
+
+    def step(self) -> None:
+        timers = self.timers
+        latch(
+            self.switches.closed,
+            self.params.close_samples,
+            round(self.params.hold / self.period),
+            timers.closed,
+            timers.opened,
+            timers.active,
+        )
+        self.state.active[...] = timers.active
+
+
+@kernel
+def latch(
+    switches: NDArray[np.bool_],
+    close_samples: int,
+    hold_samples: int,
+    closed: NDArray[np.int64],
+    opened: NDArray[np.int64],
+    active: NDArray[np.bool_],
+) -> None:
+    """One tick of all points: ``closed``, ``opened`` and ``active`` are brought up to date."""
+    for point in range(switches.shape[0]):
+        if switches[point]:
+            closed[point] += 1
+            opened[point] = 0
+            if closed[point] >= close_samples:
+                active[point] = True
+        else:
+            closed[point] = 0
+            opened[point] += 1
+            if opened[point] > hold_samples:
+                active[point] = False

@@ -1,0 +1,84 @@
+"""What the invariant Kalman filter remembers, and its parameters."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from ...runtime.language.parameters import Parameters, parameter
+from ...runtime.language.signals import Field, Signal
+
+
+class InvariantEstimate(Signal):
+    """What the filter remembers. The error's order is that of ``invariant_contacts``."""
+
+    orientation = Field(4, unit="", text="quaternion x, y, z, w from body to world")
+    vectors = Field(
+        ("n_vectors", 3), frame="world",
+        text="velocity [m/s], position [m], centres of the contacts' rubber [m]",
+    )  # fmt: skip
+    present = Field("n_contacts", dtype="bool", text="which contact points are in the state")
+    gyro_bias = Field(3, unit="rad/s", frame="body", text="what the gyroscope reads too much")
+    accelerometer_bias = Field(3, unit="m/s^2", frame="body", text="the same of the accelerometer")
+    encoder_offset = Field("n_joints", unit="rad", text="the same of the joint encoders")
+    covariance = Field(("n_errors", "n_errors"), text="of the error")
+    angular_velocity = Field(3, unit="rad/s", frame="body", text="at the last tick, without bias")
+    started = Field(dtype="bool", text="whether the first sample has been seen")
+    saturated_ticks = Field(dtype="int64", text="ticks with a saturated sample")
+    saturated_run = Field(
+        6, dtype="int64", text="ticks in a row that each axis of gyroscope, accelerometer is so"
+    )
+
+
+class InvariantFilterParameters(Parameters):
+    """Noise of the sensors and of the contacts, and how the filter uses them.
+
+    Standard deviations of a sample are at the block's rate. The defaults are the standard trial's
+    noise; its biases and offsets are uniform, with these as their deviations.
+    """
+
+    gyro_noise: float = parameter(0.02, unit="rad/s", gt=0, text="of a sample")
+    gyro_aliasing: float = parameter(
+        0.29,
+        ge=0,
+        text="further noise, as a share of what a rate changes from sample to sample",
+    )
+    accelerometer_noise: float = parameter(0.1, unit="m/s^2", gt=0, text="of a sample")
+    gyro_bias: float = parameter(0.006, unit="rad/s", ge=0, text="of the bias at the start")
+    accelerometer_bias: float = parameter(0.06, unit="m/s^2", ge=0, text="of the bias at the start")
+    gyro_bias_walk: float = parameter(1e-4, unit="rad/s^2", ge=0, text="per root second")
+    accelerometer_bias_walk: float = parameter(1e-3, unit="m/s^3", ge=0, text="per root second")
+    encoder_offset: float = parameter(0.0017, unit="rad", ge=0, text="of the encoders' offsets")
+    kinematics_noise: float = parameter(
+        2e-4, unit="m", gt=0, text="of where leg kinematics see a point, per axis"
+    )
+    contact_noise: float = parameter(
+        1e-4, unit="m", ge=0, text="how far a standing point creeps in a second, per axis"
+    )
+    slide_noise: float = parameter(
+        1e-3, unit="m", ge=0, text="how far a standing foot slides in a second, per axis"
+    )
+    impact_slide: float = parameter(
+        0.0,
+        unit="s^2",
+        ge=0,
+        text="by how much it slides more, by the specific force beyond gravity",
+    )
+    gate: float = parameter(16.3, gt=0, text="a residual less likely than this is refused")
+    support: float = parameter(
+        4.0, unit="m/s^2", text="upward specific force below which no contact is believed"
+    )
+    ground: Literal["level", "flat", "unknown"] = parameter("level", text="see above")
+    ground_noise: float = parameter(2e-4, unit="m", gt=0, text="of a point's height")
+    ground_time: float = parameter(0.2, unit="s", gt=0, text="how long its errors last")
+    gyro_range: float | None = parameter(
+        None, unit="rad/s", gt=0, text="the gyroscope saturates here; none: never"
+    )
+    accelerometer_range: float | None = parameter(
+        None, unit="m/s^2", gt=0, text="the accelerometer saturates here; none: never"
+    )
+    saturated_rate: float = parameter(
+        10.0, unit="rad/s", gt=0, text="how far off a saturated axis of the gyroscope may be"
+    )
+    saturated_force: float = parameter(
+        100.0, unit="m/s^2", gt=0, text="the same of the accelerometer"
+    )

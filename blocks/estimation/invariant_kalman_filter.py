@@ -1,0 +1,388 @@
+"""Where the base is and how it moves, by an invariant Kalman filter with contact."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...mathematics.extended_pose import retract
+from ...mathematics.inertial_filter import GRAVITY, misalignment, propagate, turn, upright
+from ...mathematics.invariant_contacts import (
+    admit,
+    centre,
+    creep,
+    forget,
+    innovation,
+    level,
+    look,
+    watch,
+)
+from ...mathematics.invariant_propagation import deviation, drift, grow, inflate, spread
+from ...mathematics.kalman_update import correct, weigh
+from ...mathematics.rotations import rotate, to_matrix
+from ...robots.contact_kinematics import ContactKinematics
+from ...robots.description import RobotDescription
+from ...runtime.language.block import Block, Input, Output, State
+from ...runtime.language.errors import BlockError
+from ...runtime.language.parameters import Parameters
+from ..signals import BaseState, ContactState, EstimatorHealth, ImuReading, JointState
+from .invariant_estimate import InvariantEstimate, InvariantFilterParameters
+
+Array = NDArray[np.float64]
+
+_FASTEST_TURN = 100.0
+_STRONGEST_FORCE = 1000.0
+"""Sensor values are brought within these [rad/s, m/s^2], so that nothing can overflow."""
+_START_TURN = 0.05
+_START_SPEED = 0.01
+_START_PLACE = 0.02
+"""Standard deviations at the start [rad, m/s, m], before the feet have been used."""
+_EXACT = 1e-5
+"""Standard deviation [m] of what holds because the world is defined so."""
+_OPENING = 1.0
+"""How fast the velocity is doubted while no standing point agrees with it [m/s per root s]."""
+
+
+class InvariantKalmanFilter(Block):
+    """A contact-aided right-invariant extended Kalman filter (Hartley et al. 2020).
+
+    Same ports as ``StateEstimator``: ``set: {estimator.use: blocks.InvariantKalmanFilter}``.
+
+    **State.** X = (R, v, p, d_1 .. d_N) on SE_{2+N}(3): the base's orientation, velocity and
+    position and the points that stand on the ground (toe and heel of each foot); the biases of
+    gyroscope and accelerometer; and the offsets of the joint encoders, which is what binds a robot
+    whose encoders are off by more than they are noisy. The error is xi = log(X_est X^-1).
+
+    **Prediction** by the IMU, as in ``StateEstimator``; the covariance by a transition that does
+    not depend on the trajectory (``invariant_propagation``). In flight there is nothing else.
+
+    **Contacts** are measured, never assumed. A point that is reported active, while the IMU feels
+    support, enters the state where leg kinematics see it and then stands still but for
+    ``contact_noise`` and what its foot slides as a whole, sqrt(slide_noise^2 + (impact_slide (|f| -
+    g))^2): feet slide a little where they are hit or push hardest. While it stands,
+    R h(q) + p - d = 0 corrects everything. A residual that is too unlikely (``gate``, chi-squared
+    of three degrees) says that the point has slipped or lifted: it leaves the state and enters
+    again where it is now, so nothing is learnt from it.
+    While all points are refused, the velocity's own variance grows until one is believed.
+
+    **Ground.** ``level``: points that stand are at one height; ``flat``: at the height zero they
+    started on; ``unknown``: nothing is said. Its errors last, so it counts as one measurement in
+    ``ground_time``, not in every tick.
+
+    **Saturation.** A sample at the end of the given range is a bound, not a value. Its axis counts
+    with ``saturated_rate`` or ``saturated_force`` for its standard deviation, so the covariance
+    grows as it should and whatever else is known takes over. A rate that is saturated in flight is
+    not known at all; ``health`` says so.
+
+    It starts at the first sample, standing on level ground: the world's origin is midway between
+    the soles and x is where the feet point. Yaw and horizontal position drift from jump to jump.
+    Standard deviations are of one sample at the block's rate. The defaults are the standard
+    trial's noise; offsets and biases are there uniform, with these as their deviations.
+    Never waits, never raises in a run.
+
+    Raises:
+        BlockError: the graph has no robot.
+    """
+
+    Params = InvariantFilterParameters
+    params: InvariantFilterParameters
+
+    imu = Input(ImuReading, text="gyroscope, and accelerometer as the mean over the tick")
+    joints = Input(JointState, text="joint angles and velocities")
+    contacts = Input(ContactState, text="which points carry load; a short hold serves best")
+    base = Output(BaseState, text="pose and velocity of the base")
+    health = Output(EstimatorHealth, text="how far to believe it")
+    estimate = State(InvariantEstimate, text="the filter")
+
+    @classmethod
+    def state_dimensions(
+        cls, params: Parameters, robot: RobotDescription | None
+    ) -> Mapping[str, int]:
+        """The vectors of the state and the size of the error."""
+        if robot is None:
+            return {"n_vectors": 2, "n_errors": 15}
+        n = len(robot.contacts)
+        return {"n_vectors": 2 + n, "n_errors": 15 + 3 * n + len(robot.joints)}
+
+    def setup(self) -> None:
+        """The robot's kinematics, constant matrices and scratch memory."""
+        robot, params = self.context.robot, self.params
+        if robot is None:
+            raise BlockError("InvariantKalmanFilter needs a robot: name one in the graph")
+        self._kinematics = ContactKinematics(robot)
+        self._points, n_joints = len(robot.contacts), len(robot.joints)
+        self._radius = [contact.radius for contact in robot.contacts]
+        self._foot_of_point = np.array(robot.foot_of_contact(), dtype=np.int64)
+        self._levers = np.array(_levers(robot))
+        self._bias = 9 + 3 * self._points
+        self._offsets = self._bias + 6
+        n = self._offsets + n_joints
+        self._transition = np.zeros((n, n))
+        drift(GRAVITY, self.period, self._transition)
+        self._reach, self._scaled = np.zeros((n, 6)), np.zeros((n, 6))
+        self._product, self._correction = np.zeros((n, n)), np.zeros(n)
+        self._sensitivity, self._rows = np.zeros((3, n)), np.zeros((3, n))
+        self._seen, self._gain = np.zeros((n, 3)), np.zeros((n, 3))
+        self._inverse, self._corner = np.zeros((3, 3)), np.zeros((3, 3))
+        self._noise, self._residual = np.zeros(6), np.zeros(3)
+        self._place_noise = params.kinematics_noise**2 * np.eye(3)
+        self._row_noise, self._identity = np.eye(3), np.eye(3)
+        self._rotation = np.zeros((3, 3))
+        self._middle_vectors = np.zeros((2 + self._points, 3))
+        self._world_jacobian = np.zeros((3, n_joints))
+        self._world_point, self._spare = np.zeros(3), np.zeros(3)
+        self._turn, self._middle, self._acceleration = np.zeros(4), np.zeros(4), np.zeros(3)
+        self._angles, self._rates = np.zeros(n_joints), np.zeros(n_joints)
+        self._used_offset = np.zeros(n_joints)
+        self._gyro, self._force, self._last_rate = np.zeros(3), np.zeros(3), np.zeros(3)
+        self._believed = np.zeros(self._points, dtype=np.bool_)
+
+    def step(self) -> None:
+        estimate, params = self.estimate, self.params
+        np.clip(self.imu.angular_velocity, -_FASTEST_TURN, _FASTEST_TURN, out=self._gyro)
+        np.clip(self.imu.specific_force, -_STRONGEST_FORCE, _STRONGEST_FORCE, out=self._force)
+        self._watch_saturation()
+        self._last_rate[...] = estimate.angular_velocity
+        np.subtract(self._gyro, estimate.gyro_bias, out=estimate.angular_velocity)
+        for axis in range(3):
+            change = float(estimate.angular_velocity[axis]) - float(self._last_rate[axis])
+            self._noise[axis] = math.hypot(float(self._noise[axis]), params.gyro_aliasing * change)
+        np.subtract(self._force, estimate.accelerometer_bias, out=self._force)
+        if estimate.started[()]:
+            self._predict()
+            self._see()
+        else:
+            self._start()
+        self._use_contacts()
+        if params.ground != "unknown":
+            self._use_ground()
+        np.subtract(self._gyro, estimate.gyro_bias, out=estimate.angular_velocity)
+        self._publish()
+
+    def _watch_saturation(self) -> None:
+        """The noise of this tick's samples, axis by axis."""
+        params, health, run = self.params, self.health, self.estimate.saturated_run
+        health.gyro_saturated[()] = inflate(
+            self._gyro, params.gyro_range or math.inf, params.gyro_noise, params.saturated_rate,
+            run[:3], self._noise[:3],
+        )  # fmt: skip
+        health.accelerometer_saturated[()] = inflate(
+            self._force, params.accelerometer_range or math.inf, params.accelerometer_noise,
+            params.saturated_force, run[3:], self._noise[3:],
+        )  # fmt: skip
+        if health.gyro_saturated[()] or health.accelerometer_saturated[()]:
+            self.estimate.saturated_ticks += 1
+        health.saturated_ticks[()] = self.estimate.saturated_ticks
+
+    def _predict(self) -> None:
+        estimate, params, period = self.estimate, self.params, self.period
+        covariance = estimate.covariance
+        propagate(
+            estimate.orientation, estimate.vectors[1], estimate.vectors[0], self._last_rate,
+            estimate.angular_velocity, self._force, period, self._middle, self._acceleration,
+        )  # fmt: skip
+        to_matrix(self._middle, self._rotation)
+        vectors = self._middle_vectors
+        vectors[...] = estimate.vectors
+        for axis in range(3):
+            gained = 0.5 * period * float(self._acceleration[axis])
+            vectors[0, axis] -= gained
+            vectors[1, axis] -= 0.5 * period * float(vectors[0, axis])
+        spread(self._rotation, vectors, estimate.present, GRAVITY, period, self._reach)
+        grow(
+            self._transition, self._reach, self._bias, self._noise, covariance,
+            self._scaled, self._product,
+        )  # fmt: skip
+        pressed = max(math.hypot(*self._force.tolist()) - GRAVITY, 0.0)
+        slide = math.hypot(params.slide_noise, params.impact_slide * pressed)
+        creep(
+            self._foot_of_point, estimate.present, params.contact_noise, slide, period, covariance
+        )
+        for first, walk in (
+            (self._bias, params.gyro_bias_walk), (self._bias + 3, params.accelerometer_bias_walk),
+        ):  # fmt: skip
+            for k in range(first, first + 3):
+                covariance[k, k] += walk * walk * period
+
+    def _see(self) -> None:
+        """Leg kinematics with what is known of the encoders' offsets."""
+        estimate, seen = self.estimate, self._kinematics
+        self._used_offset[...] = estimate.encoder_offset
+        np.subtract(self.joints.position, self._used_offset, out=self._angles)
+        seen.evaluate(estimate.orientation, estimate.angular_velocity, self._angles, self._rates)
+        seen.differentiate()
+        to_matrix(estimate.orientation, self._rotation)
+
+    def _look(self, point: int) -> None:
+        """Where a point is from the base, in the world, and what that depends on."""
+        estimate = self.estimate
+        np.dot(self._rotation, self._kinematics.jacobians[point], out=self._world_jacobian)
+        # As it is with the offsets as they are by now.
+        np.subtract(estimate.encoder_offset, self._used_offset, out=self._angles)
+        np.dot(self._kinematics.jacobians[point], self._angles, out=self._spare)
+        np.subtract(self._kinematics.centres[point], self._spare, out=self._spare)
+        np.dot(self._rotation, self._spare, out=self._world_point)
+        look(self._world_jacobian, self._offsets, self._sensitivity)
+
+    def _start(self) -> None:
+        """Standing on level ground around the origin, the feet pointing along x."""
+        estimate, params, seen = self.estimate, self.params, self._kinematics
+        upright(self._force, estimate.orientation)
+        self._see()
+        for _ in range(20):
+            misalignment(
+                estimate.orientation, seen.points, seen.forward, self._residual, self._spare
+            )
+            np.clip(self._residual, -0.2, 0.2, out=self._residual)
+            turn(estimate.orientation, *self._residual.tolist())
+        to_matrix(estimate.orientation, self._rotation)
+        position = estimate.vectors[1]
+        for sole in seen.soles:
+            rotate(estimate.orientation, sole, self._spare)
+            for axis in range(2):
+                position[axis] -= float(self._spare[axis]) / len(seen.soles)
+        for point in range(self._points):
+            rotate(estimate.orientation, seen.centres[point], self._spare)
+            position[2] += (self._radius[point] - float(self._spare[2])) / self._points
+        for first, last, deviation_at_start in (
+            (0, 3, _START_TURN), (3, 6, _START_SPEED), (6, 9, _START_PLACE),
+            (self._bias, self._bias + 3, params.gyro_bias),
+            (self._bias + 3, self._offsets, params.accelerometer_bias),
+            (self._offsets, estimate.covariance.shape[0], params.encoder_offset),
+        ):  # fmt: skip
+            for k in range(first, last):
+                estimate.covariance[k, k] = deviation_at_start * deviation_at_start
+        estimate.started[()] = True
+        self._believed.fill(True)
+        self._enter()
+        self._define_world()
+
+    def _define_world(self) -> None:
+        """What holds because the world is where the feet are at the start: all points are at one
+        height, zero; its origin is in their middle; its x is where they point on average."""
+        n, vectors = self._points, self.estimate.vectors
+        for first in range(0, n, 3):
+            self._level(range(first, min(first + 3, n)), -1, self.params.ground_noise**2)
+        centre(self._levers, vectors, self._sensitivity)
+        self._residual.fill(0.0)
+        np.multiply(self._identity, _EXACT * _EXACT, out=self._row_noise)
+        self._weigh(self._row_noise)
+        self._correct(self._row_noise)
+
+    def _use_contacts(self) -> None:
+        """Correct by the points that stand; take in those that come, let go those that leave."""
+        estimate, params, trusted = self.estimate, self.params, self.health.trusted
+        rotate(estimate.orientation, self._force, self._spare)
+        supported = float(self._spare[2]) >= params.support
+        supported = supported or bool(self.health.accelerometer_saturated[()])
+        refused = agreed = False
+        for point in range(self._points):
+            believed = supported and bool(self.contacts.active[point])
+            self._believed[point] = believed
+            trusted[point] = False
+            if not estimate.present[point]:
+                continue
+            if believed:
+                self._look(point)
+                watch(point, self._sensitivity)
+                innovation(point, self._world_point, estimate.vectors, self._residual)
+                if self._weigh(self._place_noise) <= params.gate:
+                    self._correct(self._place_noise)
+                    trusted[point] = agreed = True
+                    continue
+                refused = True
+            estimate.present[point] = False
+            forget(point, estimate.covariance)
+        if refused and not agreed:
+            for k in range(3, 6):
+                estimate.covariance[k, k] += _OPENING * _OPENING * self.period
+        self._enter()
+
+    def _enter(self) -> None:
+        """Take in the points that are believed and not yet in the state."""
+        estimate = self.estimate
+        for point in range(self._points):
+            if not self._believed[point] or estimate.present[point]:
+                continue
+            self._look(point)
+            admit(
+                point, self._sensitivity, self._place_noise, estimate.covariance,
+                self._rows, self._corner,
+            )  # fmt: skip
+            np.add(estimate.vectors[1], self._world_point, out=estimate.vectors[2 + point])
+            estimate.present[point] = True
+
+    def _use_ground(self) -> None:
+        """The heights of the points that stand: one another's, or the one they started on."""
+        params, reference = self.params, -1
+        standing = [point for point in range(self._points) if self.health.trusted[point]]
+        if params.ground == "level" and standing:
+            reference = standing.pop(0)
+        variance = params.ground_noise**2 * max(params.ground_time / self.period, 1.0)
+        for first in range(0, len(standing), 3):
+            self._level(standing[first : first + 3], reference, variance)
+
+    def _level(self, points: Sequence[int], reference: int, variance: float) -> None:
+        """Correct by the heights of up to three points, over the reference's or over zero."""
+        self._sensitivity.fill(0.0)
+        self._residual.fill(0.0)
+        vectors, noise = self.estimate.vectors, self._row_noise
+        np.copyto(noise, self._identity)
+        for row, point in enumerate(points):
+            height = self._radius[point]
+            if reference >= 0:
+                height -= self._radius[reference]
+            level(row, point, reference, height, vectors, self._sensitivity, self._residual)
+            for column in range(len(points)):
+                shared = variance if reference >= 0 else 0.0
+                noise[row, column] = shared + (variance if row == column else 0.0)
+        self._weigh(noise)
+        self._correct(noise)
+
+    def _weigh(self, noise: Array) -> float:
+        """How unlikely the residual is."""
+        return weigh(
+            self.estimate.covariance, self._sensitivity, noise, self._residual,
+            self._seen, self._inverse, self._corner,
+        )  # fmt: skip
+
+    def _correct(self, noise: Array) -> None:
+        """Correct everything by the residual that has just been weighed."""
+        estimate, correction = self.estimate, self._correction
+        correct(
+            estimate.covariance, self._sensitivity, noise, self._residual,
+            self._seen, self._inverse, self._gain, self._product, correction,
+        )  # fmt: skip
+        bias, offsets = self._bias, self._offsets
+        retract(correction, estimate.orientation, estimate.vectors, self._turn, self._spare)
+        estimate.gyro_bias += correction[bias : bias + 3]
+        estimate.accelerometer_bias += correction[bias + 3 : offsets]
+        estimate.encoder_offset += correction[offsets:]
+        to_matrix(estimate.orientation, self._rotation)
+
+    def _publish(self) -> None:
+        estimate, base, health = self.estimate, self.base, self.health
+        np.subtract(self._gyro, estimate.gyro_bias, out=estimate.angular_velocity)
+        base.position[...] = estimate.vectors[1]
+        base.orientation[...] = estimate.orientation
+        base.linear_velocity[...] = estimate.vectors[0]
+        base.angular_velocity[...] = estimate.angular_velocity
+        covariance, vectors = estimate.covariance, estimate.vectors
+        health.velocity_std[()] = deviation(covariance, 3, vectors[0])
+        health.position_std[()] = deviation(covariance, 6, vectors[1])
+        tilt = float(covariance[0, 0]) + float(covariance[1, 1])
+        health.tilt_std[()] = math.sqrt(max(tilt, 0.0))
+        health.yaw_std[()] = math.sqrt(max(float(covariance[2, 2]), 0.0))
+
+
+def _levers(robot: RobotDescription) -> list[float]:
+    """How far every contact point lies ahead of its foot's middle [m]."""
+    feet, ahead = robot.foot_of_contact(), [contact.position[0] for contact in robot.contacts]
+    middle = [
+        sum(x for x, other in zip(ahead, feet, strict=True) if other == foot) / feet.count(foot)
+        for foot in feet
+    ]
+    return [x - m for x, m in zip(ahead, middle, strict=True)]

@@ -1,0 +1,1 @@
+"""General blocks on plain vectors."""

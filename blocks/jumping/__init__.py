@@ -1,0 +1,1 @@
+"""Blocks that know what a jump is: plans, phases, landing."""

@@ -1,0 +1,263 @@
+"""Which phase of the jump the robot is really in."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...mathematics.kernel import kernel
+from ...runtime.language.block import Block, Input, Output, State
+from ...runtime.language.errors import BlockError
+from ...runtime.language.parameters import Parameters, live_parameter
+from ...runtime.language.signals import Field, Signal
+from ..signals import ContactState, DynamicsTerms, JumpReference, Phase, PhaseState
+
+_GRAVITY = 9.81
+_THRUST = int(Phase.THRUST)
+
+
+class PhaseMemory(Signal):
+    """What the phase machine remembers."""
+
+    phase = Field(dtype="int64", values=Phase, text="see Phase")
+    began = Field(unit="s", text="plan time at which the phase began")
+    touchdown = Field(unit="s", text="plan time of the last touchdown, negative before the first")
+    lift_off_time = Field(unit="s", text="planned lift-off of the flight under way or last")
+    touchdown_time = Field(unit="s", text="planned touchdown of that flight")
+    unloaded = Field("n_contacts", unit="s", text="how long each point has been without contact")
+    stance = Field("n_contacts", dtype="bool", text="the points in stance after touchdown")
+
+
+class JumpPhase(Block):
+    """The phase by plan time and measured contact, the stance points, and the time to touchdown.
+
+    ============  =====================================================================
+    phase         ends
+    ============  =====================================================================
+    STAND, SQUAT  at the planned times
+    THRUST        at the planned lift-off; up to ``late_lift_off`` later while any point
+                  still has contact; in its second half at once when no point has had
+                  contact for ``early_lift_off``
+    FLIGHT        at the first contact after ``touchdown_share`` of the predicted flight
+    LANDING       ``landing_time`` after touchdown; where the plan has another flight, with the
+                  planned thrust, and THRUST follows again
+    FAULT         never; entered from any other phase on the conditions below
+    ============  =====================================================================
+
+    RECOVER follows the last LANDING and stays. FAULT: no point has had contact for ``lost_contact`` while
+    the robot should stand, or the flight has lasted that much longer than predicted at its start
+    by the plan.
+
+    Stance: before lift-off the points that carry load in the plan, so that heels may rise while
+    the toes still push; where the plan has none of them, those of the tick before; in flight none; after touchdown every point that had
+    contact within the last ``contact_hold``, and those of the same foot that are less than
+    ``flat_height`` above the lowest of these; if that leaves none, those of the tick before. A
+    controller that may push with a heel a hair above the ground brings it down by doing so; one
+    that may not lets the robot teeter on its toes.
+
+    The time to touchdown is the ballistic fall of the measured centre of mass to the height it is
+    planned to touch down at: z + v s - g s^2 / 2 = z_td.
+
+    Does not judge tilt, torques or sensors (``SafetyMonitor`` does), and goes back for nothing but
+    another planned flight.
+    """
+
+    class Params(Parameters):
+        late_lift_off: float = live_parameter(
+            0.0, unit="s", ge=0.0, text="how long to wait for the feet to leave the ground"
+        )
+        early_lift_off: float = live_parameter(
+            0.01, unit="s", gt=0.0, text="without any contact for this long the robot flies"
+        )
+        touchdown_share: float = live_parameter(
+            0.5, ge=0.0, le=1.0, text="share of the predicted flight before touchdown counts"
+        )
+        landing_time: float = live_parameter(
+            0.35, unit="s", ge=0.0, text="from touchdown until the robot rises again"
+        )
+        contact_hold: float = live_parameter(
+            0.0, unit="s", ge=0.0, text="how long a point stays in stance after its contact ends"
+        )
+        flat_height: float = live_parameter(
+            0.006, unit="m", ge=0.0, text="how far a foot's other points may be from the ground"
+        )
+        lost_contact: float = live_parameter(
+            0.2, unit="s", gt=0.0, text="how long without contact before it is a fault"
+        )
+
+    params: Params
+    reference = Input(JumpReference, text="the plan")
+    contacts = Input(ContactState, text="which points carry load")
+    terms = Input(DynamicsTerms, text="the present state")
+    phase = Output(PhaseState, text="the phase, its times and the stance points")
+    memory = State(PhaseMemory, text="the phase, its times, and contacts lately lost")
+
+    def setup(self) -> None:
+        robot = self.context.robot
+        if robot is None:
+            raise BlockError("JumpPhase needs a robot: name one in the graph, e.g. robot: bruce")
+        self._foot_of_point = np.array(robot.foot_of_contact())
+
+    def start(self) -> None:
+        self.memory.touchdown[()] = -1.0
+
+    def step(self) -> None:
+        p, memory, out = self.params, self.memory, self.phase
+        now = float(self.reference.time)
+        active, unloaded = self.contacts.active, memory.unloaded
+        shortest = count_unloaded(active, self.period, unloaded)
+        if int(memory.phase) < Phase.FLIGHT:
+            memory.lift_off_time[...] = self.reference.lift_off_time
+            memory.touchdown_time[...] = self.reference.touchdown_time
+        lift_off, touchdown_time = float(memory.lift_off_time), float(memory.touchdown_time)
+        another = float(self.reference.lift_off_time) > touchdown_time
+        remaining = 0.0
+        if int(memory.phase) <= Phase.FLIGHT:
+            remaining = time_to_height(
+                float(self.terms.com[2]), float(self.terms.com_velocity[2]),
+                planned_touchdown_height(
+                    float(self.reference.com[2]), float(self.reference.com_velocity[2]),
+                    touchdown_time - max(now, lift_off),
+                ),
+            )  # fmt: skip
+        before = int(memory.phase)
+        phase = next_phase(
+            before, int(self.reference.phase), now - float(memory.began), now, lift_off,
+            touchdown_time, remaining, shortest, p.late_lift_off, p.early_lift_off,
+            p.touchdown_share, p.landing_time, p.lost_contact, another,
+        )  # fmt: skip
+        if phase != before:
+            memory.phase[()] = phase
+            memory.began[()] = now
+            if phase == Phase.LANDING:
+                memory.touchdown[()] = now
+        choose_stance(
+            phase, self.reference.contact, unloaded, p.contact_hold, self.terms.contact_position,
+            self._foot_of_point, p.flat_height, memory.stance,
+        )  # fmt: skip
+        out.phase[()] = phase
+        out.time_in_phase[()] = now - float(memory.began)
+        out.time_to_touchdown[()] = remaining if phase == Phase.FLIGHT else 0.0
+        since = now - float(memory.touchdown) if float(memory.touchdown) >= 0.0 else 0.0
+        out.time_since_touchdown[()] = since
+        out.stance[...] = memory.stance
+
+
+@kernel
+def count_unloaded(
+    active: NDArray[np.bool_], period: float, unloaded: NDArray[np.float64]
+) -> float:
+    """Count on how long each point has been without contact; the shortest of these times [s]."""
+    shortest = math.inf
+    for i in range(active.shape[0]):
+        unloaded[i] = 0.0 if active[i] else float(unloaded[i]) + period
+        shortest = min(shortest, float(unloaded[i]))
+    return shortest
+
+
+@kernel
+def planned_touchdown_height(height: float, velocity: float, remaining: float) -> float:
+    """Where a body at ``height`` with ``velocity`` will be after falling for ``remaining``."""
+    return height + remaining * (velocity - 0.5 * _GRAVITY * remaining)
+
+
+@kernel
+def time_to_height(height: float, velocity: float, goal: float) -> float:
+    """The time [s] until a falling body comes down to ``goal``; its apex where it is below that."""
+    square = velocity * velocity + 2.0 * _GRAVITY * (height - goal)
+    return max(0.0, (velocity + math.sqrt(max(square, 0.0))) / _GRAVITY)
+
+
+@kernel
+def next_phase(
+    phase: int,
+    planned: int,
+    time_in_phase: float,
+    now: float,
+    lift_off_time: float,
+    touchdown_time: float,
+    remaining: float,
+    unloaded: float,
+    late_lift_off: float,
+    early_lift_off: float,
+    touchdown_share: float,
+    landing_time: float,
+    lost_contact: float,
+    another: bool,
+) -> int:
+    """The phase that follows; see the block's text.
+
+    Args:
+        unloaded: how long no point has had contact [s].
+        lift_off_time, touchdown_time: planned, of the next flight, the one under way or the last.
+        remaining: predicted time to touchdown [s].
+        another: whether the plan has a flight behind that one.
+    """
+    if phase == Phase.FAULT:
+        return Phase.FAULT
+    if phase == Phase.FLIGHT:
+        if unloaded == 0.0 and time_in_phase >= touchdown_share * (time_in_phase + remaining):
+            return Phase.LANDING
+        if time_in_phase > touchdown_time - lift_off_time + lost_contact:
+            return Phase.FAULT
+        return Phase.FLIGHT
+    if unloaded > lost_contact:
+        return Phase.FAULT
+    if phase >= Phase.LANDING:
+        if another and phase == Phase.LANDING:
+            return Phase.THRUST if planned == Phase.THRUST else Phase.LANDING
+        if phase == Phase.LANDING and time_in_phase >= landing_time:
+            return Phase.RECOVER
+        return phase
+    if now >= lift_off_time:
+        waiting = unloaded == 0.0 and now < lift_off_time + late_lift_off
+        return Phase.THRUST if waiting else Phase.FLIGHT
+    second_half = phase == Phase.THRUST and now + time_in_phase >= lift_off_time
+    if second_half and unloaded >= early_lift_off:
+        return Phase.FLIGHT
+    return max(phase, min(planned, _THRUST))
+
+
+@kernel
+def choose_stance(
+    phase: int,
+    planned: NDArray[np.bool_],
+    unloaded: NDArray[np.float64],
+    hold: float,
+    position: NDArray[np.float64],
+    foot: NDArray[np.int64],
+    flat_height: float,
+    stance: NDArray[np.bool_],
+) -> None:
+    """The points in stance, written over those of the tick before; see the block's text.
+
+    Args:
+        planned: the points that carry load in the plan.
+        unloaded: how long each point has been without contact [s].
+        position: of the points [m, world], (n, 3).
+        foot: the foot of each point.
+    """
+    if phase < Phase.FLIGHT:
+        if np.any(planned):
+            stance[:] = planned
+        elif not np.any(stance):
+            stance[:] = True
+        return
+    if phase == Phase.FLIGHT:
+        stance[:] = False
+        return
+    ground = math.inf
+    for i in range(unloaded.shape[0]):
+        if unloaded[i] <= hold:
+            ground = min(ground, float(position[i, 2]))
+    if ground == math.inf:
+        return
+    for i in range(unloaded.shape[0]):
+        stance[i] = unloaded[i] <= hold
+        if float(position[i, 2]) >= ground + flat_height:
+            continue
+        for j in range(unloaded.shape[0]):
+            if foot[j] == foot[i] and unloaded[j] <= hold:
+                stance[i] = True

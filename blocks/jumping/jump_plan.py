@@ -1,0 +1,167 @@
+"""A planned jump, played back: the whole-body plan of a task from the library or the planner."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+from ...runtime.language.block import Block, Metric, Output
+from ...runtime.language.errors import BlockError
+from ...runtime.language.parameters import Parameters, parameter
+from ..signals import JumpReference
+from .jump_table import JumpTableReader
+
+if TYPE_CHECKING:
+    from ...planner.checking.validity import ValidityReport
+    from ...planner.library.plan import JumpPlan as Plan
+    from ...planner.task.task import JumpTask
+    from ...robots.description import RobotDescription
+
+SHIPPED = Path(__file__).parents[2] / "graphs"
+"""Where tasks are looked for that are not beside the graph."""
+
+
+class JumpPlan(Block):
+    """The motion of a jump that the kino-dynamic planner found (section III): what to follow.
+
+    The task is a file (``tasks/in_situ.yaml``; looked for beside the graph, then among the shipped
+    graphs) or the task itself (``{rise: 12 cm, distance_x: 5 cm}``). Its plan comes from the plan
+    library under the task's hash: the shipped plans need no solver. Where there is none it is
+    solved while the graph loads, from the nearest plan of the library, and kept.
+
+    Every plan, also a kept one, first passes the validity check (``planner/checking/validity``) with
+    exact dynamics. With ``check: reported`` one that fails it is followed all the same, to compare
+    the formulations ``paper`` and ``srbm``, whose plans always fail: then the run's cautions say so
+    with every test that failed, and the metrics have ``plan_valid`` and ``plan_tests_failed``. Of
+    those formulations the reference has the centre of mass and momentum that the plan believes in.
+    ``formulation`` plans the same task in another one, without what only ``full`` has: impacts,
+    margins and limits of the motors.
+
+    At the start the robot stands still for ``stand_time``; at the end it stays
+    where the plan ended. Between the plan's knots the reference is read from a table of 2 ms steps
+    (``planner/library/reference_table``), what is fed forward ``lead`` ahead of time.
+
+    It follows time alone and knows nothing of what the robot really does. Raises ``BlockError`` at
+    load where the task cannot be read or is for another robot, cannot be planned, or its plan is
+    not valid and must be; the message says which constraint or which test.
+    """
+
+    class Params(Parameters):
+        task: str | Mapping[str, Any] = parameter(
+            "tasks/in_situ.yaml", text="a task's file, or the task's parameters"
+        )
+        stand_time: float = parameter(
+            0.4, unit="s", gt=0.0, text="standing before the plan, for the estimator to settle"
+        )
+        lead: float = parameter(
+            0.002,
+            unit="s",
+            ge=0.0,
+            le=0.02,
+            text="delay from sensing to torque that is made up for",
+        )
+        library: str = parameter(
+            "", text="folder where new plans are kept; the user's cache if empty"
+        )
+        solve: bool = parameter(True, text="whether a plan that is not there may be solved")
+        check: Literal["required", "reported"] = parameter(
+            "required", text="whether the plan must be valid, or is followed and called invalid"
+        )
+        formulation: Literal["full", "paper", "srbm"] | None = parameter(
+            None, text="which one plans, in place of the task's"
+        )
+
+    params: Params
+    reference = Output(JumpReference, text="the plan at the present instant")
+
+    def setup(self) -> None:
+        robot = self.context.robot
+        if robot is None:
+            raise BlockError("JumpPlan needs a robot: name one, e.g. robot: bruce")
+        from ...planner.library.reference_table import reference_table
+
+        task = self._task()
+        if task.robot != robot.name:
+            raise BlockError(
+                f"the task {task.name!r} is for {task.robot}, but the graph's robot is {robot.name}"
+            )
+        plan = self._plan(task, robot)
+        self._report = self._look_at(plan)
+        self._reader = JumpTableReader(reference_table(plan, robot, self.params.stand_time))
+
+    def step(self) -> None:
+        self._reader.read(self.time, self.reference, self.params.lead)
+
+    def metrics(self) -> Mapping[str, Metric]:
+        report = self._report
+        if report is None:
+            return {}
+        return {"plan_valid": report.valid, "plan_tests_failed": len(report.failed)}
+
+    def cautions(self) -> Sequence[str]:
+        report = self._report
+        if report is None or report.valid:
+            return ()
+        return (
+            "THE PLAN IS NOT VALID and is followed all the same (check: reported):\n"
+            + report.explain(),
+        )
+
+    def _look_at(self, plan: Plan) -> ValidityReport | None:
+        """What the check says of a plan that need not be valid; ``None`` where it must be."""
+        if self.params.check == "required":
+            return None
+        from ...planner.checking.validity import PlanTest, ValidityReport
+
+        report = ValidityReport(tuple(PlanTest(**test) for test in plan.report["tests"]))
+        broken = [test for test in report.failed if test.name in ("arrays", "phases")]
+        if broken:
+            raise BlockError(f"the plan {plan.task.name!r} is broken: {broken[0].where}")
+        return report
+
+    def _task(self) -> JumpTask:
+        task = self._named_task()
+        chosen = self.params.formulation
+        if chosen is None:
+            return task
+        impact = task.impact and chosen == "full"
+        return task.model_copy(update={"formulation": chosen, "impact": impact})
+
+    def _named_task(self) -> JumpTask:
+        from ...planner.task.task import TaskError, make_task, read_task
+
+        wanted = self.params.task
+        try:
+            if not isinstance(wanted, str):
+                return make_task({"name": self.context.path, **wanted})
+            places = [folder / wanted for folder in (self.context.folder, Path(), SHIPPED)]
+            found = [place for place in places if place.is_file()]
+            if not found:
+                there = sorted(path.stem for path in (SHIPPED / "tasks").glob("*.yaml"))
+                raise BlockError(
+                    f"there is no task {wanted!r} beside the graph or among the shipped ones: "
+                    + ", ".join(f"tasks/{name}.yaml" for name in there)
+                )
+            return read_task(found[0])
+        except TaskError as error:
+            raise BlockError(str(error)) from error
+
+    def _plan(self, task: JumpTask, robot: RobotDescription) -> Plan:
+        from ...planner.errors import TaskError
+        from ...planner.library.library import PlanLibrary
+
+        folder = Path(self.params.library) if self.params.library else None
+        library = PlanLibrary(robot, folder)
+        if not self.params.solve and library.path_of(task) is None:
+            raise BlockError(
+                f"there is no plan for the task {task.name!r}; make one with 'aloft plan', or set "
+                "solve: true"
+            )
+        try:
+            if self.params.check == "reported":
+                return library.attempt(task)
+            plan, _ = library.plan(task)
+        except TaskError as error:
+            raise BlockError(str(error)) from error
+        return plan

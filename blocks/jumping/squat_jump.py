@@ -1,0 +1,293 @@
+"""A squat jump as a motion of the whole body: squat, thrust, flight, landing, recovery.
+
+In the squat the torso's lean is prescribed. From the thrust on the pitching momentum is, so the
+torso's swing is what makes it so: a jump that leaves with the momentum it should, found by
+integration, where a torso held upright would leave with a spin and fall. (Roll and yaw stay
+prescribed while the feet stand: a thigh that is level has its hip's yaw and roll axes in line.)
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...mathematics.polynomials import minimum_jerk, quintic
+from ...robots.description import RobotDescription
+from ...robots.pinocchio_model import PinocchioModel
+from ...runtime.language.errors import BlockError
+from .guided_motion import GuidedBody, Motion, MotionRecorder
+from .jump_table import JumpTable
+
+Array = NDArray[np.float64]
+
+GRAVITY = 9.81
+"""m/s^2"""
+
+
+@dataclass(frozen=True)
+class SquatJumpTask:
+    """What jump is asked for. Heights are the centre of mass's, drops and depths below standing.
+
+    Attributes:
+        rise: apex above standing [m].
+        squat_depth, lift_off_drop, touchdown_drop, landing_depth: heights below standing [m] at
+            the bottom of the squat, at lift-off, at touchdown and where the landing comes to rest.
+        lean: forward pitch of the torso at the bottom of the squat [rad].
+        touchdown_pitch: the same at touchdown [rad].
+        distance: how far ahead the feet land [m].
+        unloading: how far the feet are unloaded at lift-off: 1 when they carry nothing.
+        settle_time: how long after lift-off the legs take to their landing posture [s].
+        stand_time, squat_time, pause_time, landing_time, recover_time: durations [s].
+    """
+
+    rise: float
+    squat_depth: float
+    lift_off_drop: float
+    touchdown_drop: float
+    landing_depth: float
+    lean: float
+    touchdown_pitch: float
+    distance: float
+    unloading: float
+    settle_time: float
+    stand_time: float
+    squat_time: float
+    pause_time: float
+    landing_time: float
+    recover_time: float
+
+
+def plan_squat_jump(
+    built: PinocchioModel, robot: RobotDescription, task: SquatJumpTask, profile: str
+) -> JumpTable:
+    """The whole jump, from standing to standing.
+
+    Raises:
+        BlockError: the legs or the motors cannot do it; the message says which, and what to ask
+            for instead.
+    """
+    body = GuidedBody(built, robot)
+    table = MotionRecorder(body, body.standing(robot.standing_position))
+    jump = _Jump(task, body, table.q)
+    table.run(task.stand_time, jump.rest)
+    table.run(task.squat_time, jump.squat)
+    table.run(task.pause_time, jump.pause)
+    bottom, start = table.q, table.now
+    momentum = _lift_off_momentum(jump, body, bottom, start)
+    table.run(jump.thrust_time, lambda t: jump.thrust(t, momentum))
+    lift_off = table.now
+    table.run(jump.flight_time, lambda t: jump.flight(t, momentum))
+    touchdown = table.now
+    pitch = body.pitch(table.q)
+    table.run(task.landing_time, lambda t: jump.landing(t, pitch))
+    recover = table.now
+    table.run(task.recover_time, jump.recover)
+    columns = {name: np.array(rows) for name, rows in table.rows.items()}
+    _check(robot, columns, profile)
+    return JumpTable(
+        np.array(table.time), columns, task.stand_time, start, lift_off, touchdown, recover
+    )
+
+
+def _lift_off_momentum(jump: _Jump, body: GuidedBody, bottom: Array, start: float) -> float:
+    """The pitching momentum at lift-off with which the torso lands as asked, by secants."""
+
+    def error(momentum: float) -> float:
+        trial = MotionRecorder(body, bottom)
+        trial.now = start
+        trial.run(jump.thrust_time, lambda t: jump.thrust(t, momentum), keep=False)
+        trial.run(jump.flight_time, lambda t: jump.flight(t, momentum), keep=False)
+        return body.pitch(trial.q) - jump.task.touchdown_pitch
+
+    last, momentum = 0.0, 0.005
+    last_error, present = error(last), error(momentum)
+    for _ in range(8):
+        if abs(present) < 1e-4:
+            break
+        slope = (present - last_error) / (momentum - last)
+        last, last_error = momentum, present
+        momentum -= present / slope
+        present = error(momentum)
+    return momentum
+
+
+class _Jump:
+    """The motion of every phase, as functions of the time in it."""
+
+    def __init__(self, task: SquatJumpTask, body: GuidedBody, q: Array) -> None:
+        self.task = task
+        self.feet = body.feet(q)
+        self.home = body.com(q)
+        standing = float(self.home[2])
+        self.low = standing - task.squat_depth
+        self.high = standing - task.lift_off_drop
+        self.touch = standing - task.touchdown_drop
+        self.rest_height = standing - task.landing_depth
+        self.speed = math.sqrt(2.0 * GRAVITY * (task.rise + task.lift_off_drop))
+        # v(u) = V (3u^2 - 2u^3) - unloading g T (u^3 - u^2): its integral is the stroke.
+        quarter, stroke = task.unloading * GRAVITY / 12.0, self.high - self.low
+        half = 0.5 * self.speed
+        if quarter > 0.0:
+            self.thrust_time = (math.sqrt(half * half + 4.0 * quarter * stroke) - half) / (
+                2.0 * quarter
+            )
+        else:
+            self.thrust_time = stroke / half
+        fall = math.sqrt(2.0 * GRAVITY * (task.rise + task.touchdown_drop))
+        self.flight_time = (self.speed + fall) / GRAVITY
+        self.fall = fall
+        self._aim()
+        self._plan_legs()
+
+    def _aim(self) -> None:
+        """The forward take-off speed, and how far the squat leans the body ahead for it.
+
+        At lift-off the body has moved by half the thrust time times its speed, and it lands
+        behind its feet by what stops it, the capture distance v sqrt(z/g). The squat's offset is
+        the one that keeps the centre of pressure in the middle of the feet, within 30 mm.
+        """
+        height = 0.5 * (self.low + self.high)
+        lift = GRAVITY + self.speed / self.thrust_time
+        way = 0.5 * self.thrust_time + self.flight_time + math.sqrt(self.touch / GRAVITY)
+        lead = height / (self.thrust_time * lift) - 0.15 * self.thrust_time
+        speed = self.task.distance / (way + lead)
+        self.offset = min(max(lead * speed, -0.03), 0.03)
+        self.forward = (self.task.distance - self.offset) / way
+
+    def _plan_legs(self) -> None:
+        """The feet relative to the centre of mass in flight: from lift-off to landing posture."""
+        self.bottom = np.array([self.offset, 0.0, self.low])
+        self.take_off = np.array([self.forward, 0.0, self.speed])
+        travel = 0.5 * self.thrust_time * self.forward
+        self.lift_off_com = np.array([self.offset + travel, 0.0, self.high])
+        self.touch_com = np.array(
+            [self.offset + travel + self.flight_time * self.forward, 0.0, self.touch]
+        )
+        landed = self.feet + np.array([self.task.distance, 0.0, 0.0])
+        start, end = self.feet - self.lift_off_com, landed - self.touch_com
+        push = np.array([0.0, 0.0, self.task.unloading * GRAVITY])
+        self.legs = [
+            [
+                quintic(
+                    self.task.settle_time,
+                    (float(start[i, k]), -float(self.take_off[k]), float(push[k])),
+                    (float(end[i, k]), 0.0, 0.0),
+                )
+                for k in range(3)
+            ]
+            for i in range(self.feet.shape[0])
+        ]
+
+    def _motion(self, com: Array) -> Motion:
+        return Motion(
+            com, np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(3), (False, False, False),
+            np.zeros(self.feet.shape),
+        )  # fmt: skip
+
+    def rest(self, t: float) -> Motion:
+        """Standing still."""
+        return self._motion(self.home)
+
+    def squat(self, t: float) -> Motion:
+        """Down and leaning, with least jerk."""
+        motion = self._rise_or_sink(self.home, self.bottom, t / self.task.squat_time,
+                                    self.task.squat_time)  # fmt: skip
+        rate = minimum_jerk(t / self.task.squat_time)[1] / self.task.squat_time
+        motion.rotation = np.array([0.0, rate * self.task.lean, 0.0])
+        return motion
+
+    def pause(self, t: float) -> Motion:
+        """Waiting at the bottom."""
+        return self._motion(self.bottom)
+
+    def thrust(self, t: float, momentum: float) -> Motion:
+        """Up, the pitching momentum growing to that of lift-off."""
+        total = self.thrust_time
+        u = t / total
+        share, rate, way = 3.0 * u**2 - 2.0 * u**3, 6.0 * u * (1.0 - u), u**3 - 0.5 * u**4
+        brake = np.array([0.0, 0.0, -self.task.unloading * GRAVITY])
+        motion = self._motion(
+            self.bottom + total * way * self.take_off + total**2 * (u**4 / 4 - u**3 / 3) * brake
+        )
+        motion.com_velocity = share * self.take_off + total * (u**3 - u**2) * brake
+        motion.com_acceleration = rate / total * self.take_off + (3.0 * u**2 - 2.0 * u) * brake
+        motion.by_momentum = (False, True, False)
+        motion.rotation = np.array([0.0, share * momentum, 0.0])
+        motion.rotation_rate = np.array([0.0, rate / total * momentum, 0.0])
+        return motion
+
+    def flight(self, t: float, momentum: float) -> Motion:
+        """Ballistic, the legs taking their landing posture."""
+        fall = np.array([0.0, 0.0, -GRAVITY])
+        motion = self._motion(self.lift_off_com + t * self.take_off + 0.5 * t**2 * fall)
+        motion.com_velocity = self.take_off + t * fall
+        motion.com_acceleration = fall
+        motion.by_momentum = (True, True, True)
+        motion.rotation = np.array([0.0, momentum, 0.0])
+        motion.foot_velocity = np.tile(motion.com_velocity, (self.feet.shape[0], 1))
+        if t < self.task.settle_time:
+            motion.foot_velocity += [[leg.velocity(t) for leg in foot] for foot in self.legs]
+        return motion
+
+    def landing(self, t: float, pitch: float) -> Motion:
+        """Down to rest over the feet, the torso turning upright from ``pitch``."""
+        duration = self.task.landing_time
+        speed = np.array([self.forward, 0.0, -self.fall])
+        goal = np.array([self.task.distance, 0.0, self.rest_height])
+        # A quintic that begins with speed passes its end unless it is given this short a time.
+        stop = min(duration, 2.5 * (float(self.touch_com[2]) - self.rest_height) / self.fall)
+        times = (duration, duration, max(stop, 0.02))
+        paths = [
+            quintic(
+                times[k],
+                (float(self.touch_com[k]), float(speed[k]), 0.0),
+                (float(goal[k]), 0.0, 0.0),
+            )
+            for k in range(3)
+        ]
+        motion = self._motion(goal)
+        for k, path in enumerate(paths):
+            if t < times[k]:
+                motion.com[k] = path.position(t)
+                motion.com_velocity[k] = path.velocity(t)
+                motion.com_acceleration[k] = path.acceleration(t)
+        rate = minimum_jerk(t / duration)[1] / duration
+        motion.rotation = np.array([0.0, -rate * pitch, 0.0])
+        return motion
+
+    def recover(self, t: float) -> Motion:
+        """Up to standing height, with least jerk."""
+        low = np.array([self.task.distance, 0.0, self.rest_height])
+        high = np.array([self.task.distance, 0.0, float(self.home[2])])
+        duration = self.task.recover_time
+        return self._rise_or_sink(low, high, t / duration, duration)
+
+    def _rise_or_sink(self, start: Array, end: Array, share: float, duration: float) -> Motion:
+        way, rate, bend = minimum_jerk(share)
+        motion = self._motion(start + way * (end - start))
+        motion.com_velocity = rate / duration * (end - start)
+        motion.com_acceleration = bend / duration**2 * (end - start)
+        return motion
+
+
+def _check(robot: RobotDescription, columns: dict[str, Array], profile: str) -> None:
+    """Raise where the plan passes a joint's limit or a motor's speed."""
+    hint = "ask for less: a smaller rise, distance, lean or squat_depth"
+    angles, limits = columns["joint_position"], robot.joint_limits
+    excess = np.maximum(angles - limits[:, 1], limits[:, 0] - angles).max(axis=0)
+    worst = int(excess.argmax())
+    if excess[worst] > 0.0:
+        raise BlockError(
+            f"this jump moves {robot.joints[worst].name} {excess[worst]:.3f} rad past its limit; "
+            + hint
+        )
+    speeds = np.abs(columns["joint_velocity"] @ robot.joint_to_motor.T).max(axis=0)
+    worst, most = int(speeds.argmax()), robot.profiles[profile].no_load_speed
+    if speeds[worst] > most:
+        raise BlockError(
+            f"this jump turns {robot.transmission.motors[worst]} at {speeds[worst]:.1f} rad/s, but "
+            f"{profile} reaches {most:.1f} rad/s; {hint}"
+        )

@@ -1,0 +1,1 @@
+"""Blocks that judge a run from what only a simulator knows."""

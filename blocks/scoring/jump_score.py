@@ -1,0 +1,330 @@
+"""The one judge of jumps: success by fixed criteria, from what only a simulator knows."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from math import degrees, hypot, sqrt
+
+import numpy as np
+
+from ...mathematics.support_margin import support_margin
+from ...runtime.language.block import Block, Input, Metric, State
+from ..signals import JumpReference, RobotTruth, WholeBodyCommand
+from .jump_criteria import NEVER, JumpCriteria, JumpRecord, feet_moved, feet_turned, first_failure
+from .jump_series import (
+    EARLY_LIFT_OFF,
+    JumpSeries,
+    goes_on,
+    keep_place,
+    note_landing,
+    note_place,
+    series_failure,
+)
+
+GRAVITY = 9.81
+
+
+class JumpScore(Block):
+    """Judges one jump and ends the run. No controller can see it.
+
+    A jump is a success when all of these hold; every tolerance is a parameter:
+
+    1. Nothing but toes and heels ever touches the ground, and no leg the other.
+    2. It does not fall: tilt at most 69 deg, base at least 0.12 m above the ground. A fall ends
+       the run.
+    3. Real flight: all contact points unloaded for at least 90 % of the planned flight time, and
+       the com's vertical speed at lift-off within 10 % of the plan's. (A flight begins when all
+       points have been unloaded for 20 ms, and counts from the beginning of that time.)
+    4. No joint ever beyond its limit; every motor torque within what its speed allows.
+    5. Tilt after touchdown always below 15 deg (set 45 deg for pushes).
+    6. 1.5 s after touchdown: tilt below 5 deg, com slower than 0.05 m/s, base slower than
+       0.2 rad/s, all contact points loaded, each foot with over 20 % of the weight, com at least
+       10 mm inside the support polygon.
+    7. From 0.15 s after touchdown to the end: no foot unloaded for more than 20 ms, and the
+       middle of each foot stays within 5 mm horizontally (set 20 mm for pushes).
+    8. Task: apex above standing within 10 % of its target, feet within 2 cm and 5 deg of theirs;
+       every contact point above ground of the ``landing_height``. Targets are the parameters
+       ``rise``, ``distance`` and ``yaw``, else the reference's, and without either not judged.
+
+    The run ends 0.1 s after the rest has been judged. Not judged, but counted: solver failures,
+    share of saturated motor samples, peak torque and speed. Metrics: ``success``, ``reason`` (the
+    first failed criterion with its figures) and the figures themselves; of the angular momentum at
+    lift-off its magnitude and its part about the world's y axis, the robot's pitch as it stood.
+
+    Of several ``jumps`` in a row all the figures above are of the last; those before it must be
+    real flights too, with their lift-off speed and apex as planned, and land within
+    ``series_distance_tolerance`` and the yaw's tolerance. Feet that leave the ground more than 0.1 s
+    before the next planned lift-off count as a bounce. A row that does not go on ends the run 1.5 s
+    after its last touchdown.
+
+    Raises:
+        ValueError: the graph has no robot.
+    """
+
+    Params = JumpCriteria
+    params: JumpCriteria
+    truth = Input(RobotTruth, reads_truth=True, text="what the simulator knows")
+    reference = Input(JumpReference, default={}, text="the planned jump, for its targets")
+    wbc = Input(WholeBodyCommand, default={}, text="the controller's answers, to count failures")
+    record = State(JumpRecord, text="everything the judgement needs")
+    series = State(JumpSeries, text="the jumps of a row that are over")
+
+    def setup(self) -> None:
+        """Group the contact points by foot."""
+        robot = self.context.robot
+        if robot is None:
+            raise ValueError("the score needs to know the robot; add `robot: bruce` to the graph")
+        foot_of_contact = robot.foot_of_contact()
+        self._points_of_foot = [
+            [k for k, foot in enumerate(foot_of_contact) if foot == number]
+            for number in range(len(robot.feet))
+        ]
+        self._weight = robot.total_mass * GRAVITY
+        self._planned = "reference" in self.context.wired
+        self._difference = np.zeros(2)
+
+    def step(self) -> None:
+        """Follow the jump by one tick."""
+        record, truth = self.record, self.truth
+        time = self.time
+        first = record.ticks == 0
+        record.now[()] = time
+        self._follow_feet(first)
+        if self._planned:
+            self._follow_reference(time, first)
+        if first:
+            self._begin()
+        record.ticks += 1
+        self._follow_machine()
+        tilt = self._tilt()
+        base_height = truth.base_position.item(2) - max(truth.ground_height.tolist())
+        fallen = tilt > self.params.fall_tilt or base_height < self.params.fall_height
+        if fallen and record.fall_time == NEVER:
+            record.fall_time[()] = time
+            record.fall_tilt[()] = tilt
+            record.fall_height[()] = base_height
+            self.request_stop("the robot fell")
+        self._follow_flight(time)
+        if record.touchdown_time != NEVER:
+            self._follow_landing(time - float(record.touchdown_time), tilt)
+        elif self.series.made:
+            self._follow_row(time)
+        record.vertical_speed[()] = truth.com_velocity.item(2)
+
+    def metrics(self) -> Mapping[str, Metric]:
+        """The judgement and its figures."""
+        record = self.record
+        if record.ticks == 0:
+            return {"success": False, "reason": "the run had no ticks"}
+        failure = first_failure(record, self.params, self._planned)
+        made = int(self.series.made) + int(record.touchdown_time != NEVER)
+        if self.params.jumps > 1 and record.fall_time == NEVER and not record.forbidden:
+            failure = series_failure(self.series, self.params, made) or failure
+        x, y = feet_moved(record)
+        flown = record.lift_off_time != NEVER
+        landed = record.touchdown_time != NEVER
+        judged = record.judged_time != NEVER
+        values: dict[str, Metric] = {
+            "success": failure is None,
+            "reason": failure or "all criteria hold",
+            "qp_failures": int(record.failures),
+            "saturated_share": float(record.saturated / record.ticks),
+            "peak_motor_torque_nm": float(record.peak_torque),
+            "peak_motor_speed_rad_s": float(record.peak_speed),
+            "forbidden_contacts": int(record.forbidden),
+            "joint_limit_violation_rad": float(record.violation),
+            "motor_overload_nm": float(record.overload),
+        }
+        if self.params.jumps > 1:
+            values |= {"jumps": made, "worst_landing_error_m": float(self.series.place_error)}
+        if flown:
+            values |= {
+                "apex_above_standing_m": float(record.apex_height - record.standing_height),
+                "apex_from_squat_m": float(record.apex_height - record.squat_height),
+                "lift_off_speed_m_s": float(record.lift_off_speed),
+                "lift_off_angular_momentum_nms": hypot(*record.lift_off_momentum.tolist()),
+                "lift_off_pitch_momentum_nms": record.lift_off_momentum.item(1),
+            }
+        if landed:
+            values |= {
+                "touchdown_speed_m_s": float(record.touchdown_speed),
+                "flight_time_s": float(record.touchdown_time - record.lift_off_time),
+                "peak_tilt_deg": degrees(record.peak_tilt),
+                "foot_slip_m": float(record.foot_slip),
+                "jump_distance_x_m": x,
+                "jump_distance_y_m": y,
+                "jump_yaw_deg": degrees(feet_turned(record)),
+            }
+        if judged:
+            values |= {
+                "final_tilt_deg": degrees(record.tilt),
+                "final_com_speed_m_s": float(record.com_speed),
+                "final_angular_speed_rad_s": float(record.angular_speed),
+                "final_support_margin_m": float(record.margin),
+                "final_load_share": float(record.load_share),
+            }
+        if self._planned:
+            values |= {
+                "planned_flight_time_s": float(record.planned_flight),
+                "planned_lift_off_speed_m_s": float(record.planned_speed),
+                "planned_apex_above_standing_m": float(
+                    record.planned_apex - record.planned_standing
+                ),
+            }
+        return values
+
+    def _begin(self) -> None:
+        record, height = self.record, self.truth.com[2]
+        for instant in (
+            record.fall_time, record.unloaded_time, record.lift_off_time, record.touchdown_time,
+            record.judged_time, record.forbidden_time, record.planned_speed_time,
+        ):  # fmt: skip
+            instant[()] = NEVER
+        for start in (record.standing_height, record.squat_height, record.apex_height):
+            start[()] = height
+        record.start_foot[:] = record.foot
+        record.start_direction[:] = record.direction
+
+    def _follow_feet(self, first: bool) -> None:
+        """The middle of every foot and where it points, from its contact points."""
+        places = self.truth.contact_position
+        for number, points in enumerate(self._points_of_foot):
+            for axis in range(2):
+                ends = places[points[0]].item(axis), places[points[-1]].item(axis)
+                middle = sum(places[k].item(axis) for k in points) / len(points)
+                self.record.foot[number, axis] = middle
+                self.record.direction[number, axis] = ends[0] - ends[1]
+
+    def _follow_reference(self, time: float, first: bool) -> None:
+        record, plan = self.record, self.reference
+        yaw = sum(plan.foot_yaw.tolist()) / len(self._points_of_foot)
+        record.planned_foot[:] = plan.foot_position[:, :2]
+        record.planned_yaw[()] = yaw
+        height = plan.com.item(2)
+        if first:
+            record.planned_start[:] = record.planned_foot
+            record.planned_yaw_start[()] = yaw
+            record.planned_standing[()] = height
+            record.planned_apex[()] = height
+            record.planned_speed_time[()] = NEVER
+        record.planned_apex[()] = max(record.planned_apex.item(), height)
+        taken_off = plan.lift_off_time - 1e-9 <= plan.time < plan.touchdown_time
+        fresh = record.planned_speed_time == NEVER
+        if fresh or taken_off:  # from the middle of a flight on the reference names the next
+            record.planned_flight[()] = plan.touchdown_time - plan.lift_off_time
+        later = plan.lift_off_time > self.series.planned_lift_off
+        if taken_off and (fresh or later):
+            self.series.planned_lift_off[()] = plan.lift_off_time
+            record.planned_apex[()] = height if not fresh else record.planned_apex.item()
+            record.planned_speed_time[()] = time
+            # The plan's own ballistic flight takes it back to the planned instant.
+            late = plan.time.item() - plan.lift_off_time.item()
+            record.planned_speed[()] = plan.com_velocity.item(2) + GRAVITY * late
+
+    def _follow_machine(self) -> None:
+        """Contacts, limits, motors and solver: what must never be exceeded at any time."""
+        record, truth = self.record, self.truth
+        if truth.forbidden_contacts and not record.forbidden:
+            record.forbidden_time[()] = record.now
+        record.forbidden += truth.forbidden_contacts
+        record.failures[()] = self.wbc.failures
+        record.saturated += truth.saturated_share
+        for largest, value in (
+            (record.violation, truth.joint_limit_violation.item()),
+            (record.overload, truth.motor_overload.item()),
+            (record.peak_torque, max(abs(t) for t in truth.motor_torque.tolist())),
+            (record.peak_speed, max(abs(v) for v in truth.motor_speed.tolist())),
+        ):
+            largest[()] = max(largest.item(), value)
+
+    def _tilt(self) -> float:
+        """The angle between the base's z axis and the world's [rad]."""
+        x, y, z, w = self.truth.base_orientation.tolist()
+        # The half angle's sine is exact where the angle is small, unlike the whole one's cosine.
+        sine = hypot(x, y) / sqrt(x * x + y * y + z * z + w * w)
+        return 2.0 * float(np.arcsin(min(1.0, sine)))
+
+    def _follow_flight(self, time: float) -> None:
+        """Lift-off, apex and touchdown, by the simulator's contacts."""
+        record, truth = self.record, self.truth
+        height, speed = truth.com.item(2), truth.com_velocity.item(2)
+        touched = any(truth.contact_touched.tolist())
+        if record.lift_off_time == NEVER:
+            touched = touched or self._bounces()
+            record.squat_height[()] = min(record.squat_height.item(), height)
+            if touched:
+                record.unloaded_time[()] = NEVER
+                return
+            if record.unloaded_time == NEVER:
+                # Nothing touched during the whole of the tick before.
+                record.unloaded_time[()] = max(0.0, time - self.period)
+                record.unloaded_speed[()] = record.vertical_speed if time > 0.0 else speed
+                record.unloaded_momentum[:] = truth.angular_momentum
+                record.apex_height[()] = height
+            if time - record.unloaded_time.item() >= self.params.flight_confirmation - 1e-9:
+                record.lift_off_time[()] = record.unloaded_time
+                record.lift_off_speed[()] = record.unloaded_speed
+                record.lift_off_momentum[:] = record.unloaded_momentum
+                if self.series.made:
+                    keep_place(self.series)
+        elif record.touchdown_time == NEVER and touched:
+            record.touchdown_time[()] = time - self.period
+            record.touchdown_speed[()] = -record.vertical_speed
+            if goes_on(self.series, self.params):
+                note_landing(record, self.series, self._planned)
+                return
+        if record.touchdown_time == NEVER:
+            record.apex_height[()] = max(record.apex_height.item(), height)
+
+    def _bounces(self) -> bool:
+        """Whether a foot off the ground between two jumps is no lift-off."""
+        plan = self.reference
+        early = float(plan.time) < float(plan.lift_off_time) - EARLY_LIFT_OFF
+        return self._planned and bool(self.series.made) and early
+
+    def _follow_row(self, time: float) -> None:
+        """Between two jumps: where the feet stand, and whether another comes."""
+        if self._planned and any(self.truth.contact_touched.tolist()):
+            note_place(self.record, self.series)
+        landed = time - float(self.series.landed_time)
+        if self.record.lift_off_time == NEVER and landed >= self.params.rest_time - 1e-9:
+            self.request_stop(f"no other jump {landed:.2f} s after touchdown")
+
+    def _follow_landing(self, landed: float, tilt: float) -> None:
+        """Peaks since touchdown, feet that slide or step, and the rest when its time comes."""
+        record, truth, params = self.record, self.truth, self.params
+        record.peak_tilt[()] = max(record.peak_tilt.item(), tilt)
+        if landed < params.slip_delay - 1e-9:
+            record.landed_foot[:] = record.foot
+        else:
+            touched = truth.contact_touched.tolist()
+            for number, points in enumerate(self._points_of_foot):
+                np.subtract(record.foot[number], record.landed_foot[number], out=self._difference)
+                moved = hypot(self._difference.item(0), self._difference.item(1))
+                record.foot_slip[()] = max(record.foot_slip.item(), moved)
+                lifted = 0.0 if any(touched[k] for k in points) else self.period
+                total = record.lifted_time.item(number) + lifted if lifted else 0.0
+                record.lifted_time[number] = total
+                record.longest_lift[()] = max(record.longest_lift.item(), total)
+        if record.judged_time == NEVER and landed >= params.rest_time - 1e-9:
+            self._judge_rest(tilt)
+        if landed >= params.rest_time + params.settle_time - 1e-9:
+            self.request_stop(f"{landed:.2f} s after touchdown")
+
+    def _judge_rest(self, tilt: float) -> None:
+        record, truth = self.record, self.truth
+        record.judged_time[()] = record.now
+        record.tilt[()] = tilt
+        record.com_speed[()] = sqrt(sum(v * v for v in truth.com_velocity.tolist()))
+        record.angular_speed[()] = sqrt(sum(w * w for w in truth.base_angular_velocity.tolist()))
+        touched = truth.contact_touched
+        record.points_unloaded[()] = sum(not t for t in touched.tolist())
+        record.margin[()] = support_margin(
+            truth.contact_position, touched, truth.com.item(0), truth.com.item(1)
+        )
+        record.load_share[()] = min(
+            sum(truth.contact_force[k].item(2) for k in points) / self._weight
+            for points in self._points_of_foot
+        )
+        record.ground_low[()] = min(truth.ground_height.tolist())
+        record.ground_high[()] = max(truth.ground_height.tolist())

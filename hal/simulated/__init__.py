@@ -1,0 +1,1 @@
+"""The robot simulated by MuJoCo."""

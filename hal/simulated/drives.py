@@ -1,0 +1,134 @@
+"""The drives of a simulated robot: commands on their way, joint feedback, motor limits."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...blocks.signals import CommandMode, JointCommand
+from ...robots.description import ActuatorProfile, RobotDescription
+from .actuator import clip_joint_torque, joint_feedback_torque, motor_torque_limits
+from .state import DriveState, TickRecord
+
+Array = NDArray[np.float64]
+
+
+class Drives:
+    """Turns commands into joint torques at the physics rate, as drives close their own loops.
+
+    A command takes effect at the first physics step at or after its arrival and stays until the
+    next one arrives. All that is remembered lives in the given ``state`` and ``record``.
+    """
+
+    def __init__(
+        self,
+        robot: RobotDescription,
+        profile: ActuatorProfile,
+        damping: float,
+        state: DriveState,
+        record: TickRecord,
+    ) -> None:
+        self._profile = profile
+        self._damping = damping
+        self._state = state
+        self._record = record
+        self._joint_to_motor = np.ascontiguousarray(robot.joint_to_motor)
+        self._motor_to_torque = np.ascontiguousarray(robot.joint_to_motor.T)
+        self._torque_to_motor = robot.torque_to_motor
+        n = len(robot.joints)
+        self._scratch, self._speed, self._wanted, self._motor = (np.zeros(n) for _ in range(4))
+        self._lower, self._upper, self._excess = (np.zeros(n) for _ in range(3))
+        self._clipped, self._one = np.zeros(n, dtype=np.bool_), np.ones(n, dtype=np.int64)
+        self._slots = len(state.due)
+        self._rows = [
+            (state.torque[k], state.stiffness[k], state.damping[k], state.position[k],
+             state.velocity[k])
+            for k in range(self._slots)
+        ]  # fmt: skip
+
+    def hold(self, position: Array, torque: Array, stiffness: float, damping: float) -> None:
+        """Forget all commands and hold that position from now on."""
+        self._state.active[()] = 0
+        self._state.pending[()] = 0
+        self._state.last_due[()] = 0
+        self._state.mode[0] = CommandMode.ACTIVE
+        self._state.torque[0] = torque
+        self._state.position[0] = position
+        self._state.velocity[0] = 0.0
+        self._state.stiffness[0] = stiffness
+        self._state.damping[0] = damping
+
+    def damp(self) -> None:
+        """Forget all commands and go into damping at once."""
+        self._state.pending[()] = 0
+        self._state.mode[int(self._state.active)] = CommandMode.DAMPING
+
+    def send(self, command: JointCommand, due: int) -> None:
+        """Put a command on its way; it arrives at physics step ``due``, or when the one sent
+        before it does if that is later."""
+        state = self._state
+        due = max(due, int(state.last_due))
+        pending = int(state.pending)
+        slot = (int(state.active) + 1 + pending) % self._slots
+        torque, stiffness, damping, position, velocity = self._rows[slot]
+        state.mode[slot] = command.mode
+        torque[:] = command.torque
+        position[:] = command.position
+        velocity[:] = command.velocity
+        stiffness[:] = command.stiffness
+        damping[:] = command.damping
+        state.due[slot] = due
+        state.last_due[()] = due
+        state.pending[()] = pending + 1
+
+    def joint_torque(self, step: int, position: Array, velocity: Array, out: Array) -> None:
+        """The joint torques [N m] during physics step ``step`` into ``out``.
+
+        ``position`` is what the drives' own encoders read, ``velocity`` the joint velocity.
+        """
+        state = self._state
+        pending = int(state.pending)
+        active = int(state.active)
+        while pending:
+            following = (active + 1) % self._slots
+            if state.due[following] > step:
+                break
+            active, pending = following, pending - 1
+            state.active[()] = active
+            state.pending[()] = pending
+        mode = int(state.mode[active])
+        if mode == CommandMode.ACTIVE:
+            torque, stiffness, damping, target, target_velocity = self._rows[active]
+            joint_feedback_torque(
+                torque, stiffness, damping, target, target_velocity, position, velocity,
+                out, self._scratch,
+            )  # fmt: skip
+        elif mode == CommandMode.DAMPING:
+            np.multiply(velocity, -self._damping, out=out)
+        else:
+            out.fill(0.0)
+        self._limit(velocity, out)
+
+    def _limit(self, velocity: Array, torque: Array) -> None:
+        """Clip to what the motors can do at their speed, and record how near they came."""
+        profile, record = self._profile, self._record
+        np.dot(self._joint_to_motor, velocity, out=self._speed)
+        motor_torque_limits(
+            self._speed, profile.peak_torque, profile.corner_speed, profile.no_load_speed,
+            self._lower, self._upper,
+        )  # fmt: skip
+        clip_joint_torque(
+            torque, self._torque_to_motor, self._motor_to_torque, self._lower, self._upper,
+            self._wanted, self._motor,
+        )  # fmt: skip
+        np.not_equal(self._wanted, self._motor, out=self._clipped)
+        np.add(record.saturated, self._one, out=record.saturated, where=self._clipped)
+        np.maximum(record.torque_high, self._motor, out=record.torque_high)
+        np.minimum(record.torque_low, self._motor, out=record.torque_low)
+        np.maximum(record.speed_high, self._speed, out=record.speed_high)
+        np.minimum(record.speed_low, self._speed, out=record.speed_low)
+        np.subtract(self._motor, self._upper, out=self._excess)
+        np.maximum(record.overload, self._excess, out=record.overload)
+        np.subtract(self._lower, self._motor, out=self._excess)
+        np.maximum(record.overload, self._excess, out=record.overload)
+        record.joint_torque[:] = torque

@@ -1,0 +1,300 @@
+"""The robot simulated by MuJoCo, behind the same ports as a real one."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from ...blocks.signals import ExternalForce, RobotTruth
+from ...robots.description import RobotDescription
+from ...runtime.language.block import Input, Metric, Output, State
+from ...runtime.language.parameters import Parameters
+from ..robot import Robot
+from .drives import Drives
+from .mujoco_model import Variation
+from .parameters import SimulatorParameters
+from .random_streams import WORDS, Purpose, RandomStreams, stream
+from .sensors import Sensors
+from .stance import centre_on_origin, holding_torque, place_standing
+from .state import DriveState, PhysicsState, TickRecord
+from .truth import TruthReport
+from .world import build_world, draw_variation
+
+HOLD_STIFFNESS = 300.0
+HOLD_DAMPING = 1.5
+SETTLING_TIME = 0.3
+
+
+class MujocoRobot(Robot):
+    """The robot of the graph in MuJoCo: rigid links, rotors, motors, contact, noisy sensors.
+
+    Time: the control tick ``n`` is at ``t_n``; physics runs in steps of ``timestep`` between ticks
+    and starts, with ``random_start_phase``, at a phase of the control clock drawn from the seed.
+    Sensors are sampled at ``t_n``: the gyroscope and the joints at that instant, the accelerometer
+    as the mean over the tick before (what its filter passes), the switches by the force in the
+    physics step before. The command computed from them takes effect at the first physics step at
+    or after ``t_n + latency + jitter``, until the next one does. In between, the drives close the
+    joint loop at the physics rate with the command's gains, on their own encoders, and clip in
+    motor space by the torque-speed curve (``actuator.py``; DESIGN.md, the standard trial).
+
+    Command modes: ``OFF`` no torque; ``ACTIVE`` feedforward plus joint feedback; ``DAMPING``
+    ``drive_damping`` on every joint, whatever the command's gains say.
+
+    Start: the robot stands in its description's pose (torso turned by a drawn
+    ``initial_attitude_error``, soles flat), held by its drives at 300 N m/rad around the static
+    torques, settles for 0.3 s, and is centred: the middle between the soles is the world's origin.
+    It is held so until the first command arrives.
+
+    Everything random follows from ``seed``; every disturbance has a stream of its own, so setting
+    one to zero changes no other. Snapshots are exact: a restored run continues bit for bit.
+
+    It does not model: motor temperature and supply voltage, belt and cable elasticity, backlash,
+    contact of a leg with the torso or with itself, an IMU lever arm, wind.
+
+    Raises:
+        ValueError: no robot in the graph, no such actuator profile, or a timestep that does not
+            divide the control period.
+        IndexError: a push at a point the robot does not have.
+    """
+
+    outside = "simulated"
+
+    Params = SimulatorParameters
+    params: SimulatorParameters
+
+    push = Input(ExternalForce, default={}, text="a force from outside, held for the tick")
+    truth = Output(RobotTruth, truth=True, text="what only a simulator knows")
+    physics = State(PhysicsState, text="the simulator's state, written for a snapshot")
+    drives = State(DriveState, text="commands in the drives and on their way")
+    record = State(TickRecord, text="what happened in the physics steps of the last tick")
+
+    @classmethod
+    def example_parameters(cls) -> Mapping[str, Any]:
+        """Every disturbance at once, so that the conformance suite meets them all."""
+        return {
+            "gyro_noise": 0.02, "gyro_bias": 0.01, "gyro_range": 30.0,
+            "accelerometer_noise": 0.1, "accelerometer_bias": 0.1, "accelerometer_range": 160.0,
+            "encoder_offset": 0.003, "encoder_resolution": 1e-4, "joint_velocity_noise": 0.05,
+            "switch_threshold": [0.5, 3.0], "switch_bounce": 0.002, "latency": 0.002,
+            "jitter": 0.0005, "initial_attitude_error": 0.01, "random_start_phase": True,
+        }  # fmt: skip
+
+    @classmethod
+    def local_dimensions(
+        cls, params: Parameters, robot: RobotDescription | None
+    ) -> Mapping[str, int]:
+        """None: the seed is not a size."""
+        return {}
+
+    @classmethod
+    def state_dimensions(
+        cls, params: Parameters, robot: RobotDescription | None
+    ) -> Mapping[str, int]:
+        """Sizes of the simulator's state, of the random streams' and of the command ring."""
+        import mujoco
+
+        assert isinstance(params, SimulatorParameters)
+        model = build_world(params, robot, Variation())
+        everything = mujoco.mjtState.mjSTATE_INTEGRATION
+        flight = params.latency + params.jitter + params.timestep
+        return {
+            "n_integration": mujoco.mj_stateSize(model, everything),
+            "n_random": WORDS,
+            "n_queue": math.ceil(flight / params.timestep) + 2,
+        }
+
+    def setup(self) -> None:
+        """Draw the world from the seed and build it."""
+        import mujoco
+
+        robot, params = self.context.robot, self.params
+        self._variation = draw_variation(params)
+        self._model = build_world(params, robot, self._variation)
+        assert robot is not None
+        self._robot = robot
+        self._step1, self._step2 = mujoco.mj_step1, mujoco.mj_step2
+        steps = self.period / params.timestep
+        self._steps = round(steps)
+        if abs(steps - self._steps) > 1e-6 or self._steps < 1:
+            raise ValueError(
+                f"timestep {params.timestep} s does not divide the control period "
+                f"{self.period} s; try {self.period / max(1, math.ceil(steps))} s"
+            )
+        self._streams = RandomStreams(params.seed)
+        self._jitter = self._streams[Purpose.JITTER]
+        self._sensors = Sensors(robot, params, self._streams)
+        self._drives = Drives(
+            robot, robot.profiles[params.profile], params.drive_damping, self.drives, self.record
+        )
+        self._limits = (robot.joint_limits[:, 0].copy(), robot.joint_limits[:, 1].copy())
+        n = len(robot.joints)
+        self._encoder, self._excess = np.zeros(n), np.zeros(n)
+        self._mean_force = np.zeros(3)
+        self._attach(mujoco.MjData(self._model))
+
+    def _attach(self, data: Any) -> None:
+        """Views into the simulator's memory, made once."""
+        model = self._model
+        self._data = data
+        self._position, self._velocity = data.qpos[7:], data.qvel[6:]
+        self._body_rates = data.qvel[3:6]
+        self._ctrl, self._external = data.ctrl, data.xfrc_applied
+        self._accelerometer = data.sensor("accelerometer").data
+        self._contacts = data.sensor("contacts").data
+        names = [contact.name for contact in self._robot.contacts]
+        first = int(model.sensor(f"load/{names[0]}").adr[0])
+        self._load = data.sensordata[first : first + 4 * len(names)].reshape(-1, 4)
+        self._vertical = self._load[:, 3]
+        self._truth = TruthReport(data, self._robot, self.params.build_scene())
+        self._points = []
+        for point, (link, _) in self._robot.points.items():
+            body = model.body(link).id
+            place, centre = data.site(f"point/{point}").xpos, data.xipos[body]
+            self._points.append((place, centre, self._external[body]))
+
+    def open(self) -> None:
+        """Stand on the ground, settle, and wait for the first command."""
+        import mujoco
+
+        params = self.params
+        attitude = stream(params.seed, Purpose.ATTITUDE).standard_normal(3)
+        mujoco.mj_resetData(self._model, self._data)
+        place_standing(
+            self._model, self._data, self._robot, attitude * params.initial_attitude_error
+        )
+        torque = holding_torque(self._model, self._data, self._robot)
+        held = self._position + self._sensors.encoder_offset
+        self._drives.hold(held, torque, HOLD_STIFFNESS, HOLD_DAMPING)
+        phase = 0.0
+        if params.random_start_phase:
+            phase = float(stream(params.seed, Purpose.START_PHASE).random()) * self.period
+        early = math.floor(phase / params.timestep)
+        self._late = phase - early * params.timestep
+        self._step1(self._model, self._data)
+        self._simulate(math.ceil(SETTLING_TIME / params.timestep) + early)
+        centre_on_origin(self._data, self._robot)
+        self._data.time = 0.0
+        self.physics.step[()] = -self._steps
+        self.record.bounce_end.fill(-self._steps)
+        self._step1(self._model, self._data)
+        self._clear_record()
+        self._simulate(self._steps)
+
+    def read(self) -> None:
+        """Publish the sensors and the truth at the present instant."""
+        record, steps = self.record, int(self.record.steps)
+        np.divide(record.accelerometer, steps, out=self._mean_force)
+        self._sensors.read_imu(self._body_rates, self._mean_force, self.imu)
+        self._sensors.read_joints(self._position, self._velocity, record.joint_torque, self.joints)
+        self._sensors.read_switches(int(self.physics.step), record, self.contacts)
+        self._truth.publish(record, self.truth)
+
+    def write(self) -> None:
+        """Send the command on its way to the drives."""
+        params = self.params
+        delay = params.latency + self._late
+        if params.jitter:
+            delay += params.jitter * self._jitter.random()
+        arrival = int(self.physics.step) + math.ceil(delay / params.timestep - 1e-9)
+        self._drives.send(self.command, arrival)
+
+    def advance(self) -> None:
+        """Simulate to the next tick."""
+        self._external.fill(0.0)
+        self._clear_record()
+        self._simulate(self._steps, pushed=True)
+
+    def damp(self) -> None:
+        """One tick with the drives in damping; no force from outside."""
+        self._drives.damp()
+        self._external.fill(0.0)
+        self._clear_record()
+        self._simulate(self._steps)
+
+    def freeze(self) -> None:
+        """Copy the simulator's and the random streams' state into the declared one."""
+        import mujoco
+
+        mujoco.mj_getState(
+            self._model, self._data, self.physics.integration, mujoco.mjtState.mjSTATE_INTEGRATION
+        )
+        self._streams.save(self.physics.random)
+
+    def thaw(self) -> None:
+        """Take both back, and recompute what follows from positions and velocities."""
+        import mujoco
+
+        mujoco.mj_setState(
+            self._model, self._data, self.physics.integration, mujoco.mjtState.mjSTATE_INTEGRATION
+        )
+        self._streams.load(self.physics.random)
+        self._step1(self._model, self._data)
+
+    def metrics(self) -> Mapping[str, Metric]:
+        """What was drawn from the seed."""
+        return {
+            "robot_friction": float(self._variation.friction),
+            "robot_mass_kg": float(self._robot.total_mass * self._variation.mass),
+            "robot_contact_stiffness": float(self._variation.contact_stiffness),
+        }
+
+    def _simulate(self, steps: int, *, pushed: bool = False) -> None:
+        """That many physics steps; afterwards all derived quantities are those of the end."""
+        model, data, record = self._model, self._data, self.record
+        step = int(self.physics.step)
+        for _ in range(steps):
+            np.add(self._position, self._sensors.encoder_offset, out=self._encoder)
+            self._drives.joint_torque(step, self._encoder, self._velocity, self._ctrl)
+            if pushed:
+                self._apply_push()
+            self._step2(model, data)
+            self._sensors.watch_switches(step, self._vertical, record)
+            np.add(record.load, self._load, out=record.load)
+            np.add(record.accelerometer, self._accelerometer, out=record.accelerometer)
+            allowed = 0.0
+            for point in self._load:
+                allowed += point.item(0)
+            if self._contacts.item(0) > allowed:
+                record.forbidden += 1
+            self._step1(model, data)
+            lower, upper = self._limits
+            np.subtract(lower, self._position, out=self._excess)
+            np.maximum(record.violation, self._excess, out=record.violation)
+            np.subtract(self._position, upper, out=self._excess)
+            np.maximum(record.violation, self._excess, out=record.violation)
+            step += 1
+        record.steps += steps
+        self.physics.step[()] = step
+
+    def _apply_push(self) -> None:
+        """Put the external force on its body at its point; the moment follows the body."""
+        force = self.push.force
+        fx, fy, fz = force.item(0), force.item(1), force.item(2)
+        if fx == fy == fz == 0.0:
+            return
+        index = int(self.push.point)
+        if not 0 <= index < len(self._points):
+            raise IndexError(
+                f"push at point {index}; {self._robot.name} has {len(self._points)}: "
+                + ", ".join(self._robot.points)
+            )
+        place, centre, wrench = self._points[index]
+        x, y, z = (place.item(k) - centre.item(k) for k in range(3))
+        wrench[0], wrench[1], wrench[2] = fx, fy, fz
+        wrench[3], wrench[4], wrench[5] = y * fz - z * fy, z * fx - x * fz, x * fy - y * fx
+
+    def _clear_record(self) -> None:
+        """Begin a new tick; what switches remember stays."""
+        record = self.record
+        record.steps[()] = 0
+        record.forbidden[()] = 0
+        for total in (record.load, record.accelerometer, record.violation, record.overload):
+            total.fill(0.0)
+        record.saturated.fill(0)
+        for high in (record.torque_high, record.speed_high):
+            high.fill(-np.inf)
+        for low in (record.torque_low, record.speed_low):
+            low.fill(np.inf)

@@ -1,0 +1,115 @@
+"""The parameters of the simulated robot: world, actuators, imperfections, all nominal by default."""
+
+from __future__ import annotations
+
+from typing import Literal, Self
+
+from pydantic import model_validator
+
+from ...runtime.language.parameters import Parameters, parameter
+from . import scenes
+
+
+class SimulatorParameters(Parameters):
+    """What may be set on ``MujocoRobot``. A *spread* is half the width of a uniform distribution
+    around the nominal value, drawn once from the seed; a *noise* is the standard deviation of a
+    normal distribution, drawn for every sample."""
+
+    profile: str = parameter("koala", text="the actuator profile of the robot's description")
+    seed: int = parameter(0, ge=0, text="the seed of everything random")
+    timestep: float = parameter(
+        0.0005, unit="s", gt=0, le=0.002, text="physics step; it must divide the control period"
+    )
+
+    scene: Literal["flat", "step", "platform"] = parameter("flat", text="what the ground is like")
+    step_height: float = parameter(0.05, unit="m", gt=0, text="scene step: its height")
+    step_distance: float = parameter(
+        0.1, unit="m", text="scene step: from the start to its front edge"
+    )
+    step_depth: float = parameter(
+        1.5, unit="m", gt=0, text="scene step: from there to where it goes down again"
+    )
+    platform_height: float = parameter(
+        0.35, unit="m", gt=0, text="scene platform: its height above the floor"
+    )
+    platform_edge: float = parameter(
+        0.15, unit="m",
+        text="scene platform: from the start to the edge that is jumped off; negative: behind it",
+    )  # fmt: skip
+
+    friction: float = parameter(0.7, gt=0, text="friction coefficient of the ground")
+    friction_range: list[float] | None = parameter(
+        None, min_length=2, max_length=2,
+        text="lowest and highest friction, drawn uniformly in place of `friction`",
+    )  # fmt: skip
+    contact_stiffness: float = parameter(
+        1.0, ge=0.05, le=16.0, text="factor on the stiffness of all contacts"
+    )
+    contact_stiffness_spread: float = parameter(
+        1.0, ge=1.0, le=16.0, text="further factor, log-uniform between its inverse and this"
+    )
+    mass_scale: float = parameter(1.0, gt=0, text="factor on all masses and inertias")
+    mass_spread: float = parameter(0.0, ge=0, lt=1, text="spread of that factor")
+    base_com_offset: list[float] = parameter(
+        [0.0, 0.0, 0.0], unit="m", min_length=3, max_length=3, text="offset of the torso's CoM"
+    )
+    base_com_spread: float = parameter(0.0, unit="m", ge=0, text="spread of that, per axis")
+
+    initial_attitude_error: float = parameter(
+        0.0, unit="rad", ge=0, le=0.1,
+        text="standard deviation per axis of the torso's attitude at the start, soles flat",
+    )  # fmt: skip
+    random_start_phase: bool = parameter(
+        False, text="start physics at a drawn phase of the control clock"
+    )
+    latency: float = parameter(0.0, unit="s", ge=0, le=0.1, text="from sensing to torque")
+    jitter: float = parameter(
+        0.0, unit="s", ge=0, le=0.1, text="further latency, uniform from zero to this, per command"
+    )
+
+    gyro_noise: float = parameter(0.0, unit="rad/s", ge=0, text="gyroscope noise")
+    gyro_bias: float = parameter(0.0, unit="rad/s", ge=0, text="spread of its bias, per axis")
+    gyro_range: float | None = parameter(
+        None, unit="rad/s", gt=0, text="it saturates here; none: never"
+    )
+    accelerometer_noise: float = parameter(0.0, unit="m/s^2", ge=0, text="accelerometer noise")
+    accelerometer_bias: float = parameter(
+        0.0, unit="m/s^2", ge=0, text="spread of its bias, per axis"
+    )
+    accelerometer_range: float | None = parameter(
+        None, unit="m/s^2", gt=0, text="it saturates here; none: never"
+    )
+    encoder_offset: float = parameter(
+        0.0, unit="rad", ge=0, text="spread of the joint encoders' offsets"
+    )
+    encoder_resolution: float = parameter(
+        0.0, unit="rad", ge=0, text="joint angles are rounded to multiples of this; zero: not"
+    )
+    joint_velocity_noise: float = parameter(0.0, unit="rad/s", ge=0, text="joint velocity noise")
+    switch_threshold: list[float] = parameter(
+        [1.0, 1.0], unit="N", min_length=2, max_length=2,
+        text="lowest and highest force that closes a switch, drawn per switch",
+    )  # fmt: skip
+    switch_bounce: float = parameter(
+        0.0, unit="s", ge=0, le=0.1, text="for how long a switch chatters after each change"
+    )
+
+    drive_damping: float = parameter(
+        0.5, unit="N m s/rad", ge=0, text="joint damping of a drive in its damping mode"
+    )
+
+    @model_validator(mode="after")
+    def _check_ranges(self) -> Self:
+        for name in ("friction_range", "switch_threshold"):
+            value = getattr(self, name)
+            if value is not None and not 0.0 < value[0] <= value[1]:
+                raise ValueError(f"{name} must be two positive numbers in rising order: {value}")
+        return self
+
+    def build_scene(self) -> scenes.Scene:
+        """The ground these parameters describe."""
+        if self.scene == "step":
+            return scenes.step(self.step_height, self.step_distance, self.step_depth)
+        if self.scene == "platform":
+            return scenes.platform(self.platform_height, self.platform_edge)
+        return scenes.flat()

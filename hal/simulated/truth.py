@@ -1,0 +1,66 @@
+"""What only a simulator knows, gathered after every tick."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ...blocks.signals import RobotTruth
+from ...robots.description import RobotDescription
+from .scenes import Scene
+from .state import TickRecord
+
+if TYPE_CHECKING:
+    from mujoco import MjData
+
+
+class TruthReport:
+    """Fills ``RobotTruth`` from the simulator's memory and the record of the last tick.
+
+    Positions, velocities and momenta are those of the present instant; forces, contacts, peaks
+    and counts are over the physics steps of the last tick.
+    """
+
+    def __init__(self, data: MjData, robot: RobotDescription, scene: Scene) -> None:
+        self._data = data
+        self._scene = scene
+        self._position, self._velocity = data.qpos[7:], data.qvel[6:]
+        self._com, self._com_velocity, self._angular_momentum = (
+            data.sensor(name).data for name in ("com", "com_velocity", "angular_momentum")
+        )
+        self._places = [data.site(contact.name).xpos for contact in robot.contacts]
+        n = len(robot.joints)
+        self._negative, self._is_low = np.zeros(n), np.zeros(n, dtype=np.bool_)
+
+    def publish(self, record: TickRecord, truth: RobotTruth) -> None:
+        """Write all fields of ``truth``."""
+        data, steps = self._data, int(record.steps)
+        truth.base_position[:] = data.qpos[:3]
+        truth.base_orientation[:3] = data.qpos[4:7]
+        truth.base_orientation[3] = data.qpos[3]
+        truth.base_linear_velocity[:] = data.qvel[:3]
+        truth.base_angular_velocity[:] = data.qvel[3:6]
+        truth.joint_position[:] = self._position
+        truth.joint_velocity[:] = self._velocity
+        truth.com[:] = self._com
+        truth.com_velocity[:] = self._com_velocity
+        truth.angular_momentum[:] = self._angular_momentum
+        np.divide(record.load[:, 1:], -steps, out=truth.contact_force)
+        for k, place in enumerate(self._places):
+            truth.contact_position[k] = place
+            truth.ground_height[k] = self._scene.ground_height(place.item(0), place.item(1))
+            force = truth.contact_force[k]
+            truth.contact_touched[k] = any(force.item(axis) != 0.0 for axis in range(3))
+        truth.forbidden_contacts[()] = record.forbidden
+        truth.joint_limit_violation[()] = max(record.violation.tolist())
+        truth.motor_overload[()] = max(record.overload.tolist())
+        truth.saturated_share[()] = sum(record.saturated.tolist()) / (steps * len(self._is_low))
+        for high, low, out in (
+            (record.torque_high, record.torque_low, truth.motor_torque),
+            (record.speed_high, record.speed_low, truth.motor_speed),
+        ):
+            np.negative(low, out=self._negative)
+            np.greater(self._negative, high, out=self._is_low)
+            out[:] = high
+            np.copyto(out, low, where=self._is_low)

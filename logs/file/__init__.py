@@ -1,0 +1,1 @@
+"""The file a recording is kept in: written, read, exported, mended."""

@@ -1,0 +1,231 @@
+"""What is in a recording: the one place that says it, for who writes one and for who reads it.
+
+A recording is a Rerun file (``.rrd``) with these entities; ``B/P/F`` stands for a block's path, an
+output and a field. All but the static ones are on the timelines ``t`` (exact nanoseconds) and
+``tick``.
+
+===================  ===============================================================================
+``__properties``     ``aloft``: ``header`` (JSON of ``Header``) and its main parts once more, to be
+                     read in the viewer; ``outcome``: ``outcome`` (JSON of ``RunResult.to_json``),
+                     written last, so a recording without it was cut off
+``graph``            the graph as it ran, after includes, sub-graphs and overrides, as text
+``signals/B/P/F``    the field after every tick, flat, as float64 ``Scalars``; int64 fields also as
+                     component ``aloft:exact``, as float64 is exact up to 2^53 only. A value equal
+                     to that of the tick before and after is left out: see ``changed_rows``
+``recorded``         ``aloft:span``: first and last of ticks without a gap whose signals are all
+                     there; written after them
+``keyframes``        ``aloft:bus`` and ``aloft:state`` at tick k: the bytes of both buffers before
+                     tick k ran, from which a run can go on
+``notes``            ``aloft:note``: JSON of a ``Note``: life cycle, overruns, faults, parameter
+                     changes, dropped ticks
+``states/B/P/F``     each change of a number whose values have names, and of a truth value, for
+                     the viewer; of several truth values each is in ``states/B/P/F/<its name>``
+``limits/B/P/F``     what bounds a field by the robot's description, for the viewer
+``events``           notes, changes of state, lift-off and touchdown as text, for the viewer
+``world``            the robot in 3D, for the viewer; see ``scene``
+``times``            the time each block took, as text, for the viewer; written last
+===================  ===============================================================================
+
+Row k of a signal is its value after all outputs of tick k were written. Unwired inputs never
+change: they are in ``Header.bus_start``, over which the signals of a tick are laid to get the bytes
+of its bus back.
+"""
+
+from __future__ import annotations
+
+import json
+from base64 import b64decode, b64encode
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from hashlib import blake2b
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...robots.description import RobotDescription
+from ...runtime.language.layout import Layout
+from ...runtime.language.signals import Slot
+
+FORMAT = 2
+"""The number of this format; a reader refuses any other."""
+SIGNALS, STATES, KEYFRAMES, NOTES, EVENTS = "signals", "states", "keyframes", "notes", "events"
+LIMITS, TIMES, WORLD, GRAPH = "limits", "times", "world", "graph"
+RECORDED = "recorded"
+EXACT, BUS, STATE, NOTE, SPAN = "exact", "bus", "state", "note", "span"
+
+
+@dataclass(frozen=True)
+class RecordedField:
+    """One field of the bus or of the state, without the code it was declared in.
+
+    ``dimensions`` are the shape as declared (``n_joints``), ``shape`` in numbers; ``values`` names
+    the numbers of an int64 field; ``constant`` is true for an unwired input.
+    """
+
+    name: str
+    dtype: str
+    start: int
+    shape: tuple[int, ...]
+    dimensions: tuple[int | str, ...]
+    unit: str | None = None
+    frame: str | None = None
+    text: str = ""
+    values: Mapping[int, str] = field(default_factory=dict)
+    constant: bool = False
+
+    @property
+    def field_name(self) -> str:
+        """The last part of the name."""
+        return self.name.rpartition(".")[2]
+
+    @classmethod
+    def from_json(cls, data: Mapping[str, Any]) -> Self:
+        """The field that ``dataclasses.asdict`` made plain."""
+        values = {int(number): name for number, name in data["values"].items()}
+        shape, dimensions = tuple(data["shape"]), tuple(data["dimensions"])
+        return cls(**{**data, "values": values, "shape": shape, "dimensions": dimensions})
+
+
+@dataclass(frozen=True)
+class RecordedLayout:
+    """Where every field lies in a buffer of ``size`` bytes; see ``runtime.layout``."""
+
+    fields: tuple[RecordedField, ...]
+    lengths: Mapping[str, int]
+    offsets: Mapping[str, int]
+    size: int
+
+    def layout(self) -> Layout:
+        """The same as the runtime has it."""
+        slots = {f.name: Slot(f.dtype, f.start, f.shape) for f in self.fields}
+        return Layout(slots, dict(self.lengths), dict(self.offsets), self.size)
+
+    def schema_hash(self) -> str:
+        """16 hexadecimal digits that are equal for equal names, types, shapes, units and frames."""
+        parts = [[f.name, f.dtype, f.start, f.shape, f.unit, f.frame] for f in self.fields]
+        return blake2b(json.dumps(parts).encode(), digest_size=8).hexdigest()
+
+    @classmethod
+    def from_json(cls, data: Mapping[str, Any]) -> Self:
+        """The layout that ``dataclasses.asdict`` made plain."""
+        fields = tuple(RecordedField.from_json(entry) for entry in data["fields"])
+        return cls(fields, data["lengths"], data["offsets"], data["size"])
+
+
+@dataclass(frozen=True)
+class RecordedBlock:
+    """One block: its type as ``module:Class``, when it runs and the folder of its graph file."""
+
+    path: str
+    type: str
+    period_ticks: int
+    offset_ticks: int
+    folder: str
+
+
+@dataclass(frozen=True)
+class Header:
+    """All that is known before the first tick.
+
+    Attributes:
+        name: the graph's.
+        graph: the graph's text after flattening.
+        base_rate: ticks a second [Hz].
+        first_tick: zero, but for a run that began at a snapshot.
+        clock: ``free``, ``paced`` or ``robot``.
+        ticks: how many the graph runs by itself, if it says so.
+        overrides: what was set beside the graph file.
+        seeds: the parameters called ``seed``, as ``block.seed``.
+        parameters: every other number or text the blocks were made with, as ``block.name``.
+        versions: of Python and of all that computes.
+        machine: what byte-equality depends on beside: processor, system, BLAS.
+        blocks: in file order.
+        order: their paths in the order of execution.
+        bus, state: the layouts of both buffers.
+        bus_start: the bytes of the bus before the first tick.
+        robot: the robot's description, if the graph has one.
+        source: the graph file, as the run was told.
+    """
+
+    name: str
+    graph: str
+    base_rate: float
+    bus: RecordedLayout
+    state: RecordedLayout
+    bus_start: bytes
+    first_tick: int = 0
+    clock: str = "free"
+    ticks: int | None = None
+    overrides: Mapping[str, Any] = field(default_factory=dict)
+    seeds: Mapping[str, int] = field(default_factory=dict)
+    parameters: Mapping[str, float | str] = field(default_factory=dict)
+    versions: Mapping[str, str] = field(default_factory=dict)
+    machine: Mapping[str, str] = field(default_factory=dict)
+    blocks: tuple[RecordedBlock, ...] = ()
+    order: tuple[str, ...] = ()
+    robot: RobotDescription | None = None
+    source: str = ""
+    format: int = FORMAT
+
+    @property
+    def schema_hashes(self) -> dict[str, str]:
+        """Of the bus and of the state."""
+        return {"bus": self.bus.schema_hash(), "state": self.state.schema_hash()}
+
+    def to_json(self) -> str:
+        """As text."""
+        data = asdict(self) | {"schema_hashes": self.schema_hashes}
+        data["robot"] = self.robot and self.robot.model_dump(mode="json")
+        data["bus_start"] = b64encode(self.bus_start).decode()
+        return json.dumps(data)
+
+    @classmethod
+    def from_json(cls, text: str) -> Self:
+        """Back from text."""
+        data = json.loads(text)
+        del data["schema_hashes"]
+        robot = data["robot"]
+        data["robot"] = robot and RobotDescription.model_validate(robot)
+        data["bus"] = RecordedLayout.from_json(data["bus"])
+        data["state"] = RecordedLayout.from_json(data["state"])
+        data["bus_start"] = b64decode(data["bus_start"])
+        data["blocks"] = tuple(RecordedBlock(**block) for block in data["blocks"])
+        data["order"] = tuple(data["order"])
+        return cls(**data)
+
+
+@dataclass(frozen=True)
+class RecordedRows:
+    """Some ticks (n,) of a run and the bus after each, ``rows`` (n, bytes)."""
+
+    header: Header
+    ticks: NDArray[np.int64]
+    rows: NDArray[np.uint8]
+    layout: Layout
+
+    def fields(self) -> list[RecordedField]:
+        """Every field of every output, in file order."""
+        return [entry for entry in self.header.bus.fields if not entry.constant]
+
+    def signal(self, name: str) -> NDArray[Any]:
+        """One field at every tick, (n, ...). Raises ``KeyError``."""
+        return self.layout.view(self.rows, name)
+
+
+def entity_of(kind: str, name: str) -> str:
+    """The entity that holds ``block.port.field``; nested blocks nest."""
+    return f"{kind}/{name.replace('.', '/')}"
+
+
+def nanoseconds(base_rate: float, ticks: NDArray[np.int64]) -> NDArray[np.int64]:
+    """The instant of every tick on the timeline ``t``, as integers, because floats would round."""
+    instants: NDArray[np.int64] = np.rint(ticks * (1e9 / base_rate)).astype(np.int64)
+    return instants
+
+
+def spans(ticks: NDArray[np.int64]) -> NDArray[np.int64]:
+    """First and last (m, 2) of each stretch without a gap of ``ticks`` (n,), which are in order."""
+    ends = np.flatnonzero(np.diff(ticks) != 1)
+    first = np.concatenate([ticks[:1], ticks[ends + 1]])
+    return np.stack([first, np.concatenate([ticks[ends], ticks[-1:]])], axis=1)

@@ -1,0 +1,160 @@
+"""The header of a recording, made from the graph that is to run."""
+
+from __future__ import annotations
+
+import platform
+from collections.abc import Iterator, Mapping
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+from ...runtime.language.layout import Layout
+from ...runtime.language.signals import Field
+from ...runtime.language.stages import BlockSpec, CheckedGraph
+from ...runtime.running.memory import BoundGraph
+from .format import Header, RecordedBlock, RecordedField, RecordedLayout
+
+RECORDED_VERSIONS = (
+    "aloft", "numpy", "numba", "mujoco-core", "pin", "qpsolvers", "daqp", "casadi", "rerun-sdk",
+)  # fmt: skip
+_NOTHING = RecordedLayout((), {}, {}, 0)
+
+
+def header_of(bound: BoundGraph) -> Header:
+    """The header of a run of ``bound``, as its memory is now."""
+    memory, graph = bound.memory, bound.graph
+    return make_header(
+        graph,
+        memory.bus.layout,
+        memory.bus.buffer.tobytes(),
+        state=memory.state.layout,
+        first_tick=bound.clock.tick,
+        clock=bound.clock.kind,
+    )
+
+
+def make_header(
+    graph: CheckedGraph,
+    bus: Layout,
+    bus_start: bytes,
+    *,
+    state: Layout | None = None,
+    first_tick: int = 0,
+    clock: str = "",
+) -> Header:
+    """The header of a run of ``graph``; without ``state``, one that can hold no keyframes."""
+    return Header(
+        name=graph.name,
+        graph=graph.text,
+        base_rate=graph.base_rate,
+        bus=_recorded(bus, {**dict(_outputs(graph)), **dict(_constants(graph))}),
+        state=_recorded(state, dict(_states(graph))) if state is not None else _NOTHING,
+        bus_start=bus_start,
+        first_tick=first_tick,
+        clock=clock or graph.clock.kind,
+        ticks=graph.ticks,
+        overrides=dict(graph.overrides),
+        seeds={
+            f"{spec.path}.seed": spec.params.seed
+            for spec in graph.blocks
+            if hasattr(spec.params, "seed")
+        },
+        parameters=dict(_parameters(graph)),
+        versions=versions(),
+        machine=machine(),
+        blocks=tuple(_block(spec) for spec in graph.blocks),
+        order=graph.order,
+        robot=graph.robot,
+        source=graph.file or next((spec.where.file for spec in graph.blocks if spec.where), ""),
+    )
+
+
+def _block(spec: BlockSpec) -> RecordedBlock:
+    kind = f"{spec.block_type.__module__}:{spec.block_type.__qualname__}"
+    return RecordedBlock(spec.path, kind, spec.period_ticks, spec.offset_ticks, str(spec.folder))
+
+
+def _parameters(graph: CheckedGraph) -> Iterator[tuple[str, float | str]]:
+    for spec in graph.blocks:
+        for name, value in spec.params:
+            if name != "seed" and isinstance(value, bool | int | float | str):
+                yield f"{spec.path}.{name}", value
+
+
+def _outputs(graph: CheckedGraph) -> Iterator[tuple[str, tuple[Field, bool]]]:
+    for spec in graph.blocks:
+        for port, output in spec.block_type.outputs.items():
+            for name, field in output.signal.fields.items():
+                yield f"{spec.path}.{port}.{name}", (field, False)
+
+
+def _constants(graph: CheckedGraph) -> Iterator[tuple[str, tuple[Field, bool]]]:
+    for spec in graph.blocks:
+        for port, source in spec.block_type.inputs.items():
+            if port not in spec.wires:
+                for name, field in source.signal.fields.items():
+                    yield f"{spec.path}.{port}.{name}", (field, True)
+
+
+def _states(graph: CheckedGraph) -> Iterator[tuple[str, tuple[Field, bool]]]:
+    for spec in graph.blocks:
+        for port, state in spec.block_type.states.items():
+            for name, field in state.signal.fields.items():
+                yield f"{spec.path}.{port}.{name}", (field, False)
+
+
+def _recorded(layout: Layout, declared: Mapping[str, tuple[Field, bool]]) -> RecordedLayout:
+    fields = []
+    for name, slot in layout.slots.items():
+        field, constant = declared[name]
+        fields.append(
+            RecordedField(
+                name=name,
+                dtype=slot.section,
+                start=slot.start,
+                shape=slot.shape,
+                dimensions=field.shape,
+                unit=None if field.unit is None else str(field.unit),
+                frame=field.frame,
+                text=field.text,
+                values={int(v): v.name.lower() for v in field.values or ()},
+                constant=constant,
+            )
+        )
+    return RecordedLayout(tuple(fields), dict(layout.lengths), dict(layout.offsets), layout.size)
+
+
+def versions() -> dict[str, str]:
+    """The versions of Python and of every package that computes something in a run."""
+    found = {"python": platform.python_version()}
+    for name in RECORDED_VERSIONS:
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:
+            continue
+    return found
+
+
+def machine() -> dict[str, str]:
+    """What the bytes of a run may depend on beside versions: processor, system and BLAS."""
+    import numpy as np
+
+    try:
+        blas = np.show_config(mode="dicts")["Build Dependencies"]["blas"]
+        library = f"{blas.get('name', '')} {blas.get('version', '')}".strip()
+    except (KeyError, TypeError):
+        library = ""
+    return {
+        "architecture": platform.machine(),
+        "processor": _processor(),
+        "system": platform.system(),
+        "blas": library,
+    }
+
+
+def _processor() -> str:
+    try:
+        text = Path("/proc/cpuinfo").read_text(encoding="utf-8")
+    except OSError:
+        return platform.processor()
+    names = (line.partition(":")[2].strip() for line in text.splitlines() if "model name" in line)
+    return next(names, platform.processor())

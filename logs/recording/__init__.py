@@ -1,0 +1,1 @@
+"""Records a run while it goes on, or when it is over."""

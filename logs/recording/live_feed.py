@@ -1,0 +1,116 @@
+"""Shows a run to a viewer while it goes on, in a thread of the recorder's process.
+
+The viewer may be slow, hang or die: then the thread waits for it, and nobody waits for the thread.
+What it cannot take is left out, and the recording lacks nothing of it.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+from queue import Empty, Full, Queue
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...runtime.running.life_cycle import describe
+from ...runtime.running.notes import Note
+from ..file.format import Header
+from ..file.run_stream import RunStream
+from ..viewing.blueprint import recording_blueprint
+
+LIVE_RATE = 100.0
+"""Rows a second that are shown [Hz]; the recording has all."""
+MOST_ELEMENTS = 64
+"""Fields with more elements, such as mass matrices, are not shown live."""
+WAITING = 64
+"""Pieces of work that may wait for the viewer."""
+PATIENCE = 10.0
+"""Seconds without any progress, though there is work, after which the viewer is given up."""
+LAST_WAIT = 3.0
+"""Seconds that the end of the run waits for the viewer to have everything."""
+
+
+class LiveFeed:
+    """Sends one run to the viewer that listens at ``source``.
+
+    Attributes:
+        problem: why nothing is shown any more; empty while all is well.
+        left_out: pieces of work the viewer was too slow for.
+    """
+
+    def __init__(self, source: str, header: Header) -> None:
+        self.problem = ""
+        self.left_out = 0
+        self._source, self._header = source, header
+        self._work: Queue[Callable[[RunStream], None] | None] = Queue(WAITING)
+        self._stirred = time.monotonic()
+        self._thread = threading.Thread(target=self._run, daemon=True)
+        self._thread.start()
+
+    def rows(self, ticks: NDArray[np.int64], rows: NDArray[np.uint8]) -> None:
+        """Show the bus after each of these ticks; keeps the arrays."""
+        self._put(lambda run: run.write_rows(ticks, rows))
+
+    def note(self, note: Note) -> None:
+        """Show a note."""
+        self._put(lambda run: run.write_note(note))
+
+    def finish(self, outcome: dict[str, Any] | None) -> None:
+        """Show how the run ended, and wait a little until all has arrived."""
+        if outcome is not None:
+            self._put(lambda run: run.write_times(outcome))
+        self._put(None)
+        self._thread.join(LAST_WAIT)
+        if self._thread.is_alive() and not self.problem:
+            self.problem = "the viewer did not take the end of the run"
+
+    def _put(self, work: Callable[[RunStream], None] | None) -> None:
+        if self.problem:
+            return
+        try:
+            self._work.put_nowait(work)
+        except Full:
+            self.left_out += 1
+            if time.monotonic() - self._stirred > PATIENCE:
+                self.problem = f"the viewer has taken nothing for {PATIENCE:g} s"
+
+    def _run(self) -> None:
+        import rerun as rr
+
+        header = self._header
+        try:
+            stream = rr.RecordingStream("aloft", recording_id=header.name, send_properties=False)
+            rr.set_log_time_enabled(False, recording=stream)
+            layout = recording_blueprint(header, live=True)
+            stream.connect_grpc(self._source, default_blueprint=layout)
+            run = RunStream(stream, header, rate=LIVE_RATE, most=MOST_ELEMENTS)
+            run.write_start()
+            while not self.problem:
+                self._stirred = time.monotonic()
+                try:
+                    work = self._work.get(timeout=1.0)
+                except Empty:
+                    continue
+                if work is None:
+                    break
+                work(run)
+                _raise_if_severed(stream)
+            stream.flush(timeout_sec=LAST_WAIT)
+        except Exception as error:  # noqa: BLE001  # whatever it is, the recording goes on
+            self.problem = describe(error)
+
+
+def _raise_if_severed(stream: Any) -> None:
+    """Sending to a viewer that has gone is silent; only a flush says it."""
+    try:
+        stream.flush(timeout_sec=1.0)
+    except RuntimeError as error:
+        if "severed" in str(error):
+            raise ViewerGoneError("the viewer has been closed") from error
+
+
+class ViewerGoneError(Exception):
+    """The viewer was closed, or died."""

@@ -1,0 +1,239 @@
+"""Records a run while it goes on: the control thread copies, another process writes.
+
+::
+
+    result = aloft.load("graphs/jump.yaml").run(sinks=[Recorder("jump.rrd")], log=False)
+
+Each tick costs one copy of the bus into a ring of shared memory. Whatever happens on the other side
+(the disk is full, the process dies), the run goes on; ``warnings`` says what is missing.
+"""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Callable
+from dataclasses import asdict
+from importlib.util import find_spec
+from os import PathLike
+from pathlib import Path
+from typing import Literal
+
+from ...runtime.running.live_parameters import ParameterChange
+from ...runtime.running.memory import BoundGraph
+from ...runtime.running.notes import Note, parameter_note
+from ...runtime.running.run_result import RunResult
+from ..file.header import header_of
+from . import recorder_link
+from .recorder_link import RecorderLink
+from .recorder_process import KEYFRAME, NOTE, ROW, Report
+from .ring import space_of
+
+WhenFull = Literal["wait", "drop"]
+
+
+class Recorder:
+    """A sink that records into one file, replacing what was there.
+
+    Args:
+        path: the file; its folder is made. ``None`` writes none and only shows the run live.
+        when_full: what to do when the process cannot keep up: ``wait``, which costs a simulation in
+            virtual time nothing but a while, or ``drop`` ticks, which are counted. By default what
+            suits the graph's clock: a run in real time never waits.
+        keyframe_period: seconds of the graph's time between two keyframes; zero for none.
+        flush_period: seconds after which what has come is handed to the operating system; a
+            process that is killed loses no more than that.
+        sync_period: seconds after which it is put on the disk; a power cut takes no more than that.
+        ring_time: seconds of the run that fit into the ring.
+        live: where a viewer listens (``viewer.Viewer.source``) that is to show the run while it
+            goes on; a viewer that dies or hangs is a warning.
+        on_warning: called with each warning at once, where ``warnings`` is looked at in the end.
+
+    Attributes:
+        warnings: what went wrong, one text each.
+        dropped: how many ticks were run but are not in the file.
+        report: what the process said at its end.
+    """
+
+    def __init__(
+        self,
+        path: str | PathLike[str] | None,
+        *,
+        when_full: WhenFull | None = None,
+        keyframe_period: float = 1.0,
+        flush_period: float = 0.5,
+        sync_period: float = 5.0,
+        ring_time: float = 4.0,
+        live: str = "",
+        on_warning: Callable[[str], object] | None = None,
+    ) -> None:
+        self.path = Path(path) if path is not None else None
+        self.warnings: list[str] = []
+        self.dropped = 0
+        self.report: Report | None = None
+        self.link: RecorderLink | None = None
+        self._when_full = when_full
+        self._keyframe_period = keyframe_period
+        self._periods = flush_period, sync_period
+        self._ring_time = ring_time
+        self._live = live
+        self._on_warning = on_warning
+        self._gap: tuple[int, int, int] | None = None
+        self._told_of_stall = False
+
+    @property
+    def recording(self) -> Path | None:
+        """The file; ``None`` if there is none."""
+        return self.path if self.link is not None else None
+
+    def open(self, bound: BoundGraph) -> None:
+        """Start the process; in a run in real time, wait until it is ready."""
+        self._bound = bound
+        self._bus = bound.memory.bus.buffer.data
+        self._frame = bytearray(len(self._bus) + bound.memory.state.buffer.size)
+        self._every = round(self._keyframe_period * bound.graph.base_rate)
+        free = bound.clock.kind == "free"
+        self._waits = (self._when_full or ("wait" if free else "drop")) == "wait"
+        problem = self._start()
+        if self.link is None:
+            self._warn(f"no recording: {problem}")
+            return
+        self._write = self.link.ring.write
+        bound.parameters.listeners.append(self._note_change)
+        if not free and not self.link.wait_until_ready():
+            self._warn("the recorder was not ready when the run began")
+        if self._every and bound.clock.tick:
+            self._keep_keyframe(bound.clock.tick)  # a run that goes on from a snapshot
+
+    def _warn(self, text: str) -> None:
+        self.warnings.append(text)
+        if self._on_warning is not None:
+            self._on_warning(text)
+
+    def _start(self) -> str:
+        """Start the process, or say why it cannot be, before anything moves."""
+        if find_spec("rerun") is None:
+            return "Rerun cannot be imported; pip install rerun-sdk"
+        ticks = round(self._ring_time * self._bound.graph.base_rate)
+        capacity = ticks * space_of(len(self._bus)) + 4 * space_of(len(self._frame))
+        header = header_of(self._bound).to_json()
+        try:
+            if self.path is not None:
+                self.path.parent.mkdir(parents=True, exist_ok=True)
+                self.path.open("wb").close()
+            self.link = RecorderLink(self.path, header, capacity, *self._periods, self._live)
+        except OSError as error:
+            return f"{self.path} cannot be written ({error.strerror or error})"
+        return ""
+
+    def record(self, tick: int) -> None:
+        """Copy the bus into the ring, and at times all that the graph remembers."""
+        if self.link is None:
+            return
+        if self._gap is not None or not self._write(ROW, tick, self._bus):
+            self._find_room(tick)
+        if self._every and (tick + 1) % self._every == 0:
+            self._keep_keyframe(tick + 1)
+
+    def _find_room(self, tick: int) -> None:
+        """Wait for room if that is the policy, else count the tick as dropped until there is."""
+        if self._gap is None and self._waits and self._wait_for_room(tick):
+            return
+        if self._gap is not None and self._note_gap(tick) and self._write(ROW, tick, self._bus):
+            return
+        first, _, count = self._gap or (tick, tick, 0)
+        self._gap = (first, tick, count + 1)
+        self.dropped += 1
+
+    def _wait_for_room(self, tick: int) -> bool:
+        assert self.link is not None
+        self.link.stirs()
+        while self._waiting_helps():
+            if self._write(ROW, tick, self._bus):
+                return True
+            time.sleep(1e-3)
+        self._waits = False  # it has ended or hangs, but the run does not
+        return False
+
+    def _waiting_helps(self) -> bool:
+        """Whether to go on waiting for the process; says once that it takes long."""
+        assert self.link is not None
+        stalled = self.link.stalled_for()
+        if not self.link.lives() or stalled > recorder_link.GIVE_UP_TIME:
+            return False
+        if stalled > recorder_link.STALL_TIME:
+            if not self._waits:
+                return False
+            if not self._told_of_stall:
+                self._told_of_stall = True
+                self._warn(
+                    f"the recorder has not gone on for {stalled:.0f} s; the run waits for it"
+                )
+        return True
+
+    def _note_gap(self, tick: int) -> bool:
+        """Note which ticks were dropped; whether there was room for that."""
+        assert self._gap is not None
+        first, last, count = self._gap
+        text = f"{count} ticks were not recorded: {first} to {last}"
+        data = {"first": first, "last": last, "count": count}
+        if not self._write(NOTE, tick, _encoded(Note(tick, "dropped", text, "WARN", data))):
+            return False
+        self._gap = None
+        return True
+
+    def _keep_keyframe(self, tick: int) -> None:
+        """Copy all that the graph remembers before ``tick``; left out where there is no room."""
+        if self._gap is not None:
+            return
+        try:
+            for block in self._bound.blocks.values():
+                block.freeze()
+        except Exception as error:  # noqa: BLE001  # a recorder must not end the run
+            self._warn(f"no keyframes from tick {tick} on: a freeze failed ({error})")
+            self._every = 0
+            return
+        size = len(self._bus)
+        self._frame[:size] = self._bus
+        self._frame[size:] = self._bound.memory.state.buffer.data
+        self._write(KEYFRAME, tick, self._frame)
+
+    def _note_change(self, change: ParameterChange) -> None:
+        self.note(parameter_note(change))
+
+    def note(self, note: Note) -> None:
+        """Put a note into the ring; there is nearly always room."""
+        if self.link is not None:
+            self._write(NOTE, note.tick, _encoded(note))
+
+    def close(self) -> None:
+        """Nothing to do: the end comes with the outcome."""
+
+    def finish(self, result: RunResult) -> list[str]:
+        """Have the outcome written and wait for the process to end; what went wrong."""
+        if self.link is None:
+            return self.warnings
+        if self._gap is not None:
+            self.link.stirs()
+            while not self._note_gap(self._gap[1]) and self._waiting_helps():
+                time.sleep(1e-3)
+        self.report, problem = self.link.finish(result.to_json(), self._waiting_helps)
+        if self.dropped:
+            self._warn(f"{self.dropped} ticks were run but not recorded")
+        if self.report is None:
+            self._warn(
+                f"the recording is not whole: {problem}; what was written before can be read after "
+                f"'aloft log repair {self.path}'"
+            )
+        elif self.report.problem:
+            self._warn(
+                f"the recording is not whole: {self.report.problem}; {self.report.rows} ticks were "
+                f"written, {self.report.lost} were not"
+            )
+        if self.report is not None and self.report.live_problem:
+            self._warn(f"the viewer did not show all of the run: {self.report.live_problem}")
+        return self.warnings
+
+
+def _encoded(note: Note) -> bytes:
+    return json.dumps(asdict(note)).encode()

@@ -1,0 +1,139 @@
+"""What the process that runs a graph has of the recorder's process: the ring, and two pipes."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import asdict
+from pathlib import Path
+from select import select
+from typing import Any
+
+from .recorder_process import HEADER, Report, Task
+from .ring import ALIGNMENT, RingWriter, make_memory, space_of
+
+_MAIN = (
+    "import sys, json; sys.path[:] = json.loads(sys.argv[2]); "
+    "from aloft.logs.recording.finished_run.recorder_process import main; main(sys.argv[1])"
+)
+START_TIME = 30.0
+"""Seconds the process may take to be ready for a run in real time."""
+STALL_TIME = 60.0
+"""Seconds without any progress that are worth a warning, and more than a robot waits."""
+GIVE_UP_TIME = 600.0
+"""Seconds without any progress after which a simulation gives the process up, too."""
+
+
+class RecorderLink:
+    """A recorder's process that was started for one file, and the ring it reads.
+
+    Args:
+        path: the file, if there is to be one.
+        header: of the recording, as text.
+        capacity: least size of the ring [bytes].
+        flush_period, sync_period, live: see ``Task``.
+
+    Raises:
+        OSError: the process cannot be started.
+    """
+
+    def __init__(
+        self,
+        path: Path | None,
+        header: str,
+        capacity: int,
+        flush_period: float,
+        sync_period: float,
+        live: str = "",
+    ) -> None:
+        text = header.encode()
+        capacity = max(1 << 16, capacity + space_of(len(text)))
+        capacity += -capacity % ALIGNMENT
+        descriptor = make_memory(capacity)
+        try:
+            self.ring = RingWriter(descriptor, capacity)
+            self.ring.write(HEADER, 0, text)
+            place = str(path.absolute()) if path is not None else ""
+            task = Task(descriptor, capacity, place, flush_period, sync_period, live)
+            folders = json.dumps([str(Path(folder).absolute()) for folder in sys.path])
+            # not forked, as a copy of this process would hold its robot; and in a session of its
+            # own, so that nobody's Ctrl-C ends it before the run has come to rest
+            self._process = subprocess.Popen(
+                [sys.executable, "-c", _MAIN, json.dumps(asdict(task)), folders],
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                pass_fds=[descriptor],
+                start_new_session=True,
+            )
+        finally:
+            os.close(descriptor)
+        assert self._process.stdin is not None and self._process.stdout is not None
+        self._input, self._output = self._process.stdin, self._process.stdout
+        self._said = b""
+        self._seen, self._since = 0, time.monotonic()
+
+    @property
+    def process_id(self) -> int:
+        """The process's number."""
+        return self._process.pid
+
+    def lives(self) -> bool:
+        """Whether the process has not ended."""
+        return self._process.poll() is None
+
+    def stalled_for(self) -> float:
+        """Seconds since the process has read on, or since ``stirs``."""
+        if self.ring.read_back != self._seen:
+            self._seen, self._since = self.ring.read_back, time.monotonic()
+        return time.monotonic() - self._since
+
+    def stirs(self) -> None:
+        """Say that the process has had nothing to do until now, which ``stalled_for`` cannot know."""
+        self._since = time.monotonic()
+
+    def wait_until_ready(self) -> bool:
+        """Wait until the process takes what is in the ring; whether it does."""
+        end = time.monotonic() + START_TIME
+        while b"\n" not in self._said and time.monotonic() < end:
+            if not self._listen(0.1):
+                return False
+        return b"\n" in self._said
+
+    def finish(
+        self, outcome: dict[str, Any], goes_on: Callable[[], bool]
+    ) -> tuple[Report | None, str]:
+        """Tell the outcome and wait for the end, as long as ``goes_on`` says so.
+
+        Returns:
+            What the process says was done, if it came to that, and else why it did not.
+        """
+        with suppress(BrokenPipeError):  # it has ended, which is seen below
+            self._input.write(json.dumps(outcome).encode())
+            self._input.flush()
+        with suppress(BrokenPipeError):
+            self._input.close()
+        self.stirs()
+        while self._listen(0.05):
+            if self.lives() and not goes_on():
+                return None, f"the recorder has been stuck for {self.stalled_for():.0f} s"
+        self._output.close()
+        code = self._process.wait()
+        self.ring.close()
+        lines = [json.loads(line) for line in self._said.splitlines()]
+        if lines and "rows" in lines[-1]:
+            return Report(**lines[-1]), ""
+        how = f"was killed by signal {-code}" if code < 0 else f"ended with code {code}"
+        return None, f"the recorder {how}"
+
+    def _listen(self, seconds: float) -> bool:
+        """Hear what the process says within that time; false once it will say no more."""
+        if not select([self._output], [], [], seconds)[0]:
+            return True
+        part = os.read(self._output.fileno(), 65536)
+        self._said += part
+        return bool(part)

@@ -1,0 +1,121 @@
+"""A recording file as a run that can be replayed: its graph is loaded again from its own text."""
+
+from __future__ import annotations
+
+from bisect import bisect_left
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...runtime.language.errors import AloftError, ExitCode
+from ...runtime.language.layout import Layout
+from ...runtime.language.registry import with_present_names
+from ...runtime.language.stages import CheckedGraph
+from ...runtime.loading import load_text
+from ...runtime.running.live_parameters import ParameterChange
+from ...runtime.running.memory import Snapshot
+from ..file.header import machine, versions
+from ..file.reader import RecordedRun, read
+
+
+@dataclass(frozen=True)
+class OpenedRun:
+    """A recording, and the graph that ran, with the code of today.
+
+    Attributes:
+        file: the recording.
+        folder: where the graph file lay, to which what the graph names is relative.
+    """
+
+    file: RecordedRun
+    folder: Path
+
+    @classmethod
+    def of(cls, path: str | PathLike[str], folder: Path | None = None) -> OpenedRun:
+        """Open the recording at ``path``.
+
+        Raises:
+            FileNotFoundError: there is no such file.
+            AloftError: it is no recording, or it holds no tick.
+        """
+        file = read(path)
+        if not len(file.ticks):
+            raise AloftError(f"{path} holds no tick")
+        return cls(file, folder or _folder(Path(path), Path(file.header.source)))
+
+    def load(self, overrides: Mapping[str, Any] | Sequence[str] = ()) -> CheckedGraph:
+        """The recorded graph, with something changed. Raises ``LoadError``."""
+        header = self.file.header
+        name = Path(header.source).name or f"{header.name}.yaml"
+        return load_text(with_present_names(header.graph), self.folder / name, overrides)
+
+    @cached_property
+    def graph(self) -> CheckedGraph:
+        """The recorded graph. Raises ``LoadError`` where code or files have gone since."""
+        return self.load()
+
+    @property
+    def bus(self) -> Layout:
+        """The layout of the rows."""
+        return self.file.header.bus.layout()
+
+    @property
+    def state(self) -> Layout:
+        """The layout of the keyframes' state."""
+        return self.file.header.state.layout()
+
+    @property
+    def ticks(self) -> NDArray[np.int64]:
+        """All recorded ticks."""
+        return self.file.ticks
+
+    @property
+    def keyframes(self) -> Sequence[int]:
+        """Ticks before which everything was kept."""
+        return self.file.keyframes
+
+    @property
+    def changes(self) -> Sequence[ParameterChange]:
+        """Parameters changed while it ran."""
+        return self.file.parameter_changes
+
+    @property
+    def failed(self) -> bool:
+        """Whether a block failed in the tick after the last row."""
+        outcome = self.file.outcome or {}
+        if outcome.get("exit_code") != ExitCode.RUN_FAILED:
+            return False
+        return int(self.ticks[-1]) + 1 - self.file.header.first_tick == outcome.get("ticks")
+
+    def rows(self, first: int, last: int) -> tuple[NDArray[np.int64], NDArray[np.uint8]]:
+        """The ticks from ``first`` up to ``last``, and their rows."""
+        start, end = bisect_left(self.ticks, first), bisect_left(self.ticks, last)
+        return self.ticks[start:end], self.file.rows[start:end]
+
+    def keyframe(self, tick: int) -> Snapshot:
+        """What the graph remembered before ``tick``. Raises ``KeyError``."""
+        return self.file.snapshot(tick)
+
+    def what_is_other_now(self) -> list[str]:
+        """What computed the run and is not the same here: versions, the processor."""
+        header = self.file.header
+        now = {**versions(), **machine()}
+        then = {**header.versions, **header.machine}
+        return [
+            f"{name} was {then[name]} and is {now.get(name, 'not installed')}"
+            for name in then
+            if then[name] != now.get(name)
+        ]
+
+
+def _folder(recording: Path, source: Path) -> Path:
+    """The graph file's folder: as the run named it, seen from here or from the recording."""
+    places = (Path(), recording.parent, recording.parent.parent)
+    found = (place / source for place in places if (place / source).is_file())
+    return next(found, source).parent

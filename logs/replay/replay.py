@@ -1,0 +1,320 @@
+"""A recorded run executed again, in whole or in part, and compared with what it was.
+
+Three ways, which differ only in which blocks run; all others are fed from the recording:
+
+* all of them: a simulation repeats itself from its seed;
+* all but those whose outputs come from outside the graph: a robot's run is repeated on what its
+  sensors said;
+* only some, changed ones: what would they have done in this situation? Nothing feeds back.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...runtime.language.errors import AloftError
+from ...runtime.language.stages import CheckedGraph, ClockSpec
+from ...runtime.loading.adjust import adjust
+from ...runtime.running.differences import Comparison, Difference, Translation
+from ...runtime.running.executor import Executor
+from ...runtime.running.feeding import Fed, Feed, fed_graph
+from ...runtime.running.memory import BoundGraph, Snapshot
+from ...runtime.running.run_result import RunResult
+from ...runtime.running.sinks import Sink
+from .replayable import Replayable, RowCursor, nearest_keyframe
+
+Inputs = Literal["seed", "recorded"]
+BeforeTick = Callable[[BoundGraph, int], None]
+PIECE = 256
+"""Ticks compared at once."""
+
+
+class ReplayError(AloftError):
+    """A recording cannot be replayed as asked."""
+
+
+@dataclass(frozen=True)
+class Replayed:
+    """What came of a replay.
+
+    Attributes:
+        result: of the run.
+        signals: the fields of the blocks that ran, compared tick by tick.
+        states: what these remember, compared at every keyframe.
+        first_tick: where it began.
+        ran: the blocks that ran; all others were fed.
+        notes: what could not be compared, and why.
+        ticks, rows: of the replay, where they were to be kept; in ``bus``'s layout.
+    """
+
+    result: RunResult
+    bound: BoundGraph
+    signals: Comparison
+    states: Comparison
+    first_tick: int
+    ran: tuple[str, ...]
+    notes: tuple[str, ...] = ()
+    ticks: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, np.int64))
+    rows: NDArray[np.uint8] = field(default_factory=lambda: np.zeros((0, 0), np.uint8))
+
+    @property
+    def first(self) -> Difference | None:
+        """What differs first; of one tick, the state it began with before its signals."""
+        found = [d for d in (self.states.first, self.signals.first) if d is not None]
+        return min(found, key=lambda d: d.tick) if found else None
+
+    @property
+    def identical(self) -> bool:
+        """Whether every byte that was compared is the same, and nothing was left out."""
+        return self.first is None and not self.notes
+
+
+def replay(
+    recorded: Replayable,
+    *,
+    graph: CheckedGraph | None = None,
+    inputs: Inputs | None = None,
+    run: Sequence[str] | None = None,
+    first_tick: int | None = None,
+    last_tick: int | None = None,
+    keep: bool = False,
+    before_tick: BeforeTick | None = None,
+    sinks: Sequence[Sink] = (),
+) -> Replayed:
+    """Execute a recorded run again.
+
+    Args:
+        recorded: the run.
+        graph: what to run; by default what ran. Another one has other blocks or parameters.
+        inputs: ``seed``: every block runs; ``recorded``: those whose outputs come from outside
+            are fed; by default the former if a simulator is all there is outside.
+        run: run only these blocks, and feed all others.
+        first_tick: begin at the last keyframe at or before it; by default at the beginning.
+        last_tick: end before it; by default with the recording.
+        keep: whether to keep the replayed rows.
+        before_tick: called with the graph before every tick, and once after the last.
+        sinks: what else looks on.
+
+    Raises:
+        ReplayError: there is no such block or no such tick, or ticks are missing.
+        RunError: a block could not be set up.
+    """
+    graph = graph or recorded.graph
+    if not len(recorded.ticks):
+        raise ReplayError("the recording holds no tick")
+    fed = _fed(graph, inputs or default_inputs(graph), run)
+    start = _start(recorded, first_tick)
+    end = int(recorded.ticks[-1]) + 1
+    if last_tick is not None:
+        end = min(end, last_tick)
+    elif recorded.failed and not fed:
+        end += 1  # into the tick that failed
+    if end <= start:
+        raise ReplayError(f"no tick from {start} up to {end} is in the recording")
+    _expect_beginning(recorded, start)
+    _expect_no_gap(recorded, fed, start, end)
+    bound = BoundGraph(fed_graph(graph, fed))
+    bound.clock.tick = start
+    follower = Follower(recorded, bound, start, keep, before_tick)
+    result = Executor(
+        bound, clock=ClockSpec("free"), sinks=[follower, *sinks], log=False,
+        on_ready=follower.ready,
+    ).run(end - start)  # fmt: skip
+    notes = list(follower.notes)
+    if end - start - follower.seen > recorded.failed:
+        notes.append(f"it ended after {follower.seen} of {end - start} ticks: {result.reason}")
+    return Replayed(
+        result, bound, follower.signals, follower.states, start, follower.ran, tuple(notes),
+        *follower.kept(),
+    )  # fmt: skip
+
+
+def default_inputs(graph: CheckedGraph) -> Inputs:
+    """Whether a run can be repeated from its seed."""
+    real = any(spec.block_type.outside == "real" for spec in graph.blocks)
+    return "recorded" if real else "seed"
+
+
+def _fed(graph: CheckedGraph, inputs: Inputs, run: Sequence[str] | None) -> list[str]:
+    """The blocks that do not run."""
+    paths = [spec.path for spec in graph.blocks]
+    if run is not None:
+        for path in run:
+            if path not in paths:
+                raise ReplayError(f"there is no block {path!r}; there is {', '.join(paths)}")
+        return [path for path in paths if path not in run]
+    if inputs == "seed":
+        return []
+    return [spec.path for spec in graph.blocks if spec.block_type.outside != "no"]
+
+
+def _start(recorded: Replayable, first_tick: int | None) -> int:
+    """The tick to begin with: the recording's first, or a keyframe."""
+    first = int(recorded.ticks[0])
+    if first_tick is None:
+        return first
+    if not first <= first_tick <= recorded.ticks[-1]:
+        raise ReplayError(
+            f"tick {first_tick} is not in the recording, which has {first} to {recorded.ticks[-1]}"
+        )
+    keyframe = nearest_keyframe(recorded, first_tick)
+    return first if keyframe is None else keyframe
+
+
+def _expect_beginning(recorded: Replayable, start: int) -> None:
+    """What is not the beginning of a run needs a keyframe."""
+    if start > 0 and start not in recorded.keyframes:
+        raise ReplayError(
+            f"the recording begins at tick {start}, and holds nothing of what the graph "
+            "remembered there; begin at a keyframe with --from: "
+            + (", ".join(map(str, recorded.keyframes)) or "there is none")
+        )
+
+
+def _expect_no_gap(recorded: Replayable, fed: Sequence[str], start: int, end: int) -> None:
+    """Blocks can be fed only where every tick was recorded."""
+    ticks = recorded.ticks
+    if int(ticks[0]) == start == 0 and len(ticks) == ticks[-1] + 1:
+        return
+    inside = ticks[(ticks >= start) & (ticks < end)]
+    gaps = np.flatnonzero(np.diff(inside) > 1)
+    if fed and len(gaps):
+        before, after = inside[gaps[0]], inside[gaps[0] + 1]
+        raise ReplayError(
+            f"ticks {before + 1} to {after - 1} were not recorded, so blocks cannot be fed from "
+            f"the recording there; begin after them with --from {after}"
+        )
+
+
+class Follower:
+    """A sink that feeds what does not run, applies recorded parameter changes, and compares."""
+
+    def __init__(
+        self, recorded: Replayable, bound: BoundGraph, first_tick: int, keep: bool,
+        before_tick: BeforeTick | None = None,
+    ) -> None:  # fmt: skip
+        self._recorded, self._bound = recorded, bound
+        self._first, self._keep, self._before_tick = first_tick, keep, before_tick
+        memory, order = bound.memory, bound.graph.order
+        try:
+            self._feed = Feed(bound, recorded.bus)
+        except KeyError as name:
+            raise ReplayError(
+                f"{name.args[0]} is not in the recording, so its block cannot be fed from it"
+            ) from None
+        self.ran = tuple(path for path in bound.blocks if path not in self._feed.paths)
+        self._bus = Translation(recorded.bus, memory.bus.layout)
+        self._state = Translation(recorded.state, memory.state.layout)
+        if first_tick > 0:
+            self._expect_state()
+        ran = dict.fromkeys(self.ran)
+        # a recording without keyframes says nothing of state
+        states = self._state.notes if recorded.keyframes else []
+        self.notes = [note for note in (*self._bus.notes, *states) if _block(note) in ran]
+        whole = self._bus.identical and not self._feed.paths
+        names = [name for name in self._bus.names if _block(name) in ran]
+        self.signals = Comparison(memory.bus.layout, order, None if whole else names)
+        self.states = Comparison(memory.state.layout, order, self._state.names, "state")
+        self._rows = np.zeros((PIECE, memory.bus.layout.size), np.uint8)
+        self._expected = np.zeros((PIECE, recorded.bus.size), np.uint8)
+        self._ticks = np.zeros(PIECE, np.int64)
+        self._used = self.seen = 0
+        self._cursor = RowCursor(recorded)
+        self._keyframes = dict.fromkeys(recorded.keyframes)
+        self._changes = list(recorded.changes)
+        self._kept: list[tuple[NDArray[np.int64], NDArray[np.uint8]]] = []
+
+    def _expect_state(self) -> None:
+        """All that this graph remembers must be in the keyframe it begins with."""
+        for note in self._state.notes:
+            if not note.endswith(" is in the recording only"):
+                raise ReplayError(
+                    f"what the keyframe at tick {self._first} holds does not fit this graph: state "
+                    f"{note}; replay from the beginning"
+                )
+
+    def open(self, bound: BoundGraph) -> None:
+        """Nothing to do: blocks have not started."""
+
+    def ready(self) -> None:
+        """Restore the keyframe it begins with, and prepare the first tick."""
+        if self._first > 0:  # at the beginning blocks are as they start
+            self._restore(self._recorded.keyframe(self._first))
+        self._prepare(self._first)
+
+    def record(self, tick: int) -> None:
+        """Keep the tick for comparison, and prepare the next one."""
+        self.seen += 1
+        row = self._cursor.at(tick)
+        if row is not None:
+            self._expected[self._used] = row
+            self._rows[self._used] = self._bound.memory.bus.buffer
+            self._ticks[self._used] = tick
+            self._used += 1
+            if self._used == PIECE:
+                self._compare()
+        if tick + 1 in self._keyframes:
+            self._compare_state(tick + 1)
+        self._prepare(tick + 1)
+
+    def close(self) -> None:
+        """Compare what is left."""
+        self._compare()
+
+    def kept(self) -> tuple[NDArray[np.int64], NDArray[np.uint8]]:
+        """The replayed ticks and rows, none if they were not to be kept."""
+        if not self._kept:
+            return np.zeros(0, np.int64), np.zeros((0, self._rows.shape[1]), np.uint8)
+        ticks, rows = zip(*self._kept, strict=True)
+        return np.concatenate(ticks), np.concatenate(rows)
+
+    def _prepare(self, tick: int) -> None:
+        while self._changes and self._changes[0].tick <= tick:
+            change = self._changes.pop(0)
+            block = self._bound.blocks.get(change.path.partition(".")[0])
+            if block is not None and not isinstance(block, Fed):
+                parameters = self._bound.parameters
+                parameters.apply(adjust(self._bound.blocks, {change.path: change.new}), tick)
+        if self._feed.paths:
+            row = self._cursor.at(tick)
+            if row is not None:
+                self._feed.show(row)
+        if self._before_tick is not None:
+            self._before_tick(self._bound, tick)
+
+    def _restore(self, keyframe: Snapshot) -> None:
+        """Bus and state of a keyframe, as far as this graph has the same."""
+        memory = self._bound.memory
+        bus = np.frombuffer(keyframe.bus, np.uint8)
+        state = np.frombuffer(keyframe.state, np.uint8)
+        for translation, region, data in (
+            (self._bus, memory.bus, bus), (self._state, memory.state, state),
+        ):  # fmt: skip
+            translation.write(data, region.buffer)
+        self._bound.clock.tick = self._first
+        for block in self._bound.blocks.values():
+            block.thaw()
+
+    def _compare(self) -> None:
+        if not self._used:
+            return
+        ticks, rows = self._ticks[: self._used], self._rows[: self._used]
+        self.signals.add(ticks, self._bus.rows(self._expected[: self._used]), rows)
+        if self._keep:
+            self._kept.append((ticks.copy(), rows.copy()))
+        self._used = 0
+
+    def _compare_state(self, tick: int) -> None:
+        was = np.frombuffer(self._recorded.keyframe(tick).state, np.uint8)[None]
+        now = np.frombuffer(self._bound.snapshot().state, np.uint8)[None]
+        self.states.add(np.array([tick]), self._state.rows(was), now)
+
+
+def _block(name: str) -> str:
+    """The block's path in ``block.port.field``, also at the start of a note."""
+    return name.split(" ", 1)[0].rpartition(".")[0].rpartition(".")[0]

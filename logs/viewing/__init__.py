@@ -1,0 +1,1 @@
+"""What a recording shows: the robot in 3D, its states, and time series."""

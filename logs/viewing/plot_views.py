@@ -1,0 +1,135 @@
+"""Time series laid out from the graph: one view a field, called by its name and unit, with its
+limits; and views in which several fields, or the same field of two runs, lie over one another."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..file.format import LIMITS, SIGNALS, Header, RecordedField, entity_of
+from .limits import limits_of
+from .scene_ports import ScenePorts, block_of, ports_of
+from .signal_names import AXES, element_names
+
+MAIN_FIELDS = ("contact_force", "motor_torque", "motor_speed")
+"""Of the port that poses the robot, in the first tab beside centre of mass and base."""
+MOST_PLOTS = 5
+"""Shown first of a graph without a robot."""
+OTHER = np.array([0xFFA726FF, 0xC0CA33FF, 0x26C6DAFF], np.uint32)
+"""x, y and z of what lies over the true values: an estimate, the other run."""
+DARK = np.array([0x8E3B38FF, 0x3E6B40FF, 0x2B628EFF], np.uint32)
+"""x, y and z of a plan, below the true values."""
+
+
+@dataclass(frozen=True)
+class Shown:
+    """A run in the stream: the ``root`` of its entities and, if there are several, its ``label``."""
+
+    root: str = ""
+    label: str = ""
+
+
+@dataclass(frozen=True)
+class Line:
+    """A field in a plot; ``label`` says what it is beside the others, ``colors`` are of x, y, z."""
+
+    field: RecordedField
+    label: str = ""
+    colors: NDArray[np.uint32] | None = None
+
+
+def field_plot(header: Header, field: RecordedField, shown: Sequence[Shown]) -> Any:
+    """One field by itself."""
+    return plot(header, field.name, [Line(field)], shown)
+
+
+def plot(header: Header, name: str, lines: Sequence[Line], shown: Sequence[Shown]) -> Any:
+    """Several fields of one unit in one view, of every run."""
+    import rerun.blueprint as rrb
+
+    if len(shown) > 1 and len(lines) > 1:
+        lines = lines[:1]  # of several runs only what is true, or else nobody could tell them apart
+    first = lines[0].field
+    unit = f" [{first.unit}]" if first.unit not in (None, "", "1") else ""
+    frame = f", {first.frame}" if first.frame else ""
+    entities, overrides = [], {}
+    for k, run in enumerate(shown):
+        for line in lines:
+            entity = run.root + entity_of(SIGNALS, line.field.name)
+            entities.append(entity)
+            label = run.label or line.label
+            if label:
+                overrides[entity] = _series(header, line, label, other=k > 0)
+    if limits_of(first, header):
+        entities.append(shown[0].root + entity_of(LIMITS, first.name))
+    return rrb.TimeSeriesView(
+        origin="/", contents=entities, name=f"{name}{unit}{frame}", overrides=overrides or None
+    )
+
+
+def _series(header: Header, line: Line, label: str, *, other: bool) -> Any:
+    """The legend of a field that is not alone in its plot."""
+    import rerun as rr
+
+    names = [f"{label} {name}" for name in element_names(line.field, header.robot)]
+    colors = None
+    if line.field.shape == (3,):
+        colors = OTHER if other else AXES if line.colors is None else line.colors
+    widths = [1.0 if other or line.label in ("estimated", "planned") else 2.0] * len(names)
+    return rr.SeriesLines(names=names, colors=colors, widths=widths)
+
+
+def main_plots(header: Header, ports: ScenePorts | None, shown: Sequence[Shown]) -> list[Any]:
+    """What to look at first: the robot's motion, true, estimated and planned, forces and motors;
+    of a graph without a robot its first fields."""
+    fields = {field.name: field for field in header.bus.fields if not field.constant}
+    if ports is None:
+        return [field_plot(header, field, shown) for field in list(fields.values())[:MOST_PLOTS]]
+    base = ports.pose.base_position
+    velocity = next(
+        (n for end in ("base_linear_velocity", "linear_velocity")
+         if (n := f"{block_of(base)}.{end}") in fields),
+        "",
+    )  # fmt: skip
+    estimate = ports.estimate.base_position if ports.estimate else ""
+    overlays = (
+        ("centre of mass", ports.com or "", "", f"{ports.plan}.com"),
+        ("base", base, estimate, ""),
+        ("velocity of the base", velocity, f"{block_of(estimate)}.linear_velocity", ""),
+    )
+    plots = []
+    for name, actual, guess, plan in overlays:
+        known = (("planned", plan, DARK), ("", actual, AXES), ("estimated", guess, OTHER))
+        lines = [Line(fields[n], label, c) for label, n, c in known if n in fields]
+        if lines:
+            lines.sort(key=lambda line: line.label != "")  # the true one first: it names the unit
+            plots.append(plot(header, name, [_named(line) for line in lines], shown))
+    names = [f"{block_of(base)}.{field}" for field in MAIN_FIELDS]
+    plots += [field_plot(header, fields[name], shown) for name in names if name in fields]
+    return plots
+
+
+def _named(line: Line) -> Line:
+    return line if line.label else Line(line.field, "true", line.colors)
+
+
+def block_tabs(header: Header, shown: Sequence[Shown]) -> list[Any]:
+    """One tab a block, in it all its signals but for great matrices."""
+    import rerun.blueprint as rrb
+
+    tabs: dict[str, list[Any]] = {}
+    for port, fields in ports_of(header).items():
+        for field in fields.values():
+            if len(element_names(field, None)) or not field.shape:
+                view = plot(
+                    header, f"{port.rpartition('.')[2]}.{field.field_name}", [Line(field)], shown
+                )
+                tabs.setdefault(block_of(port), []).append(view)
+    return [
+        rrb.Grid(*views, grid_columns=2 if len(views) > 3 else 1, name=block)
+        for block, views in tabs.items()
+    ]

@@ -1,0 +1,64 @@
+"""The robot in 3D, with all that the graph says about its contacts, its motion and its plan."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ..file.format import EVENTS, Header, RecordedRows
+from ..file.time_columns import time_columns
+from .flights import SHORTEST_FLIGHT, Flights
+from .scene_contacts import ContactPart
+from .scene_motion import FootTargetPart, MassCentrePart, PlanPart
+from .scene_part import Colors, Moments
+from .scene_ports import ScenePorts
+from .scene_push import PushPart
+from .scene_robot import RobotPart
+
+PICTURE_RATE = 100.0
+"""Pictures a second [Hz]: more than an eye sees, a fifth of the bytes."""
+PARTS = (RobotPart, ContactPart, MassCentrePart, PlanPart, FootTargetPart, PushPart)
+
+
+class Scene:
+    """Writes the scene to a Rerun ``stream``, batch by batch, below ``root``."""
+
+    def __init__(
+        self, stream: Any, header: Header, ports: ScenePorts, root: str, colors: Colors
+    ) -> None:
+        self._stream, self._header, self._ports = stream, header, ports
+        self._root = root
+        self._every = max(1, round(header.base_rate / PICTURE_RATE))
+        self._parts = [part(stream, header, ports, f"{root}world", colors) for part in PARTS]
+        self._flights = Flights(max(1, round(SHORTEST_FLIGHT * header.base_rate)))
+
+    def write_static(self) -> None:
+        """Write what does not move."""
+        import rerun as rr
+
+        self._stream.log(f"{self._root}world", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
+        for part in self._parts:
+            part.write_static()
+
+    def write(self, batch: RecordedRows) -> None:
+        """Write the ticks of a batch that are due, and the flights that ended in it."""
+        due = np.flatnonzero(batch.ticks % self._every == 0)
+        if len(due):
+            moments = Moments(batch, due, time_columns(self._header, batch.ticks[due]))
+            for part in self._parts:
+                part.write(moments)
+        self._write_flights(batch)
+
+    def _write_flights(self, batch: RecordedRows) -> None:
+        import rerun as rr
+
+        if self._ports.contact_force is None:
+            return
+        loaded = (batch.signal(self._ports.contact_force) != 0.0).any(axis=2)
+        events = self._flights.add(batch.ticks, loaded)
+        if events:
+            times = time_columns(self._header, np.array([tick for tick, _ in events]))
+            texts = [text for _, text in events]
+            columns = rr.TextLog.columns(text=texts, level=["INFO"] * len(texts))
+            self._stream.send_columns(f"{self._root}{EVENTS}", times, columns)

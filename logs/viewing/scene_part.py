@@ -1,0 +1,83 @@
+"""What the parts of the 3D scene have in common: where they write to, and the instants drawn."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...robots.description import RobotDescription
+from ...robots.kinematics import LinkPoses, link_poses
+from ..file.format import Header, RecordedRows
+from .scene_ports import PoseSource, ScenePorts
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Colors:
+    """What belongs to one run is drawn in its colours, as 0xRRGGBBAA."""
+
+    robot: int = 0x90A4AEFF
+    estimate: int = 0x42A5F5FF
+    force: int = 0xE53935FF
+    cone: int = 0xFFB74DFF
+    com: int = 0xFDD835FF
+    plan: int = 0x66BB6AFF
+    target: int = 0xAB47BCFF
+    support: int = 0x26C6DAFF
+    push: int = 0xFF4081FF
+
+
+OTHER_RUN = Colors(robot=0xD7A86EFF, estimate=0xFFCC80FF, force=0xB71C1CFF, com=0xFB8C00FF)
+"""The colours of the run that another is compared with."""
+
+
+@dataclass(frozen=True)
+class Moments:
+    """The instants of a batch that are drawn: ``due`` of its ticks, with their ``times``."""
+
+    batch: RecordedRows
+    due: NDArray[np.int64]
+    times: list[Any]
+
+    def __len__(self) -> int:
+        return len(self.due)
+
+    def __getitem__(self, name: str) -> NDArray[Any]:
+        """A signal at these instants, (n, ...)."""
+        return self.batch.signal(name)[self.due]
+
+    def poses(self, robot: RobotDescription, source: PoseSource) -> LinkPoses:
+        """Where the links are at these instants."""
+        base, orientation = self[source.base_position], self[source.base_orientation]
+        return link_poses(robot, base, orientation, self[source.joint_position])
+
+
+class ScenePart:
+    """One thing in the scene: ``write_static`` once, ``write`` for every batch."""
+
+    def __init__(
+        self, stream: Any, header: Header, ports: ScenePorts, world: str, colors: Colors
+    ) -> None:
+        assert header.robot is not None
+        self.stream, self.header, self.ports = stream, header, ports
+        self.robot: RobotDescription = header.robot
+        self.world, self.colors = world, colors
+
+    def write_static(self) -> None:
+        """Write what does not change: shapes, colours, sizes."""
+
+    def write(self, moments: Moments) -> None:
+        """Write these instants."""
+        raise NotImplementedError
+
+    def log(self, name: str, what: Any) -> None:
+        """Write something static about an entity below ``world``."""
+        self.stream.log(f"{self.world}/{name}", what, static=True)
+
+    def send(self, name: str, moments: Moments, columns: Any) -> None:
+        """Write columns, a row an instant, to an entity below ``world``."""
+        self.stream.send_columns(f"{self.world}/{name}", moments.times, columns)

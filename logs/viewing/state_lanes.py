@@ -1,0 +1,85 @@
+"""Changes of what has few values, a lane each in the viewer's state timeline: phases, contacts,
+whether a problem was solved."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...robots.description import RobotDescription
+from ..file.format import STATES, RecordedField, RecordedRows, entity_of
+from .signal_names import element_names
+
+PALETTE = (
+    0x78909CFF, 0x26A69AFF, 0xFFA726FF, 0x42A5F5FF, 0xAB47BCFF, 0x66BB6AFF, 0xE53935FF, 0xFDD835FF,
+)  # fmt: skip
+NO, YES, BAD = 0x455A64FF, 0x43A047FF, 0xE53935FF
+MOST_LANES = 8
+"""A field with more truth values than this has no lanes."""
+
+
+@dataclass(frozen=True)
+class Lane:
+    """One lane: its entity, the ``element`` of ``field`` it shows, and label and colour by value;
+    ``told`` if its changes are events, too."""
+
+    entity: str
+    field: RecordedField
+    element: int
+    labels: Mapping[int, str]
+    colors: tuple[int, ...]
+    told: bool
+
+
+def lanes_of(field: RecordedField, robot: RobotDescription | None) -> list[Lane]:
+    """The lanes of a field: none for most fields."""
+    entity = entity_of(STATES, field.name)
+    if field.values and not field.shape:
+        colors = tuple(PALETTE[k % len(PALETTE)] for k in range(len(field.values)))
+        return [Lane(entity, field, 0, field.values, colors, told=True)]
+    if field.dtype != "bool":
+        return []
+    labels = {0: "no", 1: field.field_name}
+    if not field.shape:
+        good = field.field_name in ("solved", "reachable")
+        colors = (BAD, YES) if good else (NO, YES)
+        return [Lane(entity, field, 0, labels | ({0: "failed"} if good else {}), colors, told=good)]
+    names = element_names(field, robot)
+    if len(names) > MOST_LANES:
+        return []
+    return [
+        Lane(f"{entity}/{name.replace(' ', '_')}", field, k, labels, (NO, YES), told=False)
+        for k, name in enumerate(names)
+    ]
+
+
+@dataclass(frozen=True)
+class Changes:
+    """When a lane changed, (n,) ticks, and to what."""
+
+    lane: Lane
+    ticks: NDArray[np.int64]
+    labels: list[str]
+
+
+class LaneReader:
+    """Finds the changes in batches of rows that come in order."""
+
+    def __init__(self, lanes: list[Lane]) -> None:
+        self._lanes = lanes
+        self._last: dict[str, int] = {}
+
+    def changes(self, batch: RecordedRows) -> Iterator[Changes]:
+        """What changed in this batch; the first batch begins with a change."""
+        for lane in self._lanes:
+            values = batch.signal(lane.field.name)
+            numbers = values.reshape(len(values), -1)[:, lane.element].astype(np.int64)
+            last = self._last.get(lane.entity, int(numbers[0]) - 1)
+            self._last[lane.entity] = int(numbers[-1])
+            changed = np.flatnonzero(np.diff(numbers, prepend=last))
+            if len(changed):
+                labels = [lane.labels.get(int(n), str(n)) for n in numbers[changed]]
+                yield Changes(lane, batch.ticks[changed], labels)

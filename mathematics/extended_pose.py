@@ -1,0 +1,122 @@
+"""The matrix Lie group SE_m(3): an orientation and m vectors of one world, as pure functions.
+
+An element is a unit quaternion x, y, z, w from body to world and m vectors (m, 3) [world]:
+velocity, position and contact points. As a matrix it is [[R, V], [0, I]] with the vectors as the
+columns of V, so the product turns the right element's vectors by the left one's orientation and
+adds. A tangent vector (3 + 3 m) is a rotation vector [rad], then one rate for each vector; as a
+matrix [[phi]x, Xi], zeros below. Nothing here allocates.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .kernel import kernel
+from .rotations import exponential as rotation_exponential
+from .rotations import logarithm as rotation_logarithm
+from .rotations import multiply, normalise, rotate
+
+Array = NDArray[np.float64]
+
+_SMALL = 1e-4
+"""Below this angle [rad] the coefficients come from their series, which is then exact."""
+
+
+@kernel
+def bend(phi: Array, vector: Array, out: Array) -> None:
+    """The left Jacobian of SO(3) at ``phi`` times a vector: what it becomes while being turned.
+
+    J v = v + (1 - cos a) / a^2 phi x v + (a - sin a) / a^3 phi x (phi x v), with a the angle.
+    """
+    x, y, z = float(phi[0]), float(phi[1]), float(phi[2])
+    a, b, c = float(vector[0]), float(vector[1]), float(vector[2])
+    square = x * x + y * y + z * z
+    angle = math.sqrt(square)
+    if angle < _SMALL:
+        first, second = 0.5 - square / 24.0, 1.0 / 6.0 - square / 120.0
+    else:
+        half = math.sin(0.5 * angle) / angle
+        first, second = 2.0 * half * half, (angle - math.sin(angle)) / (angle * square)
+    tx, ty, tz = y * c - z * b, z * a - x * c, x * b - y * a
+    out[0] = a + first * tx + second * (y * tz - z * ty)
+    out[1] = b + first * ty + second * (z * tx - x * tz)
+    out[2] = c + first * tz + second * (x * ty - y * tx)
+
+
+@kernel
+def unbend(phi: Array, vector: Array, out: Array) -> None:
+    """The inverse of ``bend``, for angles below 2 pi.
+
+    J^-1 v = v - phi x v / 2 + (1 / a^2 - (1 + cos a) / (2 a sin a)) phi x (phi x v).
+    """
+    x, y, z = float(phi[0]), float(phi[1]), float(phi[2])
+    a, b, c = float(vector[0]), float(vector[1]), float(vector[2])
+    square = x * x + y * y + z * z
+    angle = math.sqrt(square)
+    if angle < _SMALL:
+        second = 1.0 / 12.0 + square / 720.0
+    else:
+        # (1 + cos a) / sin a = cot(a / 2), which has no pole at pi.
+        half = 0.5 * angle
+        second = (1.0 - half * math.cos(half) / math.sin(half)) / square
+    tx, ty, tz = y * c - z * b, z * a - x * c, x * b - y * a
+    out[0] = a - 0.5 * tx + second * (y * tz - z * ty)
+    out[1] = b - 0.5 * ty + second * (z * tx - x * tz)
+    out[2] = c - 0.5 * tz + second * (x * ty - y * tx)
+
+
+@kernel
+def exponential(tangent: Array, orientation: Array, vectors: Array) -> None:
+    """The group element of a tangent vector, written to ``orientation`` and ``vectors``."""
+    rotation_exponential(tangent, orientation)
+    for k in range(vectors.shape[0]):
+        bend(tangent, tangent[3 * k + 3 : 3 * k + 6], vectors[k])
+
+
+@kernel
+def logarithm(orientation: Array, vectors: Array, tangent: Array) -> None:
+    """The tangent vector of a group element, its rotation at most pi."""
+    rotation_logarithm(orientation, tangent)
+    for k in range(vectors.shape[0]):
+        unbend(tangent, vectors[k], tangent[3 * k + 3 : 3 * k + 6])
+
+
+@kernel
+def divide(
+    left: Array, left_vectors: Array, right: Array, right_vectors: Array,
+    orientation: Array, vectors: Array, spare: Array,
+) -> None:  # fmt: skip
+    """``left`` times the inverse of ``right``: the right-invariant error of ``left``.
+
+    Args:
+        orientation, vectors: the result; none of the arguments.
+        spare: scratch (4,).
+    """
+    for i in range(3):
+        spare[i] = -float(right[i])
+    spare[3] = float(right[3])
+    multiply(left, spare, orientation)
+    for k in range(vectors.shape[0]):
+        rotate(orientation, right_vectors[k], vectors[k])
+        for i in range(3):
+            vectors[k, i] = float(left_vectors[k, i]) - float(vectors[k, i])
+
+
+@kernel
+def retract(tangent: Array, orientation: Array, vectors: Array, turn: Array, spare: Array) -> None:
+    """The element becomes exp(``tangent``) times itself: a correction expressed in the world.
+
+    Args:
+        turn, spare: scratch, (4,) and (3,).
+    """
+    rotation_exponential(tangent, turn)
+    multiply(turn, orientation, orientation)
+    normalise(orientation, orientation)
+    for k in range(vectors.shape[0]):
+        bend(tangent, tangent[3 * k + 3 : 3 * k + 6], spare)
+        rotate(turn, vectors[k], vectors[k])
+        for i in range(3):
+            vectors[k, i] += spare[i]

@@ -1,0 +1,146 @@
+"""How the right-invariant error of an inertial estimate grows in one period, and its covariance.
+
+The error of a state is a vector (n): the logarithm of estimate times inverse truth on SE_{2+N}(3)
+(rotation, velocity, position, N contact points, all in the world), then estimate minus truth of the
+gyroscope's bias, the accelerometer's bias and further constants. Without biases it obeys a linear
+equation that does not depend on the trajectory (Hartley et al. 2020, theorem 1): gravity turns an
+error of tilt into one of velocity, and that into one of position::
+
+    xi_R' = 0,   xi_v' = [g]x xi_R,   xi_p' = xi_v,   xi_d' = 0
+
+A bias enters through the adjoint of the estimate. Nothing here allocates.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .kernel import kernel
+
+Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+Indices = NDArray[np.int64]
+
+
+@kernel
+def drift(gravity: float, period: float, transition: Array) -> None:
+    """The constant part of the transition matrix (n, n): exp of the equation above."""
+    for i in range(transition.shape[0]):
+        for k in range(transition.shape[1]):
+            transition[i, k] = 1.0 if i == k else 0.0
+    # [g]x of (0, 0, -gravity)
+    transition[3, 1], transition[4, 0] = gravity * period, -gravity * period
+    transition[6, 1] = 0.5 * gravity * period * period
+    transition[7, 0] = -0.5 * gravity * period * period
+    for i in range(3):
+        transition[6 + i, 3 + i] = period
+
+
+@kernel
+def spread(
+    rotation: Array, vectors: Array, present: Flags, gravity: float, period: float, reach: Array
+) -> None:
+    """What a constant error of the IMU does to the state's in one period: ``reach`` (n, 6).
+
+    Its columns are for angular velocity [rad/s, body] and specific force [m/s^2, body]: minus the
+    adjoint of the estimate, integrated to second order.
+
+    Args:
+        rotation: the estimated orientation (3, 3), in the middle of the period.
+        vectors: estimated velocity, position and contact points (2 + N, 3), there too.
+        present: which contact points are in the state, (N,); the others do not move.
+    """
+    for j in range(3):
+        x, y, z = float(rotation[0, j]), float(rotation[1, j]), float(rotation[2, j])
+        reach[0, j], reach[1, j], reach[2, j] = -period * x, -period * y, -period * z
+        for k in range(vectors.shape[0]):
+            row = 3 * k + 3
+            if k >= 2 and not present[k - 2]:
+                reach[row, j] = reach[row + 1, j] = reach[row + 2, j] = 0.0
+                continue
+            a, b, c = float(vectors[k, 0]), float(vectors[k, 1]), float(vectors[k, 2])
+            if k == 0:  # half a period of the error of tilt that grows meanwhile
+                c -= 0.5 * gravity * period
+            elif k == 1:
+                a += 0.5 * period * float(vectors[0, 0])
+                b += 0.5 * period * float(vectors[0, 1])
+                c += 0.5 * period * float(vectors[0, 2])
+            reach[row, j] = -period * (b * z - c * y)
+            reach[row + 1, j] = -period * (c * x - a * z)
+            reach[row + 2, j] = -period * (a * y - b * x)
+        reach[3, j + 3], reach[4, j + 3], reach[5, j + 3] = -period * x, -period * y, -period * z
+        half = -0.5 * period * period
+        reach[6, j + 3], reach[7, j + 3], reach[8, j + 3] = half * x, half * y, half * z
+
+
+@kernel
+def grow(
+    transition: Array, reach: Array, bias: int, noise: Array, covariance: Array,
+    scaled: Array, product: Array,
+) -> None:  # fmt: skip
+    """One period of the covariance (n, n): F P F' + W W', W being the noise of the IMU's samples.
+
+    Args:
+        transition: F; its columns of the biases become ``reach``.
+        bias: the index of the first of six bias columns.
+        noise: standard deviations of angular velocity and specific force, (6,).
+        scaled, product: scratch, (n, 6) and (n, n).
+    """
+    transition[:bias, bias : bias + 6] = reach[:bias]
+    np.dot(transition, covariance, product)
+    np.dot(product, transition.T, covariance)
+    np.multiply(reach, noise, scaled)
+    np.dot(scaled, scaled.T, product)
+    np.add(covariance, product, covariance)
+    np.add(covariance, covariance.T, product)  # symmetric to the last bit
+    np.multiply(product, 0.5, covariance)
+
+
+@kernel
+def deviation(covariance: Array, first: int, vector: Array) -> float:
+    """The standard deviation of the norm of a vector's own error.
+
+    The error of a vector u is xi_u and what the error of rotation does to it: xi_u + xi_R x u.
+
+    Args:
+        first: the index of xi_u in the error.
+        vector: u, (3,).
+    """
+    total = 0.0
+    for i in range(3):
+        j, k = (i + 1) % 3, (i + 2) % 3
+        a, b = float(vector[k]), -float(vector[j])  # (xi_R x u)_i = u_k xi_j - u_j xi_k
+        total += float(covariance[first + i, first + i])
+        total += 2.0 * (a * float(covariance[first + i, j]) + b * float(covariance[first + i, k]))
+        total += a * a * float(covariance[j, j]) + b * b * float(covariance[k, k])
+        total += 2.0 * a * b * float(covariance[j, k])
+    return math.sqrt(total) if total > 0.0 else 0.0
+
+
+@kernel
+def inflate(
+    reading: Array, limit: float, noise: float, doubt: float, run: Indices, out: Array
+) -> bool:
+    """The standard deviation of a sample's axes; whether one of them is at the end of its range.
+
+    What a saturated sample is off by lasts, so the n-th in a row does not add to the errors before
+    it like new noise, as the root of n, but like one error, as n.
+
+    Args:
+        reading: a sample, (3,). limit: of its range.
+        noise, doubt: the deviations of an axis inside the range and at its end.
+        run: for how many samples in a row every axis has been there; brought up to date.
+    """
+    any_full = False
+    for axis in range(3):
+        out[axis] = noise
+        if abs(float(reading[axis])) >= 0.999 * limit:
+            run[axis] += 1
+            out[axis] = doubt * math.sqrt(2.0 * int(run[axis]) - 1.0)
+            any_full = True
+        else:
+            run[axis] = 0
+    return any_full

@@ -1,0 +1,80 @@
+"""The measurement update of a Kalman filter, three rows at a time, as pure functions.
+
+The error e of the estimate has covariance P (n, n). A measurement says what the residual
+r = -H e + noise is, so the estimate is corrected by K r. Rows that are not needed are zero in H and
+r, with a noise of one. Nothing here allocates.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .kernel import kernel
+
+Array = NDArray[np.float64]
+
+
+@kernel
+def invert(matrix: Array, out: Array) -> None:
+    """The inverse of a symmetric matrix (3, 3); zero where it has none."""
+    a, b, c = float(matrix[0, 0]), float(matrix[0, 1]), float(matrix[0, 2])
+    d, e, f = float(matrix[1, 1]), float(matrix[1, 2]), float(matrix[2, 2])
+    aa, bb, cc = d * f - e * e, c * e - b * f, b * e - c * d
+    determinant = a * aa + b * bb + c * cc
+    scale = 1.0 / determinant if abs(determinant) > 1e-300 else 0.0
+    out[0, 0], out[0, 1], out[0, 2] = scale * aa, scale * bb, scale * cc
+    out[1, 0], out[1, 1], out[1, 2] = scale * bb, scale * (a * f - c * c), scale * (b * c - a * e)
+    out[2, 0], out[2, 1], out[2, 2] = scale * cc, scale * (b * c - a * e), scale * (a * d - b * b)
+
+
+@kernel
+def weigh(
+    covariance: Array, sensitivity: Array, noise: Array, residual: Array,
+    seen: Array, inverse: Array, spare: Array,
+) -> float:  # fmt: skip
+    """How unlikely a residual is: r' S^-1 r with S = H P H' + N, chi-squared with three degrees.
+
+    Args:
+        sensitivity: H, (3, n). noise: N, (3, 3). residual: r, (3,).
+        seen, inverse: become P H' (n, 3) and S^-1 (3, 3), for ``correct``.
+        spare: scratch (3, 3).
+    """
+    np.dot(covariance, sensitivity.T, seen)
+    np.dot(sensitivity, seen, spare)
+    np.add(spare, noise, spare)
+    invert(spare, inverse)
+    total = 0.0
+    for i in range(3):
+        for k in range(3):
+            total += float(residual[i]) * float(inverse[i, k]) * float(residual[k])
+    return total
+
+
+@kernel
+def correct(
+    covariance: Array, sensitivity: Array, noise: Array, residual: Array,
+    seen: Array, inverse: Array, gain: Array, product: Array, correction: Array,
+) -> None:  # fmt: skip
+    """Update the covariance in Joseph's form, (I - K H) P (I - K H)' + K N K', after ``weigh``.
+
+    The form is a sum of squares: whatever rounding does to K, the result stays positive. It is
+    made symmetric to the last bit.
+
+    Args:
+        seen, inverse: from ``weigh``; the first is overwritten.
+        gain: becomes K, (n, 3). product: scratch (n, n).
+        correction: becomes K r, (n,).
+    """
+    np.dot(seen, inverse, gain)
+    np.dot(gain, residual, correction)
+    np.dot(gain, seen.T, product)
+    np.subtract(covariance, product, covariance)  # (I - K H) P
+    np.dot(covariance, sensitivity.T, seen)
+    np.dot(seen, gain.T, product)
+    np.subtract(covariance, product, covariance)
+    np.dot(gain, noise, seen)
+    np.dot(seen, gain.T, product)
+    np.add(covariance, product, covariance)
+    np.add(covariance, covariance.T, product)
+    np.multiply(product, 0.5, covariance)

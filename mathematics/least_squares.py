@@ -1,0 +1,50 @@
+"""Small dense least squares as pure functions that allocate nothing."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .kernel import kernel
+
+Array = NDArray[np.float64]
+
+
+@kernel
+def solve_damped(rows: Array, damping: float, normal: Array, vector: Array) -> None:
+    """Solve (A'A + damping^2 I) x = A'b in place: ``vector`` is A'b and becomes x.
+
+    Args:
+        rows: A, (m, n), contiguous.
+        damping: above zero, in A's unit; what keeps x finite where A has no full rank.
+        normal: scratch (n, n).
+    """
+    np.dot(rows.T, rows, normal)
+    for i in range(normal.shape[0]):
+        normal[i, i] += damping * damping
+    solve_positive(normal, vector)
+
+
+@kernel
+def solve_positive(matrix: Array, vector: Array) -> None:
+    """Solve a symmetric positive definite system in place: ``vector`` becomes the solution.
+
+    By LDL'; ``matrix`` is overwritten. A pivot that rounding has made not positive is skipped.
+    """
+    n = vector.shape[0]
+    for j in range(n):
+        pivot = float(matrix[j, j])
+        inverse_pivot = 1.0 / pivot if pivot > 1e-300 else 0.0
+        for i in range(j + 1, n):
+            factor = float(matrix[i, j]) * inverse_pivot
+            for k in range(j + 1, i + 1):
+                matrix[i, k] -= factor * float(matrix[k, j])
+            vector[i] -= factor * float(vector[j])
+        vector[j] *= inverse_pivot
+        for i in range(j + 1, n):
+            matrix[j, i] = float(matrix[i, j]) * inverse_pivot
+    for j in range(n - 2, -1, -1):
+        value = float(vector[j])
+        for i in range(j + 1, n):
+            value -= float(matrix[j, i]) * float(vector[i])
+        vector[j] = value

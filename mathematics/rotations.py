@@ -1,0 +1,239 @@
+"""Rotations as pure functions over arrays: quaternions, matrices, exponential and logarithm.
+
+A quaternion is x, y, z, w (Hamilton) and takes body vectors to the world. Functions write their
+result into ``out``, which may be the same array as an argument, and allocate nothing. Angles are
+in rad. Scalars are read with ``float``: Python's own arithmetic is faster than NumPy's on them.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .kernel import kernel
+
+Array = NDArray[np.float64]
+
+_SMALL = 1e-8
+"""Below this angle [rad] the series to second order is exact to the last bit."""
+
+
+@kernel
+def cross(a: Array, b: Array, out: Array) -> None:
+    """The cross product of two three-vectors."""
+    ax, ay, az = float(a[0]), float(a[1]), float(a[2])
+    bx, by, bz = float(b[0]), float(b[1]), float(b[2])
+    out[0] = ay * bz - az * by
+    out[1] = az * bx - ax * bz
+    out[2] = ax * by - ay * bx
+
+
+@kernel
+def skew(vector: Array, out: Array) -> None:
+    """The matrix (3, 3) whose product with b is the cross product of ``vector`` and b."""
+    x, y, z = float(vector[0]), float(vector[1]), float(vector[2])
+    out[0, 0] = out[1, 1] = out[2, 2] = 0.0
+    out[0, 1], out[0, 2], out[1, 2] = -z, y, -x
+    out[1, 0], out[2, 0], out[2, 1] = z, -y, x
+
+
+@kernel
+def normalise(quaternion: Array, out: Array) -> None:
+    """The unit quaternion of the same direction; the identity where there is no direction."""
+    x, y, z, w = (
+        float(quaternion[0]),
+        float(quaternion[1]),
+        float(quaternion[2]),
+        float(quaternion[3]),
+    )
+    largest = max(abs(x), abs(y), abs(z), abs(w))
+    if largest == 0.0:
+        out[0] = out[1] = out[2] = 0.0
+        out[3] = 1.0
+        return
+    # Scaling first keeps the squares of very large and very small numbers representable.
+    x, y, z, w = x / largest, y / largest, z / largest, w / largest
+    norm = math.sqrt(x * x + y * y + z * z + w * w)
+    out[0], out[1], out[2], out[3] = x / norm, y / norm, z / norm, w / norm
+
+
+@kernel
+def conjugate(quaternion: Array, out: Array) -> None:
+    """The inverse of a unit quaternion."""
+    w = float(quaternion[3])
+    out[0], out[1], out[2] = -float(quaternion[0]), -float(quaternion[1]), -float(quaternion[2])
+    out[3] = w
+
+
+@kernel
+def multiply(a: Array, b: Array, out: Array) -> None:
+    """The quaternion product: first the rotation ``b``, then ``a``."""
+    ax, ay, az, aw = float(a[0]), float(a[1]), float(a[2]), float(a[3])
+    bx, by, bz, bw = float(b[0]), float(b[1]), float(b[2]), float(b[3])
+    out[0] = aw * bx + ax * bw + ay * bz - az * by
+    out[1] = aw * by - ax * bz + ay * bw + az * bx
+    out[2] = aw * bz + ax * by - ay * bx + az * bw
+    out[3] = aw * bw - ax * bx - ay * by - az * bz
+
+
+@kernel
+def rotate(quaternion: Array, vector: Array, out: Array) -> None:
+    """``vector`` turned by a unit quaternion: from body to world."""
+    x, y, z, w = (
+        float(quaternion[0]),
+        float(quaternion[1]),
+        float(quaternion[2]),
+        float(quaternion[3]),
+    )
+    a, b, c = float(vector[0]), float(vector[1]), float(vector[2])
+    tx, ty, tz = 2.0 * (y * c - z * b), 2.0 * (z * a - x * c), 2.0 * (x * b - y * a)
+    out[0] = a + w * tx + y * tz - z * ty
+    out[1] = b + w * ty + z * tx - x * tz
+    out[2] = c + w * tz + x * ty - y * tx
+
+
+@kernel
+def rotate_back(quaternion: Array, vector: Array, out: Array) -> None:
+    """``vector`` turned by the inverse of a unit quaternion: from world to body."""
+    x, y, z, w = (
+        -float(quaternion[0]),
+        -float(quaternion[1]),
+        -float(quaternion[2]),
+        float(quaternion[3]),
+    )
+    a, b, c = float(vector[0]), float(vector[1]), float(vector[2])
+    tx, ty, tz = 2.0 * (y * c - z * b), 2.0 * (z * a - x * c), 2.0 * (x * b - y * a)
+    out[0] = a + w * tx + y * tz - z * ty
+    out[1] = b + w * ty + z * tx - x * tz
+    out[2] = c + w * tz + x * ty - y * tx
+
+
+@kernel
+def to_matrix(quaternion: Array, out: Array) -> None:
+    """The rotation matrix (3, 3) of a unit quaternion."""
+    x, y, z, w = (
+        float(quaternion[0]),
+        float(quaternion[1]),
+        float(quaternion[2]),
+        float(quaternion[3]),
+    )
+    out[0, 0] = 1.0 - 2.0 * (y * y + z * z)
+    out[0, 1] = 2.0 * (x * y - w * z)
+    out[0, 2] = 2.0 * (x * z + w * y)
+    out[1, 0] = 2.0 * (x * y + w * z)
+    out[1, 1] = 1.0 - 2.0 * (x * x + z * z)
+    out[1, 2] = 2.0 * (y * z - w * x)
+    out[2, 0] = 2.0 * (x * z - w * y)
+    out[2, 1] = 2.0 * (y * z + w * x)
+    out[2, 2] = 1.0 - 2.0 * (x * x + y * y)
+
+
+@kernel
+def from_matrix(matrix: Array, out: Array) -> None:
+    """The unit quaternion of a rotation matrix, with w >= 0 where w is not tiny.
+
+    Shepperd's method: divide by the largest of the four components, so no digit is lost.
+    """
+    a, b, c = float(matrix[0, 0]), float(matrix[1, 1]), float(matrix[2, 2])
+    trace = a + b + c
+    if trace >= a and trace >= b and trace >= c:
+        s = 2.0 * math.sqrt(1.0 + trace)
+        out[0] = (float(matrix[2, 1]) - float(matrix[1, 2])) / s
+        out[1] = (float(matrix[0, 2]) - float(matrix[2, 0])) / s
+        out[2] = (float(matrix[1, 0]) - float(matrix[0, 1])) / s
+        out[3] = 0.25 * s
+        return
+    i = 0 if a >= b and a >= c else (1 if b >= c else 2)
+    j, k = (i + 1) % 3, (i + 2) % 3
+    diagonal = 1.0 + float(matrix[i, i]) - float(matrix[j, j]) - float(matrix[k, k])
+    s = 2.0 * math.sqrt(max(diagonal, 0.0))
+    w = (float(matrix[k, j]) - float(matrix[j, k])) / s
+    sign = -1.0 if w < 0.0 else 1.0
+    out[i] = sign * 0.25 * s
+    out[j] = sign * (float(matrix[i, j]) + float(matrix[j, i])) / s
+    out[k] = sign * (float(matrix[i, k]) + float(matrix[k, i])) / s
+    out[3] = sign * w
+
+
+@kernel
+def exponential(vector: Array, out: Array) -> None:
+    """The unit quaternion of a rotation vector [rad]: axis times angle."""
+    x, y, z = float(vector[0]), float(vector[1]), float(vector[2])
+    angle = math.sqrt(x * x + y * y + z * z)
+    scale = 0.5 if angle < _SMALL else math.sin(0.5 * angle) / angle
+    out[0], out[1], out[2] = scale * x, scale * y, scale * z
+    out[3] = math.cos(0.5 * angle)
+
+
+@kernel
+def logarithm(quaternion: Array, out: Array) -> None:
+    """The rotation vector [rad] of a unit quaternion, of length at most pi."""
+    x, y, z, w = (
+        float(quaternion[0]),
+        float(quaternion[1]),
+        float(quaternion[2]),
+        float(quaternion[3]),
+    )
+    if w < 0.0:
+        x, y, z, w = -x, -y, -z, -w
+    sine = math.sqrt(x * x + y * y + z * z)
+    scale = 2.0 / w if sine < _SMALL else 2.0 * math.atan2(sine, w) / sine
+    out[0], out[1], out[2] = scale * x, scale * y, scale * z
+
+
+@kernel
+def integrate(quaternion: Array, angular_velocity: Array, duration: float, out: Array) -> None:
+    """The orientation after turning at a constant body rate [rad/s] for ``duration`` [s]."""
+    wx, wy, wz = (
+        float(angular_velocity[0]),
+        float(angular_velocity[1]),
+        float(angular_velocity[2]),
+    )
+    rate = math.sqrt(wx * wx + wy * wy + wz * wz)
+    half = 0.5 * rate * duration
+    scale = 0.5 * duration if abs(half) < _SMALL else math.sin(half) / rate
+    bx, by, bz, bw = scale * wx, scale * wy, scale * wz, math.cos(half)
+    ax, ay, az, aw = (
+        float(quaternion[0]),
+        float(quaternion[1]),
+        float(quaternion[2]),
+        float(quaternion[3]),
+    )
+    out[0] = aw * bx + ax * bw + ay * bz - az * by
+    out[1] = aw * by - ax * bz + ay * bw + az * bx
+    out[2] = aw * bz + ax * by - ay * bx + az * bw
+    out[3] = aw * bw - ax * bx - ay * by - az * bz
+    normalise(out, out)
+
+
+@kernel
+def yaw(quaternion: Array) -> float:
+    """The heading [rad]: the angle about the world's z of the body's x axis."""
+    x, y, z, w = (
+        float(quaternion[0]),
+        float(quaternion[1]),
+        float(quaternion[2]),
+        float(quaternion[3]),
+    )
+    return math.atan2(2.0 * (x * y + w * z), 1.0 - 2.0 * (y * y + z * z))
+
+
+@kernel
+def tilt(quaternion: Array) -> float:
+    """The angle [rad] between the body's z axis and the world's, from 0 to pi."""
+    x, y, z, w = (
+        float(quaternion[0]),
+        float(quaternion[1]),
+        float(quaternion[2]),
+        float(quaternion[3]),
+    )
+    # From half angles: the arc cosine of the matrix element would lose half the digits at zero.
+    return 2.0 * math.atan2(math.sqrt(x * x + y * y), math.sqrt(z * z + w * w))
+
+
+@kernel
+def wrap(angle: float) -> float:
+    """The same angle [rad] from -pi to pi."""
+    return angle - 2.0 * math.pi * math.floor(angle / (2.0 * math.pi) + 0.5)

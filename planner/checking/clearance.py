@@ -1,0 +1,132 @@
+"""How far a planned robot keeps from the ground and its legs from each other.
+
+Links are the capsules of the robot's description, as in the simulator. The ground is level with a
+step where the task has one. Everything is vectorised over instants.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...robots.description import RobotDescription
+from ...robots.kinematics import LinkPoses, from_base_outwards
+from ..task.sequence import edge_of
+from ..task.task import JumpTask
+
+Array = NDArray[np.float64]
+
+
+def step_edge(task: JumpTask, jump: int = 0) -> float | None:
+    """The x at which the ground changes height under one of the task's jumps; see ``edge_of``."""
+    return edge_of(task.hops()[jump], task.places()[jump])
+
+
+def ground_height(task: JumpTask, x: Array, progress: Array | float) -> Array:
+    """The ground's height [m] at ``x`` [m].
+
+    ``progress``, of the same shape, is how many flights are over, with the share of the present
+    one's time: 1.5 in the middle of the second flight. Below 0 counts as 0, above all as all.
+    """
+    hops, places = task.hops(), task.places()
+    done = np.clip(np.broadcast_to(progress, x.shape), 0.0, len(hops))
+    levels = np.array([place.z for place in places])
+    found = levels[np.floor(done + 0.5).astype(np.int64)]
+    for number, hop in enumerate(hops):
+        edge = edge_of(hop, places[number])
+        if edge is None:
+            continue
+        beyond = x > edge if (hop.distance_x or 0.0) >= 0.0 else x < edge
+        flying = (done > number) & (done < number + 1)
+        found = np.where(beyond & (flying | (done == number)), levels[number + 1], found)
+        found = np.where(~beyond & (flying | (done == number + 1)), levels[number], found)
+    return np.asarray(found)
+
+
+def capsule_ends(
+    robot: RobotDescription, poses: LinkPoses, link: str
+) -> list[tuple[Array, Array, float]]:
+    """Both ends (n, 3) and the radius of every capsule of a link."""
+    position, rotation = poses.of(link)
+    return [
+        (
+            position + rotation @ np.array(shape.start),
+            position + rotation @ np.array(shape.end),
+            shape.radius,
+        )
+        for shape in robot.link(link).shapes
+    ]
+
+
+def body_heights(
+    robot: RobotDescription, task: JumpTask, poses: LinkPoses, progress: Array
+) -> dict[str, Array]:
+    """By link, except for feet, the lowest height [m] of its capsules above the ground, (n,)."""
+    feet = {foot.link for foot in robot.feet}
+    found = {}
+    for link in robot.links:
+        if link.name in feet or not link.shapes:
+            continue
+        heights = [
+            end[:, 2] - radius - ground_height(task, end[:, 0], progress)
+            for start, stop, radius in capsule_ends(robot, poses, link.name)
+            for end in (start, 0.5 * (start + stop), stop)
+        ]
+        found[link.name] = np.min(heights, axis=0)
+    return found
+
+
+def legs(robot: RobotDescription) -> list[list[str]]:
+    """The links of every leg, from the base outwards, legs in the order of the feet."""
+    parent = {joint.child: joint.parent for _, joint in from_base_outwards(robot)}
+    found = []
+    for foot in robot.feet:
+        chain, link = [foot.link], foot.link
+        while parent[link] != robot.base:
+            link = parent[link]
+            chain.append(link)
+        found.append(chain[::-1])
+    return found
+
+
+def leg_gap(robot: RobotDescription, poses: LinkPoses) -> Array:
+    """The least distance [m] between links of different legs, (n,); negative where they overlap."""
+    chains = [
+        [capsule for link in chain for capsule in capsule_ends(robot, poses, link)]
+        for chain in legs(robot)
+    ]
+    gap = np.full(len(poses.position), np.inf)
+    for number, chain in enumerate(chains):
+        for other in chains[number + 1 :]:
+            for a, b, radius in chain:
+                for c, d, other_radius in other:
+                    gap = np.minimum(gap, segment_distance(a, b, c, d) - radius - other_radius)
+    return gap
+
+
+def segment_distance(a: Array, b: Array, c: Array, d: Array) -> Array:
+    """The distance between the segments a-b and c-d, all (n, 3).
+
+    The closest points are the crossing of the two lines where it lies in both segments, else an
+    end of one of them and what is closest to it on the other.
+    """
+    along, across, between = b - a, d - c, a - c
+    aa, cc = _dot(along, along), _dot(across, across)
+    ac, ab, cb = _dot(along, across), _dot(along, between), _dot(across, between)
+    determinant = aa * cc - ac * ac
+    crossing = np.where(
+        determinant > 1e-12 * aa * cc,
+        (ac * cb - cc * ab) / np.where(determinant > 0.0, determinant, 1.0),
+        0.5,
+    )
+    best = np.full(len(a), np.inf)
+    for s in (np.clip(crossing, 0.0, 1.0), np.zeros(len(a)), np.ones(len(a))):
+        t = np.clip((cb + s * ac) / np.where(cc > 0.0, cc, 1.0), 0.0, 1.0)
+        s = np.clip((t * ac - ab) / np.where(aa > 0.0, aa, 1.0), 0.0, 1.0)
+        gap = between + s[:, None] * along - t[:, None] * across
+        best = np.minimum(best, np.sqrt(_dot(gap, gap)))
+    return best
+
+
+def _dot(x: Array, y: Array) -> Array:
+    return np.asarray((x * y).sum(axis=1))

@@ -1,0 +1,309 @@
+"""The tests a plan must pass, each a few lines: what is measured, where, and what is allowed.
+
+Limits are about what the robot's feedback takes no notice of; they are not the solver's own
+tolerances, which are far smaller.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...blocks.signals import Phase
+from ..models.exact_dynamics import ExactDynamics
+from .clearance import body_heights, leg_gap
+from .evidence import DEGREE, MILLIMETRE, Evidence, Found, worst
+from .replay import held_joints
+
+Array = NDArray[np.float64]
+
+SHORTEST_IMPACT = 0.004
+"""s; as long as the feet's contact takes to stop them at least. What a motor can do in that time
+bounds its impulse at touchdown."""
+
+
+def start_and_end(e: Evidence) -> Iterator[Found]:
+    """The plan begins at rest in its stance over the origin and ends at rest."""
+    plan, joints = e.plan, [joint.name for joint in e.robot.joints]
+    stances = (plan.task.start_joints(e.robot), plan.task.end_joints(e.robot))
+    missed = np.abs(plan.position[0, 7:] - [stances[0][name] for name in joints])
+    yield Found("start", missed.max(), 1e-3, "rad", "the first knot's distance from the stance",
+                joints[int(missed.argmax())])  # fmt: skip
+    middle = np.append(e.replay.soles[0].mean(axis=0), e.replay.heading[0].mean())
+    yield Found("origin", float(np.abs(middle).max()), MILLIMETRE, "m or rad",
+                "the first knot's distance from the origin between the soles")  # fmt: skip
+    for name, knot in (("rest_at_start", 0), ("rest_at_end", -1)):
+        speeds = np.abs(plan.velocity[knot])
+        yield Found(name, speeds.max(), 1e-2, "m/s or rad/s", "the largest velocity")
+
+
+def states(e: Evidence) -> Iterator[Found]:
+    """Centre of mass, momentum and torque are what Pinocchio makes of the states and forces."""
+    plan, r = e.plan, e.replay
+    for name, planned, exact, limit, unit in (
+        ("com", plan.com, r.com, 1e-5, "m"),
+        ("com_velocity", plan.com_velocity, r.com_velocity, 1e-4, "m/s"),
+        ("angular_momentum", plan.angular_momentum, r.angular_momentum, 1e-5, "N m s"),
+    ):
+        yield Found(name, np.abs(planned - exact).max(), limit, unit, "its error at the knots")
+    s = r.samples
+    missed = np.abs(s.torque[e.middles] - plan.joint_torque[s.knot[e.middles]])
+    k, joint = worst(missed)
+    yield Found("joint_torque", missed.max(), 0.2, "N m", "its error in the middle of an interval",
+                f"{e.robot.joints[joint].name} {e.moment(int(e.middles[k]))}")  # fmt: skip
+
+
+def interval_defects(e: Evidence) -> Iterator[Found]:
+    """Exact dynamics from each knot leads to the next."""
+    for column, (name, limit, unit) in enumerate(
+        (
+            ("position_defect", MILLIMETRE, "m"),
+            ("rotation_defect", 0.5 * DEGREE, "rad"),
+            ("velocity_defect", 0.05, "m/s"),
+            ("angular_velocity_defect", 0.5, "rad/s"),
+        )
+    ):
+        found = e.replay.defect[:, column]
+        k = int(found.argmax())
+        yield Found(name, found[k], limit, unit, "the base's error after one interval",
+                    f"from {e.plan.time[k]:.3f} s")  # fmt: skip
+
+
+def discretisation(e: Evidence) -> Iterator[Found]:
+    """The planner's own equations, of the formulation that is built on them."""
+    if e.plan.task.formulation != "full":
+        return
+    gap, wrench = e.replay.gap, e.replay.wrench
+    for name, found, limit, unit, text in (
+        ("violation", gap, 1e-6, "m or rad", "what the states miss of a constant acceleration"),
+        ("force_balance", wrench, 1e-3, "N or N m", "what forces miss in an interval's middle"),
+    ):
+        k = int(found.argmax())
+        yield Found(name, found[k], limit, unit, text, f"from {e.plan.time[k]:.3f} s")
+
+
+def flight(e: Evidence) -> Iterator[Found]:
+    """The whole flight by exact dynamics ends where the plan says."""
+    plan, r = e.plan, e.replay
+    position, rotation = (max(errors) for errors in zip(*r.flight_errors, strict=True))
+    yield Found("flight_position", position, MILLIMETRE, "m", "the base's error at touchdown")
+    yield Found("flight_rotation", rotation, 0.5 * DEGREE, "rad", "the base's error at touchdown")
+    knots = plan.time[np.array(r.flights)]
+    missed = np.abs(knots - plan.flights).max() if knots.shape == np.shape(plan.flights) else np.inf
+    yield Found("flight_times", float(missed), 1e-9, "s", "lift-off and touchdown from their knots")
+
+
+def task_done(e: Evidence) -> Iterator[Found]:
+    """Every jump is the one that was asked for."""
+    task, r = e.plan.task, e.replay
+    hops, places = task.hops(), task.places()
+    for name, missed, limit, unit, text in (
+        ("rise", [(e.rises[i], hop.rise) for i, hop in enumerate(hops)], MILLIMETRE, "m",
+         "how far the apex, from the state at lift-off, misses the one asked for"),
+        ("take_off_speed", [(float(r.com_velocity[r.flights[i][0], 2]), hop.take_off_speed)
+                            for i, hop in enumerate(hops)], 5e-3, "m/s", "its error"),
+        ("flight_time", [(end - start, hop.flight_time) for (start, end), hop
+                         in zip(e.plan.flights, hops, strict=True)], MILLIMETRE, "s", "its error"),
+    ):  # fmt: skip
+        errors = [abs(found - wanted) for found, wanted in missed if wanted is not None]
+        if errors:
+            yield Found(name, max(errors), limit, unit, text, _which(e, int(np.argmax(errors))))
+    standing = [*(start for start, _ in r.flights[1:]), -1]
+    goals = np.array([(place.x, place.y, place.z) for place in places[1:]])
+    missed_by = np.abs(r.soles[standing].mean(axis=1) - goals)
+    jump, axis = worst(missed_by)
+    yield Found("landing_place", missed_by.max(), 3 * MILLIMETRE, "m", "the feet's distance from it",
+                "xyz"[axis] + _which(e, jump))  # fmt: skip
+    pitch, yaw = e.turn
+    turned = (r.heading[standing] - r.heading[0]).mean(axis=1)
+    # Through a somersault a heading is not defined, so it counts as it is at the end.
+    twists = [math.remainder(t - place.heading, math.tau)
+              for t, place in zip(turned, places[1:], strict=True)]  # fmt: skip
+    yield Found("twist", float(np.abs(twists).max()), 0.5 * DEGREE, "rad",
+                "the feet's error in heading")  # fmt: skip
+    rotation = places[-1].turned
+    if any(hop.rotation for hop in hops):
+        yield Found("rotation", abs(pitch - rotation), 5 * DEGREE, "rad", "the body's error")
+    else:
+        yield Found("whole_turn", abs(yaw - places[-1].heading), 20 * DEGREE, "rad",
+                    "how far the torso's turn differs from the feet's")  # fmt: skip
+
+
+def _which(e: Evidence, jump: int) -> str:
+    """Which of several jumps."""
+    return f" jump {jump + 1}" if len(e.replay.flights) > 1 else ""
+
+
+def contacts(e: Evidence) -> Iterator[Found]:
+    """Feet stay where they stand, on the ground, and push only there, within the friction cone."""
+    plan, s = e.plan, e.replay.samples
+    names = [contact.name for contact in e.robot.contacts]
+    loaded = plan.contact[s.knot]
+    flying = plan.phase[s.knot] == Phase.FLIGHT
+    standing = loaded & ~flying[:, None]
+    slip = np.zeros(len(names))
+    for place in range(len(plan.flights) + 1):
+        for number in range(len(names)):
+            places = s.points[standing[:, number] & (e.place == place), number]
+            if len(places):
+                slip[number] = max(slip[number], float(np.ptp(places, axis=0).max()))
+    yield Found("foot_slip", slip.max(), 3 * MILLIMETRE, "m", "how far a loaded point moves",
+                names[int(slip.argmax())])  # fmt: skip
+    height = np.where(standing, np.abs(e.point_height), 0.0)
+    yield Found("foot_on_ground", height.max(), 2 * MILLIMETRE, "m",
+                "how far a loaded point is off the ground")  # fmt: skip
+    force = plan.contact_force
+    idle = np.where(plan.contact[:, :, None], 0.0, np.abs(force)).max()
+    yield Found("force_without_contact", idle, 1e-6, "N", "the largest force on an unloaded point")
+    pull, tangent = -force[:, :, 2], np.hypot(force[:, :, 0], force[:, :, 1])
+    yield Found("pull", pull.max(), 1e-3, "N", "how hard a foot pulls at the ground")
+    excess = tangent - plan.task.friction * np.maximum(force[:, :, 2], 0.0)
+    k, number = worst(excess)
+    yield Found("friction", excess.max(), 1e-2, "N", "how far a force is outside its cone",
+                f"{names[number]} at {plan.time[k]:.3f} s")  # fmt: skip
+
+
+def touchdown(e: Evidence) -> Iterator[Found]:
+    """Feet that are to arrive at rest do, and those that may hit the ground are slow enough."""
+    plan, r, s = e.plan, e.replay, e.replay.samples
+    knots = [touchdown for _, touchdown in r.flights]
+    if plan.task.impact:
+        if plan.task.formulation != "full":
+            return
+        found = np.array([_impact(e, k) for k in knots])
+        k = int(np.argmax(found[:, 0]))
+        yield Found("impact", found[k, 0], 1e-3, "m/s or rad/s",
+                    "how far the impulse's velocities miss exact dynamics'", _which(e, k))  # fmt: skip
+        k = int(np.argmax(found[:, 1]))
+        peak = e.effort * e.robot.profiles[plan.task.profile].peak_torque
+        yield Found("held_joints", found[k, 1], peak * SHORTEST_IMPACT, "N m s",
+                    "the impulse of a motor whose joint keeps still", _which(e, k))  # fmt: skip
+        yield from _hits(e, knots)
+        return
+    samples = np.searchsorted(s.time, plan.time[knots] - 1e-9)
+    speeds = np.linalg.norm(s.point_velocity[samples], axis=2)
+    speeds = np.where(plan.contact[knots], speeds, 0.0)
+    yield Found(
+        "touchdown_speed", float(speeds.max()), 0.05, "m/s", "the feet's speed at touchdown"
+    )
+
+
+def _hits(e: Evidence, knots: list[int]) -> Iterator[Found]:
+    """How fast points hit the ground, downwards and along or across their foot, where bounded."""
+    margins, r, s = e.plan.task.margins, e.replay, e.replay.samples
+    if margins is None:
+        return
+    fast = np.zeros(2)
+    for knot in knots:
+        speeds = s.point_velocity[np.searchsorted(s.time, e.plan.time[knot] - 1e-9)]
+        for point, foot in enumerate(e.robot.foot_of_contact()):
+            x, y, z = speeds[point] if e.plan.contact[knot + 1, point] else np.zeros(3)
+            cosine, sine = np.cos(r.heading[knot, foot]), np.sin(r.heading[knot, foot])
+            slides = abs(cosine * x + sine * y), abs(cosine * y - sine * x)
+            fast = np.maximum(fast, [-z, max(slides)])
+    for name, found, most, what in (
+        ("touchdown_speed", fast[0], margins.touchdown_speed, "downwards"),
+        ("touchdown_slide", fast[1], margins.touchdown_slide, "along or across the foot"),
+    ):
+        if most is not None:
+            text = f"how fast a point hits the ground {what}"
+            yield Found(name, float(found), most + 0.05, "m/s", text)
+
+
+def _impact(e: Evidence, knot: int) -> tuple[float, float]:
+    """The error of all generalised velocities behind the impulse at a knot, or of all of them
+    without an impact; and the largest motor impulse that keeps a joint still [N m s]."""
+    plan = e.plan
+    if knot + 1 >= len(plan.time) or plan.time[knot + 1] > plan.time[knot]:
+        return math.inf, 0.0
+    dynamics = ExactDynamics(e.robot, plan.task.profile)
+    q, v, impulse = plan.position[knot], plan.velocity[knot], plan.contact_force[knot]
+    exact, kept = dynamics.velocity_after_impact(q, v, impulse, held_joints(plan, knot))
+    moved = np.abs(plan.position[knot + 1] - q).max()
+    error = max(np.abs(exact - plan.velocity[knot + 1]).max(), moved)
+    return float(error), float(np.abs(e.robot.torque_to_motor @ kept).max())
+
+
+def momentum(e: Evidence) -> Iterator[Found]:
+    """The angular momentum at lift-offs and touchdowns is no more than the task allows."""
+    task, r = e.plan.task, e.replay
+    lasting = np.diff(e.plan.time, append=np.inf) > 0.0
+    ends = [stop + int(not lasting[stop]) for _, stop in r.flights]
+    for name, knots, most in (
+        ("lift_off_momentum", [start for start, _ in r.flights], task.lift_off_momentum),
+        ("touchdown_momentum", ends, task.touchdown_momentum),
+    ):
+        if most is not None:
+            found = float(np.abs(r.angular_momentum[knots]).max())
+            yield Found(name, found, most + 1e-3, "N m s", "the angular momentum about an axis")
+
+
+def machine(e: Evidence) -> Iterator[Found]:
+    """Joints stay within their limits, motors within what they can do at their speed."""
+    robot, task, s = e.robot, e.plan.task, e.replay.samples
+    angles, limits = s.position[:, 7:], robot.joint_limits
+    excess = np.maximum(angles - limits[:, 1], limits[:, 0] - angles)
+    sample, joint = worst(excess)
+    yield Found("joint_limits", excess.max(), 5e-3, "rad", "how far a joint passes its limit",
+                f"{robot.joints[joint].name} {e.moment(sample)}")  # fmt: skip
+    profile = robot.profiles[task.profile]
+    speed = np.abs(e.motor_speed)
+    sample, motor = worst(speed)
+    yield Found("motor_speed", speed.max(), 1.01 * e.effort * profile.no_load_speed, "rad/s",
+                "the largest motor speed",
+                f"{robot.transmission.motors[motor]} {e.moment(sample)}")  # fmt: skip
+    over = np.abs(e.motor_torque) - allowed_motor_torque(e, 1.0)
+    sample, motor = worst(over)
+    yield Found("motor_torque", over.max(), 0.03 * profile.peak_torque, "N m",
+                "how far a motor torque passes what its speed allows",
+                f"{robot.transmission.motors[motor]} {e.moment(sample)}")  # fmt: skip
+    # The share that is kept for feedback is a matter of whole intervals, not of their ends.
+    middle = e.middles
+    over = np.abs(e.motor_torque[middle]) - allowed_motor_torque(e, e.effort)[middle]
+    sample, motor = worst(over)
+    yield Found("effort", over.max(), 0.01 * profile.peak_torque, "N m",
+                "how far a motor torque passes the share of it that the task allows",
+                f"{robot.transmission.motors[motor]} {e.moment(int(middle[sample]))}")  # fmt: skip
+
+
+def allowed_motor_torque(e: Evidence, effort: float) -> Array:
+    """The torque [N m] that a share of the motors' abilities allows at the samples' speeds."""
+    profile = e.robot.profiles[e.plan.task.profile]
+    # Braking torque is the peak at any speed; driving torque falls between corner and no load.
+    driving = np.sign(e.motor_torque) * e.motor_speed / effort
+    fall = (profile.no_load_speed - driving) / (profile.no_load_speed - profile.corner_speed)
+    return np.asarray(effort * profile.peak_torque * np.clip(fall, 0.0, 1.0))
+
+
+def clearances(e: Evidence) -> Iterator[Found]:
+    """Nothing but the feet comes near the ground, the feet clear it in flight, legs stay apart."""
+    robot, task = e.robot, e.plan.task
+    names = [contact.name for contact in robot.contacts]
+    low = -e.point_height
+    sample, number = worst(low)
+    yield Found("foot_below_ground", low.max(), MILLIMETRE, "m", "how deep a foot is",
+                f"{names[number]} {e.moment(sample)}")  # fmt: skip
+    at = [int(np.abs(e.progress - 0.5 - i).argmin()) for i in range(len(e.plan.flights))]
+    missing = task.foot_clearance - e.point_height[at].min(axis=0)
+    yield Found("foot_clearance", missing.max(), MILLIMETRE, "m",
+                "what the feet lack of the clearance asked for in the middle of the flight",
+                names[int(missing.argmax())])  # fmt: skip
+    heights = body_heights(robot, task, e.poses, e.progress)
+    link = min(heights, key=lambda name: float(heights[name].min()))
+    sample = int(heights[link].argmin())
+    yield Found("body_on_ground", -float(heights[link][sample]), 0.0, "m",
+                "how deep the body is in the ground", f"{link} {e.moment(sample)}")  # fmt: skip
+    gap = leg_gap(robot, e.poses)
+    sample = int(gap.argmin())
+    yield Found("leg_clearance", task.leg_clearance - float(gap[sample]), MILLIMETRE, "m",
+                "what the legs lack of the gap asked for", e.moment(sample))  # fmt: skip
+
+
+PLAN_TESTS: tuple[Callable[[Evidence], Iterator[Found]], ...] = (
+    start_and_end, states, interval_defects, discretisation, flight, task_done, contacts, touchdown,
+    momentum, machine, clearances,
+)  # fmt: skip
+"""All tests, in the order of the report."""

@@ -1,0 +1,205 @@
+"""A plan replayed with exact dynamics: what really happens between and at its knots.
+
+Every interval is started from the plan's own state and integrated by itself, because in stance an
+open loop is unstable and an error that has grown says nothing about the plan. The flight is also
+integrated as a whole, from lift-off to touchdown, and so is each of several flights.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...blocks.signals import Phase
+from ...robots.description import RobotDescription
+from ..library.plan import JumpPlan
+from ..models.exact_dynamics import ExactDynamics, joint_motion, rotation_between
+from .midpoint import midpoint_residuals
+
+Array = NDArray[np.float64]
+
+FLIGHT_STEP = 0.001
+"""Longest step of the flight's integration [s]; halving it changes a landing by less than 1 um."""
+
+
+@dataclass(frozen=True)
+class Samples:
+    """The motion at many instants: knots and what lies between them, ``n`` in all.
+
+    ``knot`` is the interval that an instant belongs to. ``force`` (n, n_contacts, 3) is that of
+    the interval, ``torque`` what exact dynamics needs for the planned joint motion under it, both
+    zero at impacts.
+    """
+
+    time: Array
+    knot: NDArray[np.int64]
+    position: Array
+    velocity: Array
+    torque: Array
+    points: Array
+    point_velocity: Array
+
+
+@dataclass(frozen=True)
+class Replay:
+    """What exact dynamics makes of a plan.
+
+    Attributes:
+        samples: knots, middles of stance intervals and every step of the flight.
+        defect: per interval how far exact dynamics from one knot misses the next: base position
+            [m], rotation [rad], linear [m/s] and angular velocity [rad/s] of the base, (N-1, 4).
+        gap, wrench: what is left over of the planner's own equations, see ``midpoint``, (N-1,).
+        flight_errors: base position [m] and rotation [rad] missed at every touchdown.
+        com, com_velocity, angular_momentum: at the knots, by Pinocchio.
+        soles, heading: sole centres [m] (N, n_feet, 3) and unwrapped headings [rad] (N, n_feet).
+        flights: the knots where every flight begins and ends, before any impact.
+    """
+
+    samples: Samples
+    defect: Array
+    gap: Array
+    wrench: Array
+    flight_errors: tuple[tuple[float, float], ...]
+    com: Array
+    com_velocity: Array
+    angular_momentum: Array
+    soles: Array
+    heading: Array
+    flights: tuple[tuple[int, int], ...]
+
+
+def replay(plan: JumpPlan, robot: RobotDescription) -> Replay:
+    """Replay a plan.
+
+    Raises:
+        ValueError: it has not one flight for every jump of its task.
+    """
+    dynamics = ExactDynamics(robot, plan.task.profile)
+    flights = flight_knots(plan)
+    flown = [_fly(plan, dynamics, lift_off, touchdown) for lift_off, touchdown in flights]
+    defect = np.array([_interval_defect(plan, dynamics, k) for k in range(len(plan.time) - 1)])
+    gap, wrench = midpoint_residuals(plan, dynamics)
+    samples = _sample(plan, dynamics, [row for rows, _ in flown for row in rows])
+    states = [dynamics.centroidal(q, v) for q, v in zip(plan.position, plan.velocity, strict=True)]
+    placed = [dynamics.soles(q) for q in plan.position]
+    turns = np.array([turn for _, turn in placed])
+    return Replay(
+        samples, defect, gap, wrench, tuple(error for _, error in flown),
+        np.array([s[0] for s in states]),
+        np.array([s[1] for s in states]),
+        np.array([s[2] for s in states]),
+        np.array([soles for soles, _ in placed]),
+        np.unwrap(np.arctan2(turns[:, :, 1, 0], turns[:, :, 0, 0]), axis=0),
+        flights,
+    )  # fmt: skip
+
+
+def flight_knots(plan: JumpPlan) -> tuple[tuple[int, int], ...]:
+    """The knots at lift-off and at touchdown of every flight, the latter before any impact.
+
+    Raises:
+        ValueError: there are more or fewer flights than jumps.
+    """
+    lasting = np.diff(plan.time, append=plan.time[-1]) > 0.0
+    flying = np.flatnonzero((plan.phase == Phase.FLIGHT) & lasting)
+    found = [
+        (int(run[0]), int(run[-1]) + 1)
+        for run in np.split(flying, np.flatnonzero(np.diff(flying) > 1) + 1)
+        if len(run)
+    ]
+    jumps = len(plan.task.hops())
+    if len(found) != jumps:
+        raise ValueError(
+            f"a plan has a flight, of intervals one after the other, for every jump; found "
+            f"{len(found)} for {jumps}"
+        )
+    return tuple(found)
+
+
+def _fly(
+    plan: JumpPlan, dynamics: ExactDynamics, lift_off: int, touchdown: int
+) -> tuple[list[tuple[float, int, Array, Array]], tuple[float, float]]:
+    """The flight from the plan's state at lift-off on, and where it misses the touchdown's."""
+    q, v = plan.position[lift_off], plan.velocity[lift_off]
+    nothing = np.zeros(plan.contact_force.shape[1:])
+    out = []
+    for k in range(lift_off, touchdown):
+        joints = joint_motion(plan.position, plan.velocity, plan.time, k)
+        q = np.concatenate([q[:7], plan.position[k, 7:]])
+        v = np.concatenate([v[:6], plan.velocity[k, 6:]])
+        steps = dynamics.integrate(q, v, joints, nothing, FLIGHT_STEP)
+        out += [(float(plan.time[k]) + t, k, there, moving) for t, there, moving in steps]
+        _, q, v = steps[-1]
+    planned = plan.position[touchdown]
+    missed = float(np.linalg.norm(q[:3] - planned[:3])), rotation_between(q[3:7], planned[3:7])
+    return out, missed
+
+
+def held_joints(plan: JumpPlan, k: int) -> NDArray[np.bool_]:
+    """The joints (n_joints) that stand still before and behind the impact at a knot: roll and yaw
+    of a mirrored jump, which their motors keep."""
+    still = (plan.velocity[k : k + 2, 6:] == 0.0).all(axis=0)
+    return np.asarray(still)
+
+
+def _interval_defect(plan: JumpPlan, dynamics: ExactDynamics, k: int) -> Array:
+    """How far exact dynamics from knot ``k`` misses the next knot; see ``Replay``."""
+    q, v, planned_q, planned_v = (
+        plan.position[k], plan.velocity[k], plan.position[k + 1], plan.velocity[k + 1],
+    )  # fmt: skip
+    force = plan.contact_force[k]
+    if plan.time[k + 1] > plan.time[k]:
+        joints = joint_motion(plan.position, plan.velocity, plan.time, k)
+        _, q, v = dynamics.integrate(q, v, joints, force, 0.5 * joints.duration)[-1]
+    else:
+        v, _ = dynamics.velocity_after_impact(q, v, force, held_joints(plan, k))
+    return np.array(
+        [
+            np.linalg.norm(q[:3] - planned_q[:3]),
+            rotation_between(q[3:7], planned_q[3:7]),
+            np.linalg.norm(v[:3] - planned_v[:3]),
+            np.linalg.norm(v[3:6] - planned_v[3:6]),
+        ]
+    )
+
+
+def _sample(
+    plan: JumpPlan, dynamics: ExactDynamics, flight: list[tuple[float, int, Array, Array]]
+) -> Samples:
+    """All knots, the middles of stance intervals and the steps of the flight, in time's order."""
+    rows: list[tuple[float, int, Array, Array]] = []
+    fallen = {k for _, k, _, _ in flight}
+    for k in range(len(plan.time)):
+        rows.append(
+            (float(plan.time[k]), min(k, len(plan.time) - 2), plan.position[k], plan.velocity[k])
+        )
+        if k in fallen:
+            rows += [row for row in flight if row[1] == k]
+        elif k + 1 < len(plan.time) and plan.time[k + 1] > plan.time[k]:
+            joints = joint_motion(plan.position, plan.velocity, plan.time, k)
+            force, h = plan.contact_force[k], joints.duration
+            q, v = plan.position[k], plan.velocity[k]
+            t, q, v = dynamics.integrate(q, v, joints, force, 0.5 * h)[0]
+            rows.append((float(plan.time[k]) + t, k, q, v))
+    torque, points, velocities = [], [], []
+    for time, k, q, v in rows:
+        places, jacobian = dynamics.contact_jacobians(q)
+        points.append(places)
+        velocities.append((jacobian @ v).reshape(-1, 3))
+        if plan.time[k + 1] > plan.time[k]:
+            joints = joint_motion(plan.position, plan.velocity, plan.time, k)
+            acceleration = joints.at(time - float(plan.time[k]))[2]
+            torque.append(dynamics.joint_torque(q, v, acceleration, plan.contact_force[k]))
+        else:
+            torque.append(np.zeros(plan.joint_torque.shape[1]))
+    return Samples(
+        np.array([row[0] for row in rows]),
+        np.array([row[1] for row in rows]),
+        np.array([row[2] for row in rows]),
+        np.array([row[3] for row in rows]),
+        np.array(torque),
+        np.array(points),
+        np.array(velocities),
+    )

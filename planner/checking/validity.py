@@ -1,0 +1,152 @@
+"""Whether a plan may be handed to a robot: named tests against exact dynamics and the task.
+
+Independent of the solver: Pinocchio and NumPy only, nothing of the planner's own model. A plan is
+valid if every test passes; the report keeps every figure, passed or not.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...robots.description import RobotDescription
+from ...runtime.language.errors import AloftError
+from ..library.plan import ARRAYS, JumpPlan
+from .evidence import Evidence
+from .plan_tests import PLAN_TESTS
+from .replay import replay
+
+Array = NDArray[np.float64]
+
+
+class InvalidPlanError(AloftError):
+    """A plan failed the validity check; the message names the tests that failed. ``plan`` is that
+    plan with its report, to look at and not to run."""
+
+    def __init__(self, message: str, plan: JumpPlan) -> None:
+        super().__init__(message)
+        self.plan = plan
+
+
+@dataclass(frozen=True)
+class PlanTest:
+    """One test: passed where ``value`` is at most ``limit``, both in ``unit``.
+
+    ``where`` says at which instant, joint or contact the value was found.
+    """
+
+    name: str
+    passed: bool
+    value: float
+    limit: float
+    unit: str
+    where: str
+    text: str
+
+
+@dataclass(frozen=True)
+class ValidityReport:
+    """All tests of one plan, and ``figures``: what the plan does and how hard, with their units."""
+
+    tests: tuple[PlanTest, ...]
+    figures: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def valid(self) -> bool:
+        """Whether every test passed."""
+        return all(test.passed for test in self.tests)
+
+    @property
+    def failed(self) -> tuple[PlanTest, ...]:
+        """The tests that did not pass."""
+        return tuple(test for test in self.tests if not test.passed)
+
+    def as_json(self) -> dict[str, Any]:
+        """The report as plain data, as it stands in a plan's file."""
+        return {
+            "valid": self.valid,
+            "tests": [asdict(test) for test in self.tests],
+            "figures": dict(self.figures),
+        }
+
+    def explain(self) -> str:
+        """One line for every test that failed."""
+        return "\n".join(
+            f"{test.name}: {test.text} is {test.value:.4g} {test.unit}, at most {test.limit:.4g} "
+            f"{test.unit} is allowed{f' ({test.where})' if test.where else ''}"
+            for test in self.failed
+        )
+
+
+def check_plan(plan: JumpPlan, robot: RobotDescription) -> ValidityReport:
+    """Test a plan; about 0.1 s."""
+    broken = broken_array(plan, robot)
+    if broken:
+        return ValidityReport((PlanTest("arrays", False, math.inf, 0.0, "", broken, "the arrays"),))
+    try:
+        evidence = Evidence(plan, robot, replay(plan, robot))
+    except ValueError as error:
+        return ValidityReport((PlanTest("phases", False, math.inf, 0.0, "", str(error), "phases"),))
+    tests = tuple(_run_tests(evidence))
+    return ValidityReport(tests, evidence.figures())
+
+
+def _run_tests(evidence: Evidence) -> Iterator[PlanTest]:
+    for make in PLAN_TESTS:
+        for found in make(evidence):
+            yield PlanTest(
+                found.name, bool(found.value <= found.limit), float(found.value),
+                float(found.limit), found.unit, found.where, found.text,
+            )  # fmt: skip
+
+
+def checked(plan: JumpPlan, robot: RobotDescription) -> JumpPlan:
+    """The plan with its validity report."""
+    return plan.with_report(check_plan(plan, robot).as_json())
+
+
+def require_valid(plan: JumpPlan, robot: RobotDescription) -> None:
+    """Let only valid plans through: what every user of a plan calls before a robot moves.
+
+    The check is made anew; a report that came with a file is not believed.
+
+    Raises:
+        InvalidPlanError: with a line for every test that failed.
+    """
+    report = check_plan(plan, robot)
+    if not report.valid:
+        raise InvalidPlanError(
+            f"the plan {plan.task.name!r} is not valid:\n{report.explain()}",
+            plan.with_report(report.as_json()),
+        )
+
+
+def broken_array(plan: JumpPlan, robot: RobotDescription) -> str:
+    """What is wrong with the arrays themselves; empty where nothing is."""
+    knots, joints = len(plan.time), len(robot.joints)
+    shapes: dict[str, tuple[int, ...]] = {
+        "time": (knots,),
+        "phase": (knots,),
+        "position": (knots, 7 + joints),
+        "velocity": (knots, 6 + joints),
+        "acceleration": (knots, 6 + joints),
+        "joint_torque": (knots, joints),
+        "contact": (knots, len(robot.contacts)),
+        "contact_force": (knots, len(robot.contacts), 3),
+        **dict.fromkeys(("com", "com_velocity", "angular_momentum"), (knots, 3)),
+    }
+    for name in ARRAYS:
+        array = np.asarray(getattr(plan, name))
+        if array.shape != shapes[name]:
+            return f"{name} has the shape {array.shape}, expected {shapes[name]}"
+        if not np.isfinite(array).all():
+            return f"{name} is not finite at knot {int(np.argwhere(~np.isfinite(array))[0][0])}"
+    length = np.abs(np.linalg.norm(plan.position[:, 3:7], axis=1) - 1.0)
+    if length.max() > 1e-9:
+        return f"the base quaternion at knot {int(length.argmax())} is not of length 1"
+    return ""

@@ -1,0 +1,264 @@
+"""Plans kept by what was asked for: taken from there, or solved from the nearest one and kept."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import zipfile
+from collections.abc import Callable, Iterable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ...robots.description import RobotDescription
+from ..checking.validity import InvalidPlanError, checked, require_valid
+from ..errors import PlanError
+from ..solving.refinement import ROUNDS, curable
+from ..task.task import JumpTask, TaskError, make_task
+from .plan import JumpPlan, PlanFileError, read_plan, write_plan
+
+SHIPPED = Path(__file__).parents[2] / "graphs" / "plans"
+"""The plans that come with aloft; ``make plans`` makes them anew."""
+
+INVALID = "invalid"
+"""The folder, within a library's, of plans that failed the validity check."""
+
+SCALES = {
+    "rise": 0.05, "take_off_speed": 0.3, "distance_x": 0.1, "distance_y": 0.1, "twist": 0.5,
+    "landing_height": 0.05, "step_edge": 0.2, "rotation": 1.0, "squat_time": 0.2,
+    "thrust_time": 0.1, "flight_time": 0.1, "landing_time": 0.2, "contact_time": 0.2, "effort": 0.1, "friction": 0.2,
+    "foot_clearance": 0.02, "leg_clearance": 0.02,
+}  # fmt: skip
+"""How much of each parameter [its unit] is a distance of 1 between two tasks."""
+
+Solver = Callable[[JumpTask, RobotDescription, JumpPlan | None], JumpPlan]
+"""Makes a plan of a task, starting from another plan where one is given."""
+
+
+def user_folder() -> Path:
+    """Where a user's own plans are kept."""
+    home = os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")
+    return Path(home) / "aloft" / "plans"
+
+
+def task_distance(first: JumpTask, second: JumpTask) -> float | None:
+    """How far apart two tasks are, in units of ``SCALES``; ``None`` where one cannot start from
+    the other, because something else than those parameters differs."""
+    alike = set(JumpTask.model_fields) - {"name", *SCALES}
+    if any(getattr(first, name) != getattr(second, name) for name in alike):
+        return None
+    total = 0.0
+    for name, scale in SCALES.items():
+        one, other = getattr(first, name), getattr(second, name)
+        if (one is None) != (other is None):
+            return None
+        if one is not None:
+            total += ((one - other) / scale) ** 2
+    return float(np.sqrt(total))
+
+
+def kept_name(task: JumpTask, robot: RobotDescription) -> str:
+    """The name of a task's file: its name, for people, and its hash."""
+    readable = re.sub(r"[^A-Za-z0-9_.+]+", "_", task.name).strip("_") or "jump"
+    return f"{readable}-{task.hash(robot)}.npz"
+
+
+def names_of(robot: RobotDescription) -> dict[str, list[str]]:
+    """What a plan's file calls its columns."""
+    return {
+        "joints": [joint.name for joint in robot.joints],
+        "feet": [foot.name for foot in robot.feet],
+        "contacts": [contact.name for contact in robot.contacts],
+        "motors": list(robot.transmission.motors),
+    }
+
+
+class PlanLibrary:
+    """The plans of one robot: those in ``folder``, which new ones are added to, and behind them
+    those in other folders, by default the shipped ones.
+
+    A plan is looked up by its task's hash, so a plan never stands for a task it was not made for.
+    Files are written as a whole or not at all; any number of processes may use one folder.
+    """
+
+    def __init__(
+        self,
+        robot: RobotDescription,
+        folder: Path | None = None,
+        others: tuple[Path, ...] = (SHIPPED,),
+    ) -> None:
+        self.robot = robot
+        self.folder = user_folder() if folder is None else folder
+        self._folders = (self.folder, *others)
+
+    def path_of(self, task: JumpTask) -> Path | None:
+        """The file of that very task, or ``None``."""
+        for folder in self._folders:
+            found = sorted(folder.glob(f"*-{task.hash(self.robot)}.npz"))
+            if found:
+                return found[0]
+        return None
+
+    def attempt(self, task: JumpTask, solve: Solver | None = None) -> JumpPlan:
+        """A plan of a task, valid or not, with its report, which is made anew.
+
+        As ``plan``, but one that fails the validity check is kept too, in a folder of its own
+        where ``plan`` and everybody else never look: it must be asked for in this way.
+
+        Raises:
+            TaskError, PlanError: as ``plan``.
+        """
+        invalid = PlanLibrary(self.robot, self.folder / INVALID, ())
+        found = self.find(task) or invalid.find(task)
+        if found is not None:
+            return checked(found, self.robot)
+        try:
+            return self.plan(task, solve)[0]
+        except InvalidPlanError as error:
+            invalid.add(error.plan)
+            return error.plan
+
+    def hashes(self) -> frozenset[str]:
+        """The hashes of all tasks that have a file, in one look at the folders."""
+        files = (path for folder in self._folders for path in folder.glob("*-*.npz"))
+        return frozenset(path.stem.rpartition("-")[2] for path in files)
+
+    def find(self, task: JumpTask) -> JumpPlan | None:
+        """The plan of that very task, or ``None``. A file that cannot be read counts as none."""
+        path = self.path_of(task)
+        if path is None:
+            return None
+        try:
+            return read_plan(path)
+        except PlanFileError:
+            return None
+
+    def nearest(self, task: JumpTask) -> tuple[JumpPlan, float] | None:
+        """The valid plan of the nearest task that can be started from, and how far it is."""
+        found = []
+        for path, kept in self.tasks():
+            distance = task_distance(task, kept)
+            if distance is not None:
+                found.append((distance, str(path)))
+        for distance, name in sorted(found):
+            try:
+                plan = read_plan(name)
+            except PlanFileError:
+                continue
+            if plan.valid and plan.task.hash(self.robot) in name:
+                return plan, distance
+        return None
+
+    def tasks(self) -> Iterator[tuple[Path, JumpTask]]:
+        """Every kept plan's file and task, in the order of their names; broken files are left out.
+
+        Only the header of each file is read.
+        """
+        for path, header in self.headers():
+            try:
+                yield path, make_task(header["task"])
+            except (KeyError, TypeError, TaskError):
+                continue
+
+    def headers(self) -> Iterator[tuple[Path, dict[str, Any]]]:
+        """Every file with its header; broken files are left out."""
+        for folder in self._folders:
+            for path in sorted(folder.glob("*-*.npz")):
+                try:
+                    with np.load(path, allow_pickle=False) as file:
+                        yield path, json.loads(str(file["header"]))
+                except (OSError, KeyError, ValueError, EOFError, zipfile.BadZipFile):
+                    continue
+
+    def prune(self, tasks: Iterable[JumpTask]) -> list[Path]:
+        """Remove from this library's own folder every plan of a task that is none of these."""
+        wanted = {task.hash(self.robot) for task in tasks}
+        others = [
+            path
+            for path in sorted(self.folder.glob("*-*.npz"))
+            if path.stem.rpartition("-")[2] not in wanted
+        ]
+        for path in others:
+            path.unlink(missing_ok=True)
+        return others
+
+    def add(self, plan: JumpPlan) -> Path:
+        """Keep a plan, which replaces any of the same task in this folder."""
+        path = self.folder / kept_name(plan.task, self.robot)
+        write_plan(path, plan, names_of(self.robot))
+        for other in self.folder.glob(f"*-{plan.task.hash(self.robot)}.npz"):
+            if other != path:
+                other.unlink(missing_ok=True)
+        return path
+
+    def plan(
+        self, task: JumpTask, solve: Solver | None = None, *, anew: bool = False
+    ) -> tuple[JumpPlan, bool]:
+        """A valid plan of a task, and whether it was kept already.
+
+        The exact plan where it is kept; else solved, from the nearest plan if there is one and
+        from nothing if that fails, checked, and kept. ``anew`` looks for no kept plan.
+
+        Raises:
+            TaskError: what is asked for contradicts itself or the robot.
+            PlanError: the task cannot be planned.
+            InvalidPlanError: it can, but the plan fails the validity check; it is not kept.
+        """
+        kept = None if anew else self.find(task)
+        if kept is not None:
+            require_valid(kept, self.robot)
+            return kept, True
+        near = None if anew else self.nearest(task)
+        plan = solve_and_check(task, self.robot, near[0] if near else None, solve)
+        self.add(plan)
+        return plan, False
+
+
+def solve_and_check(
+    task: JumpTask,
+    robot: RobotDescription,
+    warm_start: JumpPlan | None = None,
+    solve: Solver | None = None,
+) -> JumpPlan:
+    """A valid plan of a task with its report; a warm start that leads nowhere is tried without.
+
+    A plan that fails the check because its intervals are too long is solved again on finer ones.
+
+    Raises:
+        TaskError, PlanError, InvalidPlanError: as ``PlanLibrary.plan``.
+    """
+    from ..task.task_checks import require_consistent
+
+    require_consistent(task, robot)
+    make = solve or solve_task
+    if warm_start is not None:
+        try:
+            plan = checked(make(task, robot, warm_start), robot)
+        except PlanError:
+            pass
+        else:
+            if plan.valid:
+                return plan
+    plan = checked(make(task, robot, None), robot)
+    for _ in range(ROUNDS):
+        if plan.valid or not curable(plan):
+            break
+        try:
+            plan = checked(make(task, robot, plan), robot)
+        except PlanError:
+            break
+    if not plan.valid:
+        require_valid(plan, robot)
+    return plan
+
+
+def solve_task(task: JumpTask, robot: RobotDescription, warm_start: JumpPlan | None) -> JumpPlan:
+    """The planner."""
+    from ..solving.solve import solve_jump
+
+    return solve_jump(task, robot, warm_start=warm_start)
+
+
+__all__ = ["InvalidPlanError", "PlanLibrary", "solve_and_check", "task_distance"]

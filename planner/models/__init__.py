@@ -1,0 +1,1 @@
+"""Models of the robot that the planner works with, symbolic and exact."""

@@ -1,0 +1,201 @@
+"""The robot's exact equations of motion, for checking plans: Pinocchio and NumPy, no solver.
+
+The joints move as planned and the contact forces are the planned ones; how the base then moves
+follows from its six rows of the equations of motion,
+
+    M_bb a_b + M_bj a_j + h_b = sum over contacts of J_b' F,
+
+and the joint torques from the other rows. Nothing here shares code with the planner's own model.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...robots.description import RobotDescription
+from ...robots.pinocchio_model import build_pinocchio_model
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class JointMotion:
+    """The joints between two knots: the cubics through both ends' angles and velocities.
+
+    Where the plan's joint acceleration is constant over the interval this is exactly its motion.
+    """
+
+    start: Array
+    end: Array
+    start_velocity: Array
+    end_velocity: Array
+    duration: float
+
+    def at(self, time: float) -> tuple[Array, Array, Array]:
+        """Angles, velocities and accelerations [rad] at ``time`` since the first knot [s]."""
+        t, u = self.duration, time / self.duration
+        way = self.end - self.start
+        bend = 3.0 * way - t * (2.0 * self.start_velocity + self.end_velocity)
+        twist = t * (self.start_velocity + self.end_velocity) - 2.0 * way
+        position = self.start + u * (t * self.start_velocity + u * (bend + u * twist))
+        velocity = self.start_velocity + u / t * (2.0 * bend + 3.0 * u * twist)
+        return position, velocity, (2.0 * bend + 6.0 * u * twist) / t**2
+
+
+class ExactDynamics:
+    """The whole-body model of a robot with the rotors of one actuator profile."""
+
+    def __init__(self, robot: RobotDescription, profile: str) -> None:
+        import pinocchio
+
+        built = build_pinocchio_model(robot, profile)
+        self.pin: Any = pinocchio
+        self.model = built.model
+        self.data = built.model.createData()
+        self.contact_frames = built.contact_frames
+        self.sole_frames = built.sole_frames
+        self.mass = robot.total_mass
+        self._rotor_coupling = built.rotor_coupling
+
+    def contact_jacobians(self, q: Array) -> tuple[Array, Array]:
+        """Contact points (n_contacts, 3) and their Jacobians (3 n_contacts, n_velocities), world
+        axes."""
+        pin = self.pin
+        pin.computeJointJacobians(self.model, self.data, q)
+        pin.updateFramePlacements(self.model, self.data)
+        axes = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+        rows = [
+            pin.getFrameJacobian(self.model, self.data, frame, axes)[:3]
+            for frame in self.contact_frames
+        ]
+        return self._places(self.contact_frames), np.vstack(rows)
+
+    def points(self, q: Array) -> Array:
+        """The contact points in the world [m], (n_contacts, 3)."""
+        self.pin.framesForwardKinematics(self.model, self.data, q)
+        return self._places(self.contact_frames)
+
+    def soles(self, q: Array) -> tuple[Array, Array]:
+        """The sole centres (n_feet, 3) and the feet's rotations to the world (n_feet, 3, 3)."""
+        self.pin.framesForwardKinematics(self.model, self.data, q)
+        turns = [self.data.oMf[frame].rotation.copy() for frame in self.sole_frames]
+        return self._places(self.sole_frames), np.array(turns)
+
+    def _places(self, frames: tuple[int, ...]) -> Array:
+        return np.array([self.data.oMf[frame].translation for frame in frames])
+
+    def centroidal(self, q: Array, v: Array) -> tuple[Array, Array, Array]:
+        """Centre of mass [m], its velocity [m/s] and the angular momentum about it [N m s]."""
+        momentum = self.pin.computeCentroidalMomentum(self.model, self.data, q, v)
+        com = np.array(self.data.com[0])
+        return com, np.array(momentum.linear) / self.mass, np.array(momentum.angular)
+
+    def mass_matrix(self, q: Array) -> Array:
+        """The joint-space inertia with all rotors."""
+        matrix = np.triu(self.pin.crba(self.model, self.data, q))
+        return np.asarray(matrix + np.triu(matrix, 1).T + self._rotor_coupling)
+
+    def base_acceleration(self, q: Array, v: Array, joints: Array, force: Array) -> Array:
+        """How the base accelerates (6,) if the joints do as given [rad/s^2] under these contact
+        forces [N, world], (n_contacts, 3)."""
+        pushed = self._pushed(q, force)
+        known = np.concatenate([np.zeros(6), joints])
+        bias = self.pin.rnea(self.model, self.data, q, v, known)[:6]
+        inertia = self.pin.crba(self.model, self.data, q)[:6, :6]
+        inertia = np.triu(inertia) + np.triu(inertia, 1).T
+        return np.asarray(np.linalg.solve(inertia, pushed[:6] - bias))
+
+    def joint_torque(self, q: Array, v: Array, joints: Array, force: Array) -> Array:
+        """The torques [N m] of that motion, (n_joints,), without friction."""
+        acceleration = np.concatenate([self.base_acceleration(q, v, joints, force), joints])
+        pushed = self._pushed(q, force)
+        whole = self.pin.rnea(self.model, self.data, q, v, acceleration)
+        return np.asarray((whole + self._rotor_coupling @ acceleration - pushed)[6:])
+
+    def _pushed(self, q: Array, force: Array) -> Array:
+        """J' F: the generalised force of the contacts."""
+        if not force.any():
+            return np.zeros(self.model.nv)
+        return np.asarray(self.contact_jacobians(q)[1].T @ force.ravel())
+
+    def velocity_after_impact(
+        self, q: Array, v: Array, impulse: Array, held: NDArray[np.bool_] | None = None
+    ) -> tuple[Array, Array]:
+        """The generalised velocity behind contact impulses [N s, world], (n_contacts, 3).
+
+        Joints that are ``held`` (n_joints) keep their velocity, by impulses [N m s] (n_joints) of
+        their motors, which come second; the other motors give none.
+        """
+        matrix, pushed = self.mass_matrix(q), self._pushed(q, impulse)
+        fixed = np.zeros(self.model.nv, dtype=bool)
+        if held is not None:
+            fixed[6:] = held
+        change = np.zeros(self.model.nv)
+        free = ~fixed
+        change[free] = np.linalg.solve(matrix[np.ix_(free, free)], pushed[free])
+        return np.asarray(v + change), np.asarray((matrix @ change - pushed)[6:] * fixed[6:])
+
+    def integrate(
+        self, q: Array, v: Array, joints: JointMotion, force: Array, longest_step: float
+    ) -> list[tuple[float, Array, Array]]:
+        """The motion over one interval from the state (q, v): the base's by Runge and Kutta's
+        method of order four under constant contact forces.
+
+        Returns time since the interval began [s], q and v after every step; ``q`` is followed as
+        position and quaternion, and the joints' part of both is the planned one.
+        """
+        count = max(1, int(np.ceil(joints.duration / longest_step - 1e-9)))
+        h = joints.duration / count
+        base, twist = q[:7].copy(), v[:6].copy()
+        out = []
+        for i in range(count):
+            t = i * h
+            d1 = self._rates(base, twist, joints.at(t), force)
+            middle = joints.at(t + 0.5 * h)
+            d2 = self._rates(base + 0.5 * h * d1[:7], twist + 0.5 * h * d1[7:], middle, force)
+            d3 = self._rates(base + 0.5 * h * d2[:7], twist + 0.5 * h * d2[7:], middle, force)
+            d4 = self._rates(base + h * d3[:7], twist + h * d3[7:], joints.at(t + h), force)
+            change = h / 6.0 * (d1 + 2.0 * d2 + 2.0 * d3 + d4)
+            base, twist = base + change[:7], twist + change[7:]
+            base[3:7] /= np.linalg.norm(base[3:7])
+            position, velocity, _ = joints.at(t + h)
+            out.append((t + h, np.concatenate([base, position]), np.concatenate([twist, velocity])))
+        return out
+
+    def _rates(
+        self, base: Array, twist: Array, joints: tuple[Array, Array, Array], force: Array
+    ) -> Array:
+        """The derivative of base position, quaternion and twist, (13,)."""
+        position, velocity, acceleration = joints
+        unit = base.copy()
+        unit[3:7] /= np.linalg.norm(unit[3:7])
+        q = np.concatenate([unit, position])
+        v = np.concatenate([twist, velocity])
+        x, y, z, w = unit[3:7]
+        spin = 0.5 * np.array([[w, -z, y], [z, w, -x], [-y, x, w], [-x, -y, -z]])
+        moved = self.pin.Quaternion(unit[3:7]).toRotationMatrix() @ twist[:3]
+        return np.concatenate(
+            [moved, spin @ twist[3:6], self.base_acceleration(q, v, acceleration, force)]
+        )
+
+
+def rotation_between(first: Array, second: Array) -> float:
+    """The angle [rad] between two unit quaternions."""
+    # From half angles: an arc cosine would lose half the digits where the two are alike.
+    half = min(float(np.linalg.norm(first - second)), float(np.linalg.norm(first + second)))
+    return 4.0 * float(np.arcsin(min(1.0, 0.5 * half)))
+
+
+def joint_motion(plan_position: Array, plan_velocity: Array, time: Array, knot: int) -> JointMotion:
+    """The joints of a plan between that knot and the next."""
+    return JointMotion(
+        plan_position[knot, 7:],
+        plan_position[knot + 1, 7:],
+        plan_velocity[knot, 6:],
+        plan_velocity[knot + 1, 6:],
+        float(time[knot + 1] - time[knot]),
+    )

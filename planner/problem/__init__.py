@@ -1,0 +1,1 @@
+"""Jumps as optimisation problems: the formulations, their variables, rows and first guesses."""

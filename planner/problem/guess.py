@@ -1,0 +1,139 @@
+"""Where the solver begins: standing, a ballistic flight, standing; or the same jump straight ahead,
+displaced and turned as the task wants it."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...blocks.signals import Phase
+from ..models.symbolic_model import GRAVITY
+from .layout import Stretch
+from .problem import Problem
+
+Array = NDArray[np.float64]
+
+USUAL_TIMES = {Phase.SQUAT: 0.4, Phase.THRUST: 0.2, Phase.LANDING: 0.15}
+"""s; where the time of a phase is free."""
+
+
+def flight_guess(problem: Problem, number: int) -> tuple[float, float]:
+    """How long a flight lasts [s] and the vertical speed it begins with [m/s], roughly."""
+    hop = problem.task.hops()[number]
+    fall = hop.landing_height or 0.0
+    if hop.rise is not None:
+        up = np.sqrt(2.0 * GRAVITY * hop.rise)
+    elif hop.take_off_speed is not None:
+        up = hop.take_off_speed
+    else:
+        up = np.sqrt(2.0 * GRAVITY * max(0.15, fall + 0.1))
+    duration = hop.flight_time
+    if duration is None:
+        duration = (up + np.sqrt(max(up * up - 2.0 * GRAVITY * fall, 0.04))) / GRAVITY
+    return float(duration), float(fall / duration + 0.5 * GRAVITY * duration)
+
+
+def ballistic_guess(problem: Problem) -> Array:
+    """Every variable of the problem: the robot stands, flies as its centre of mass would, and
+    stands again; the weight is shared equally by the contact points."""
+    coordinates, assembly = problem.coordinates, problem.assembly
+    n = coordinates.size
+    weight = problem.model.robot.total_mass * GRAVITY / len(problem.model.robot.contacts)
+    every = len(coordinates.axes)
+    falling = coordinates.reduce(np.where(np.arange(problem.model.size) == 2, -GRAVITY, 0.0))
+    guess = np.zeros(assembly.variables)
+    for stretch in problem.stretches:
+        start = problem.stances[stretch.place].coordinates
+        mean = _mean_length(problem, stretch)
+        if stretch.flies:
+            duration, up = flight_guess(problem, stretch.place)
+            travel = (problem.stances[stretch.place + 1].coordinates - start) / duration
+        for k in range(stretch.first, stretch.stop):
+            whole, speed = start, np.zeros(len(start))
+            state, control = assembly.state_start[k], assembly.control_start[k]
+            if stretch.flies:
+                time = mean * float(problem.steps[stretch.first : k].sum())
+                whole, speed = start + time * travel, travel.copy()
+                whole[2] = start[2] + up * time - 0.5 * GRAVITY * time * time
+                speed[2] = up - GRAVITY * time
+                guess[control : control + n] = falling
+            elif not stretch.impact:
+                first = control + n + every - 1
+                guess[first : control + n + coordinates.forces : every] = weight
+            guess[state : state + n] = coordinates.reduce(whole)
+            guess[state + n : state + 2 * n] = coordinates.reduce(speed)
+            _guess_lengths(problem, guess, k, mean)
+    k, end = problem.knots - 1, problem.end.coordinates
+    guess[assembly.state_start[k] : assembly.state_start[k] + n] = coordinates.reduce(end)
+    return np.clip(guess, problem.lower, problem.upper)
+
+
+def _mean_length(problem: Problem, stretch: Stretch) -> float:
+    """The mean length of a stretch's intervals [s]."""
+    if stretch.flies:
+        return flight_guess(problem, stretch.place)[0] / stretch.count
+    low, high = stretch.bounds
+    usual = USUAL_TIMES[stretch.phase] / stretch.count
+    return min(max(usual, low), high)
+
+
+def _guess_lengths(problem: Problem, guess: Array, k: int, mean: float) -> None:
+    """The mean interval lengths among a knot's variables: its own, and that it chooses."""
+    assembly, knot = problem.assembly, problem.assembly.knots[k]
+    if problem.stretch_at(k).timed:
+        guess[assembly.state_start[k] + 2 * problem.coordinates.size] = mean
+    if knot.hold is not None:
+        following = problem.stretch_at(k + 1)
+        guess[assembly.control_start[k] + knot.hold] = _mean_length(problem, following)
+
+
+def displaced_guess(problem: Problem, straight: Problem, values: Array) -> Array:
+    """Every variable of a problem, from the solution of the same jumps without their sideways
+    displacements and twists: the whole robot is moved and turned in proportion to the flight."""
+    coordinates, assembly = problem.coordinates, problem.assembly
+    n, own, plane = coordinates.size, straight.coordinates, straight.assembly
+    guess = ballistic_guess(problem)
+    places = problem.task.places()
+    for k in range(problem.knots):
+        stretch = problem.stretch_at(k)
+        state, control = assembly.state_start[k], assembly.control_start[k]
+        other, others = plane.state_start[k], plane.control_start[k]
+        here, there = places[stretch.place], places[stretch.place + stretch.flies]
+        share = float(problem.steps[stretch.first : k].sum() / stretch.count) * stretch.flies
+        twist, aside, ahead = there.heading - here.heading, there.y - here.y, there.x - here.x
+        angle = here.heading + share * twist
+        turn = _turn(angle)
+        q = own.matrix @ values[other : other + own.size]
+        v = own.matrix @ values[other + own.size : other + 2 * own.size]
+        place = np.array([here.x + share * ahead, here.y + share * aside])
+        q[:2] = turn @ (q[:2] - [place[0], 0.0]) + place
+        v[:2] = turn @ v[:2]
+        q[5] += angle
+        if stretch.flies:
+            duration = values[other + 2 * own.size] * stretch.count
+            v[1] += aside / duration
+            v[5] += twist / duration
+        guess[state : state + n] = coordinates.reduce(q)
+        guess[state + n : state + 2 * n] = coordinates.reduce(v)
+        if k == problem.knots - 1:
+            break
+        if stretch.timed:
+            guess[state + 2 * n] = values[other + 2 * own.size]
+        a = own.matrix @ values[others : others + own.size]
+        a[:2] = turn @ a[:2]
+        guess[control : control + n] = coordinates.reduce(a)
+        hold, held = assembly.knots[k].hold, plane.knots[k].hold
+        if hold is not None and held is not None:
+            guess[control + hold] = values[others + held]
+        if stretch.flies:
+            continue
+        pushed = values[others + own.size : others + own.size + own.forces]
+        forces = (own.force_matrix @ pushed).reshape(-1, 3)
+        forces[:, :2] = forces[:, :2] @ turn.T
+        start = control + n
+        guess[start : start + coordinates.forces] = coordinates.reduce_forces(forces.ravel())
+    return guess
+
+
+def _turn(angle: float) -> Array:
+    return np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])

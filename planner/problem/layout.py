@@ -1,0 +1,110 @@
+"""The phases of a task divided into intervals: what the knots of its problem stand for.
+
+Knots are the beginnings of intervals, and the end. A stretch is a phase with a number of intervals;
+where its time is free, and in every flight, the mean length of its intervals is a state that the
+knot before it chooses. With impacts one interval of no length, the touchdown's impulse, comes
+between a flight and the ground.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...blocks.signals import Phase
+from ...robots.description import RobotDescription
+from ..task.sequence import PHASES
+from ..task.task import JumpTask, TaskError
+from .knot_spacing import spacing
+
+Array = NDArray[np.float64]
+
+SHORTEST_FLIGHT, LONGEST_FLIGHT = 0.04, 1.5
+"""s; bounds of a flight time that is left to the planner."""
+SHORTEST_STANCE, LONGEST_STANCE = 0.03, 0.6
+"""s; bounds of any other."""
+
+
+@dataclass(frozen=True, eq=False)
+class Stretch:
+    """A phase of the problem.
+
+    Attributes:
+        phase: which.
+        first, count: its first knot, and how many intervals it has.
+        time: how long it lasts [s]; ``None`` if that is free.
+        lengths: of its intervals as multiples of their mean, (count,).
+        place: how many flights are before it: where the feet stand, or a flight takes off.
+        contacts: the contact points on the ground.
+        impact: whether it is the impulse of a touchdown.
+    """
+
+    phase: Phase
+    first: int
+    count: int
+    time: float | None
+    lengths: Array
+    place: int
+    contacts: tuple[int, ...]
+    impact: bool = False
+
+    @property
+    def flies(self) -> bool:
+        """Whether the robot is in the air."""
+        return self.phase is Phase.FLIGHT
+
+    @property
+    def timed(self) -> bool:
+        """Whether the mean length of its intervals is a state."""
+        return self.flies or self.time is None
+
+    @property
+    def stop(self) -> int:
+        """The knot at which it ends."""
+        return self.first + self.count
+
+    @property
+    def piece(self) -> str:
+        """The piece that its intervals are made of."""
+        if self.impact:
+            return "impact"
+        return "flight" if self.flies else "free_stance" if self.timed else "stance"
+
+    @property
+    def bounds(self) -> tuple[float, float]:
+        """The least and the greatest mean length of its intervals [s]."""
+        if self.time is not None:
+            return self.time / self.count, self.time / self.count
+        low, high = (
+            (SHORTEST_FLIGHT, LONGEST_FLIGHT) if self.flies else (SHORTEST_STANCE, LONGEST_STANCE)
+        )
+        return low / self.count, high / self.count
+
+
+def layout(task: JumpTask, robot: RobotDescription) -> tuple[Stretch, ...]:
+    """The stretches of a task in the order of time.
+
+    Raises:
+        TaskError: a phase on the ground names no contact point.
+    """
+    names = [contact.name for contact in robot.contacts]
+    spans, found, knot, place = task.spans(), list[Stretch](), 0, 0
+    for number, span in enumerate(spans):
+        phase, on_ground = PHASES[span.phase], span.on_ground(names)
+        flies = phase is Phase.FLIGHT
+        if not flies and not on_ground:
+            raise TaskError(
+                f"phases.{number}.contacts: no contact point of {robot.name} is named like "
+                f"{span.contacts!r}; there is {', '.join(names)}, or all"
+            )
+        if task.impact and found and found[-1].flies:
+            found.append(Stretch(phase, knot, 1, 0.0, np.zeros(1), place, on_ground, impact=True))
+            knot += 1
+        last = all(later.phase != "flight" for later in spans[number:])
+        count = span.knots or 1
+        lengths = spacing(phase, count, last=last)
+        found.append(Stretch(phase, knot, count, span.time, lengths, place, on_ground))
+        knot, place = knot + count, place + flies
+    return tuple(found)

@@ -1,0 +1,102 @@
+"""The ground and a step in it as an obstacle: how high points of the body are above it.
+
+Feet on their way over a step follow a timetable (the ``air`` piece) in an ordinary jump. What turns
+over in flight has none: there feet, calves, thighs and torso are all kept above the step's shape,
+which is rounded so that it has derivatives. In every jump onto or off a step the calves are, also
+while the robot stands in front of it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..models.coordinates import Coordinates
+from ..models.symbolic_model import SymbolicModel
+from ..task.sequence import Hop
+from .layout import Stretch
+
+Indices = NDArray[np.int64]
+Point = tuple[str, tuple[str, tuple[float, float, float]], float]
+ROUNDING = 0.01
+"""m; how long before the edge the rounded step has half its height."""
+
+
+def obstacle_points(model: SymbolicModel, coordinates: Coordinates) -> list[Point]:
+    """Of the base and the computed limbs (kind, (link, place), radius): contact points, of kind
+    ``foot``, then ends and middles of the capsules, of kind ``calf`` for the links that carry a
+    foot and ``body`` for all others. The feet's own capsules are left to their contact points."""
+    robot = model.robot
+    link_of = {foot.name: foot.link for foot in robot.feet}
+    carriers = {joint.parent for joint in robot.joints if joint.child in link_of.values()}
+    found: list[Point] = []
+    for c in coordinates.contacts:
+        contact = robot.contacts[c]
+        found.append(("foot", (link_of[contact.foot], contact.position), 0.0))
+    for link in robot.links:
+        limb = model.limb_of_link[link.name]
+        if link.name in link_of.values() or (limb >= 0 and limb not in coordinates.limbs):
+            continue
+        kind = "calf" if link.name in carriers else "body"
+        for shape in link.shapes:
+            middle = tuple(0.5 * (a + b) for a, b in zip(shape.start, shape.end, strict=True))
+            found += [
+                (kind, (link.name, (place[0], place[1], place[2])), shape.radius)
+                for place in (shape.start, middle, shape.end)
+            ]
+    return found
+
+
+def heights_above_step(
+    model: SymbolicModel, coordinates: Coordinates, q: Any, w: Mapping[str, Any]
+) -> list[Any]:
+    """Heights of ``obstacle_points``, less their radii, above ground that changes by ``step`` at
+    ``edge`` on the way ``onwards`` (+1 or -1); within ``early`` of the edge, and a point's radius,
+    the higher ground still, or already, counts for all but 0.25 % of the step."""
+    import casadi as ca
+
+    frames = model.frames(coordinates.expand(q), coordinates.limbs)
+    rows = []
+    higher = ca.sign(w["step"])
+    for _, point, radius in obstacle_points(model, coordinates):
+        place = model.point(frames, *point)
+        way = w["onwards"] * (place[0] - w["edge"]) + higher * (w["early"] + radius)
+        whole = 0.5 * (1.0 + ca.tanh(3.0 * way / w["early"]))
+        rows.append(place[2] - radius - w["ground"] - w["step"] * whole)
+    return rows
+
+
+class ObstacleRows:
+    """Which points a problem keeps above the ground at a knot, and above which ground."""
+
+    def __init__(self, model: SymbolicModel, coordinates: Coordinates) -> None:
+        kinds = [kind for kind, _, _ in obstacle_points(model, coordinates)]
+        self._of_kind = {
+            name: np.flatnonzero(np.array(kinds) == name).astype(np.int64)
+            for name in ("foot", "calf", "body")
+        }
+        self.feet = len(self._of_kind["foot"])
+        self.count = len(kinds)
+
+    def rows(self, hop: Hop, edge: float | None, stretch: Stretch, first: bool) -> Indices:
+        """The rows of a jump's knot; ``first`` says that it is the flight's first."""
+        turns = bool(hop.rotation)
+        if edge is None and not turns:
+            return np.zeros(0, np.int64)
+        kinds = ["calf", *(["body"] if turns else [])]
+        if turns and stretch.flies and not first:
+            kinds = ["foot", *kinds]
+        return np.concatenate([self._of_kind[kind] for kind in kinds])
+
+
+def step_parameters(hop: Hop, edge: float | None, ground: float, share: float) -> dict[str, float]:
+    """The piece's parameters where a jump begins at a height of ``ground``. With no edge the ground
+    changes its height in the middle of the flight; ``share`` of its time is past."""
+    step = hop.landing_height or 0.0
+    onwards = 1.0 if (hop.distance_x or 0.0) >= 0.0 else -1.0
+    if edge is None:
+        ground, step, edge = ground + (step if share >= 0.5 else 0.0), 0.0, 0.0
+    return {"ground": ground, "step": step, "edge": edge, "onwards": onwards, "early": ROUNDING}

@@ -1,0 +1,202 @@
+"""The ``paper`` formulation: the jump problem of the paper's section III, as it is written there.
+
+Decision variables, integration, cost and constraints are those of equations (1) to (16) of that
+section; ``centroidal_stages`` has them. What the paper leaves open is chosen so:
+
+- The boundary set Q holds the paper's examples, r[1], r[N], the heights in stance and in flight and
+  the take-off velocity; also joint limits, rest at both ends, and the base's pose at the end.
+- dt is fixed, the same within every phase. The flight lasts as long as the ballistic flight of the
+  asked rise from standing height to standing height takes.
+- The friction cone, printed with a squared F_z, is sqrt(F_x^2 + F_y^2) <= mu F_z.
+- The weights are the task's, those of forces and of h's rate scaled up, because the acceleration of
+  the centre of mass has the weight one, as in the paper.
+
+There are no motor limits, no clearance of feet, calves and legs, no velocity of the feet at
+touchdown, and the integration is of first order: the validity check says what that costs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...blocks.signals import Phase
+from ..models.quaternions import pose_of
+from ..models.stance import Stance
+from ..models.symbolic_model import GRAVITY, SymbolicModel
+from ..task.task import JumpTask
+from . import centroidal_stages as stages
+from .assembly import Knot
+from .one_flight import Grid, ballistic_flight, uniform_grid
+from .program import Filler, Program
+from .stage_functions import Piece
+
+Array = NDArray[np.float64]
+
+
+FORCE_SCALE, RATE_SCALE = 100.0, 1e4
+"""Q_f and Q_h by the task's weight of forces: of the size of the acceleration's term."""
+
+
+class PaperProblemBuilder:
+    """Builds the paper's problem of a task."""
+
+    def __init__(
+        self,
+        task: JumpTask,
+        model: SymbolicModel,
+        pieces: Mapping[str, Piece],
+        start: Stance,
+        end: Stance,
+    ) -> None:
+        self.task, self.model, self.pieces = task, model, pieces
+        self.start, self.end = start, end
+        self.up, flight_time = ballistic_flight(task, backward_steps=task.knots.flight)
+        self.grid: Grid = uniform_grid(task, flight_time)
+        self.nq, self.nv = model.size + 1, model.size
+        self.nx = stages.state_size(model)
+        self.forces = 3 * len(model.robot.contacts)
+        self.lift_off, self.touchdown = self.grid.flight.start, self.grid.flight.stop
+        self.last = len(self.grid.phases)
+        self.q_start, self.q_end = pose_of(start.coordinates), pose_of(end.coordinates)
+
+    def build(self) -> Program:
+        """The problem with its bounds, parameters and guess."""
+        sizes = stages.parameter_sizes(self.model)
+        self.fill = Filler(self._knots(), self.pieces, sizes)
+        for k in range(self.last + 1):
+            self._bound_state(k)
+            for name in self.fill.assembly.knots[k].pieces:
+                getattr(self, f"_fill_{'interval' if name in ('stance', 'flight') else name}")(k)
+            self._guess(k)
+        self._fix()
+        return self.fill.done(self.task, self.model, self.grid, self.start, self.end)
+
+    def _in_contact(self, k: int) -> bool:
+        """Whether the feet are on the ground at a knot; at the last one that follows from rest."""
+        return 0 < k <= self.lift_off or self.touchdown <= k < self.last
+
+    def _knots(self) -> list[Knot]:
+        every = np.arange(self.nx)
+        knots = []
+        for k, phase in enumerate(self.grid.phases):
+            name = "flight" if phase is Phase.FLIGHT else "stance"
+            controls = self.nv + 3 + (0 if phase is Phase.FLIGHT else self.forces)
+            knot = Knot(self.nx, controls, gap=name)
+            take = np.arange(self.nx + controls)
+            knot.pieces[name] = (take, np.arange(self.nx, self.pieces[name].rows))
+            if k > 0:
+                rows = self.pieces["posture"].rows if self._in_contact(k) else 3
+                knot.pieces["posture"] = (every, np.arange(rows))
+            knots.append(knot)
+        knots[0].fixed = tuple(range(self.nx))
+        speed = self.nq + 3
+        knots[self.lift_off].fixed = (self.nq + 2, speed, speed + 1, speed + 2)
+        knots[-1].fixed = tuple(range(self.nx, self.nx + self.nv))
+        end = Knot(self.nx, 0, fixed=(0, 1, 2))
+        end.pieces["posture"] = (every, np.arange(3))
+        end.pieces["attitude"] = (np.arange(3, 7), np.arange(3))
+        return [*knots, end]
+
+    def _fix(self) -> None:
+        """Q: standing still at the start, the velocity at lift-off, at rest in place at the end."""
+        flight = float(self.grid.steps[self.grid.flight].sum())
+        across = [self.task.distance_x / flight, self.task.distance_y / flight]
+        self.fill.fix(0, "stance", self._at_rest(self.q_start, self.start.com))
+        self.fill.fix(self.lift_off, "take-off speed", [self.start.com[2], *across, self.up])
+        self.fill.fix(self.last - 1, "stance", np.zeros(self.nv))
+        self.fill.fix(self.last, "stance", self.q_end[:3])
+
+    def _at_rest(self, q: Array, com: Array) -> Array:
+        return np.concatenate([q, com, np.zeros(6)])
+
+    def _bound_state(self, k: int) -> None:
+        """Joint limits; the centre of mass is at most as high as standing in stance, and between
+        that and the apex in flight."""
+        if k in (0, self.last):
+            return
+        at = int(self.fill.assembly.state_start[k])
+        limits = self.model.robot.joint_limits
+        self.fill.lower[at + 7 : at + self.nq] = limits[:, 0]
+        self.fill.upper[at + 7 : at + self.nq] = limits[:, 1]
+        height = at + self.nq + 2
+        nominal, landing = float(self.start.com[2]), float(self.end.com[2])
+        if k < self.lift_off:
+            self.fill.upper[height] = nominal
+        elif self.lift_off < k < self.touchdown:
+            self.fill.lower[height] = min(nominal, landing)
+            self.fill.upper[height] = nominal + self.up**2 / (2.0 * GRAVITY)
+        elif self.touchdown < k < self.last - 1:  # at rest it is there anyway
+            self.fill.upper[height] = landing
+
+    def _nominal(self, k: int) -> Array:
+        """q_nom: standing, and in flight from one stance to the other at constant rates."""
+        share = min(max((k - self.lift_off) / len(self.grid.flight), 0.0), 1.0)
+        return pose_of((1.0 - share) * self.start.coordinates + share * self.end.coordinates)
+
+    def _fill_interval(self, k: int) -> None:
+        weights, joints = self.task.weights, self.nv - 6
+        name = "flight" if self.grid.phases[k] is Phase.FLIGHT else "stance"
+        common = {
+            "step": self.grid.steps[k],
+            "q_nom": self._nominal(k + 1),
+            "Q_q": [0.0] * 3 + [4.0 * weights.orientation] * 4 + [weights.posture] * joints,
+            "Q_v": [0.0] * 3 + [weights.joint_velocity] * (3 + joints),
+            "Q_h": RATE_SCALE * weights.force,
+        }
+        rates = [("dynamics", 3, 0.0, 0.0), ("momentum", 3, 0.0, 0.0)]
+        if name == "stance":
+            common |= {"Q_f": FORCE_SCALE * weights.force, "friction": self.task.friction,
+                       "place": self._stance_at(k + 1).points.ravel()}  # fmt: skip
+            rates.append(("friction", self.forces // 3, 0.0, np.inf))
+            force = int(self.fill.assembly.control_start[k]) + self.nv + 3
+            self.fill.lower[force + 2 : force + self.forces : 3] = 0.0
+        self.fill.set(name, k, **common)
+        self.fill.rows(name, k, rates)
+
+    def _stance_at(self, k: int) -> Stance:
+        return self.start if k <= self.lift_off else self.end
+
+    def _fill_posture(self, k: int) -> None:
+        stance = self._stance_at(k)
+        heading = [np.cos(stance.heading), np.sin(stance.heading)]
+        self.fill.set("posture", k, place=stance.points.ravel(), heading=heading)
+        held = [("footholds", self.pieces["posture"].rows - 3, 0.0, 0.0)]
+        com = [("centre of mass", 3, 0.0, 0.0)]
+        self.fill.rows("posture", k, com + (held if self._in_contact(k) else []))
+
+    def _fill_attitude(self, k: int) -> None:
+        self.fill.set("attitude", k, wanted=self.q_end[3:7])
+        self.fill.rows("attitude", k, [("stance", 3, 0.0, 0.0)])
+
+    def _guess(self, k: int) -> None:
+        """Standing, a ballistic flight, standing; the weight shared by all contact points."""
+        first, last = self.start, self.end
+        flight = float(self.grid.steps[self.grid.flight].sum())
+        q, com, speed = self._nominal(k), first.com.copy(), np.zeros(3)
+        if k > self.touchdown:
+            com = last.com.copy()
+        elif k >= self.lift_off:
+            time = float(self.grid.times[k] - self.grid.times[self.lift_off])
+            speed = (last.com - first.com) / flight
+            com = first.com + time * speed
+            com[2] = first.com[2] + self.up * time - 0.5 * GRAVITY * time * time
+            speed[2] = self.up - GRAVITY * time
+            q = q.copy()
+            q[:3] += com - first.com - (time / flight) * (last.com - first.com)
+        at = int(self.fill.assembly.state_start[k])
+        self.fill.guess[at : at + self.nx] = np.concatenate([q, com, speed, np.zeros(3)])
+        if k == self.last:
+            return
+        control = int(self.fill.assembly.control_start[k])
+        if self.grid.phases[k] is Phase.FLIGHT:
+            turn = (last.coordinates - first.coordinates) / flight
+            self.fill.guess[control : control + 3] = speed
+            self.fill.guess[control + 3 : control + 6] = turn[[4, 3, 5]]
+            self.fill.guess[control + self.nv + 2] = -GRAVITY
+            return
+        share = self.model.robot.total_mass * GRAVITY * 3.0 / self.forces
+        begin = control + self.nv + 3
+        self.fill.guess[begin + 2 : begin + self.forces : 3] = share

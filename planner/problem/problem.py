@@ -1,0 +1,344 @@
+"""A jump as an optimisation problem of the whole body's motion: the ``full`` formulation.
+
+What the knots stand for is the ``layout``. Lift-off is the first knot of a flight, touchdown the
+first behind it. The length of a flight interval is a state that the last knot before the flight
+chooses, and so is that of any other phase whose time is free.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...blocks.signals import Phase
+from ..models.coordinates import Coordinates
+from ..models.stance import Stance
+from ..models.symbolic_model import SymbolicModel
+from ..task.margins import Margins, joint_bounds
+from ..task.task import JumpTask
+from .assembly import Assembly
+from .layout import Stretch
+from .obstacles import step_parameters
+from .stage_functions import Piece, body_points, parameter_sizes
+from .structure import STEP_DOWN_SHARE, STEP_UP_SHARE, Structure
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Problem:
+    """A problem ready to be solved.
+
+    Attributes:
+        assembly: the problem's structure and functions.
+        stances: where the robot stands at the start, between jumps and at the end.
+        lower, upper: bounds of the variables.
+        row_lower, row_upper: bounds of the constraint rows.
+        parameters: their values.
+        families: of every constraint row the name of what it asks for.
+        stretches: the phases with their intervals.
+        steps: the interval lengths [s]; by their mean where that is a variable.
+    """
+
+    task: JumpTask
+    model: SymbolicModel
+    coordinates: Coordinates
+    assembly: Assembly
+    stances: tuple[Stance, ...]
+    lower: Array
+    upper: Array
+    row_lower: Array
+    row_upper: Array
+    parameters: Array
+    families: list[str]
+    stretches: tuple[Stretch, ...]
+    steps: Array
+
+    @property
+    def knots(self) -> int:
+        """The number of knots, one more than intervals."""
+        return len(self.assembly.knots)
+
+    @property
+    def start(self) -> Stance:
+        """Where the robot stands at the start."""
+        return self.stances[0]
+
+    @property
+    def end(self) -> Stance:
+        """Where the robot stands at the end."""
+        return self.stances[-1]
+
+    @property
+    def phases(self) -> list[Phase]:
+        """The phase of every interval."""
+        return [stretch.phase for stretch in self.stretches for _ in range(stretch.count)]
+
+    @property
+    def flights(self) -> tuple[range, ...]:
+        """The knots of every flight, lift-off to the one before touchdown."""
+        return tuple(range(s.first, s.stop) for s in self.stretches if s.flies)
+
+    @property
+    def flight(self) -> range:
+        """The knots of the first flight."""
+        return self.flights[0]
+
+    def stretch_at(self, k: int) -> Stretch:
+        """The stretch of the interval that begins with a knot; the last one at the end."""
+        return next((s for s in self.stretches if k < s.stop), self.stretches[-1])
+
+    def posture(self, k: int) -> Array:
+        """The posture, of all coordinates, that the cost prefers: standing, turning in flight."""
+        stretch = self.stretch_at(k)
+        here = self.stances[stretch.place].coordinates
+        if not stretch.flies:
+            return here
+        share = (k - stretch.first) / stretch.count
+        return (1.0 - share) * here + share * self.stances[stretch.place + 1].coordinates
+
+
+class ProblemBuilder:
+    """Builds the problem of a task in those coordinates."""
+
+    def __init__(
+        self,
+        task: JumpTask,
+        model: SymbolicModel,
+        coordinates: Coordinates,
+        pieces: Mapping[str, Piece],
+        stances: Sequence[Stance],
+    ) -> None:
+        self.task, self.model, self.coordinates = task, model, coordinates
+        self.structure = Structure(task, model, coordinates, pieces, stances)
+        self.stretches, self.of_knot = self.structure.stretches, self.structure.of_knot
+        self.stances, self.hops = self.structure.stances, self.structure.hops
+        self.margins = task.margins or Margins()
+        self.n, self.m = coordinates.size, len(coordinates.joints)
+        self.forces = coordinates.forces
+        self.steps = np.concatenate(
+            [s.lengths * (1.0 if s.timed else (s.time or 0.0) / s.count) for s in self.stretches]
+        )
+        self.pieces = pieces
+
+    def build(self) -> Problem:
+        """The problem with its bounds and parameters."""
+        self.assembly = Assembly(self.structure.knots, self.pieces)
+        size, rows = self.assembly.variables, self.assembly.constraints
+        self.lower, self.upper = np.full(size, -np.inf), np.full(size, np.inf)
+        self.row_lower, self.row_upper = np.zeros(rows), np.zeros(rows)
+        self.families = ["integration"] * rows
+        self.parameters = np.zeros(self.assembly.parameters)
+        self.problem = Problem(
+            self.task, self.model, self.coordinates, self.assembly, self.stances,
+            self.lower, self.upper, self.row_lower, self.row_upper, self.parameters,
+            self.families, self.stretches, self.steps,
+        )  # fmt: skip
+        for k in range(len(self.of_knot) + 1):
+            self._bound_state(k)
+            for row, (_, value, family) in zip(
+                self.assembly.fixed_rows(k), self.structure.given.get(k, []), strict=True
+            ):
+                self.row_lower[row] = self.row_upper[row] = value
+                self.families[row] = family
+            for name in self.assembly.knots[k].pieces:
+                fill = {"free_stance": "stance"}.get(name, name)
+                getattr(self, f"_fill_{fill}")(k)
+        return self.problem
+
+    # Bounds of the variables
+
+    def _bound_state(self, k: int) -> None:
+        """Start and end are given, joints stay within their limits, feet only push."""
+        n, start = self.n, int(self.assembly.state_start[k])
+        base = len(self.coordinates.free_base)
+        if k == len(self.of_knot):
+            return
+        stretch, knot = self.of_knot[k], self.assembly.knots[k]
+        if k:
+            limits = joint_bounds(self.model.robot, self.margins, stretch.place > 0)
+            limits = limits[list(self.coordinates.moving)]
+            self.lower[start + base : start + n] = limits[:, 0]
+            self.upper[start + base : start + n] = limits[:, 1]
+            lean = self._most_lean(k)
+            pitch = start + self.coordinates.free_base.index(3)
+            nominal = float(self.nominal(k)[pitch - start])
+            self.lower[pitch], self.upper[pitch] = nominal - lean, nominal + lean
+        if k == 0 and stretch.timed:
+            self.lower[start + 2 * n], self.upper[start + 2 * n] = stretch.bounds
+        control = int(self.assembly.control_start[k])
+        if not stretch.flies:
+            every, idle = len(self.coordinates.axes), self.structure.idle(stretch)
+            for point in range(len(self.coordinates.contacts)):
+                if point not in idle:
+                    self.lower[control + n + point * every + every - 1] = 0.0
+        following = self.of_knot[k + 1] if knot.hold is not None else None
+        if following is not None and following.time is None and knot.hold is not None:
+            self.lower[control + knot.hold], self.upper[control + knot.hold] = following.bounds
+
+    def _most_lean(self, k: int) -> float:
+        """How far the torso may lean away from the nominal posture at a knot."""
+        stretch, bounds = self.of_knot[k], [np.inf]
+        if stretch.place == 0 and not (stretch.flies and k > stretch.first):
+            bounds.append(self.margins.squat_lean or np.inf)
+        if stretch.place > 0 and not stretch.flies:
+            bounds.append(self.margins.landing_lean or np.inf)
+            if self.of_knot[k - 1].flies and self.task.touchdown_lean is not None:
+                bounds.append(self.task.touchdown_lean)
+        return float(min(bounds))
+
+    # What a piece's rows ask for, and its parameters
+
+    def _rows(self, name: str, k: int, families: list[tuple[str, int, float, float]]) -> None:
+        """Bounds and families of a piece's rows, given for all rows after the gap in turn."""
+        start, kept = self.assembly.rows_of(name, k)
+        table: list[tuple[str, float, float]] = []
+        for family, count, low, high in families:
+            table += [(family, low, high)] * count
+        table = [("integration", 0.0, 0.0)] * (self.pieces[name].rows - len(table)) + table
+        for i, row in enumerate(kept):
+            self.families[start + i], self.row_lower[start + i], self.row_upper[start + i] = table[
+                row
+            ]
+
+    def _set(self, name: str, k: int, **values: Any) -> None:
+        start = self.assembly.parameter_start[name, k]
+        for key, size in parameter_sizes(self.coordinates)[name].items():
+            if key in values:
+                self.parameters[start : start + size] = values[key]
+            start += size
+
+    def _motor_rows(self) -> list[tuple[str, int, float, float]]:
+        profile, effort = self.model.robot.profiles[self.task.profile], self.task.effort
+        peak, top = profile.peak_torque * effort, profile.no_load_speed * effort
+        line = self._slope() * top
+        return [
+            ("motor torque", self.m, -peak, peak),
+            ("motor torque at speed", 2 * self.m, -line, line),
+            ("motor speed", self.m, -top, top),
+        ]
+
+    def _slope(self) -> float:
+        profile = self.model.robot.profiles[self.task.profile]
+        return profile.peak_torque / (profile.no_load_speed - profile.corner_speed)
+
+    def _interval(self, k: int) -> dict[str, Any]:
+        weights, base = self.task.weights, self.coordinates.free_base
+        share, moving = float(self.coordinates.share), len(self.coordinates.moving)
+        posture = [weights.orientation if i >= 3 else 0.0 for i in base]
+        return {
+            "nominal": self.nominal(k),
+            "posture": posture + [weights.posture * share] * moving,
+            "velocity": [0.0] * len(base) + [weights.joint_velocity * share] * moving,
+            "acceleration": [weights.acceleration] * len(base)
+            + [weights.acceleration * share] * moving,
+            "slope": self._slope(),
+        }
+
+    def nominal(self, k: int) -> Array:
+        """The posture that the cost prefers."""
+        return self.coordinates.reduce(self.problem.posture(k))
+
+    def _fill_stance(self, k: int) -> None:
+        weights, share, stretch = self.task.weights, self.coordinates.share, self.of_knot[k]
+        self._set(
+            stretch.piece, k, step=self.steps[k], share=self.steps[k],
+            force=weights.force * share, friction=self.task.friction / np.sqrt(2.0),
+            pressure=self.margins.pressure, **self._interval(k),
+        )  # fmt: skip
+        base = ("dynamics", len(self.coordinates.rows), 0.0, 0.0)
+        pressure = ("pressure", len(self.coordinates.contacts), 0.0, np.inf)
+        self._rows(stretch.piece, k, [base, *self._motor_rows(), self._cones(), pressure])
+
+    def _cones(self) -> tuple[str, int, float, float]:
+        cones = 2 * (len(self.coordinates.axes) - 1) * len(self.coordinates.contacts)
+        return ("friction", cones, 0.0, np.inf)
+
+    def _fill_impact(self, k: int) -> None:
+        top = self.model.robot.profiles[self.task.profile].no_load_speed * self.task.effort
+        self._set(
+            "impact", k, impulse=self.task.weights.impulse,
+            friction=self.task.friction / np.sqrt(2.0),
+        )  # fmt: skip
+        balance = ("impact", self.n, 0.0, 0.0)
+        self._rows("impact", k, [balance, ("motor speed", self.m, -top, top), self._cones()])
+
+    def _fill_flight(self, k: int) -> None:
+        self._set("flight", k, share=self.steps[k], **self._interval(k))
+        base = ("dynamics", len(self.coordinates.rows), 0.0, 0.0)
+        self._rows("flight", k, [base, *self._motor_rows()])
+
+    def _fill_contact(self, k: int) -> None:
+        stretch = self.of_knot[k]
+        stance = self.stances[stretch.place]
+        places = stance.points[list(self.coordinates.contacts)].ravel()
+        heading = [np.cos(stance.heading), np.sin(stance.heading)]
+        self._set("contact", k, place=places, heading=heading)
+        feet = self.pieces["contact"].rows // 2
+        speeds = [("foot velocity", feet, 0.0, 0.0)]
+        if stretch.impact:  # hits the ground from above
+            *along, down = [most or np.inf for most in self.structure.touchdown_speeds()]
+            of_point = [("foot velocity", 1, -most, most) for most in along]
+            of_point.append(("foot velocity", 1, -down, np.inf))
+            speeds = of_point * len(self.coordinates.contacts)
+        self._rows("contact", k, [*speeds, ("footholds", feet, 0.0, 0.0)])
+
+    def _fill_obstacle(self, k: int) -> None:
+        hop, place, edge = self.structure.hop_at(k)
+        stretch, obstacles = self.of_knot[k], self.structure.obstacles
+        share = self.structure.flight_share(k) if stretch.flies else float(stretch.place > 0)
+        self._set("obstacle", k, **step_parameters(hop, edge, place.z, share))
+        floor = self.task.foot_clearance * np.sin(np.pi * share)
+        self._rows("obstacle", k, [
+            ("ground clearance", obstacles.feet, floor, np.inf),
+            ("ground clearance", obstacles.count - obstacles.feet, 0.0, np.inf),
+        ])  # fmt: skip
+
+    def _fill_take_off(self, k: int) -> None:
+        hop, stretch = self.structure.hop_at(k)[0], self.of_knot[k]
+        rise = self.stances[stretch.place].com[2] + (hop.rise or 0.0)
+        speed = hop.take_off_speed or 0.0
+        lift_off, touchdown = self.task.lift_off_momentum, self.task.touchdown_momentum
+        given = lift_off if stretch.flies else touchdown
+        most = np.inf if given is None else given
+        self._rows("take_off", k, [
+            ("apex", 1, rise, rise), ("take-off speed", 1, speed, speed),
+            ("angular momentum", 3, -most, most),
+        ])  # fmt: skip
+
+    def _fill_air(self, k: int) -> None:
+        """Feet and calves are above the ground. At a step they are above the higher ground while
+        it is under them: until ``STEP_DOWN_SHARE`` of the flight's time, or from ``STEP_UP_SHARE``
+        on, and at that instant they are still, or already, on the lower side of the edge."""
+        task, points = self.task, body_points(self.model, self.coordinates)
+        n_feet, low = len(self.coordinates.contacts), self.structure.places[self.of_knot[k].place].z
+        if not self.of_knot[k].flies:
+            self._rows("air", k, [("ground clearance", len(points), low, np.inf),
+                                  ("ground clearance", 2 * len(points), -np.inf, np.inf)])  # fmt: skip
+            return
+        share = self.structure.flight_share(k)
+        step, edge = self.structure.step_under(k)
+        switch = 0.5 if edge is None else STEP_UP_SHARE if step > 0.0 else STEP_DOWN_SHARE
+        ground = low + step if share > switch else low
+        floor = ground + task.foot_clearance * np.sin(np.pi * share)
+        if self.structure.flight_share(k - 1) < switch <= share:
+            floor = max(floor, low + step)
+        ahead = (-np.inf, np.inf)
+        if edge is not None:
+            before = (share <= switch) if step > 0.0 else False
+            beyond = (share > switch) if step < 0.0 else False
+            forward = (self.hops[self.of_knot[k].place].distance_x or 0.0) > 0.0
+            if before or beyond:
+                ahead = (-np.inf, edge) if before is forward else (edge, np.inf)
+        free = ("ground clearance", len(points) - n_feet, -np.inf, np.inf)
+        self._rows("air", k, [
+            ("ground clearance", n_feet, floor, np.inf),
+            ("ground clearance", len(points) - n_feet, ground, np.inf),
+            ("ground clearance", n_feet, *ahead),
+            free,
+            ("leg clearance", len(points), 0.5 * task.leg_clearance, np.inf),
+        ])  # fmt: skip

@@ -1,0 +1,308 @@
+"""The pieces a jump's optimisation problem is made of, as CasADi functions of one knot.
+
+Every piece has variables ``z``, parameters ``w`` and gives a cost and constraint rows; its Jacobian
+and the Hessian of its Lagrangian come with it. With n coordinates ``q`` and m joints, all in the
+reduced coordinates of ``Coordinates``:
+
+``stance``  z = q, v, a, F.     Interval on the ground. Rows: gap (2n), base dynamics, motor torque,
+            torque-speed line and motor speed (m each), friction pyramid (4 a contact point, or 2).
+``free_stance`` z = q, v, h, a, F. The same, ``share`` h seconds long. Rows: gap (2n + 1), then alike.
+``impact``  z = q, v, dv, L.    Touchdown: velocities change by dv under impulses L, M dv = J' L, with
+            none from the motors. Rows: gap (2n), impulse balance (n), motor speed (m), friction.
+``flight``  z = q, v, h, a.     Interval of ``share`` h seconds in the air. Rows: gap (2n + 1), base dynamics,
+            motor torque, torque-speed line at begin and end, motor speed.
+``contact`` z = q, v.           Rows: velocity + 10/s x place error of every contact point along its
+            foot, across it and upwards (2 in the sagittal plane), then the place errors;
+            ``ContactRows`` says which of them are independent.
+``take_off`` z = q, v.          Rows: apex height, vertical speed, angular momentum (3).
+``air``     z = q.              Rows: height of the points of feet and calves, how far ahead they
+            are, and how far on their own leg's side of the torso's middle plane, each point's
+            height and side less its radius.
+``obstacle`` z = q.             Rows: how high the points of ``obstacle_points`` are above ground
+            with a step, rounded, less their radii.
+
+Over an interval of h seconds accelerations are constant: v+ = v + h a, q+ = q + h v + h^2 a / 2, and
+the dynamics hold in its middle (second order). Gap rows hold minus the next state. ``w`` is named
+by ``Parameters``. Not modelled: friction in the joints and the rotors' gyroscopic moment.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..models.coordinates import Coordinates, full_coordinates, sagittal_coordinates
+from ..models.symbolic_model import GRAVITY, SymbolicModel, base_rotation
+from .obstacles import heights_above_step
+
+DRIFT_RATE = 10.0
+"""1/s, how fast the place error of a foot on the ground dies out."""
+
+PIECES = ("stance", "free_stance", "flight", "impact", "contact", "take_off", "air", "obstacle")
+
+
+@dataclass(frozen=True)
+class Piece:
+    """The functions of one piece: ``value(z, w) -> f, g``; ``jacobian(z, w) -> g, grad f, jac g``;
+    ``hessian(z, w, lam_f, lam_g) -> gradient and Hessian of the Lagrangian``."""
+
+    value: Any
+    jacobian: Any
+    hessian: Any
+
+    @property
+    def rows(self) -> int:
+        """The number of constraint rows."""
+        return int(self.value.size1_out(1))
+
+
+def parameter_sizes(coordinates: Coordinates) -> dict[str, dict[str, int]]:
+    """The parameters ``w`` of every piece: name -> size, in order."""
+    n, joints = coordinates.size, len(coordinates.joints)
+    contacts = len(coordinates.contacts)
+    interval = {
+        "nominal": n, "posture": n, "velocity": n, "acceleration": n, "slope": joints,
+    }  # fmt: skip
+    return {
+        "stance": {"step": 1, "friction": 1, "force": 1, "pressure": 1, **interval},
+        "free_stance": {"share": 1, "friction": 1, "force": 1, "pressure": 1, **interval},
+        "flight": {"share": 1, **interval},
+        "impact": {"friction": 1, "impulse": 1},
+        "contact": {"place": 3 * contacts, "heading": 2},
+        "take_off": {},
+        "air": {},
+        "obstacle": {"ground": 1, "step": 1, "edge": 1, "onwards": 1, "early": 1},
+    }
+
+
+def make_coordinates(model: SymbolicModel, name: str) -> Coordinates:
+    """The coordinates of that name. Raises ``ValueError`` where the robot has none."""
+    chosen = full_coordinates(model) if name == "full" else sagittal_coordinates(model)
+    if chosen is None:
+        raise ValueError(f"{model.robot.name} is not the same left and right")
+    return chosen
+
+
+def piece_expressions(
+    model: SymbolicModel, coordinates: Coordinates, name: str
+) -> tuple[Any, Any, Any, Any]:
+    """The symbols ``z`` and ``w`` of a piece, its cost and its rows."""
+    import casadi as ca
+
+    n = coordinates.size
+    sizes = parameter_sizes(coordinates)[name]
+    w = {key: ca.SX.sym(key, size) for key, size in sizes.items()}
+    q, v = ca.SX.sym("q", n), ca.SX.sym("v", n)
+    cost: Any = ca.SX(0)
+    rows: list[Any]
+    z: list[Any]
+    if name in ("stance", "free_stance", "flight"):
+        a = ca.SX.sym("a", n)
+        state = ca.SX.sym("h")
+        h = w["step"] if name == "stance" else w["share"] * state
+        forces = 0 if name == "flight" else coordinates.forces
+        F = ca.SX.sym("F", forces)
+        z = [q, v, a, F] if name == "stance" else [q, v, state, a, F]
+        half_v = v + 0.5 * h * a
+        half_q = q + 0.5 * h * v + 0.125 * h * h * a
+        all_forces: Any = ca.mtimes(ca.DM(coordinates.force_matrix), F) if forces else None
+        named = {
+            model.robot.contacts[c].name: all_forces[3 * c : 3 * c + 3]
+            for c in coordinates.contacts
+            if forces
+        }
+        base, limbs, torque = model.inverse_dynamics(
+            coordinates.expand(half_q),
+            coordinates.expand(half_v),
+            coordinates.expand(a),
+            named,
+            coordinates.limbs,
+        )
+        wrench = base + coordinates.share * sum(limbs.values())
+        to_motor = model.robot.torque_to_motor[np.ix_(coordinates.joints, coordinates.joints)]
+        geared = _geared(model, coordinates)
+        motor = ca.mtimes(ca.DM(to_motor), torque[list(coordinates.joints)])
+        own = [6 + joint for joint in coordinates.joints]
+        speed = ca.mtimes(ca.DM(geared), coordinates.expand(v)[own])
+        end_speed = ca.mtimes(ca.DM(geared), coordinates.expand(v + h * a)[own])
+        gap = [-(q + h * v + 0.5 * h * h * a), -(v + h * a)]
+        rows = [
+            *gap,
+            *([] if name == "stance" else [-state]),
+            wrench[list(coordinates.rows)],
+            motor,
+            motor + w["slope"] * speed,
+            motor + w["slope"] * end_speed,
+            speed,
+        ]
+        off = q - w["nominal"]
+        cost = (
+            ca.dot(w["posture"], off * off)
+            + ca.dot(w["velocity"], v * v)
+            + ca.dot(w["acceleration"], a * a)
+        )
+        if forces:
+            cost = cost + w["force"] * ca.dot(F, F)
+            rows += _cones(coordinates, all_forces, w["friction"])
+            rows += _pressures(model, coordinates, all_forces, w["pressure"])
+        cost = h * cost
+    elif name == "impact":
+        change, F = ca.SX.sym("dv", n), ca.SX.sym("F", coordinates.forces)
+        z = [q, v, change, F]
+        pushes = ca.mtimes(ca.DM(coordinates.force_matrix), F)
+        rows = [
+            -q, -(v + change),
+            _impulse_balance(model, coordinates, q, change, pushes),
+            ca.mtimes(ca.DM(_geared(model, coordinates)),
+                      coordinates.expand(v)[[6 + joint for joint in coordinates.joints]]),
+            *_cones(coordinates, pushes, w["friction"]),
+        ]  # fmt: skip
+        cost = w["impulse"] * ca.dot(F, F)
+    elif name == "contact":
+        z = [q, v]
+        errors = _place_errors(model, coordinates, q, w["place"], w["heading"])
+        rows = [ca.jtimes(errors, q, v) + DRIFT_RATE * errors, errors]
+    elif name == "take_off":
+        z = [q, v]
+        whole, speeds = coordinates.expand(q), coordinates.expand(v)
+        linear, angular = model.momentum(whole, speeds)
+        rise = linear[2] / model.robot.total_mass
+        rows = [model.com(whole)[2] + rise * rise / (2.0 * GRAVITY), rise, angular]
+    elif name == "air":
+        z = [q]
+        rows = _air_rows(model, coordinates, q)
+    else:
+        z = [q]
+        rows = heights_above_step(model, coordinates, q, w)
+    return ca.vertcat(*z), ca.vertcat(*w.values()), cost, ca.vertcat(*rows)
+
+
+def _geared(model: SymbolicModel, coordinates: Coordinates) -> Any:
+    """Motor speeds from the speeds of the joints that are computed."""
+    return model.robot.joint_to_motor[np.ix_(coordinates.joints, coordinates.joints)]
+
+
+def _cones(coordinates: Coordinates, forces: Any, friction: Any) -> list[Any]:
+    """The friction pyramid's rows of every contact point."""
+    rows = []
+    for c in coordinates.contacts:
+        reach = friction * forces[3 * c + 2]
+        for axis in coordinates.axes[:-1]:
+            pull = forces[3 * c + axis]
+            rows += [reach - pull, reach + pull]
+    return rows
+
+
+def _pressures(
+    model: SymbolicModel, coordinates: Coordinates, forces: Any, share: Any
+) -> list[Any]:
+    """By how much every point carries more than that share of its foot's load."""
+    contacts = model.robot.contacts
+    rows = []
+    for c in coordinates.contacts:
+        same = [i for i in coordinates.contacts if contacts[i].foot == contacts[c].foot]
+        rows.append(forces[3 * c + 2] - share * sum(forces[3 * i + 2] for i in same))
+    return rows
+
+
+def _impulse_balance(model: SymbolicModel, coordinates: Coordinates, q: Any, change: Any,
+                     impulses: Any) -> Any:  # fmt: skip
+    """M dv - J' L of the base (body frame) and of the joints that are coordinates: the others of a
+    mirrored motion are held."""
+    import casadi as ca
+
+    still = ca.SX.zeros(model.size)
+    named = {
+        model.robot.contacts[c].name: impulses[3 * c : 3 * c + 3] for c in coordinates.contacts
+    }
+    sums = []
+    # Gravity has no impulse: what holds the robot at rest is taken off again.
+    for bend, forces in ((coordinates.expand(change), named), (still, {})):
+        base, limbs, torque = model.inverse_dynamics(
+            coordinates.expand(q), still, bend, forces, coordinates.limbs
+        )
+        wrench = base + coordinates.share * sum(limbs.values())
+        sums.append(ca.vertcat(wrench[list(coordinates.rows)], torque[list(coordinates.moving)]))
+    return sums[0] - sums[1]
+
+
+def make_piece(model: SymbolicModel, coordinates: Coordinates, name: str) -> Piece:
+    """The functions of a piece with exact derivatives."""
+    return derived(f"{coordinates.name}_{name}", *piece_expressions(model, coordinates, name))
+
+
+def derived(prefix: str, z: Any, w: Any, cost: Any, rows: Any) -> Piece:
+    """A piece from its symbols ``z`` and ``w``, its cost and its rows."""
+    import casadi as ca
+
+    lam_f, lam_g = ca.SX.sym("lam_f"), ca.SX.sym("lam_g", rows.numel())
+    gradient = ca.densify(ca.gradient(cost, z))
+    hessian, slope = ca.hessian(lam_f * cost + ca.dot(lam_g, rows), z)
+    rows = ca.densify(rows)
+    options = {"cse": True}
+    return Piece(
+        ca.Function(f"{prefix}_value", [z, w], [cost, rows], options),
+        ca.Function(f"{prefix}_jacobian", [z, w], [rows, gradient, ca.jacobian(rows, z)], options),
+        ca.Function(
+            f"{prefix}_hessian", [z, w, lam_f, lam_g], [ca.densify(slope), hessian], options
+        ),
+    )
+
+
+def _place_errors(model: SymbolicModel, coordinates: Coordinates, q: Any, place: Any, heading: Any
+                  ) -> Any:  # fmt: skip
+    """Of every contact point its error along and across the foot and upwards, in the heading that
+    the foot stands with."""
+    import casadi as ca
+
+    points = model.contact_points(coordinates.expand(q), coordinates.limbs)
+    errors = []
+    for i in range(len(coordinates.contacts)):
+        off = points[i] - place[3 * i : 3 * i + 3]
+        along = heading[0] * off[0] + heading[1] * off[1]
+        across = heading[0] * off[1] - heading[1] * off[0]
+        sideways = [across] if 1 in coordinates.axes else []
+        errors += [along, *sideways, off[2]]
+    return ca.vertcat(*errors)
+
+
+def _air_rows(model: SymbolicModel, coordinates: Coordinates, q: Any) -> list[Any]:
+    """Heights, distances ahead and sides of the points."""
+    import casadi as ca
+
+    whole = coordinates.expand(q)
+    frames = model.frames(whole, coordinates.limbs)
+    left = base_rotation(whole[3:6])[:, 1]
+    points = body_points(model, coordinates)
+    places = [model.point(frames, *point) for point, _, _ in points]
+    heights = [place[2] - radius for place, (_, radius, _) in zip(places, points, strict=True)]
+    sides = [
+        sign * ca.dot(left, place - whole[0:3]) - radius
+        for place, (_, radius, sign) in zip(places, points, strict=True)
+    ]
+    return [*heights, *(place[0] for place in places), *sides]
+
+
+def body_points(model: SymbolicModel, coordinates: Coordinates
+                ) -> list[tuple[tuple[str, tuple[float, float, float]], float, float]]:  # fmt: skip
+    """The points of the legs that must not touch anything in flight: (link, place), radius and +1
+    for a left leg, -1 for a right one. Contact points first, with no radius."""
+    robot = model.robot
+    link_of = {foot.name: foot.link for foot in robot.feet}
+    found = []
+    for c in coordinates.contacts:
+        contact = robot.contacts[c]
+        found.append(((link_of[contact.foot], contact.position), 0.0))
+    for limb in coordinates.limbs:
+        for index in model.limbs[limb][-2:-1]:
+            link = robot.link(robot.joints[index].child)
+            for shape in link.shapes:
+                found += [((link.name, shape.start), shape.radius)]
+                found += [((link.name, shape.end), shape.radius)]
+    sides = {
+        limb: float(np.sign(robot.joints[model.limbs[limb][0]].origin[1]))
+        for limb in range(len(model.limbs))
+    }
+    return [(point, radius, sides[model.limb_of_link[point[0]]]) for point, radius in found]

@@ -1,0 +1,217 @@
+"""Which variables and rows a jump's problem has at each of its knots.
+
+What is given there comes with it: the start, the end, times, and no force on points that are not on
+the ground.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..models.coordinates import Coordinates
+from ..models.stance import Stance
+from ..models.symbolic_model import SymbolicModel
+from ..task.sequence import Hop, Place, edge_of
+from ..task.task import JumpTask
+from .assembly import Knot
+from .contact_rows import ContactRows, reduced_contacts
+from .layout import Stretch, layout
+from .obstacles import ObstacleRows
+from .stage_functions import Piece
+
+STEP_UP_SHARE, STEP_DOWN_SHARE = 0.45, 0.75
+
+
+class Structure:
+    """The knots of a task's problem in those coordinates.
+
+    Attributes:
+        stretches: the phases with their intervals; ``of_knot`` that of every interval.
+        given: by knot the variables that are given there, their values and families.
+        knots: all of them, the end included.
+    """
+
+    def __init__(
+        self,
+        task: JumpTask,
+        model: SymbolicModel,
+        coordinates: Coordinates,
+        pieces: Mapping[str, Piece],
+        stances: Sequence[Stance],
+    ) -> None:
+        self.task = task
+        self.coordinates, self.pieces, self.stances = coordinates, pieces, tuple(stances)
+        self.n, self.forces = coordinates.size, coordinates.forces
+        self.hops, self.places = task.hops(), task.places()
+        self.stretches = layout(task, model.robot)
+        self.of_knot = [stretch for stretch in self.stretches for _ in range(stretch.count)]
+        self.contact_rows = ContactRows(model.robot, coordinates)
+        self.obstacles = ObstacleRows(model, coordinates)
+        self.given: dict[int, list[tuple[int, float, str]]] = {}
+        self.knots = self._knots()
+
+    def _knots(self) -> list[Knot]:
+        n, end = self.n, len(self.of_knot)
+        knots = []
+        for k, stretch in enumerate(self.of_knot):
+            before = self.of_knot[k - 1] if k else None
+            after = self.of_knot[k + 1] if k + 1 < end else None
+            forces = 0 if stretch.flies else self.forces
+            states = 2 * n + stretch.timed
+            holds = after is not None and after is not stretch and after.timed
+            knot = Knot(states, n + forces + holds, gap=stretch.piece)
+            knot.hold = n + forces if holds else None
+            take = np.arange(states + n + forces)
+            knot.pieces[stretch.piece] = (take, self._interval_rows(stretch))
+            q_and_v = np.arange(2 * n)
+            if stretch.flies and k > stretch.first:
+                knot.pieces["air"] = (np.arange(n), self._air_rows(k))
+            moment = self._moment_rows(before, stretch, k)
+            if moment is not None:
+                knot.pieces["take_off"] = (q_and_v, moment)
+            if before is not None:
+                kept = self._contact_rows(before, stretch)
+                if len(kept):
+                    knot.pieces["contact"] = (q_and_v, kept)
+            obstacle = self._obstacle_rows(k)
+            if k and len(obstacle):
+                knot.pieces["obstacle"] = (np.arange(n), obstacle)
+            idle = self.idle(stretch)
+            if idle and k and not stretch.impact:
+                knot.pieces["air"] = (np.arange(n), np.array(idle))
+            self._give(k, knot, stretch, after if holds else None)
+            knots.append(knot)
+        # The last interval leads to a knot that has no interval length among its states.
+        base = len(self.coordinates.free_base)
+        at_rest = self.coordinates.reduce(self.stances[-1].coordinates)
+        values = [(i, float(at_rest[i]), "stance") for i in range(base)]
+        self.given[end] = values + [(n + i, 0.0, "stance") for i in range(n)]
+        fixed = tuple(i for i, _, _ in self.given[end])
+        return [*knots, Knot(2 * n, 0, fixed=fixed)]
+
+    def _give(self, k: int, knot: Knot, stretch: Stretch, timed: Stretch | None) -> None:
+        """What is given at a knot: the start, forces on points without contact, a next time."""
+        n, given = self.n, []
+        if k == 0:
+            start = self.coordinates.reduce(self.stances[0].coordinates)
+            given += [(i, float(start[i]), "stance") for i in range(n)]
+            given += [(n + i, 0.0, "stance") for i in range(n)]
+        every = len(self.coordinates.axes)
+        first = knot.states + n
+        for point in self.idle(stretch):
+            given += [(first + point * every + i, 0.0, "friction") for i in range(every)]
+        if timed is not None and timed.time is not None and knot.hold is not None:
+            given.append((knot.states + knot.hold, timed.time / timed.count, "flight time"))
+        if given:
+            self.given[k] = given
+            knot.fixed = tuple(i for i, _, _ in given)
+
+    def idle(self, stretch: Stretch) -> list[int]:
+        """The contact variables' points that are not on the ground in a stance."""
+        if stretch.flies:
+            return []
+        on = reduced_contacts(self.coordinates, stretch.contacts)
+        return [i for i in range(len(self.coordinates.contacts)) if i not in on]
+
+    def _interval_rows(self, stretch: Stretch) -> NDArray[np.int64]:
+        """The rows of an interval that are kept: no friction where there is no contact, and
+        pressure only where a share is asked for and the whole foot is down."""
+        total, points = self.pieces[stretch.piece].rows, len(self.coordinates.contacts)
+        rows = np.arange(2 * self.n + stretch.timed, total)
+        if stretch.flies:
+            return rows
+        each = 2 * (len(self.coordinates.axes) - 1)
+        pressure = 0 if stretch.impact else points
+        cones = total - pressure - each * points
+        idle = [cones + each * point + i for point in self.idle(stretch) for i in range(each)]
+        if idle or self.task.margins is None or not self.task.margins.pressure:
+            idle += range(total - pressure, total)
+        return np.setdiff1d(rows, idle) if idle else rows
+
+    def _contact_rows(self, before: Stretch, stretch: Stretch) -> NDArray[np.int64]:
+        """Which rows hold the feet at the knot between two intervals."""
+        held, now = (
+            set() if s.flies else reduced_contacts(self.coordinates, s.contacts)
+            for s in (before, stretch)
+        )  # fmt: skip
+        if stretch.impact:
+            bounded = [
+                axis for axis, most in enumerate(self.touchdown_speeds()) if most is not None
+            ]
+            return np.concatenate(
+                [self.contact_rows.speeds(now, bounded), self.contact_rows.places(now, set())]
+            )
+        if before.impact:
+            return self.contact_rows.velocities(now)
+        velocities = self.contact_rows.velocities(held | now)
+        return np.concatenate([velocities, self.contact_rows.places(now, held)])
+
+    def touchdown_speeds(self) -> list[float | None]:
+        """The most [m/s] that a point may move where it hits the ground: along the foot, across it
+        (not in the sagittal plane) and downwards."""
+        margins, sideways = self.task.margins, len(self.coordinates.axes) - 1
+        if margins is None:
+            return [None] * (sideways + 1)
+        return [*[margins.touchdown_slide] * sideways, margins.touchdown_speed]
+
+    def _air_rows(self, k: int) -> NDArray[np.int64]:
+        """Which rows are needed: how far ahead only where there is an edge."""
+        points = self.pieces["air"].rows // 3
+        feet = len(self.coordinates.contacts)
+        ahead = np.arange(points, points + feet)
+        step, edge = self.step_under(k)
+        if self.hops[self.of_knot[k].place].rotation:
+            return np.arange(2 * points, 3 * points)
+        if edge is None or (step > 0.0) is (
+            self.flight_share(k) > (STEP_UP_SHARE if step > 0.0 else STEP_DOWN_SHARE)):  # fmt: skip
+            ahead = ahead[:0]
+        return np.concatenate([np.arange(points), ahead, np.arange(2 * points, 3 * points)])
+
+    def hop_at(self, k: int) -> tuple[Hop, Place, float | None]:
+        """The jump under way at a knot, or the last one; where it began, and its step's edge."""
+        number = min(self.of_knot[k].place, len(self.hops) - 1)
+        hop, place = self.hops[number], self.places[number]
+        return hop, place, edge_of(hop, place)
+
+    def _obstacle_rows(self, k: int) -> NDArray[np.int64]:
+        hop, _, edge = self.hop_at(k)
+        stretch = self.of_knot[k]
+        return self.obstacles.rows(hop, edge, stretch, k == stretch.first)
+
+    def _moment_rows(
+        self, before: Stretch | None, stretch: Stretch, k: int
+    ) -> NDArray[np.int64] | None:
+        """What is asked for at a lift-off (apex or speed, angular momentum) or at a touchdown
+        (angular momentum); ``None`` at any other knot."""
+        lift_off = stretch.flies and k == stretch.first
+        kept = []
+        if lift_off:
+            hop = self.hops[stretch.place]
+            kept = [0] if hop.rise is not None else [1] if hop.take_off_speed is not None else []
+        elif not self.is_touchdown(before, stretch) or self.task.touchdown_momentum is None:
+            return None
+        most = self.task.lift_off_momentum if lift_off else self.task.touchdown_momentum
+        if most is not None:
+            # The momentum about an axis is a base moment's: zero by symmetry, or to be bounded.
+            kept += [row - 1 for row in self.coordinates.rows if row >= 3]
+        return np.array(kept, dtype=np.int64)
+
+    @staticmethod
+    def is_touchdown(before: Stretch | None, stretch: Stretch) -> bool:
+        """Whether a knot between two intervals is the first on the ground, behind any impact."""
+        landed = before is not None and (before.flies or before.impact)
+        return landed and not stretch.flies and not stretch.impact
+
+    def step_under(self, k: int) -> tuple[float, float | None]:
+        """The step's height and its edge under a flight."""
+        place = self.of_knot[k].place
+        hop = self.hops[place]
+        return hop.landing_height or 0.0, edge_of(hop, self.places[place])
+
+    def flight_share(self, k: int) -> float:
+        """How much of the flight's time is past at a knot of it."""
+        stretch = self.of_knot[k]
+        return float(stretch.lengths[: max(0, k - stretch.first)].sum() / stretch.count)

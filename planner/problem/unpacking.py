@@ -1,0 +1,186 @@
+"""From the problem's variables to a plan, and from a plan of a near task to variables."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..checking.midpoint import angular_motion, euler_angles, euler_rates, rotation
+from ..library.plan import JumpPlan
+from ..models.quaternions import pose_of
+from ..models.symbolic_model import SymbolicModel
+from .problem import Problem
+from .resampling import matching_times, means_over, same_phases, states_at
+
+Array = NDArray[np.float64]
+ORDER = [1, 0, 2]
+"""The planner's pitch, roll, yaw from angles about x, y, z, and back."""
+
+
+def knot_times(problem: Problem, values: Array) -> Array:
+    """The time of every knot [s]."""
+    n, assembly = problem.coordinates.size, problem.assembly
+    steps = problem.steps.copy()
+    for stretch in problem.stretches:
+        for k in range(stretch.first, stretch.stop if stretch.timed else stretch.first):
+            steps[k] *= values[assembly.state_start[k] + 2 * n]
+    return np.concatenate([[0.0], np.cumsum(steps)])
+
+
+def unpack(problem: Problem, values: Array) -> dict[str, Any]:
+    """The arrays of a plan, and its lift-off and touchdown times."""
+    assembly, coordinates, model = problem.assembly, problem.coordinates, problem.model
+    n, count = coordinates.size, problem.knots
+    times = knot_times(problem, values)
+    q = np.array([values[s : s + n] for s in assembly.state_start]) @ coordinates.matrix.T
+    v = np.array([values[s + n : s + 2 * n] for s in assembly.state_start]) @ coordinates.matrix.T
+    bend, force = np.zeros((count, model.size)), np.zeros((count, 3 * len(model.robot.contacts)))
+    grounded = np.zeros((count, len(model.robot.contacts)), dtype=bool)
+    impacts = np.zeros(count, dtype=bool)
+    for stretch in problem.stretches:
+        for k in range(stretch.first, stretch.stop):
+            control = assembly.control_start[k]
+            impacts[k] = stretch.impact
+            grounded[k, list(stretch.contacts)] = True
+            if not stretch.impact:
+                bend[k] = coordinates.matrix @ values[control : control + n]
+            if not stretch.flies:
+                pushed = values[control + n : control + n + coordinates.forces]
+                force[k] = coordinates.force_matrix @ pushed
+                force[k].reshape(-1, 3)[~grounded[k]] = 0.0
+    phases = [int(phase) for phase in problem.phases]
+    for array in (bend, force, grounded):
+        array[-1] = array[-2]
+    steps = np.diff(times, append=times[-1])
+    steps[-1] = steps[-2]
+    middle = q + 0.5 * steps[:, None] * v + 0.125 * steps[:, None] ** 2 * bend
+    moving = v + 0.5 * steps[:, None] * bend
+    middle[-1], moving[-1] = middle[-2], moving[-2]
+    com, speed, momentum, torque = _evaluate(model, q, v, middle, moving, bend, force)
+    torque[impacts] = 0.0
+    generalised = [twist(*row) for row in zip(q, v, bend, strict=True)]
+    halfway = [twist(*row) for row in zip(middle, moving, bend, strict=True)]
+    flights = [(float(times[f.start]), float(times[f.stop])) for f in problem.flights]
+    return {
+        "time": times,
+        "position": np.array([pose_of(row) for row in q]),
+        "velocity": np.array([row[0] for row in generalised]),
+        "acceleration": np.array([row[1] for row in halfway]),
+        "contact_force": force.reshape(count, -1, 3),
+        "contact": grounded,
+        "phase": np.array([*phases, phases[-1]], dtype=np.int64),
+        "joint_torque": torque,
+        "com": com,
+        "com_velocity": speed,
+        "angular_momentum": momentum,
+        "lift_off_time": flights[0][0],
+        "touchdown_time": flights[0][1],
+        "later_flights": tuple(flights[1:]),
+    }
+
+
+def can_start(problem: Problem, plan: JumpPlan) -> bool:
+    """Whether a plan goes through the same phases, so that ``pack`` can make variables of it."""
+    impacts = bool(np.any(np.diff(plan.time) <= 0.0)) or any(s.impact for s in problem.stretches)
+    alike = same_phases(plan.phase[:-1].tolist(), [int(phase) for phase in problem.phases])
+    return _same_grid(problem, plan) or (alike and not impacts)
+
+
+def _same_grid(problem: Problem, plan: JumpPlan) -> bool:
+    """Whether all intervals stand for the same; only then can there be impacts."""
+    intervals = len(plan.time) == problem.knots
+    impacts = {s.first for s in problem.stretches if s.impact}
+    return (
+        intervals
+        and plan.phase[:-1].tolist() == [int(phase) for phase in problem.phases]
+        and set(np.flatnonzero(np.diff(plan.time) <= 0.0).tolist()) == impacts
+    )
+
+
+def pack(problem: Problem, plan: JumpPlan, guess: Array) -> Array:
+    """Variables near a plan of a task like this one; ``guess`` elsewhere.
+
+    The plan may have other numbers of knots: it is followed phase by phase, and must go through
+    the same phases.
+    """
+    assembly, coordinates = problem.assembly, problem.coordinates
+    n = coordinates.size
+    angles = euler_angles(plan.position[:, 3:7])
+    q = np.hstack([plan.position[:, :3], angles[:, ORDER], plan.position[:, 7:]])
+    v = np.zeros_like(q)
+    for k, row in enumerate(plan.velocity):
+        v[k, :3] = rotation(angles[k]) @ row[:3]
+        v[k, 3:6] = euler_rates(angles[k], row[3:6])[ORDER]
+        v[k, 6:] = row[6:]
+    steps, force = np.diff(plan.time), plan.contact_force.reshape(len(plan.time), -1)
+    instants = plan.time
+    if not _same_grid(problem, plan):
+        phases = [int(phase) for phase in problem.phases]
+        lengths = np.diff(knot_times(problem, guess))
+        instants = matching_times(plan.time, plan.phase[:-1].tolist(), lengths, phases)
+        q, v = states_at(instants, plan.time, q, v)
+        force = means_over(instants, plan.time, force)
+        steps = np.diff(instants)
+    means = {s: float(instants[s.stop] - instants[s.first]) / s.count for s in problem.stretches}
+    values = guess.copy()
+    for k in range(problem.knots):
+        start, control = assembly.state_start[k], assembly.control_start[k]
+        values[start : start + n] = coordinates.reduce(q[k])
+        values[start + n : start + 2 * n] = coordinates.reduce(v[k])
+        if k == problem.knots - 1:
+            break
+        stretch = problem.stretch_at(k)
+        bend = (v[k + 1] - v[k]) / (1.0 if stretch.impact else steps[k])
+        values[control : control + n] = coordinates.reduce(bend)
+        if stretch.timed:
+            values[start + 2 * n] = means[stretch]
+        if not stretch.flies:
+            pushed = coordinates.reduce_forces(force[k])
+            values[control + n : control + n + coordinates.forces] = pushed
+        hold = assembly.knots[k].hold
+        if hold is not None:
+            values[control + hold] = means[problem.stretch_at(k + 1)]
+    return values
+
+
+def twist(q: Array, v: Array, bend: Array) -> tuple[Array, Array]:
+    """Generalised velocity and its derivative with the base's part in the body frame."""
+    angles = q[3:6][ORDER]
+    spin, turn = angular_motion(angles, v[3:6][ORDER], bend[3:6][ORDER])
+    back = rotation(angles).T
+    speed = back @ v[:3]
+    pull = back @ bend[:3] - np.cross(spin, speed)
+    return np.concatenate([speed, spin, v[6:]]), np.concatenate([pull, turn, bend[6:]])
+
+
+_evaluators: dict[int, tuple[SymbolicModel, Any, Any]] = {}
+
+
+def _evaluate(
+    model: SymbolicModel, q: Array, v: Array, middle: Array, moving: Array, bend: Array,
+    force: Array,
+) -> tuple[Array, Array, Array, Array]:  # fmt: skip
+    """Centre of mass, its velocity and the angular momentum at the knots; joint torques in the
+    middle of the intervals."""
+    import casadi as ca
+
+    if id(model) not in _evaluators:
+        place, rate, bend_of = (ca.SX.sym(name, model.size) for name in ("q", "v", "a"))
+        pushes = ca.SX.sym("F", force.shape[1])
+        linear, angular = model.momentum(place, rate)
+        named = {c.name: pushes[3 * i : 3 * i + 3] for i, c in enumerate(model.robot.contacts)}
+        torque = model.inverse_dynamics(place, rate, bend_of, named)[2]
+        of_state = ca.vertcat(model.com(place), linear / model.robot.total_mass, angular)
+        _evaluators[id(model)] = (
+            model,
+            ca.Function("states", [place, rate], [of_state], {"cse": True}),
+            ca.Function("torques", [place, rate, bend_of, pushes], [torque], {"cse": True}),
+        )
+    _, states, torques = _evaluators[id(model)]
+    found = np.array(states(q.T, v.T)).T
+    return (
+        found[:, :3].copy(), found[:, 3:6].copy(), found[:, 6:].copy(),
+        np.array(torques(middle.T, moving.T, bend.T, force.T)).T.copy(),
+    )  # fmt: skip

@@ -1,0 +1,1 @@
+"""From a problem to its solution: compiled functions, solvers, easier problems first."""

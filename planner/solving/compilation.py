@@ -1,0 +1,208 @@
+"""Compiles the pieces' functions to machine code once, and keeps the libraries.
+
+A library is kept under a hash of everything that decides its content: this planner's own sources,
+the robot, the rotors, CasADi's version and the compiler's flags. Without a C compiler, or where
+compilation fails, CasADi's own virtual machine evaluates the same functions some ten times slower.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import shutil
+import subprocess
+import tempfile
+from collections import deque
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+from ...robots.description import RobotDescription
+from ..models.coordinates import Coordinates
+from ..models.symbolic_model import SymbolicModel
+from ..problem.stage_functions import PIECES, Piece, make_piece
+
+FLAGS = ("-O1", "-fPIC", "-shared", "-ffp-contract=off")
+"""No flags of one machine's: its libraries may be kept where other machines find them, and plans
+are the same everywhere. Higher optimisation takes twice as long to compile and gains nothing."""
+
+SOURCES = (
+    "models/symbolic_model.py",
+    "models/coordinates.py",
+    "problem/stage_functions.py",
+    "problem/obstacles.py",
+)
+KINDS = ("value", "jacobian", "hessian")
+Progress = Callable[[str, int, int], None]
+"""Called with what is being done, steps done and steps in all."""
+
+
+def cache_folder() -> Path:
+    """Where compiled libraries are kept: the user's cache directory."""
+    root = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
+    return Path(root) / "aloft" / "planner"
+
+
+@dataclass(frozen=True)
+class FunctionSet:
+    """Pieces that are kept together.
+
+    Attributes:
+        name: what the functions' names begin with.
+        pieces: the names of the pieces that are wanted.
+        sources: the files, from the planner's folder, that decide what the functions compute.
+        make: the piece of a name.
+    """
+
+    name: str
+    pieces: tuple[str, ...]
+    sources: tuple[str, ...]
+    make: Callable[[str], Piece]
+
+
+def content_hash(robot: RobotDescription, rotors: float, name: str,
+                 sources: tuple[str, ...] = SOURCES) -> str:  # fmt: skip
+    """The name of a library: the same for the same content."""
+    import casadi as ca
+
+    digest = hashlib.sha256()
+    for source in sources:
+        digest.update((Path(__file__).parents[1] / source).read_bytes())
+    kept = robot.model_dump(mode="json", exclude={"profiles", "standing", "points", "text"})
+    digest.update(json.dumps(kept, sort_keys=True).encode())
+    digest.update(repr((rotors, name, ca.CasadiMeta.version(), FLAGS)).encode())
+    return digest.hexdigest()[:20]
+
+
+def load_pieces(
+    model: SymbolicModel,
+    coordinates: Coordinates,
+    *,
+    profile: str,
+    names: tuple[str, ...] = PIECES,
+    compiled: bool = True,
+    progress: Progress | None = None,
+) -> dict[str, Piece]:
+    """The named pieces' functions, compiled where there is a compiler and ``compiled`` asks for
+    it."""
+    functions = FunctionSet(
+        coordinates.name, names, SOURCES, lambda name: make_piece(model, coordinates, name)
+    )
+    return load_functions(functions, model, profile, compiled=compiled, progress=progress)
+
+
+def load_functions(
+    functions: FunctionSet,
+    model: SymbolicModel,
+    profile: str,
+    *,
+    compiled: bool = True,
+    progress: Progress | None = None,
+) -> dict[str, Piece]:
+    """The same for any set of pieces."""
+    rotors = model.robot.profiles[profile].rotor_inertia
+    key = content_hash(model.robot, rotors, functions.name, functions.sources)
+    held = _held.setdefault((key, compiled), {})
+    missing = tuple(name for name in functions.pieces if name not in held)
+    if missing:
+        held |= _load(functions, key, missing, compiled, progress)
+    return {name: held[name] for name in functions.pieces}
+
+
+_held: dict[tuple[str, bool], dict[str, Piece]] = {}
+
+
+def _load(
+    functions: FunctionSet, key: str, names: tuple[str, ...], compiled: bool,
+    progress: Progress | None,
+) -> dict[str, Piece]:  # fmt: skip
+    compiler = _compiler() if compiled else None
+    pieces: dict[str, Piece] = {}
+    waiting, elsewhere = deque(names), 0
+    while waiting:
+        name = waiting.popleft()
+        library = cache_folder() / key / f"{name}.so"
+        # What another process is compiling comes last, when there is nothing else to do but wait.
+        with _claimed(library, compiler, wait=elsewhere > len(waiting)) as ours:
+            if not ours:
+                waiting.append(name)
+                elsewhere += 1
+                continue
+            elsewhere = 0
+            usable = compiled and library.is_file()
+            if not usable and progress is not None:
+                how = "compiling" if compiler else "building"
+                progress(f"{how} the {functions.name} {name} functions", len(pieces), len(names))
+            piece = None if usable else functions.make(name)
+            if piece is not None and compiler is not None:
+                usable = _compile(compiler, piece, library)
+        prefix = f"{functions.name}_{name}"
+        pieces[name] = _external(library, prefix) if usable or piece is None else piece
+    if progress is not None:
+        progress(f"{functions.name} functions ready", len(names), len(names))
+    return pieces
+
+
+@contextmanager
+def _claimed(library: Path, compiler: str | None, *, wait: bool) -> Iterator[bool]:
+    """Whether a library that is missing is this process's to make, so that no two make the same.
+
+    With ``wait`` it becomes so when the other process is done or has died. Where files cannot be
+    locked, and where nothing is to be made, it always is.
+    """
+    try:
+        import fcntl
+
+        missing = compiler is not None and not library.is_file()
+        if missing:
+            library.parent.mkdir(parents=True, exist_ok=True)
+        lock = library.with_suffix(".lock").open("w") if missing else None
+    except (ImportError, OSError):
+        lock = None
+    if lock is None:
+        yield True
+        return
+    with lock:
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX if wait else fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            yield False
+        else:
+            yield True
+
+
+def _external(library: Path, prefix: str) -> Piece:
+    import casadi as ca
+
+    found: list[Any] = [ca.external(f"{prefix}_{kind}", str(library)) for kind in KINDS]
+    return Piece(*found)
+
+
+@lru_cache(maxsize=1)
+def _compiler() -> str | None:
+    return next((path for name in ("cc", "gcc", "clang") if (path := shutil.which(name))), None)
+
+
+def _compile(compiler: str, piece: Piece, library: Path) -> bool:
+    """Compile a piece; whether that worked. Other processes see the whole library or none."""
+    import casadi as ca
+
+    try:
+        library.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(dir=library.parent) as folder:
+            generator = ca.CodeGenerator(f"{library.stem}.c")
+            for kind in KINDS:
+                generator.add(getattr(piece, kind))
+            generator.generate(f"{folder}/")
+            made = Path(folder) / library.name
+            source = Path(folder) / f"{library.stem}.c"
+            command = [compiler, *FLAGS, str(source), "-o", str(made), "-lm"]
+            subprocess.run(command, check=True, capture_output=True)
+            made.replace(library)
+    except (OSError, subprocess.CalledProcessError):
+        return False
+    return True

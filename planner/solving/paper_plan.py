@@ -1,0 +1,124 @@
+"""From a task to a plan with the ``paper`` formulation."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...blocks.signals import Phase
+from ...robots.description import RobotDescription
+from ...robots.kinematics import matrices_of_quaternions
+from ..library.plan import JumpPlan
+from ..models.exact_dynamics import ExactDynamics
+from ..models.robot_model import model_of
+from ..models.stance import stances_of
+from ..problem import centroidal_stages as stages
+from ..problem.one_flight import joint_torques
+from ..problem.paper_problem import PaperProblemBuilder
+from ..problem.program import Program
+from ..task.task import JumpTask, Knots
+from .bounded import cpu_time
+from .compilation import FunctionSet, Progress, load_functions
+from .outcome import failure, statistics_of, versions
+from .solver import solve
+
+Array = NDArray[np.float64]
+LIMIT = 500
+"""Iterations; without weights on accelerations the problem needs many."""
+
+
+def paper_problem(
+    task: JumpTask,
+    robot: RobotDescription,
+    *,
+    compiled: bool = True,
+    progress: Progress | None = None,
+) -> Program:
+    """The paper's problem of a task.
+
+    Raises:
+        PlanError: the task asks for what the paper's formulation has not.
+    """
+    model, finder = model_of(robot, task.profile)
+    functions = FunctionSet(
+        stages.NAME, stages.PIECES, stages.SOURCES, lambda name: stages.make_piece(model, name)
+    )
+    pieces = load_functions(functions, model, task.profile, compiled=compiled, progress=progress)
+    stances = stances_of(task, robot, finder)
+    return PaperProblemBuilder(task, model, pieces, stances[0], stances[-1]).build()
+
+
+def solve_paper(
+    task: JumpTask,
+    robot: RobotDescription,
+    *,
+    warm_start: JumpPlan | None = None,
+    progress: Progress | None = None,
+    compiled: bool = True,
+    solver: str = "",
+    knots: Knots | None = None,
+) -> JumpPlan:
+    """The plan of a task as the paper would make it; see ``solve_jump``.
+
+    A ``warm_start`` is not used. IPOPT is tried first: the equations have index three, as the
+    centre of mass is tied to the joints by position, and fatrop more often ends early.
+    """
+    started = cpu_time()
+    if knots is not None:
+        task = task.model_copy(update={"knots": knots})
+    problem = paper_problem(task, robot, compiled=compiled, progress=progress)
+    tries = [solver] if solver else ["ipopt", "fatrop"]
+    for name in tries:
+        solution = solve(problem, problem.guess, solver=name, limit=LIMIT)
+        if solution.solved:
+            break
+    else:
+        raise failure(task, solution)
+    statistics = statistics_of(problem, solution)
+    arrays = unpack(problem, solution.values, robot)
+    statistics["cpu_s"] = cpu_time() - started
+    return JumpPlan(task=task, statistics=statistics, versions=versions(), **arrays)
+
+
+def unpack(problem: Program, values: Array, robot: RobotDescription) -> dict[str, Any]:
+    """The arrays of a plan. Centre of mass and momentum are the paper's variables r, rdot and h;
+    the torques follow from exact inverse dynamics and nothing limits them."""
+    model, grid = problem.model, problem.grid
+    n, nv, count = model.size + 1, model.size, problem.knots
+    states = np.array([problem.state(values, k) for k in range(count)])
+    position = states[:, :n].copy()
+    position[:, 3:7] /= np.linalg.norm(position[:, 3:7], axis=1, keepdims=True)
+    turn = matrices_of_quaternions(position[:, 3:7])
+    velocity = np.zeros((count, nv))
+    force = np.zeros((count, 3 * len(robot.contacts)))
+    grounded = np.array([phase is not Phase.FLIGHT for phase in grid.phases])
+    for k in range(count - 1):
+        control = problem.control(values, k)
+        # v, rddot and F of knot k + 1; force and acceleration belong to the interval before it.
+        velocity[k + 1] = control[:nv]
+        velocity[k + 1, :3] = turn[k + 1].T @ control[:3]
+        if grounded[k]:
+            force[k] = control[nv + 3 :]
+    force[-1] = force[-2]
+    acceleration = np.diff(velocity, axis=0) / grid.steps[:, None]
+    contact = np.append(grounded, grounded[-1])
+    forces = force.reshape(count, -1, 3)
+    phases = [int(phase) for phase in grid.phases]
+    dynamics = ExactDynamics(robot, problem.task.profile)
+    return {
+        "time": grid.times,
+        "position": position,
+        "velocity": velocity,
+        "acceleration": np.vstack([acceleration, acceleration[-1:]]),
+        "contact_force": forces,
+        "contact": np.repeat(contact[:, None], forces.shape[1], axis=1),
+        "phase": np.array([*phases, phases[-1]], dtype=np.int64),
+        "joint_torque": joint_torques(dynamics, grid.times, position, velocity, forces),
+        "com": states[:, n : n + 3].copy(),
+        "com_velocity": states[:, n + 3 : n + 6].copy(),
+        "angular_momentum": states[:, n + 6 :].copy(),
+        "lift_off_time": float(grid.times[grid.flight.start]),
+        "touchdown_time": float(grid.times[grid.flight.stop]),
+    }

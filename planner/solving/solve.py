@@ -1,0 +1,255 @@
+"""From a task to a plan."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...robots.description import RobotDescription
+from ..library.plan import JumpPlan
+from ..models.coordinates import Coordinates
+from ..models.robot_model import model_of
+from ..models.stance import Stance, stances_of
+from ..models.symbolic_model import SymbolicModel
+from ..problem.contact_rows import is_mirrored
+from ..problem.guess import USUAL_TIMES, ballistic_guess, displaced_guess
+from ..problem.layout import Stretch, layout
+from ..problem.problem import Problem, ProblemBuilder
+from ..problem.stage_functions import PIECES, make_coordinates
+from ..problem.unpacking import can_start, knot_times, pack, unpack
+from ..task.sequence import PHASES
+from ..task.task import JumpTask, Knots
+from .bounded import cpu_time
+from .compilation import Progress, load_pieces
+from .easing import EASES, eased, from_eased, tighten, with_impacts
+from .outcome import failure, versions
+from .paper_plan import solve_paper
+from .refinement import asks_for_finer, finer_knots, with_knots
+from .rigid_body_plan import solve_rigid_body
+from .solver import Solution, solve
+
+Array = NDArray[np.float64]
+
+
+class Formulation(Protocol):
+    """Makes a plan of a task with one set of decision variables, cost and constraints."""
+
+    def __call__(
+        self,
+        task: JumpTask,
+        robot: RobotDescription,
+        *,
+        warm_start: JumpPlan | None = None,
+        progress: Progress | None = None,
+        compiled: bool = True,
+        solver: str = "",
+        knots: Knots | None = None,
+    ) -> JumpPlan:
+        """As ``solve_jump``."""
+        ...
+
+
+def solve_jump(
+    task: JumpTask,
+    robot: RobotDescription,
+    *,
+    warm_start: JumpPlan | None = None,
+    progress: Progress | None = None,
+    compiled: bool = True,
+    solver: str = "",
+    knots: Knots | None = None,
+) -> JumpPlan:
+    """The plan of a task, in the formulation that it names.
+
+    ``warm_start`` is a plan of a near task, on any grid; one that goes through other phases is not
+    used. A plan of this very task that failed the validity check is solved again on finer
+    intervals (see ``refinement``). ``knots`` are numbers of intervals to use in place of both.
+    ``progress`` is told when functions are compiled, once per robot. ``solver`` insists on
+    ``fatrop`` or ``ipopt``. The result does not depend on the number of threads.
+
+    Raises:
+        PlanError: no motion was found; ``family`` names the constraints that could not be met.
+        TaskError: the task names joints that the robot has not.
+    """
+    return FORMULATIONS[task.formulation](
+        task, robot, warm_start=warm_start, progress=progress, compiled=compiled, solver=solver,
+        knots=knots,
+    )  # fmt: skip
+
+
+def solve_full(
+    task: JumpTask,
+    robot: RobotDescription,
+    *,
+    warm_start: JumpPlan | None = None,
+    progress: Progress | None = None,
+    compiled: bool = True,
+    solver: str = "",
+    knots: Knots | None = None,
+) -> JumpPlan:
+    """The ``full`` formulation: the whole body's dynamics with its motors' limits; see ``problem``."""
+    started = cpu_time()
+    if knots is None:
+        again = warm_start is not None and asks_for_finer(task, warm_start)
+        knots = finer_knots(warm_start) if again and warm_start is not None else task.knots
+    gridded = with_knots(task, knots)
+    problem = make_problem(gridded, robot, compiled=compiled, progress=progress)
+    guess = ballistic_guess(problem)
+    solution, warm = None, False
+    if warm_start is not None and can_start(problem, warm_start):
+        warm = True
+        solution = solve(problem, pack(problem, warm_start, guess), warm=True, solver="fatrop")
+    if solution is None or not solution.solved:
+        warm = False
+        turns = any(hop.rotation for hop in task.hops()) and not solver
+        solution = _turning(problem, robot, guess) if turns else None
+    if solution is None or not solution.solved:
+        solution = solve(
+            problem, guess, solver=solver, other_guess=lambda: _displaced(problem, robot)
+        )
+    if not solution.solved:
+        raise failure(task, solution)
+    statistics = {
+        "solver": solution.solver,
+        "iterations": solution.iterations,
+        "cpu_s": cpu_time() - started,
+        "solver_cpu_s": solution.cpu,
+        "violation": solution.violation,
+        "cost": solution.cost,
+        "warm": warm,
+        "knots": problem.knots,
+        "coordinates": problem.coordinates.name,
+        "variables": problem.assembly.variables,
+        "constraints": problem.assembly.constraints,
+        "compiled": not problem.assembly.interpreted,
+    }
+    return JumpPlan(
+        task=task, statistics=statistics, versions=versions(), **unpack(problem, solution.values)
+    )
+
+
+FORMULATIONS: Mapping[str, Formulation] = {
+    "full": solve_full,
+    "paper": solve_paper,
+    "srbm": solve_rigid_body,
+}
+"""By the name a task gives."""
+
+
+def make_problem(
+    task: JumpTask,
+    robot: RobotDescription,
+    *,
+    compiled: bool = True,
+    progress: Progress | None = None,
+    coordinates: str = "",
+) -> Problem:
+    """The problem of a task in the ``full`` formulation, in the sagittal plane where the task stays in it.
+
+    Elsewhere times on the ground that are free are those of the same jumps straight ahead and
+    without impacts: with all coordinates and such times fatrop does not come to an end.
+
+    Raises ``PlanError`` and ``TaskError`` as ``solve_jump`` does.
+    """
+    model, finder = model_of(robot, task.profile)
+    stances = stances_of(task, robot, finder)
+    stretches = layout(task, robot)
+    chosen = _choose(model, task, stances, stretches, coordinates)
+    free = any(stretch.timed and not stretch.flies for stretch in stretches)
+    if free and chosen.name == "full" and not coordinates:
+        given = with_ground_times(task, robot, compiled=compiled, progress=progress)
+        return make_problem(given, robot, compiled=compiled, progress=progress)
+    used = {"contact", "take_off", "air", "obstacle", *(stretch.piece for stretch in stretches)}
+    names = tuple(name for name in PIECES if name in used)
+    pieces = load_pieces(
+        model, chosen, profile=task.profile, names=names, compiled=compiled, progress=progress
+    )
+    return ProblemBuilder(task, model, chosen, pieces, stances).build()
+
+
+def _choose(
+    model: SymbolicModel, task: JumpTask, stances: tuple[Stance, ...],
+    stretches: tuple[Stretch, ...], asked: str,
+) -> Coordinates:  # fmt: skip
+    if asked:
+        return make_coordinates(model, asked)
+    # An impact leaves the roll and yaw motors without an impulse, which a plane cannot tell.
+    if all(not hop.distance_y and not hop.twist for hop in task.hops()):
+        try:
+            plane = make_coordinates(model, "sagittal")
+        except ValueError:
+            return make_coordinates(model, "full")
+        every = np.array([stance.coordinates for stance in stances])
+        if np.allclose(plane.reduce(every) @ plane.matrix.T, every, rtol=0.0, atol=1e-12) and all(
+            is_mirrored(plane, stretch.contacts) for stretch in stretches
+        ):
+            return plane
+    return make_coordinates(model, "full")
+
+
+def with_ground_times(
+    task: JumpTask, robot: RobotDescription, *, compiled: bool = True,
+    progress: Progress | None = None,
+) -> JumpTask:  # fmt: skip
+    """The task with all times on the ground given: those that are free are found for the same
+    jumps straight ahead, or are usual ones where these cannot be planned."""
+    times = [USUAL_TIMES.get(PHASES[span.phase], 0.0) for span in task.spans()]
+    straight = straight_ahead(task).model_copy(update={"impact": False})
+    usual = with_times(straight, times)
+    if make_problem(usual, robot, compiled=compiled, progress=progress).coordinates.name != "full":
+        problem = make_problem(straight, robot, compiled=compiled, progress=progress)
+        solution = solve(problem, ballistic_guess(problem), solver="fatrop")
+        if solution.solved:
+            knots = knot_times(problem, solution.values)
+            times = [float(knots[s.stop] - knots[s.first]) for s in problem.stretches]
+    return with_times(task, times)
+
+
+def with_times(task: JumpTask, times: list[float]) -> JumpTask:
+    """The task with those times [s] of its phases where they are free, except for flights."""
+    phases = tuple(
+        span if span.phase == "flight" or span.time is not None
+        else span.model_copy(update={"time": round(time, 6)})
+        for span, time in zip(task.spans(), times, strict=True)
+    )  # fmt: skip
+    return task.model_copy(update={"phases": phases})
+
+
+def straight_ahead(task: JumpTask) -> JumpTask:
+    """The same jumps without their sideways displacements and twists."""
+    ahead = {"distance_y": 0.0, "twist": 0.0}
+    jumps = task.jumps and tuple(hop.model_copy(update=ahead) for hop in task.jumps)
+    return task.model_copy(update={**ahead, "jumps": jumps})
+
+
+def _displaced(problem: Problem, robot: RobotDescription) -> Array | None:
+    """A guess from the same jump straight ahead, where there is one and it can be solved."""
+    if problem.coordinates.name == "sagittal":
+        return None
+    task = straight_ahead(problem.task)
+    straight = make_problem(task, robot, compiled=not problem.assembly.interpreted)
+    if straight.coordinates.name != "sagittal":
+        return None
+    solution = solve(straight, ballistic_guess(straight), solver="fatrop")
+    return displaced_guess(problem, straight, solution.values) if solution.solved else None
+
+
+def _turning(problem: Problem, robot: RobotDescription, guess: Array) -> Solution | None:
+    """A somersault by way of stronger motors; one with impacts also by way of one without."""
+    found = from_eased(problem, guess)
+    if found is not None or not problem.task.impact:
+        return found
+    task = problem.task.model_copy(update={"impact": False})
+    gentle = make_problem(task, robot, compiled=not problem.assembly.interpreted)
+    for ease in EASES:
+        first = solve(eased(gentle, ease), ballistic_guess(gentle), solver="fatrop")
+        if not first.solved:
+            continue
+        plan = with_impacts(JumpPlan(task=task, **unpack(gentle, first.values)))
+        found = tighten(problem, pack(problem, plan, guess), ease)
+        if found is not None:
+            return found
+    return None

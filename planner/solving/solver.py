@@ -1,0 +1,221 @@
+"""Solves a problem: fatrop, which exploits its order in time, and IPOPT where fatrop fails."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+from collections import OrderedDict
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..problem.assembly import Assembly
+from .bounded import bounded, cpu_time
+
+Array = NDArray[np.float64]
+
+VIOLATION = 1e-6
+"""What a solution may violate a constraint by, in the constraint's unit."""
+DUAL_TOLERANCE = 1e-4
+"""fatrop's dual infeasibility does not fall much further; the cost is then stable to 7 digits."""
+LONGEST = 60
+"""s of processor time, after which a fatrop that may loop for ever is given up."""
+MOST_STATES = 20
+"""Of a knot in problems whose fatrop was never seen to do so: those in the sagittal plane."""
+KEPT = 12
+"""Solvers kept for problems of the same structure."""
+
+
+class Problem(Protocol):
+    """What is solved: of every formulation the structure, bounds and parameters."""
+
+    @property
+    def assembly(self) -> Assembly:
+        """Variables, rows and their functions."""
+        ...
+
+    @property
+    def lower(self) -> Array:
+        """Bounds of the variables."""
+        ...
+
+    @property
+    def upper(self) -> Array:
+        """Bounds of the variables."""
+        ...
+
+    @property
+    def row_lower(self) -> Array:
+        """Bounds of the constraint rows."""
+        ...
+
+    @property
+    def row_upper(self) -> Array:
+        """Bounds of the constraint rows."""
+        ...
+
+    @property
+    def parameters(self) -> Array:
+        """Values of the parameters."""
+        ...
+
+    @property
+    def families(self) -> list[str]:
+        """What every constraint row asks for."""
+        ...
+
+
+@dataclass(frozen=True)
+class Solution:
+    """Values of the variables and what it took. ``violation`` is the largest of all constraints'
+    and bounds', ``family`` whose it is."""
+
+    values: Array
+    solver: str
+    iterations: int
+    cost: float
+    violation: float
+    family: str
+    solved: bool
+    cpu: float
+
+
+def solve(
+    problem: Problem,
+    guess: Array,
+    *,
+    warm: bool = False,
+    solver: str = "",
+    limit: int = 250,
+    other_guess: Callable[[], Array | None] = lambda: None,
+) -> Solution:
+    """The first solution found, or the least violated attempt: fatrop from the guess, fatrop from
+    the other guess, IPOPT from the guess.
+
+    ``warm`` says that the guess is near the solution; ``solver`` insists on one of them.
+    """
+    tries = [solver] if solver else ["fatrop", "other", "ipopt"]
+    best: Solution | None = None
+    for name in tries:
+        start = other_guess() if name == "other" else guess
+        if start is None:
+            continue
+        found = _run(problem, start, "fatrop" if name == "other" else name, warm, limit)
+        if best is None or (not best.solved and found.violation < best.violation):
+            best = found
+        if best.solved:
+            break
+    assert best is not None
+    return best
+
+
+def _run(problem: Problem, guess: Array, name: str, warm: bool, limit: int) -> Solution:
+    started = cpu_time()
+    function, evaluate, constraint = _solver(problem.assembly, name, warm, limit)
+
+    def attempt() -> tuple[Array, dict[str, Any]]:
+        with _quiet():
+            result = function(
+                x0=guess, p=problem.parameters, lbx=problem.lower, ubx=problem.upper,
+                lbg=problem.row_lower, ubg=problem.row_upper,
+            )  # fmt: skip
+        stats = function.stats()
+        wanted = ("success", "iter_count", "unified_return_status")
+        return np.array(result["x"]).ravel(), {key: stats.get(key) for key in wanted}
+
+    # Seldom, and only seen in all coordinates, fatrop looks for a step and never ends.
+    if name == "fatrop" and max(problem.assembly.nx) > MOST_STATES:
+        ended, answer = bounded(attempt, LONGEST)
+        if not ended:
+            return Solution(guess, name, 0, np.inf, np.inf, "dynamics", False, cpu_time() - started)
+        values, stats = answer
+    else:
+        values, stats = attempt()
+    cost = float(evaluate(values, problem.parameters)) if np.isfinite(values).all() else np.inf
+    violation, family = violation_of(problem, values, constraint)
+    status = str(stats.get("unified_return_status", ""))
+    solved = bool(stats["success"]) or status == "SOLVER_RET_SUCCESS"
+    solved = solved and violation <= 2.0 * VIOLATION
+    return Solution(
+        values, name, int(stats["iter_count"]), cost, violation, family, solved,
+        cpu_time() - started,
+    )  # fmt: skip
+
+
+def violation_of(problem: Problem, values: Array, constraint: Any) -> tuple[float, str]:
+    """The largest violation of a constraint or bound, and the family it belongs to."""
+    if not np.isfinite(values).all():
+        return np.inf, "dynamics"
+    rows = np.array(constraint(values, problem.parameters)).ravel()
+    over = np.maximum(problem.row_lower - rows, rows - problem.row_upper)
+    outside = np.maximum(problem.lower - values, values - problem.upper)
+    worst = int(over.argmax())
+    if outside.max(initial=0.0) > over[worst]:
+        return float(outside.max()), "joint limits"
+    return max(float(over[worst]), 0.0), problem.families[worst]
+
+
+_solvers: OrderedDict[object, tuple[Any, Any, Any]] = OrderedDict()
+
+
+def _solver(assembly: Assembly, name: str, warm: bool, limit: int) -> tuple[Any, Any, Any]:
+    """A solver for problems of this structure, with the functions of cost and constraints."""
+    key = (assembly.signature, name, warm, limit)
+    if key in _solvers:
+        _solvers.move_to_end(key)
+        return _solvers[key]
+    made = _make_solver(assembly, name, warm, limit)
+    _solvers[key] = made
+    if len(_solvers) > KEPT:
+        _solvers.popitem(last=False)
+    return made
+
+
+def _make_solver(assembly: Assembly, name: str, warm: bool, limit: int) -> tuple[Any, Any, Any]:
+    import casadi as ca
+
+    functions = assembly.functions()
+    nlp = {key: functions[key] for key in ("x", "p", "f", "g")}
+    own: dict[str, Any] = {"tol": DUAL_TOLERANCE, "constr_viol_tol": VIOLATION,
+                              "max_iter": limit, "print_level": 0}  # fmt: skip
+    options: dict[str, Any] = {"print_time": False, "calc_lam_p": False, "error_on_fail": False}
+    if name == "fatrop":
+        # Its own tolerance takes the short intervals' small coefficients for a lack of rank.
+        own |= {"linsol_lu_fact_tol": 1e-7, "mu_init": 10.0}
+        if warm:
+            own |= {"mu_init": 1e-4, "bound_push": 1e-6, "bound_frac": 1e-6}
+        given = ("nlp_f", "nlp_g", "nlp_grad_f", "nlp_jac_g", "nlp_hess_l", "nlp_grad")
+        options |= {
+            "structure_detection": "manual", "nx": assembly.nx, "nu": assembly.nu,
+            "ng": assembly.ng, "N": len(assembly.nx) - 1,
+            "cache": {key: functions[key] for key in given}, "fatrop": own,
+        }  # fmt: skip
+    else:
+        own |= {"sb": "yes", "mu_init": 10.0}
+        if warm:
+            own |= {"mu_init": 1e-4, "bound_push": 1e-6, "bound_frac": 1e-6,
+                    "slack_bound_push": 1e-6, "slack_bound_frac": 1e-6}  # fmt: skip
+        options |= {
+            "hess_lag": functions["hess_lag"], "jac_g": functions["nlp_jac_g"],
+            "grad_f": functions["grad_f"], "no_nlp_grad": True, "ipopt": own,
+        }  # fmt: skip
+    with _quiet():
+        made = ca.nlpsol("jump", name, nlp, options)
+    return made, functions["nlp_f"], functions["nlp_g"]
+
+
+@contextlib.contextmanager
+def _quiet() -> Iterator[None]:
+    """The solvers write to the process's standard output, whatever they are told; not now."""
+    kept = os.dup(1)
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    try:
+        os.dup2(nowhere, 1)
+        yield
+    finally:
+        os.dup2(kept, 1)
+        os.close(kept)
+        os.close(nowhere)

@@ -1,0 +1,74 @@
+"""What a plan leaves to the feedback: narrower bounds than what the robot could do at best."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...robots.description import RobotDescription
+from ...runtime.language.parameters import Parameters, parameter
+
+Array = NDArray[np.float64]
+
+LIMIT_MARGIN = 0.005
+"""rad; between two knots a joint at its limit would pass it by about as much."""
+
+
+class Margins(Parameters):
+    """Bounds that keep a plan away from where a disturbed robot has nothing left to do.
+
+    A plan that may do anything crouches until the torso lies on the thighs, pushes with the very
+    ends of the feet, lands on straight legs and turns joints up to their stops. Each of these is
+    optimal and none can be followed with noise, delay and a model that is not quite true.
+    """
+
+    squat_lean: float | None = parameter(
+        None, unit="rad", ge=0.1, le=1.5,
+        text="most the torso leans forwards or backwards until lift-off; None: any",
+    )  # fmt: skip
+    landing_lean: float | None = parameter(
+        None, unit="rad", ge=0.01, le=1.5,
+        text="the same from touchdown on; None: any",
+    )  # fmt: skip
+    joints: float = parameter(
+        LIMIT_MARGIN, unit="rad", ge=0.0, le=0.5, text="distance of the joints from their limits"
+    )
+    landing_limits: Mapping[str, tuple[float, float]] = parameter(
+        {}, unit="rad",
+        text="narrower limits of joints from touchdown on, by a joint's name or by what is the "
+        "same in its name on both sides, such as knee: [-120 deg, -25 deg]",
+    )  # fmt: skip
+    pressure: float = parameter(
+        0.0, ge=0.0, lt=0.5, text="least share of a foot's load on each of its contact points"
+    )
+    touchdown_speed: float | None = parameter(
+        None, unit="m/s", gt=0.0, le=20.0,
+        text="most that a contact point moves downwards where it hits the ground with an impact; "
+        "None: any",
+    )  # fmt: skip
+    touchdown_slide: float | None = parameter(
+        None, unit="m/s", gt=0.0, le=20.0,
+        text="most that it moves there along the foot, and across it; None: any",
+    )  # fmt: skip
+
+
+def unknown_joints(margins: Margins, names: list[str]) -> list[str]:
+    """The keys of ``landing_limits`` that no joint has."""
+    return [key for key in margins.landing_limits if not any(_means(key, name) for name in names)]
+
+
+def joint_bounds(robot: RobotDescription, margins: Margins, landed: bool) -> Array:
+    """The joints' limits in a plan [rad], (n_joints, 2)."""
+    bounds = robot.joint_limits + np.array([margins.joints, -margins.joints])
+    if landed:
+        for key, (low, high) in margins.landing_limits.items():
+            for i, joint in enumerate(robot.joints):
+                if _means(key, joint.name):
+                    bounds[i] = max(bounds[i, 0], low), min(bounds[i, 1], high)
+    return np.asarray(bounds)
+
+
+def _means(key: str, joint: str) -> bool:
+    return joint == key or joint.endswith(f"_{key}")

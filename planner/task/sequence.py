@@ -1,0 +1,152 @@
+"""Several jumps in a row, and what the feet do in between: the parts of a task.
+
+name: up_and_down
+rise: 12 cm
+distance_x: 10 cm
+jumps: [{landing_height: 5 cm}, {landing_height: -5 cm}]
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+from pydantic import model_validator
+
+from ...blocks.signals import Phase
+from ...runtime.language.parameters import Parameters, parameter
+
+FREE = "free"
+SHORTEST_JUMP_OVER_AN_EDGE = 0.03
+"""Start and landing closer together than this [m] have no room for a step's edge between them."""
+PHASES = {
+    "squat": Phase.SQUAT,
+    "thrust": Phase.THRUST,
+    "flight": Phase.FLIGHT,
+    "landing": Phase.LANDING,
+}
+PATTERN = re.compile(r"[st]+(f[stl]+)*fl+")
+"""Initials of the phases: from the ground, flights with ground between them, a landing."""
+
+
+class FreeTimes(Parameters):
+    """Parameters whose times may be written as ``free``: those that may be ``None``."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _read_free(cls, data: Any) -> Any:
+        if not isinstance(data, dict):
+            return data
+        times = [key for key in data if key == "time" or key.endswith("_time")]
+        return data | {key: None for key in times if data[key] == FREE}
+
+
+class Hop(FreeTimes):
+    """One of several jumps in a row, relative to where it begins; what is not given is as the task
+    says for all of them."""
+
+    rise: float | None = parameter(
+        None, unit="m", gt=0.0, le=2.0, text="apex of the centre of mass above standing there"
+    )
+    take_off_speed: float | None = parameter(
+        None, unit="m/s", gt=0.0, le=8.0, text="vertical speed of the centre of mass at lift-off"
+    )
+    flight_time: float | None = parameter(None, unit="s", gt=0.0, le=3.0, text="in the air")
+    distance_x: float | None = parameter(
+        None, unit="m", ge=-2.0, le=2.0, text="how far it lands along the world's x axis"
+    )
+    distance_y: float | None = parameter(
+        None, unit="m", ge=-2.0, le=2.0, text="how far it lands along the world's y axis"
+    )
+    twist: float | None = parameter(
+        None, unit="rad", ge=-6.3, le=6.3, text="change of heading, to the left"
+    )
+    landing_height: float | None = parameter(
+        None, unit="m", ge=-2.0, le=2.0, text="ground at landing above the ground where it begins"
+    )
+    step_edge: float | None = parameter(
+        None, unit="m", ge=-2.0, le=2.0, text="where between them the ground changes, along x"
+    )
+    rotation: float | None = parameter(
+        None, unit="rad", ge=-12.6, le=12.6, text="the body's turn in pitch"
+    )
+
+
+class Span(FreeTimes):
+    """A phase of the sequence of contacts, in the order of time."""
+
+    phase: Literal["squat", "thrust", "flight", "landing"] = parameter(text="which phase it is")
+    time: float | None = parameter(
+        None, unit="s", gt=0.0, le=5.0, text="how long; None or free: found by the planner"
+    )
+    knots: int | None = parameter(
+        None, ge=2, le=400, text="intervals; None: as many as the task's knots say"
+    )
+    contacts: str = parameter(
+        "all", text="contact points on the ground: all, or what their names contain, e.g. toe"
+    )
+
+    def on_ground(self, names: Sequence[str]) -> tuple[int, ...]:
+        """The indices of the contact points that carry load."""
+        if self.phase == "flight":
+            return ()
+        return tuple(k for k, name in enumerate(names) if self.contacts in ("all", name)
+                     or self.contacts in name)  # fmt: skip
+
+
+def check_spans(spans: Sequence[Span], flights: int) -> str:
+    """What is wrong with a sequence of phases for so many jumps; empty where nothing is."""
+    if not PATTERN.fullmatch("".join(span.phase[0] for span in spans)):
+        return (
+            "the phases must be squat or thrust, then flights with thrust or landing between "
+            "them, then landing; found " + ", ".join(span.phase for span in spans)
+        )
+    found = sum(span.phase == "flight" for span in spans)
+    if found != flights:
+        return f"there are {found} flights among the phases but {flights} jumps"
+    if spans[0].contacts != "all" or spans[-1].contacts != "all":
+        return "the robot stands on all contact points in the first and in the last phase"
+    return ""
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where the robot stands between jumps: the soles' middle [m], their heading and how far the
+    body has turned in pitch [rad]."""
+
+    x: float
+    y: float
+    z: float
+    heading: float
+    turned: float
+
+
+def places_of(hops: Sequence[Hop]) -> tuple[Place, ...]:
+    """Where the robot stands before the first jump and after each of them."""
+    found = [Place(0.0, 0.0, 0.0, 0.0, 0.0)]
+    for hop in hops:
+        last = found[-1]
+        found.append(
+            Place(
+                last.x + (hop.distance_x or 0.0),
+                last.y + (hop.distance_y or 0.0),
+                last.z + (hop.landing_height or 0.0),
+                last.heading + (hop.twist or 0.0),
+                last.turned + (hop.rotation or 0.0),
+            )
+        )
+    return tuple(found)
+
+
+def edge_of(hop: Hop, start: Place) -> float | None:
+    """The x [m, world] at which the ground changes height under a jump that begins there; ``None``
+    if the ground is level, or if the robot lands where it stood, so that there can be no edge and
+    the ground is taken to move in flight."""
+    if not hop.landing_height:
+        return None
+    if hop.step_edge is not None:
+        return start.x + hop.step_edge
+    ahead = hop.distance_x or 0.0
+    return start.x + 0.5 * ahead if abs(ahead) >= SHORTEST_JUMP_OVER_AN_EDGE else None

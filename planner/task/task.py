@@ -1,0 +1,338 @@
+"""What jump is asked for: a task, written in YAML or made in Python.
+
+name: forward_10cm
+rise: 15 cm
+distance_x: 10 cm
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Any, Literal
+
+from pydantic import ValidationError, model_validator
+
+from ...robots.description import RobotDescription, find_robot
+from ...runtime.language.parameters import Parameters, parameter
+from ..errors import TaskError
+from .margins import Margins
+from .placed_file import PlacedFile, read_placed
+from .sequence import FreeTimes, Hop, Place, Span, check_spans, places_of
+
+__all__ = ["JumpTask", "Knots", "TaskError", "Weights", "make_task", "read_task"]
+
+GRAVITY = 9.81
+"""m/s^2"""
+
+PLAN_FORMAT = 1
+"""Part of every task's hash: plans of an older format or meaning are not taken from a library."""
+
+
+class Knots(Parameters):
+    """How many intervals each phase is divided into; about 60 in all is enough for BRUCE."""
+
+    squat: int = parameter(8, ge=2, le=200, text="going down")
+    thrust: int = parameter(16, ge=4, le=200, text="pushing off")
+    flight: int = parameter(28, ge=4, le=400, text="in the air")
+    landing: int = parameter(14, ge=4, le=200, text="absorbing the touchdown and coming to rest")
+
+    @property
+    def total(self) -> int:
+        """The intervals of the whole jump."""
+        return self.squat + self.thrust + self.flight + self.landing
+
+
+class Weights(Parameters):
+    """Weights of the cost's quadratic terms, which are integrated over time; SI units."""
+
+    posture: float = parameter(1.0, ge=0.0, text="joint angles away from the standing pose")
+    orientation: float = parameter(1.0, ge=0.0, text="the torso's rotation away from the nominal")
+    joint_velocity: float = parameter(1e-1, ge=0.0, text="joint velocities")
+    acceleration: float = parameter(5e-4, ge=0.0, text="generalised accelerations")
+    force: float = parameter(1e-3, ge=0.0, text="contact forces")
+    impulse: float = parameter(0.05, ge=0.0, text="a touchdown's impulses, not over time")
+
+
+class JumpTask(FreeTimes):
+    """One jump from standing to standing, or several in a row.
+
+    Heights are the centre of mass's above where it stands at the start. The world's origin is the
+    ground midway between the soles at the start, x forward, z up. What is ``None`` (``free`` in a
+    file) is left to the planner.
+
+    Several jumps follow each other without standing still: ``repeat`` does the same jump that many
+    times, ``jumps`` lists them, each relative to where it begins, with what the task says where
+    they say nothing. With both the whole list is repeated.
+
+    Raises pydantic's ``ValidationError`` for values out of range and for contradictions;
+    ``read_task`` turns it into a ``TaskError``.
+    """
+
+    name: str = parameter(text="what the jump is called")
+    robot: str = parameter("bruce", text="the robot's description, as in a graph file")
+    formulation: Literal["full", "paper", "srbm"] = parameter(
+        "full",
+        text="full: whole-body dynamics and motors; paper: centroidal momentum and kinematics as in the "
+        "paper; srbm: a single rigid body with legs that weigh nothing",
+    )
+    rise: float | None = parameter(
+        None, unit="m", gt=0.0, le=2.0, text="apex of the centre of mass above standing"
+    )
+    take_off_speed: float | None = parameter(
+        None, unit="m/s", gt=0.0, le=8.0, text="vertical speed of the centre of mass at lift-off"
+    )
+    distance_x: float = parameter(0.0, unit="m", ge=-2.0, le=2.0, text="how far ahead it lands")
+    distance_y: float = parameter(0.0, unit="m", ge=-2.0, le=2.0, text="how far to the left")
+    twist: float = parameter(
+        0.0, unit="rad", ge=-6.3, le=6.3, text="heading at landing, to the left; world frame"
+    )
+    landing_height: float = parameter(
+        0.0, unit="m", ge=-2.0, le=2.0, text="ground at landing above the ground at the start"
+    )
+    step_edge: float | None = parameter(
+        None, unit="m", ge=-2.0, le=2.0,
+        text="x at which the ground changes its height; None: midway between start and landing",
+    )  # fmt: skip
+    rotation: float = parameter(
+        0.0, unit="rad", ge=-12.6, le=12.6,
+        text="the body's turn in pitch from start to landing; 360 deg is a forward somersault",
+    )  # fmt: skip
+    squat_time: float | None = parameter(
+        0.4, unit="s", gt=0.0, le=5.0, text="going down; None: found by the planner"
+    )
+    thrust_time: float | None = parameter(
+        0.25, unit="s", gt=0.0, le=2.0, text="pushing off; None: found by the planner"
+    )
+    flight_time: float | None = parameter(
+        None, unit="s", gt=0.0, le=3.0, text="in the air; None: found by the planner"
+    )
+    landing_time: float | None = parameter(
+        0.5, unit="s", gt=0.0, le=5.0, text="touchdown to rest; None: found by the planner"
+    )
+    contact_time: float | None = parameter(
+        None, unit="s", gt=0.0, le=5.0,
+        text="on the ground between two jumps; None: found by the planner",
+    )  # fmt: skip
+    jumps: tuple[Hop, ...] | None = parameter(
+        None, min_length=1, max_length=50, text="jumps in a row; None: only the one above"
+    )
+    repeat: int | None = parameter(None, ge=1, le=50, text="how often they are done in a row")
+    phases: tuple[Span, ...] | None = parameter(
+        None, text="the sequence of contacts; None: squat, thrust, flight, landing, on all contacts"
+    )
+    touchdown_lean: float | None = parameter(
+        None, unit="rad", ge=0.0, le=1.5,
+        text="most the torso may lean forwards or backwards at touchdown; None: any",
+    )  # fmt: skip
+    lift_off_momentum: float | None = parameter(
+        None, unit="N*m*s", ge=0.0, le=20.0,
+        text="most angular momentum about the centre of mass at lift-off, about each axis; "
+        "None: any",
+    )  # fmt: skip
+    touchdown_momentum: float | None = parameter(
+        None, unit="N*m*s", ge=0.0, le=20.0,
+        text="the same at touchdown, after the impact if there is one; None: any",
+    )  # fmt: skip
+    impact: bool = parameter(
+        False, text="feet may hit the ground with speed and stop by an impulse; else they "
+        "arrive at rest"
+    )  # fmt: skip
+    knots: Knots = parameter(Knots(), text="intervals in each phase")
+    profile: str = parameter("koala", text="actuator profile of the robot")
+    effort: float = parameter(
+        1.0, gt=0.0, le=1.0,
+        text="share of the profile's torque and speed the plan may use; the rest is the feedback's",
+    )  # fmt: skip
+    friction: float = parameter(0.5, gt=0.0, le=2.0, text="coefficient between foot and ground")
+    foot_clearance: float = parameter(
+        0.02, unit="m", ge=0.0, le=0.5,
+        text="least height of the feet above the ground in the middle of the flight",
+    )  # fmt: skip
+    leg_clearance: float = parameter(
+        0.01, unit="m", ge=0.0, le=0.2, text="least gap between the legs"
+    )
+    weights: Weights = parameter(Weights(), text="weights of the cost")
+    margins: Margins | None = parameter(
+        None, text="what the plan leaves to the feedback; None: nothing but 5 mrad at the joints"
+    )
+    initial: Mapping[str, float] = parameter(
+        {}, unit="rad", text="joint angles at the start, by name; others as the robot stands"
+    )
+    final: Mapping[str, float] = parameter(
+        {}, unit="rad", text="joint angles at the end, by name; others as the robot stands"
+    )
+
+    @model_validator(mode="after")
+    def _check_together(self) -> JumpTask:
+        if self.rise is not None and self.take_off_speed is not None:
+            raise ValueError("give rise or take_off_speed, not both: one follows from the other")
+        for number, hop in enumerate(self.hops()):
+            which = f"jump {number + 1}: " if self.jumps else ""
+            up = hop.landing_height or 0.0
+            free = hop.rise is None and hop.take_off_speed is None and hop.flight_time is None
+            if hop.rise is not None and hop.take_off_speed is not None:
+                raise ValueError(f"{which}give rise or take_off_speed, not both")
+            if free and not up and not hop.rotation:
+                raise ValueError(
+                    f"{which}say how high the jump is: rise, take_off_speed or flight_time"
+                )
+            if hop.rise is not None and hop.rise + 0.15 < up:
+                raise ValueError(
+                    f"{which}a rise of {hop.rise:g} m cannot reach ground that is {up:g} m higher; "
+                    f"ask for a rise above {up:g} m"
+                )
+        wrong = check_spans(self.spans(), len(self.hops()))
+        if wrong:
+            raise ValueError(wrong)
+        return self
+
+    def hops(self) -> tuple[Hop, ...]:
+        """The jumps in a row, everything filled in; one of them if nothing else is asked for."""
+        own = {name: getattr(self, name) for name in Hop.model_fields}
+        found = []
+        for hop in self.jumps or (Hop(),):
+            given = {name: value for name, value in hop if value is not None}
+            how = {"rise", "take_off_speed"}
+            found.append(
+                Hop(**{k: v for k, v in own.items() if not (k in how and how & set(given))} | given)
+            )
+        return tuple(found) * (self.repeat or 1)
+
+    def places(self) -> tuple[Place, ...]:
+        """Where the robot stands at the start, between its jumps, and at the end."""
+        return places_of(self.hops())
+
+    def spans(self) -> tuple[Span, ...]:
+        """The sequence of contacts, with all times that are given and numbers of knots."""
+        hops, knots = self.hops(), self.knots
+        if self.phases is None:
+            half = None if self.contact_time is None else 0.5 * self.contact_time
+            between = (Span(phase="landing", time=half), Span(phase="thrust", time=half))
+            found = [
+                Span(phase="squat", time=self.squat_time),
+                Span(phase="thrust", time=self.thrust_time),
+            ]
+            for _ in hops[:-1]:
+                found += [Span(phase="flight"), *between]
+            found += [Span(phase="flight"), Span(phase="landing", time=self.landing_time)]
+        else:
+            found = list(self.phases)
+        flights = iter(hop.flight_time for hop in hops)
+        filled = []
+        for span in found:
+            of_jump = next(flights, None) if span.phase == "flight" else None
+            time = of_jump if span.time is None else span.time
+            count = span.knots or int(getattr(knots, span.phase))
+            filled.append(span.model_copy(update={"time": time, "knots": count}))
+        return tuple(filled)
+
+    def start_joints(self, robot: RobotDescription) -> dict[str, float]:
+        """Joint angles [rad] by name at the start. Raises ``TaskError`` for an unknown joint."""
+        return _stance(robot, self.initial, "initial")
+
+    def end_joints(self, robot: RobotDescription) -> dict[str, float]:
+        """Joint angles [rad] by name at the end. Raises ``TaskError`` for an unknown joint."""
+        return _stance(robot, self.final, "final")
+
+    def content(self) -> dict[str, Any]:
+        """All that decides the plan, as plain data: everything but the name."""
+        # What is not given is left out, so that a parameter added later changes no hash.
+        # So is the weight of impulses where there are none.
+        unused: dict[str, Any] = {} if self.impact else {"weights": {"impulse"}}
+        return self.model_dump(mode="json", exclude={"name": True, **unused}, exclude_none=True)
+
+    def hash(self, robot: RobotDescription) -> str:
+        """What a plan of this task is kept under: the same for the same task, robot and format."""
+        whole = {
+            "format": PLAN_FORMAT,
+            "task": self.content(),
+            "robot": robot.model_dump(mode="json"),
+        }
+        text = json.dumps(whole, sort_keys=True, separators=(",", ":"))
+        return hashlib.sha256(text.encode()).hexdigest()[:20]
+
+
+def _stance(robot: RobotDescription, given: Mapping[str, float], which: str) -> dict[str, float]:
+    known = [joint.name for joint in robot.joints]
+    unknown = [name for name in given if name not in known]
+    if unknown:
+        raise TaskError(
+            f"{which}: {robot.name} has no joint {', '.join(unknown)}; there is {', '.join(known)}"
+        )
+    standing = dict(zip(known, robot.standing_position.tolist(), strict=True))
+    return standing | dict(given)
+
+
+def make_task(
+    values: Mapping[str, Any], *, where: str = "task", source: PlacedFile | None = None
+) -> JumpTask:
+    """A task from plain values, quantities as numbers or text.
+
+    ``where`` is what messages call it; with ``source``, the file the values are from, they begin
+    with the line and column instead.
+
+    Raises:
+        TaskError: one line for every value that is wrong, with its key, what was found and what
+            is expected.
+    """
+    try:
+        return JumpTask.model_validate(values)
+    except ValidationError as error:
+        lines = []
+        for problem in error.errors():
+            line, place = _explain(problem), where
+            if source is not None and not problem["loc"]:
+                place = source.place_of_words(line)
+            elif source is not None:
+                place = source.place(problem["loc"], key=problem["type"] == "extra_forbidden")
+            lines.append(f"{place}: {line}")
+        raise TaskError("\n".join(lines)) from error
+
+
+def _explain(problem: Any) -> str:
+    """One of pydantic's problems as a line: the key, what is expected and what was found."""
+    key = ".".join(map(str, problem["loc"]))
+    message = str(problem["msg"]).removeprefix("Value error, ")
+    if problem["type"] == "extra_forbidden":
+        nested: dict[str, type[Parameters]] = {
+            "knots": Knots, "weights": Weights, "margins": Margins, "jumps": Hop, "phases": Span
+        }  # fmt: skip
+        owner = nested.get(str(problem["loc"][0]), JumpTask)
+        near = get_close_matches(key.rpartition(".")[2], owner.model_fields, 1, 0.0)
+        return f"{key}: is no parameter of a task; the nearest is {near[0]}"
+    if problem["type"] == "float_parsing":
+        field = JumpTask.model_fields.get(str(problem["loc"][0]))
+        extra = field.json_schema_extra if field else None
+        unit = extra.get("unit") if isinstance(extra, dict) else ""
+        message = f"expected a number in {unit}" if unit else "expected a number"
+    if not key or isinstance(problem["input"], Mapping):
+        return message
+    return f"{key}: {message}, found {problem['input']!r}"
+
+
+def read_task(path: str | Path) -> JumpTask:
+    """The task in a YAML file; its name is the file's where it has none.
+
+    Raises:
+        TaskError: the file cannot be read, a value is wrong, or what is asked for contradicts
+            itself or the robot; one line for each, with ``file:line:column``.
+    """
+    from .task_checks import contradictions
+
+    path = Path(path)
+    source = read_placed(path, "rise: 15 cm")
+    task = make_task({"name": path.stem, **source.values}, where=str(path), source=source)
+    try:
+        robot = find_robot(task.robot, path.parent)
+    except (LookupError, ValueError) as error:
+        raise TaskError(f"{source.place(['robot'])}: robot: {error.args[0]}") from error
+    wrong = contradictions(task, robot)
+    if wrong:
+        raise TaskError(
+            "\n".join(f"{source.place(key.split('.'))}: {key}: {text}" for key, text in wrong)
+        )
+    return task

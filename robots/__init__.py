@@ -1,0 +1,1 @@
+"""What a robot is: its description, kinematics and rigid-body models, and the robots that ship."""

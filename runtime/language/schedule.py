@@ -1,0 +1,203 @@
+"""The order in which blocks run: topological over ports, ties by file order, no sets, no hashing.
+
+An output of a Mealy block depends on all inputs of that block in the same tick; an output of a
+Moore block depends on none. So Moore blocks come first, in file order, and every other block comes
+after the sources of its inputs; among those that could run next, the first in the file does. A
+ring of wires through Mealy blocks alone has no order: it is found and reported whole.
+"""
+
+from __future__ import annotations
+
+import heapq
+from collections import deque
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from math import lcm
+
+from .errors import AloftError
+
+MAXIMAL_HYPERPERIOD = 100_000
+"""Ticks. Rates whose pattern takes longer to repeat are taken for a mistake."""
+
+
+@dataclass(frozen=True)
+class ScheduleBlock:
+    """What ordering needs to know of a block.
+
+    ``sources`` names for each wired input the output that feeds it, ``block.port``. A delayed wire
+    does not appear here: it depends on nothing in this tick.
+    """
+
+    path: str
+    is_moore: bool
+    sources: Mapping[str, str]
+
+
+@dataclass(frozen=True)
+class Loop:
+    """A ring without a delay, as ports: output, input it feeds, output of that block, ...
+
+    The input of the last port belongs to the block of the first.
+    """
+
+    ports: tuple[str, ...]
+
+    def __str__(self) -> str:
+        return " -> ".join(self.ports)
+
+    @property
+    def blocks(self) -> tuple[str, ...]:
+        """The blocks on the ring, in the direction of the wires."""
+        return tuple(_block_of(port) for port in self.ports[::2])
+
+
+class LoopError(AloftError):
+    """Some blocks have no order; ``loops`` has every ring."""
+
+    def __init__(self, loops: Sequence[Loop]) -> None:
+        rings = "; ".join(str(loop) for loop in loops)
+        super().__init__(
+            f"loop without a delay: {rings}. Give one wire of each ring 'delay: 1', or put a "
+            "block with state between, such as blocks.UnitDelay"
+        )
+        self.loops = tuple(loops)
+
+
+@dataclass(frozen=True)
+class _Edge:
+    """A wire between two Mealy blocks, by their index in the file."""
+
+    source: int
+    target: int
+    output: str
+    input: str
+
+
+def _block_of(port: str) -> str:
+    return port.rpartition(".")[0]
+
+
+def _edges(blocks: Sequence[ScheduleBlock]) -> list[_Edge]:
+    """All dependencies within a tick, in file order; wires from unknown blocks are left out."""
+    index = {block.path: i for i, block in enumerate(blocks)}
+    edges = []
+    for target, block in enumerate(blocks):
+        if block.is_moore:
+            continue
+        for name, output in block.sources.items():
+            source = index.get(_block_of(output))
+            if source is not None and not blocks[source].is_moore:
+                edges.append(_Edge(source, target, output, f"{block.path}.{name}"))
+    return edges
+
+
+def order_blocks(blocks: Iterable[ScheduleBlock]) -> tuple[str, ...]:
+    """The paths of ``blocks`` (given in file order) in the order they run within a tick.
+
+    Raises:
+        LoopError: there is no such order.
+    """
+    nodes = tuple(blocks)
+    waiting = [0] * len(nodes)
+    targets: list[list[int]] = [[] for _ in nodes]
+    for edge in _edges(nodes):
+        waiting[edge.target] += 1
+        targets[edge.source].append(edge.target)
+    order = [i for i, block in enumerate(nodes) if block.is_moore]
+    ready = [i for i, block in enumerate(nodes) if not block.is_moore and waiting[i] == 0]
+    heapq.heapify(ready)
+    while ready:
+        i = heapq.heappop(ready)
+        order.append(i)
+        for target in targets[i]:
+            waiting[target] -= 1
+            if waiting[target] == 0:
+                heapq.heappush(ready, target)
+    if len(order) < len(nodes):
+        raise LoopError(find_loops(nodes))
+    return tuple(nodes[i].path for i in order)
+
+
+def find_loops(blocks: Iterable[ScheduleBlock]) -> tuple[Loop, ...]:
+    """Rings without a delay: together they hold every wire that lies on any ring.
+
+    Each is a shortest ring through a wire that no earlier one holds, and starts at its first block
+    in the file.
+    """
+    nodes = tuple(blocks)
+    edges = _edges(nodes)
+    leaving: list[list[_Edge]] = [[] for _ in nodes]
+    for edge in edges:
+        leaving[edge.source].append(edge)
+    loops: list[Loop] = []
+    covered: dict[_Edge, None] = {}
+    for edge in edges:
+        if edge in covered:
+            continue
+        back = _shortest_path(leaving, edge.target, edge.source)
+        if back is None:
+            continue
+        ring = [edge, *back]
+        covered.update(dict.fromkeys(ring))
+        first = min(range(len(ring)), key=lambda i: ring[i].source)
+        ports = [port for e in (*ring[first:], *ring[:first]) for port in (e.output, e.input)]
+        loops.append(Loop(tuple(ports)))
+    return tuple(loops)
+
+
+def _shortest_path(
+    leaving: Sequence[Sequence[_Edge]], start: int, goal: int
+) -> tuple[_Edge, ...] | None:
+    """Edges from ``start`` to ``goal``, fewest first; none if they are the same block."""
+    if start == goal:
+        return ()
+    arrived: dict[int, _Edge] = {}
+    queue = deque([start])
+    while queue:
+        here = queue.popleft()
+        for edge in leaving[here]:
+            if edge.target in arrived or edge.target == start:
+                continue
+            arrived[edge.target] = edge
+            if edge.target == goal:
+                path = [edge]
+                while path[-1].source != start:
+                    path.append(arrived[path[-1].source])
+                return tuple(reversed(path))
+            queue.append(edge.target)
+    return None
+
+
+def runs_at(tick: int, period: int, offset: int) -> bool:
+    """Whether a block of that period and offset [ticks] runs in ``tick``."""
+    return tick % period == offset % period
+
+
+def hyperperiod(periods: Iterable[int]) -> int:
+    """The ticks after which the pattern of who runs repeats.
+
+    Raises:
+        AloftError: it is too long to be meant.
+    """
+    numbers = tuple(periods)
+    length = lcm(*numbers) if numbers else 1
+    if length > MAXIMAL_HYPERPERIOD:
+        different = ", ".join(str(p) for p in sorted(dict.fromkeys(numbers)))
+        raise AloftError(
+            f"periods of {different} ticks repeat only after {length} ticks; at most "
+            f"{MAXIMAL_HYPERPERIOD} are allowed. Choose rates that divide one another"
+        )
+    return length
+
+
+def phases(rates: Sequence[tuple[int, int]]) -> tuple[tuple[int, ...], ...]:
+    """For each tick of the hyperperiod which of ``rates`` (period, offset) run, by index.
+
+    Equal phases are one object, so there are few of them however long the hyperperiod is.
+    """
+    known: dict[tuple[int, ...], tuple[int, ...]] = {}
+    table = []
+    for tick in range(hyperperiod(period for period, _ in rates)):
+        active = tuple(i for i, (p, o) in enumerate(rates) if runs_at(tick, p, o))
+        table.append(known.setdefault(active, active))
+    return tuple(table)

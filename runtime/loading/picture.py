@@ -1,0 +1,200 @@
+"""What a graph looks like: a table of its blocks and wires, and a Mermaid diagram."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from ..language.block import Block
+from ..language.delay import Delay
+from ..language.registry import block_name
+from ..language.stages import BlockSpec, CheckedGraph, Wire
+from .inserted import ConstantSignal
+
+
+@dataclass(frozen=True)
+class InputRow:
+    """One input: where it comes from and what happens on the way."""
+
+    name: str
+    source: str
+    """``block.port``, or ``default`` or ``constant``."""
+    signal: str
+    fields: tuple[str, ...]
+    """The fields that are read, with their types: ``position: float64[10] rad``."""
+    delay: int = 0
+    transition: str = ""
+    """``holds ...`` behind a slower source, ``samples ...`` behind a faster one."""
+    truth: bool = False
+
+    def text(self) -> str:
+        """The input in one line."""
+        notes = [self.signal]
+        if self.delay:
+            notes.append(f"delay {self.delay}")
+        if self.transition:
+            notes.append(self.transition)
+        if self.truth:
+            notes.append("simulation truth")
+        return f"{self.name} <- {self.source} ({', '.join(notes)})"
+
+
+@dataclass(frozen=True)
+class BlockRow:
+    """One block, at its place in the order of execution."""
+
+    order: int
+    path: str
+    use: str
+    rate_hz: float
+    offset_ticks: int
+    machine: str
+    """``Moore``: outputs follow from state alone; ``Mealy``: from inputs too."""
+    inputs: tuple[InputRow, ...]
+    outputs: tuple[str, ...]
+    """The outputs with their signals: ``imu: ImuReading``."""
+
+
+def table(graph: CheckedGraph) -> tuple[BlockRow, ...]:
+    """All blocks of a graph in the order they run, also those that loading has inserted."""
+    specs = {spec.path: spec for spec in graph.blocks}
+    return tuple(
+        _row(graph, specs, number, specs[path]) for number, path in enumerate(graph.order, 1)
+    )
+
+
+def table_json(graph: CheckedGraph) -> dict[str, Any]:
+    """The table as plain data."""
+    return {
+        "name": graph.name,
+        "base_rate_hz": graph.base_rate,
+        "ticks": graph.ticks,
+        "robot": graph.robot.name if graph.robot else None,
+        "clock": asdict(graph.clock),
+        "blocks": [asdict(row) for row in table(graph)],
+    }
+
+
+def _row(
+    graph: CheckedGraph, specs: dict[str, BlockSpec], number: int, spec: BlockSpec
+) -> BlockRow:
+    block_type = spec.block_type
+    return BlockRow(
+        number,
+        spec.path,
+        _use(block_type),
+        graph.base_rate / spec.period_ticks,
+        spec.offset_ticks,
+        "Moore" if block_type.is_moore() else "Mealy",
+        tuple(_input(graph, specs, spec, name) for name in block_type.inputs),
+        tuple(f"{name}: {port.signal.__name__}" for name, port in block_type.outputs.items()),
+    )
+
+
+def _use(block_type: type[Block]) -> str:
+    for inserted, word in ((Delay, "delay"), (ConstantSignal, "constant")):
+        if issubclass(block_type, inserted):
+            return word
+    return block_name(block_type)
+
+
+def _input(
+    graph: CheckedGraph, specs: dict[str, BlockSpec], spec: BlockSpec, name: str
+) -> InputRow:
+    signal = spec.block_type.inputs[name].signal
+    fields = tuple(_field(spec, item, field) for item, field in signal.fields.items())
+    wire = spec.wires.get(name)
+    if wire is None:
+        return InputRow(name, "default", signal.__name__, fields)
+    origin = _origin(specs, wire)
+    source = specs[origin.rpartition(".")[0]]
+    if issubclass(source.block_type, ConstantSignal):
+        return InputRow(name, "constant", signal.__name__, fields)
+    return InputRow(
+        name,
+        origin,
+        signal.__name__,
+        fields,
+        wire.delay,
+        _transition(graph, source, spec),
+        source.block_type.outputs[origin.rpartition(".")[2]].truth,
+    )
+
+
+def _field(spec: BlockSpec, name: str, field: Any) -> str:
+    shape = field.resolve(spec.dimensions)
+    numbers = f"[{', '.join(map(str, shape))}]" if shape else ""
+    unit = f" {field.unit}" if field.unit is not None else ""
+    frame = f" in {field.frame}" if field.frame else ""
+    return f"{name}: {field.dtype_name}{numbers}{unit}{frame}"
+
+
+def _origin(specs: dict[str, BlockSpec], wire: Wire) -> str:
+    """The output a wire comes from, seen through the delay block that loading has inserted."""
+    source = specs[wire.source_block]
+    if wire.delay and issubclass(source.block_type, Delay):
+        return source.wires["u"].source
+    return wire.source
+
+
+def _transition(graph: CheckedGraph, source: BlockSpec, reader: BlockSpec) -> str:
+    if source.period_ticks == reader.period_ticks:
+        if source.offset_ticks == reader.offset_ticks:
+            return ""
+        return f"offset {source.offset_ticks} to {reader.offset_ticks}"
+    word = "holds" if source.period_ticks > reader.period_ticks else "samples"
+    return f"{word} {_hertz(graph, source)}"
+
+
+def _hertz(graph: CheckedGraph, spec: BlockSpec) -> str:
+    return f"{graph.base_rate / spec.period_ticks:g} Hz"
+
+
+def mermaid(graph: CheckedGraph) -> str:
+    """The graph as a Mermaid flowchart.
+
+    Rounded blocks are Moore machines. A dotted arrow is a delayed wire, a thick one joins blocks of
+    different rates; every arrow says which input it feeds, the signal, and what happens on the way.
+    """
+    shown = [s for s in graph.blocks if not issubclass(s.block_type, (Delay, ConstantSignal))]
+    names = {spec.path: f"b{number}" for number, spec in enumerate(shown)}
+    lines = ["flowchart LR"]
+    lines += _nodes(graph, shown, names, "", 1)
+    for row in table(graph):
+        if row.path not in names:
+            continue
+        for item in row.inputs:
+            source = names.get(item.source.rpartition(".")[0])
+            if source is None:
+                continue
+            label = f"{item.source.rpartition('.')[2]} to {item.name}<br/>{item.signal}"
+            arrow = "-->"
+            if item.transition:
+                label, arrow = f"{label}<br/>{item.transition}", "==>"
+            if item.delay:
+                label, arrow = f"{label}<br/>delay {item.delay}", "-.->"
+            lines.append(f'  {source} {arrow}|"{label}"| {names[row.path]}')
+    return "\n".join(lines) + "\n"
+
+
+def _nodes(
+    graph: CheckedGraph, specs: list[BlockSpec], names: dict[str, str], prefix: str, depth: int
+) -> list[str]:
+    """The nodes below a path, with a box around every sub-graph."""
+    lines: list[str] = []
+    boxes: dict[str, list[BlockSpec]] = {}
+    indent = "  " * depth
+    for spec in specs:
+        first, slash, _ = spec.path.removeprefix(prefix).partition("/")
+        if slash:
+            boxes.setdefault(first, []).append(spec)
+            continue
+        label = f"{first}<br/>{_use(spec.block_type)}<br/>{_hertz(graph, spec)}"
+        left, right = ('(["', '"])') if spec.block_type.is_moore() else ('["', '"]')
+        lines.append(f"{indent}{names[spec.path]}{left}{label}{right}")
+    for first, inside in boxes.items():
+        path = f"{prefix}{first}"
+        lines.append(f'{indent}subgraph {path.replace("/", "_")}_box ["{path}"]')
+        lines += _nodes(graph, inside, names, f"{path}/", depth + 1)
+        lines.append(f"{indent}end")
+    return lines

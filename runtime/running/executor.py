@@ -1,0 +1,262 @@
+"""The executor: takes a graph through its whole life, and ends every run in good order.
+
+While a run goes on the garbage collector is off and what exists is frozen.
+"""
+
+from __future__ import annotations
+
+import gc
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from dataclasses import replace
+from typing import Any
+
+from ..language.block import Metric
+from ..language.errors import AloftError, ExitCode, RunError
+from ..language.stages import CheckedGraph, ClockSpec
+from .interrupts import Interrupts
+from .life_cycle import LifeCycle, LifeState, describe
+from .memory import BoundGraph
+from .notes import Note, TakesNotes
+from .pacing import TimeSource, WallTime
+from .run_result import RunResult, merge_metrics
+from .sinks import MemoryLog, RunHash, Sink, TakesResult
+from .ticker import Ticker
+from .timing import block_times
+
+
+class Executor:
+    """Runs a graph, once.
+
+    Args:
+        graph: a checked graph, or a bound one.
+        clock: how to pace it; by default as the graph says.
+        sinks: what records the run, beside the log and the hash.
+        log: whether to keep every tick in memory.
+        run_hash: whether to hash every tick.
+        timing: whether to time every block. Only benchmarks switch it off.
+        finite_check: whether to check every tick. Only benchmarks switch it off.
+        time_source: what time is; tests have one of their own.
+        on_ready: called once all blocks have started, before the first tick; a replay restores a
+            keyframe here.
+
+    Raises:
+        RunError: a block could not be set up.
+        AloftError: the graph's clock is the robot's, and there is none to drive it.
+    """
+
+    def __init__(
+        self,
+        graph: CheckedGraph | BoundGraph,
+        *,
+        clock: ClockSpec | None = None,
+        sinks: Sequence[Sink] = (),
+        log: bool = True,
+        run_hash: bool = True,
+        timing: bool = True,
+        finite_check: bool = True,
+        time_source: TimeSource | None = None,
+        on_ready: Callable[[], None] | None = None,
+    ) -> None:
+        self.bound = graph if isinstance(graph, BoundGraph) else BoundGraph(graph)
+        self.life = LifeCycle(self.bound.blocks)
+        self._time: TimeSource = time_source or WallTime()
+        spec = clock or self.bound.graph.clock
+        self.bound.clock.kind = spec.kind
+        self.ticker = Ticker(
+            self.bound,
+            spec,
+            self._time,
+            timing=timing,
+            finite_check=finite_check,
+        )
+        self._log = MemoryLog() if log else None
+        self._hash = RunHash() if run_hash else None
+        own: list[Sink] = [sink for sink in (self._log, self._hash) if sink is not None]
+        self._sinks: list[Sink] = [*own, *sinks]
+        self._opened: list[Sink] = []
+        self._on_ready = on_ready
+        self._cautions: list[str] = []
+
+    def run(self, ticks: int | None = None) -> RunResult:
+        """The whole life of the graph, once: start, tick, stop cycles, close.
+
+        Runs for ``ticks``, by default as long as the graph says. SIGINT and SIGTERM stop it after
+        the present tick, and so does a block that asks for it. Whatever ended the run is in the
+        result, an error too: see ``RunResult.raise_if_failed``.
+
+        Raises:
+            AloftError: the graph has run already.
+        """
+        if self.life.state is not LifeState.IDLE:
+            raise AloftError(f"a graph that is {self.life.state.value} cannot be run again")
+        clock, graph = self.bound.clock, self.bound.graph
+        limit = ticks
+        if ticks is None and graph.ticks is not None:
+            limit = max(0, graph.ticks - clock.tick)  # a restored graph runs only what is left
+        error: RunError | None = None
+        problems: list[str] = []
+        start_time = end_time = self._time.now()
+        first_tick = clock.tick
+        with Interrupts(clock, self.life) as interrupts, _quiet_collector():
+            try:
+                try:
+                    interrupts.armed = True
+                    self._open_sinks(limit)
+                    self.life.start()
+                    self._note("life", "ready: every block has started")
+                    self._ask_for_cautions()
+                    if self._on_ready is not None:
+                        self._on_ready()
+                    self.life.move(LifeState.RUNNING)
+                    self._note("life", "running")
+                    start_time = self._time.now()
+                    self.ticker.advance(limit)
+                finally:  # within the outer try, so that nothing interrupts what follows
+                    interrupts.armed = False
+            except RunError as failure:
+                error = failure
+            except BaseException as failure:  # noqa: BLE001  # the stop cycles come first
+                error = RunError(f"the run failed: {describe(failure)}", tick=clock.tick)
+                error.__cause__ = failure
+            finally:
+                end_time = self._time.now()
+                if error is not None:
+                    self._note("fault", str(error), "ERROR")
+                self._note("life", f"stopping: {clock.stop_reason or 'the end'}")
+                self.life.stop(self._pause if self.ticker.pacer is not None else None)
+                problems += self.life.problems
+                for problem in problems:
+                    self._note("fault", problem, "ERROR")
+                self._note("life", "stopped")
+                problems += self._close_sinks()
+        result = self._result(
+            clock.tick - first_tick, (end_time - start_time) * 1e-9, error, problems, interrupts
+        )
+        return replace(result, warnings=tuple(self._finish_sinks(result)))
+
+    def _open_sinks(self, ticks: int | None) -> None:
+        if self._log is not None:
+            self._log.expect(ticks)
+        for sink in self._sinks:
+            self._opened.append(sink)  # before, as a failed open may have opened something
+            sink.open(self.bound)
+            self.ticker.records.append(sink.record)
+            if isinstance(sink, TakesNotes):
+                self.ticker.notes.append(sink.note)
+
+    def _close_sinks(self) -> list[str]:
+        problems = []
+        for sink in self._opened:
+            try:
+                sink.close()
+            except Exception as error:  # noqa: BLE001  # the next sink must be closed too
+                problems.append(f"{type(sink).__name__} failed in close: {describe(error)}")
+        return problems
+
+    def _finish_sinks(self, result: RunResult) -> list[str]:
+        warnings = []
+        for sink in self._opened:
+            if isinstance(sink, TakesResult):
+                try:
+                    warnings += sink.finish(result)
+                except Exception as error:  # noqa: BLE001  # the next sink must be finished too
+                    warnings.append(f"{type(sink).__name__} failed in finish: {describe(error)}")
+        return warnings
+
+    def _note(self, kind: str, text: str, level: str = "INFO") -> None:
+        self.ticker.tell(Note(self.bound.clock.tick, kind, text, level))
+
+    def _ask_for_cautions(self) -> None:
+        for path, block in self.bound.blocks.items():
+            self._cautions += [f"{path}: {text}" for text in block.cautions()]
+        for caution in self._cautions:
+            self._note("caution", caution, "WARN")
+
+    def _pause(self) -> None:
+        """The time between stop cycles: a period, so that a bus can carry each."""
+        self._time.sleep(self.bound.clock.base_period)
+
+    def _result(
+        self,
+        ticks: int,
+        wall_time: float,
+        error: RunError | None,
+        problems: list[str],
+        interrupts: Interrupts,
+    ) -> RunResult:
+        by_block: dict[str, dict[str, Metric]] = {}
+        for path, block in self.bound.blocks.items():
+            try:
+                by_block[path] = dict(block.metrics())
+            except Exception as failure:  # noqa: BLE001  # the other blocks' metrics still count
+                problems.append(f"block '{path}' failed in metrics: {describe(failure)}")
+        metrics, unmet, praise = merge_metrics(by_block)
+        code, reason = self._verdict(error, problems, interrupts, unmet, praise)
+        for program in self.ticker.programs:
+            program.fold()
+        pacer = self.ticker.pacer
+        return RunResult(
+            success=code is ExitCode.SUCCESS,
+            reason=reason,
+            exit_code=code,
+            ticks=ticks,
+            period=self.bound.clock.base_period,
+            wall_time_s=wall_time,
+            run_hash=self._hash.hexdigest() if self._hash is not None else "",
+            metrics=metrics,
+            blocks={
+                path: block_times(self.ticker.programs, path, self.ticker.overruns_by_block[path])
+                for path in self.bound.graph.order
+            },
+            overruns=pacer.overruns if pacer is not None else 0,
+            skipped_periods=pacer.skipped_periods if pacer is not None else 0,
+            error=error,
+            stop_problems=tuple(problems),
+            cautions=tuple(self._cautions),
+            parameter_changes=tuple(self.bound.parameters.changes),
+            log=self._log,
+            graph=self.bound.graph,
+        )
+
+    def _verdict(
+        self,
+        error: RunError | None,
+        problems: Sequence[str],
+        interrupts: Interrupts,
+        unmet: str | None,
+        praise: str | None,
+    ) -> tuple[ExitCode, str]:
+        """The exit code and the reason: the first that applies, gravest first."""
+        stopped = self.bound.clock.stop_reason
+        if error is not None and not isinstance(error.__cause__, KeyboardInterrupt):
+            return ExitCode.RUN_FAILED, str(error)
+        if interrupts.received is not None:
+            code = ExitCode(128 + interrupts.received)
+            return code, str(error or f"stopped by {interrupts.received.name}")
+        if error is not None:
+            return ExitCode.INTERRUPTED, str(error)
+        if problems:
+            return ExitCode.RUN_FAILED, problems[0]
+        if unmet is not None:
+            return ExitCode.NOT_SUCCESSFUL, unmet
+        return ExitCode.SUCCESS, praise or stopped or "ran to its end"
+
+
+@contextmanager
+def _quiet_collector() -> Iterator[None]:
+    """No garbage collection within, and what exists now is never looked at: no pauses."""
+    enabled = gc.isenabled()
+    with ExitStack() as after:
+        gc.collect()
+        gc.freeze()
+        after.callback(gc.unfreeze)
+        gc.disable()
+        if enabled:
+            after.callback(gc.enable)
+        yield
+
+
+def run(graph: CheckedGraph | BoundGraph, ticks: int | None = None, **options: Any) -> RunResult:
+    """Run a graph from start to close; the options are those of ``Executor``."""
+    return Executor(graph, **options).run(ticks)

@@ -1,0 +1,52 @@
+"""SIGINT and SIGTERM end a run cleanly: after the present tick, with the stop cycles."""
+
+from __future__ import annotations
+
+import signal
+import threading
+from types import FrameType, TracebackType
+from typing import Any, Self
+
+from ..language.block import Clock
+from .life_cycle import LifeCycle
+
+
+class Interrupts:
+    """Handles the two signals within a ``with``; elsewhere than in the main thread does nothing.
+
+    The first signal asks for the run to end after the tick. A further one raises
+    ``KeyboardInterrupt``, for a block that hangs, but only where that is caught: while ``armed``,
+    which the executor sets while blocks start and tick, or inside a guarded call while stopping.
+    Raising disarms, so no error can hit who deals with the one before.
+    """
+
+    def __init__(self, clock: Clock, life: LifeCycle) -> None:
+        self.received: signal.Signals | None = None
+        self.armed = False
+        self._clock = clock
+        self._life = life
+        self._before: dict[signal.Signals, Any] = {}
+
+    def __enter__(self) -> Self:
+        if threading.current_thread() is threading.main_thread():
+            for number in (signal.SIGINT, signal.SIGTERM):
+                self._before[number] = signal.signal(number, self._handle)
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        for number, handler in self._before.items():
+            signal.signal(number, handler)
+
+    def _handle(self, number: int, frame: FrameType | None) -> None:
+        if self.received is None:
+            self.received = signal.Signals(number)
+            if self._clock.stop_reason is None:
+                self._clock.stop_reason = f"stopped by {self.received.name}"
+        elif self.armed or self._life.guarding:
+            self.armed = self._life.guarding = False
+            raise KeyboardInterrupt

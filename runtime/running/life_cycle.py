@@ -1,0 +1,111 @@
+"""The life of a graph: idle -> ready -> running -> stopping -> stopped, and never past stopping.
+
+Whatever ends a run, the blocks that were started get their stop cycles, in which a robot commands
+damping, and are closed. Nothing a block does there keeps the others from theirs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from enum import Enum
+
+from ..language.block import Block
+from ..language.errors import AloftError, RunError
+
+STOP_CYCLES = 5
+"""Rounds of stop cycles: more than one, since a bus may lose a packet."""
+
+
+class LifeState(Enum):
+    """Where a graph is in its life."""
+
+    IDLE = "idle"
+    """Bound; nothing is open."""
+    READY = "ready"
+    """Every block has started."""
+    RUNNING = "running"
+    STOPPING = "stopping"
+    """Stop cycles go out."""
+    STOPPED = "stopped"
+    """Everything is closed."""
+
+
+_NEXT: Mapping[LifeState, tuple[LifeState, ...]] = {
+    LifeState.IDLE: (LifeState.READY, LifeState.STOPPING),
+    LifeState.READY: (LifeState.RUNNING, LifeState.STOPPING),
+    LifeState.RUNNING: (LifeState.STOPPING,),
+    LifeState.STOPPING: (LifeState.STOPPED,),
+    LifeState.STOPPED: (),
+}
+
+
+class LifeCycle:
+    """Starts and stops the blocks of a graph, in file order.
+
+    ``problems`` collects what went wrong while stopping, one text each. ``guarding`` is true while
+    a stop cycle or a close runs, where an interrupt may raise without harm to the others.
+    """
+
+    def __init__(self, blocks: Mapping[str, Block]) -> None:
+        self.state = LifeState.IDLE
+        self.problems: list[str] = []
+        self.guarding = False
+        self._blocks = blocks
+        self._started: list[str] = []
+
+    def move(self, state: LifeState) -> None:
+        """Go on to ``state``. Raises ``AloftError`` if it does not follow the present one."""
+        if state not in _NEXT[self.state]:
+            raise AloftError(f"a graph that is {self.state.value} cannot become {state.value}")
+        self.state = state
+
+    def start(self) -> None:
+        """Start all blocks: idle -> ready. Raises ``RunError`` naming the block that failed."""
+        if self.state is not LifeState.IDLE:
+            raise AloftError(f"a graph that is {self.state.value} cannot be started")
+        for path, block in self._blocks.items():
+            self._started.append(path)  # before, as a failed start may have opened something
+            try:
+                block.start()
+            except Exception as error:
+                raise RunError(
+                    f"block '{path}' failed in start: {describe(error)}", block=path
+                ) from error
+        self.move(LifeState.READY)
+
+    def stop(self, pause: Callable[[], None] | None = None) -> None:
+        """Stop cycles, ``pause`` after each round, then close: any state -> stopped."""
+        if self.state is LifeState.STOPPED:
+            return
+        self.move(LifeState.STOPPING)
+        resting = [
+            path
+            for path in self._started
+            if type(self._blocks[path]).stop_cycle is not Block.stop_cycle
+        ]
+        for cycle in range(1, STOP_CYCLES + 1):
+            for path in resting:
+                self._guard(path, self._blocks[path].stop_cycle, f"stop cycle {cycle}")
+            if resting and pause is not None:
+                self._guard("", pause, f"the pause after stop cycle {cycle}")
+        for path in self._started:
+            self._guard(path, self._blocks[path].close, "close")
+        self.move(LifeState.STOPPED)
+
+    def _guard(self, path: str, call: Callable[[], None], what: str) -> None:
+        try:
+            try:
+                self.guarding = True
+                call()
+            finally:
+                self.guarding = False
+        except BaseException as error:  # noqa: BLE001  # the next block must get its turn
+            who = f"block '{path}'" if path else "the runtime"
+            self.problems.append(f"{who} failed in {what}: {describe(error)}")
+
+
+def describe(error: BaseException) -> str:
+    """The text of an error, with its type unless it was raised for users to read."""
+    if isinstance(error, AloftError):
+        return str(error)
+    return f"{type(error).__name__}: {error}" if str(error) else type(error).__name__

@@ -1,0 +1,128 @@
+"""Parameters that change while a graph runs: handed over in one slot, taken at a tick boundary.
+
+Whoever wants a change (another thread, a replay) has it checked first, ``loading.adjust``, and
+hands over an ``Adjustment``. The control thread looks at the slot once a tick; it never waits, and
+an empty slot costs it tens of nanoseconds. All of an adjustment takes effect in the same tick, or
+none of it.
+"""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from ..language.block import Block
+from ..language.errors import AloftError
+from ..language.parameters import Parameters
+from .life_cycle import describe
+
+ANSWER_TIME = 2.0
+"""Seconds that ``submit`` waits for the next tick."""
+_POLL = 1e-3
+
+
+@dataclass(frozen=True)
+class ParameterChange:
+    """One parameter, ``block.parameter``, that was ``old`` in all ticks before ``tick`` and is
+    ``new`` from it on. Values are plain data, as a graph file would have them."""
+
+    tick: int
+    path: str
+    old: Any
+    new: Any
+
+
+@dataclass
+class Adjustment:
+    """Checked new parameters by block, and what they change: path, old and new value of each.
+
+    When it has been ``answered``, it was taken over at ``tick``, or refused because of ``error``.
+    """
+
+    params: Mapping[str, Parameters]
+    values: tuple[tuple[str, Any, Any], ...]
+    tick: int = -1
+    error: str = ""
+    answered: bool = False
+
+    def changes(self) -> tuple[ParameterChange, ...]:
+        """What was changed."""
+        return tuple(ParameterChange(self.tick, *value) for value in self.values)
+
+
+class LiveParameters:
+    """The parameters of a bound graph's ``blocks`` while it runs.
+
+    Attributes:
+        requests: the slot. It holds one adjustment, which the control thread takes out.
+        changes: everything changed so far, in order.
+        listeners: called on the control thread with every change, before the tick it counts for.
+    """
+
+    def __init__(self, blocks: Mapping[str, Block]) -> None:
+        self.blocks = blocks
+        self.requests: deque[Adjustment] = deque(maxlen=1)
+        self.changes: list[ParameterChange] = []
+        self.listeners: list[Callable[[ParameterChange], None]] = []
+
+    def answer(self, tick: int) -> None:
+        """Take over what is in the slot, for ``tick`` and those after it; control thread only."""
+        try:
+            adjustment = self.requests.popleft()
+        except IndexError:  # withdrawn in this very moment
+            return
+        try:
+            self.apply(adjustment, tick)
+        except AloftError as error:
+            adjustment.error = str(error)
+        adjustment.answered = True
+
+    def apply(self, adjustment: Adjustment, tick: int) -> None:
+        """Change the parameters, for ``tick`` and those after it.
+
+        Raises:
+            AloftError: a block refused; everything is as it was.
+        """
+        before = {path: self.blocks[path].params for path in adjustment.params}
+        for path, params in adjustment.params.items():
+            self.blocks[path].params = params
+            try:
+                self.blocks[path].on_parameters()
+            except Exception as error:
+                for other, old in before.items():
+                    self.blocks[other].params = old
+                    self.blocks[other].on_parameters()
+                raise AloftError(f"block '{path}' refuses the change: {describe(error)}") from error
+        adjustment.tick = tick
+        for change in adjustment.changes():
+            self.changes.append(change)
+            for listener in self.listeners:
+                listener(change)
+
+    def submit(self, adjustment: Adjustment, timeout: float = ANSWER_TIME) -> None:
+        """Hand an adjustment to the control thread and wait until it is taken over.
+
+        Called from any other thread.
+
+        Raises:
+            AloftError: a block refused it, another one is waiting, or no tick came in time; then
+                nothing has changed.
+        """
+        if self.requests:
+            raise AloftError("another change is waiting for its tick; try again")
+        self.requests.append(adjustment)
+        end = time.monotonic() + timeout
+        while not adjustment.answered:
+            if time.monotonic() > end:
+                try:
+                    self.requests.remove(adjustment)
+                except ValueError:
+                    end = time.monotonic() + timeout  # taken just now: the answer is on its way
+                    continue
+                raise AloftError(f"no tick came within {timeout:g} s; nothing was changed")
+            time.sleep(_POLL)
+        if adjustment.error:
+            raise AloftError(adjustment.error)

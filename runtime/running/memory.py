@@ -1,0 +1,195 @@
+"""The memory of a graph: one buffer for all signals (the bus), one for all declared state.
+
+Ports are views of these buffers, bound once; so recording a tick, taking a snapshot, hashing a run
+and comparing two runs are each one memory copy. Input views cannot be written.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...robots.description import RobotDescription
+from ..language.block import Block, Clock, Context
+from ..language.errors import AloftError, DeclarationError, RunError
+from ..language.layout import ALIGNMENT, Layout, PortLayout
+from ..language.signals import DTYPES, Signal
+from ..language.stages import BlockSpec, CheckedGraph
+from .live_parameters import LiveParameters
+
+
+class Region:
+    """One aligned, zeroed buffer of a layout, with one flat array a section."""
+
+    def __init__(self, layout: Layout) -> None:
+        self.layout = layout
+        raw = np.zeros(layout.size + ALIGNMENT, np.uint8)
+        start = -raw.ctypes.data % ALIGNMENT
+        self.buffer: NDArray[np.uint8] = raw[start : start + layout.size]
+        self.sections: Mapping[str, NDArray[Any]] = {
+            name: self.buffer[first : first + layout.lengths[name] * dtype.itemsize].view(dtype)
+            for name, dtype in DTYPES.items()
+            for first in (layout.offsets[name],)
+        }
+
+    def field(self, name: str, *, writable: bool = True) -> NDArray[Any]:
+        """The view of the slot ``block.port.field``. Raises ``KeyError``."""
+        slot = self.layout.slots[name]
+        flat = self.sections[slot.section][slot.start : slot.start + slot.size]
+        view = flat.reshape(slot.shape)
+        view.flags.writeable = writable
+        return view
+
+    def signal(
+        self, signal: type[Signal], port: str, *, writable: bool = True, source: str = ""
+    ) -> Signal:
+        """The fields of ``signal`` bound to the slots of ``source`` (by default of ``port``)."""
+        start = source or port
+        return signal.bind(
+            {name: self.field(f"{start}.{name}", writable=writable) for name in signal.fields}
+        )
+
+
+@dataclass(frozen=True)
+class Snapshot:
+    """Everything a graph remembers at one instant: bus, declared state and tick."""
+
+    tick: int
+    bus: bytes
+    state: bytes
+
+
+class Memory:
+    """The bus and the state of some blocks.
+
+    The bus holds all outputs in file order, and behind them one constant for every input without a
+    wire: its declared default, zero where it says nothing.
+    """
+
+    def __init__(self, blocks: Iterable[BlockSpec], robot: RobotDescription | None = None) -> None:
+        specs = tuple(blocks)
+        outputs, constants, states = [], [], []
+        for spec in specs:
+            for name, output in spec.block_type.outputs.items():
+                outputs.append(PortLayout(f"{spec.path}.{name}", output.signal, spec.dimensions))
+            for name, port in spec.block_type.inputs.items():
+                if name not in spec.wires:
+                    constants.append(
+                        PortLayout(f"{spec.path}.{name}", port.signal, spec.dimensions)
+                    )
+            if spec.block_type.states:
+                sizes = {
+                    **spec.dimensions,
+                    **spec.block_type.state_dimensions(spec.params, robot),
+                }
+                for name, state in spec.block_type.states.items():
+                    states.append(PortLayout(f"{spec.path}.{name}", state.signal, sizes))
+        self.bus = Region(Layout.of([*outputs, *constants]))
+        self.state = Region(Layout.of(states))
+        for spec in specs:
+            for name, port in spec.block_type.inputs.items():
+                if name not in spec.wires:
+                    self._write_defaults(f"{spec.path}.{name}", port.signal, port.default or {})
+
+    def _write_defaults(self, port: str, signal: type[Signal], defaults: Mapping[str, Any]) -> None:
+        for name, value in defaults.items():
+            if name not in signal.fields:
+                raise DeclarationError(
+                    f"default of {port}: {signal.__name__} has no field {name!r}; "
+                    f"it has {', '.join(signal.fields)}"
+                )
+            view = self.bus.field(f"{port}.{name}")
+            if np.shape(value) not in ((), view.shape):
+                raise DeclarationError(
+                    f"default of {port}.{name} has shape {np.shape(value)}, expected {view.shape}"
+                )
+            view[...] = value
+
+    def bind(self, block: Block, spec: BlockSpec) -> None:
+        """Give a block its ports and state as attributes; inputs cannot be written."""
+        # setattr, as touching __dict__ makes CPython's attribute access slower for good
+        for name, port in spec.block_type.inputs.items():
+            wire = spec.wires.get(name)
+            source = wire.source if wire is not None else ""
+            full_name = f"{spec.path}.{name}"
+            signal = self.bus.signal(port.signal, full_name, writable=False, source=source)
+            setattr(block, name, signal)
+        for name, output in spec.block_type.outputs.items():
+            setattr(block, name, self.bus.signal(output.signal, f"{spec.path}.{name}"))
+        for name, state in spec.block_type.states.items():
+            setattr(block, name, self.state.signal(state.signal, f"{spec.path}.{name}"))
+
+    def snapshot(self, tick: int) -> Snapshot:
+        """A copy of both buffers."""
+        return Snapshot(tick, self.bus.buffer.tobytes(), self.state.buffer.tobytes())
+
+    def restore(self, snapshot: Snapshot) -> None:
+        """Take both buffers back.
+
+        Raises:
+            ValueError: the snapshot is of another graph, by its sizes.
+        """
+        for region, data in ((self.bus, snapshot.bus), (self.state, snapshot.state)):
+            if len(data) != region.buffer.size:
+                raise ValueError(
+                    f"the snapshot has {len(data)} bytes where this graph has {region.buffer.size}"
+                )
+            region.buffer[:] = np.frombuffer(data, np.uint8)
+
+
+class BoundGraph:
+    """A checked graph with its memory and its block instances, set up and ready to start.
+
+    Raises:
+        RunError: a block's constructor or ``setup`` failed; it names the block.
+    """
+
+    def __init__(self, graph: CheckedGraph) -> None:
+        self.graph = graph
+        self.clock = Clock(graph.base_period)
+        self.memory = Memory(graph.blocks, graph.robot)
+        self.blocks: dict[str, Block] = {}
+        for spec in graph.blocks:
+            context = Context(
+                path=spec.path,
+                clock=self.clock,
+                period_ticks=spec.period_ticks,
+                offset_ticks=spec.offset_ticks,
+                dimensions=spec.dimensions,
+                robot=graph.robot,
+                wired=tuple(spec.wires),
+                folder=spec.folder,
+            )
+            try:
+                block = spec.block_type(spec.params, context)
+                self.memory.bind(block, spec)
+                block.setup()
+            except Exception as error:
+                kind = "" if isinstance(error, AloftError) else f"{type(error).__name__}: "
+                raise RunError(
+                    f"block '{spec.path}' failed in setup: {kind}{error}", block=spec.path
+                ) from error
+            self.blocks[spec.path] = block
+        self.parameters = LiveParameters(self.blocks)
+
+    def snapshot(self) -> Snapshot:
+        """Everything the graph remembers now, after every block's ``freeze``."""
+        for block in self.blocks.values():
+            block.freeze()
+        return self.memory.snapshot(self.clock.tick)
+
+    def restore(self, snapshot: Snapshot) -> None:
+        """Go back to a snapshot, ending with every block's ``thaw``; the graph may run on from it.
+
+        Raises:
+            ValueError: the snapshot is of another graph, by its sizes.
+        """
+        self.memory.restore(snapshot)
+        self.clock.tick = snapshot.tick
+        self.clock.stop_reason = None
+        for block in self.blocks.values():
+            block.thaw()

@@ -1,0 +1,138 @@
+"""When a tick may begin: at once, by wall time, or when the robot says so."""
+
+from __future__ import annotations
+
+import time
+from math import ceil
+from typing import Protocol
+
+from ..language.block import Block
+from ..language.errors import AloftError
+from ..language.stages import ClockSpec
+from .memory import BoundGraph
+
+SPIN = 200e-6
+"""Seconds before a deadline at which sleeping ends and polling begins: more than a usual wake-up
+takes, little enough to leave the processor to others."""
+
+
+class TimeSource(Protocol):
+    """Where the time comes from; tests have one of their own."""
+
+    def now(self) -> int:
+        """Nanoseconds since some fixed instant."""
+
+    def sleep(self, seconds: float) -> None:
+        """Return about that much later."""
+
+
+class WallTime:
+    """The system's monotonic time."""
+
+    now = staticmethod(time.perf_counter_ns)
+    sleep = staticmethod(time.sleep)
+
+
+class Pacer(Protocol):
+    """Waits for ticks and counts those that came too late."""
+
+    overruns: int
+    """Ticks whose deadline had passed before they could begin."""
+    skipped_periods: int
+    """Periods that were left out to catch up."""
+    in_a_row: int
+    """Overruns up to now without a tick in time between."""
+    missed_deadline: int
+    """The deadline [ns] of the latest overrun; zero where only the robot knows."""
+
+    def wait(self, tick: int) -> int:
+        """Return when ``tick`` may begin; the nanoseconds it is late by, zero if it is not."""
+
+
+class Paced:
+    """Ticks at absolute deadlines of wall time: sleep, then spin.
+
+    A tick that cannot begin in time is an overrun: it begins at the next whole period from the
+    start, and those after it follow on. So no time is made up by hurrying, and the phase stays.
+    """
+
+    def __init__(self, rate: float, source: TimeSource) -> None:
+        self.overruns = self.skipped_periods = self.in_a_row = self.missed_deadline = 0
+        self._rate = rate
+        self._source = source
+        self._start: int | None = None
+        self._first_tick = 0
+
+    def wait(self, tick: int) -> int:
+        """Sleep and spin to the tick's deadline."""
+        now = self._source.now()
+        if self._start is None:
+            self._start, self._first_tick = now, tick
+            return 0
+        deadline = self._deadline(self._start, tick)
+        late = now - deadline
+        if late > 0:
+            self.overruns += 1
+            self.in_a_row += 1
+            self.missed_deadline = deadline
+            self.skipped_periods += ceil(late * 1e-9 * self._rate)
+            deadline = self._deadline(self._start, tick)
+        else:
+            self.in_a_row = 0
+            late = 0
+        rest = (deadline - self._source.now()) * 1e-9 - SPIN
+        if rest > 0.0:
+            self._source.sleep(rest)
+        while self._source.now() < deadline:
+            pass
+        return late
+
+    def _deadline(self, start: int, tick: int) -> int:
+        # from the whole count, so that a period of no whole nanoseconds does not add up errors
+        periods = tick - self._first_tick + self.skipped_periods
+        return start + int(periods * 1e9 / self._rate)
+
+
+class DrivesClock(Protocol):
+    """What a block has that can drive the clock: a robot or its simulator."""
+
+    def wait(self) -> int:
+        """Return when the next cycle begins; the number of cycles missed since the last call."""
+
+
+class RobotDriven:
+    """Ticks when a block of the graph says so: the only one with a ``wait`` method."""
+
+    def __init__(self, block: Block, rate: float) -> None:
+        self.overruns = self.skipped_periods = self.in_a_row = self.missed_deadline = 0
+        self.block = block
+        self._rate = rate
+
+    def wait(self, tick: int) -> int:
+        """Wait for the robot; every missed cycle counts as a period late."""
+        driver: DrivesClock = self.block  # type: ignore[assignment]  # made so by driving_block
+        missed = driver.wait()
+        self.in_a_row = self.in_a_row + 1 if missed else 0
+        self.overruns += bool(missed)
+        self.skipped_periods += missed
+        return int(missed * 1e9 / self._rate)
+
+
+def driving_block(bound: BoundGraph) -> Block:
+    """The block that drives the clock. Raises ``AloftError`` unless there is exactly one."""
+    found = [path for path, block in bound.blocks.items() if hasattr(block, "wait")]
+    if len(found) != 1:
+        raise AloftError(
+            "clock 'robot' needs exactly one block with a wait() method; there is "
+            + (", ".join(found) or "none")
+        )
+    return bound.blocks[found[0]]
+
+
+def make_pacer(spec: ClockSpec, bound: BoundGraph, source: TimeSource) -> Pacer | None:
+    """The pacer of a graph; none for a free-running one. Raises ``AloftError``."""
+    if spec.kind == "paced":
+        return Paced(bound.graph.base_rate, source)
+    if spec.kind == "robot":
+        return RobotDriven(driving_block(bound), bound.graph.base_rate)
+    return None

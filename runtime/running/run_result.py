@@ -1,0 +1,148 @@
+"""What a run gives back: whether it succeeded and why, its metrics, times and signals."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from difflib import get_close_matches
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..language.block import Metric
+from ..language.errors import ExitCode, RunError
+from ..language.stages import CheckedGraph
+from .live_parameters import ParameterChange
+from .sinks import MemoryLog
+from .timing import BlockTimes
+
+
+@dataclass(frozen=True)
+class RunResult:
+    """The outcome of one run.
+
+    ``success`` is true only if the run ended as its graph meant it to (its time was over, or a
+    block asked to stop), nothing failed, not even while stopping, and no block's metrics say
+    ``success`` is false. A run that a signal or an error ended never is a success.
+
+    ``metrics`` are those of all blocks but for ``success`` and ``reason``; where two blocks have
+    one name, each is called ``block.name``. ``log`` holds every tick, unless it was switched off.
+    """
+
+    success: bool
+    reason: str
+    exit_code: ExitCode
+    ticks: int
+    period: float
+    wall_time_s: float
+    run_hash: str = ""
+    metrics: Mapping[str, Metric] = field(default_factory=dict)
+    blocks: Mapping[str, BlockTimes] = field(default_factory=dict)
+    overruns: int = 0
+    skipped_periods: int = 0
+    error: RunError | None = None
+    stop_problems: tuple[str, ...] = ()
+    cautions: tuple[str, ...] = ()
+    """What a block says that whoever reads the result must know, such as a check that was waived."""
+    parameter_changes: tuple[ParameterChange, ...] = ()
+    warnings: tuple[str, ...] = ()
+    """What does not touch the run itself, such as a recording that is not whole."""
+    log: MemoryLog | None = None
+    graph: CheckedGraph | None = None
+    """What ran; ``None`` only in a result made by hand."""
+
+    @property
+    def duration_s(self) -> float:
+        """The time of the graph that passed [s]."""
+        return self.ticks * self.period
+
+    @property
+    def time(self) -> NDArray[np.float64]:
+        """The time of every recorded tick [s], (ticks,)."""
+        return np.array(self._recorded().ticks, np.float64) * self.period
+
+    def signal(self, name: str) -> NDArray[Any]:
+        """All values of ``block.output.field``, (ticks, ...).
+
+        Raises:
+            KeyError: there is no such field; the message has the nearest name.
+            RuntimeError: the run kept no log.
+        """
+        log = self._recorded()
+        assert log.layout is not None
+        if name not in log.layout.slots:
+            near = get_close_matches(name, log.layout.slots, 1, 0.0)
+            raise KeyError(f"no signal {name!r}; the nearest is {', '.join(near)}")
+        return log.layout.view(log.rows(), name)
+
+    def signals(self) -> tuple[str, ...]:
+        """The names that ``signal`` knows."""
+        log = self._recorded()
+        assert log.layout is not None
+        return tuple(log.layout.slots)
+
+    def _recorded(self) -> MemoryLog:
+        if self.log is None or self.log.layout is None:
+            raise RuntimeError("this run kept no log; run it with log=True")
+        return self.log
+
+    def raise_if_failed(self) -> None:
+        """Raise the ``RunError`` that ended the run, if one did."""
+        if self.error is not None:
+            raise self.error
+
+    def to_json(self) -> dict[str, Any]:
+        """The result as plain data for ``json.dumps``; numbers that are not finite become null."""
+        return {
+            "success": self.success,
+            "reason": self.reason,
+            "exit_code": int(self.exit_code),
+            "run_hash": self.run_hash,
+            "ticks": self.ticks,
+            "duration_s": self.duration_s,
+            "wall_time_s": self.wall_time_s,
+            "overruns": self.overruns,
+            "skipped_periods": self.skipped_periods,
+            "metrics": {name: _plain(value) for name, value in self.metrics.items()},
+            "blocks": {path: asdict(times) for path, times in self.blocks.items()},
+            "stop_problems": list(self.stop_problems),
+            "cautions": list(self.cautions),
+            "warnings": list(self.warnings),
+            "parameter_changes": [asdict(change) for change in self.parameter_changes],
+        }
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, np.generic):
+        value = value.item()
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def merge_metrics(
+    by_block: Mapping[str, Mapping[str, Metric]],
+) -> tuple[dict[str, Metric], str | None, str | None]:
+    """All blocks' metrics as one, and what the blocks that judge the run say.
+
+    Returns:
+        The metrics, those of blocks with a metric ``success`` first; the ``reason`` of the first
+        of these that says no; and that of the first that says yes.
+    """
+    by_block = dict(sorted(by_block.items(), key=lambda item: "success" not in item[1]))
+    owners: dict[str, list[str]] = {}
+    failure: str | None = None
+    praise: str | None = None
+    for path, metrics in by_block.items():
+        for name in metrics:
+            owners.setdefault(name, []).append(path)
+        if failure is None and not metrics.get("success", True):
+            failure = str(metrics.get("reason") or f"block '{path}' reports no success")
+        elif praise is None and metrics.get("success") and metrics.get("reason"):
+            praise = str(metrics["reason"])
+    merged: dict[str, Metric] = {}
+    for path, metrics in by_block.items():
+        for name, value in metrics.items():
+            if name not in ("success", "reason"):
+                merged[name if len(owners[name]) == 1 else f"{path}.{name}"] = value
+    return merged, failure, praise

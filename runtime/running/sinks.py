@@ -1,0 +1,116 @@
+"""What is kept of a run: sinks get one call a tick and take one copy of the bus."""
+
+from __future__ import annotations
+
+from hashlib import blake2b
+from typing import TYPE_CHECKING, Protocol, runtime_checkable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..language.layout import Layout
+from .memory import BoundGraph
+from .notes import Note
+
+if TYPE_CHECKING:
+    from .run_result import RunResult
+
+
+class Sink(Protocol):
+    """Takes the bus of every tick. Row k is the bus after all outputs of tick k were written."""
+
+    def open(self, bound: BoundGraph) -> None:
+        """Prepare, once, before the first tick."""
+
+    def record(self, tick: int) -> None:
+        """Take the bus of this tick; called on the control thread, so one copy and no more."""
+
+    def close(self) -> None:
+        """Finish, once, also after a failure."""
+
+
+@runtime_checkable
+class TakesResult(Protocol):
+    """What a sink has beside that wants to know what came of the run."""
+
+    def finish(self, result: RunResult) -> list[str]:
+        """Take the result, last of all; gives warnings for the user."""
+
+
+class RunHash:
+    """BLAKE2b over the bytes of the bus of every tick: equal for equal runs, everywhere."""
+
+    def __init__(self) -> None:
+        self._hash = blake2b(digest_size=16)
+
+    def open(self, bound: BoundGraph) -> None:
+        """Start from nothing."""
+        self._hash = blake2b(digest_size=16)
+        self._bus = bound.memory.bus.buffer.data
+
+    def record(self, tick: int) -> None:
+        """Add one tick."""
+        self._hash.update(self._bus)
+
+    def close(self) -> None:
+        """Nothing to do."""
+
+    def hexdigest(self) -> str:
+        """The hash so far, 32 hexadecimal digits."""
+        return self._hash.hexdigest()
+
+
+class MemoryLog:
+    """Every tick of the bus in memory."""
+
+    CHUNK = 1024
+    """Ticks that room is made for when ``ticks`` are not known or used up."""
+
+    def __init__(self) -> None:
+        self._expected: int | None = None
+        self._chunks: list[NDArray[np.uint8]] = []
+        self._used = 0
+        self.ticks: list[int] = []
+        self.notes: list[Note] = []
+        self.layout: Layout | None = None
+
+    def expect(self, ticks: int | None) -> None:
+        """Say, before ``open``, how many ticks to make room for at once; more are no error."""
+        self._expected = ticks
+
+    def open(self, bound: BoundGraph) -> None:
+        """Make room and forget what was there."""
+        self.layout = bound.memory.bus.layout
+        self._bus = bound.memory.bus.buffer.data
+        self._size = bound.memory.bus.buffer.size
+        self._chunks, self.ticks, self.notes = [], [], []
+        self._add_chunk(self._expected or self.CHUNK)
+
+    def _add_chunk(self, rows: int) -> None:
+        chunk = np.empty((rows, self._size), np.uint8)
+        self._chunks.append(chunk)
+        self._flat = chunk.data.cast("B") if chunk.size else memoryview(bytearray())
+        self._used = 0
+
+    def record(self, tick: int) -> None:
+        """Copy the bus."""
+        first = self._used * self._size
+        if first >= len(self._flat) and self._size:
+            self._add_chunk(self.CHUNK)
+            first = 0
+        self._flat[first : first + self._size] = self._bus
+        self._used += 1
+        self.ticks.append(tick)
+
+    def note(self, note: Note) -> None:
+        """Keep it."""
+        self.notes.append(note)
+
+    def close(self) -> None:
+        """Nothing to do."""
+
+    def rows(self) -> NDArray[np.uint8]:
+        """All recorded ticks, (ticks, bytes)."""
+        full = self._chunks[:-1]
+        last = self._chunks[-1][: self._used] if self._chunks else np.zeros((0, 0), np.uint8)
+        return np.concatenate([*full, last]) if full else last

@@ -1,0 +1,201 @@
+"""The control loop: which calls a tick makes, in which order, and what it does when one fails.
+
+A tick: all ``emit`` and ``step`` in the computed order, one finite check of the whole bus, all
+``update``, then one call of each recorder. For every phase of the hyperperiod these calls are one
+flat list made beforehand. Between two ticks changed parameters are taken over.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from typing import Any
+
+from ..language.block import Block
+from ..language.errors import RunError
+from ..language.schedule import phases
+from ..language.stages import ClockSpec
+from .finite import FiniteCheck, NotFiniteError
+from .life_cycle import describe
+from .memory import BoundGraph
+from .notes import Note
+from .pacing import RobotDriven, TimeSource, make_pacer
+from .timing import Program
+
+
+class Ticker:
+    """Ticks a bound graph; who starts and stops its blocks is not its concern.
+
+    Args:
+        bound: the graph.
+        clock: how to pace it.
+        time_source: what time is.
+        timing: whether to time every block.
+        finite_check: whether to check every tick.
+
+    Attributes:
+        records: called with the tick after each tick, and also after one that is not finite.
+        notes: called with what is to be noted beside: overruns, and what others ``tell``.
+        overruns_by_block: deadlines that passed while a block ran.
+    """
+
+    def __init__(
+        self,
+        bound: BoundGraph,
+        clock: ClockSpec,
+        time_source: TimeSource,
+        *,
+        timing: bool = True,
+        finite_check: bool = True,
+    ) -> None:
+        self.bound = bound
+        self.records: list[Callable[[int], None]] = []
+        self.notes: list[Callable[[Note], None]] = []
+        self.overruns_by_block = dict.fromkeys(bound.blocks, 0)
+        self.pacer = make_pacer(clock, bound, time_source)
+        self._policy = clock
+        self._now = time_source.now
+        self._timing = timing
+        self._finite = FiniteCheck(bound.memory.bus) if finite_check else None
+        self.programs, self._table = self._make_programs()
+        self._previous: Program | None = None
+
+    def _make_programs(self) -> tuple[list[Program], list[Program]]:
+        """The different programs, and the one of each tick of the hyperperiod."""
+        graph = self.bound.graph
+        specs = [graph.block(path) for path in graph.order]
+        programs: dict[tuple[int, ...], Program] = {}
+        table = []
+        for active in phases([(spec.period_ticks, spec.offset_ticks) for spec in specs]):
+            if active not in programs:
+                programs[active] = self._make_program([specs[i].path for i in active])
+            table.append(programs[active])
+        return list(programs.values()), table
+
+    def _make_program(self, active: Sequence[str]) -> Program:
+        calls: list[Callable[[], Any]] = []
+        owners: list[str] = []
+        updates: list[tuple[str, Callable[[], Any]]] = []
+        for path in active:
+            block: Any = self.bound.blocks[path]
+            if type(block).is_moore():
+                calls.append(block.emit)
+                updates.append((path, block.update))
+            else:
+                calls.append(block.step)
+            owners.append(path)
+        if self._finite is not None:
+            calls.append(self._finite.check)
+            owners.append("")
+        for path, update in updates:
+            calls.append(update)
+            owners.append(path)
+        return Program(calls, owners)
+
+    def advance(self, ticks: int | None = None) -> int:
+        """Run up to that many ticks (or until stopped) and nothing else; how many were run.
+
+        The life cycle is the caller's: blocks must have been started. Ends early when a block
+        asks to stop or a signal does.
+
+        Raises:
+            RunError: a block failed, a value is not finite or the overrun policy says stop.
+        """
+        clock = self.bound.clock
+        first = tick = clock.tick
+        end = None if ticks is None else first + ticks
+        table, length, records = self._table, len(self._table), self.records
+        wait = None if self.pacer is None else self.pacer.wait
+        now, timing = self._now, self._timing
+        parameters = self.bound.parameters
+        requests = parameters.requests
+        call: Callable[..., Any] | None = None
+        try:
+            while tick != end and clock.stop_reason is None:
+                if requests:
+                    call = parameters.answer
+                    parameters.answer(tick)
+                if wait is not None:
+                    call = wait
+                    late = wait(tick)
+                    if late:
+                        self._count_overrun(tick, late)
+                    if clock.stop_reason is not None:
+                        break
+                program = table[tick % length]
+                if timing:
+                    row = [now()]
+                    for call in program.calls:
+                        call()
+                        row.append(now())
+                    program.keep(row)
+                    self._previous = program
+                else:
+                    for call in program.calls:
+                        call()
+                for call in records:
+                    call(tick)
+                tick += 1
+                clock.tick = tick
+        except RunError:
+            raise
+        except BaseException as error:
+            if isinstance(error, NotFiniteError):
+                self._record_last(tick)
+            raise self._run_error(call, tick, error) from error
+        return tick - first
+
+    def _record_last(self, tick: int) -> None:
+        """Keep the tick whose values are wrong, which is the one that somebody will look at."""
+        for record in self.records:
+            record(tick)
+
+    def _run_error(
+        self, call: Callable[..., Any] | None, tick: int, error: BaseException
+    ) -> RunError:
+        owner = getattr(call, "__self__", None)
+        if isinstance(owner, RobotDriven):
+            owner = owner.block
+        block = owner.context.path if isinstance(owner, Block) else ""
+        if isinstance(owner, Block) or not isinstance(error, NotFiniteError):
+            who = f"block '{block}'" if block else f"the runtime ({type(owner).__name__})"
+            text = f"{who} failed at {self._instant(tick)}: {describe(error)}"
+            if isinstance(error, ValueError) and "read-only" in str(error):
+                text += "; an input cannot be written: copy it into an array made in setup()"
+        else:
+            block = error.place.rpartition(".")[0].rpartition(".")[0]
+            text = f"block '{block}' wrote a value that is not finite at {self._instant(tick)}: "
+            text += str(error)
+        return RunError(text, block=block, tick=tick)
+
+    def _instant(self, tick: int) -> str:
+        return f"tick {tick} ({tick * self.bound.clock.base_period:.3f} s)"
+
+    def tell(self, note: Note) -> None:
+        """Have a note kept by all who keep notes; one that fails to is no reason to stop."""
+        for take in self.notes:
+            with suppress(Exception):
+                take(note)
+
+    def _count_overrun(self, tick: int, late: int) -> None:
+        """Blame the block that ran when the deadline of ``tick`` passed; maybe stop the run."""
+        pacer = self.pacer
+        assert pacer is not None
+        block = ""
+        if self._previous is not None and pacer.missed_deadline:
+            block = self._previous.running_at(pacer.missed_deadline)
+        if block:
+            self.overruns_by_block[block] += 1
+        if self.notes:
+            ran = f"; block '{block}' was running" if block else ""
+            data = {"late_ns": late, "block": block, "skipped_periods": pacer.skipped_periods}
+            text = f"overrun: {late * 1e-6:.3f} ms late{ran}"
+            self.tell(Note(tick, "overrun", text, "WARN", data))
+        if self._policy.overrun == "stop" and pacer.in_a_row >= self._policy.stop_after:
+            who = f"block '{block}' was running" if block else "no block was running"
+            raise RunError(
+                f"overrun at {self._instant(tick)}: {late * 1e-6:.3f} ms late, {pacer.in_a_row} in "
+                f"a row; {who} when the deadline passed, and the overrun policy is 'stop'",
+                block=block,
+                tick=tick,
+            )

@@ -1,0 +1,1 @@
+"""Many independent jobs: on this machine's processors or on a cluster."""

@@ -1,0 +1,211 @@
+"""Every term against Pinocchio's direct functions, numeric derivatives and Newton-Euler."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from aloft.blocks.control.dynamics import Dynamics
+from aloft.robots.description import find_robot
+from aloft.robots.pinocchio_model import build_pinocchio_model
+from aloft.runtime.language.errors import BlockError
+from aloft.runtime.testing import BlockBench
+
+ROBOT = find_robot("bruce")
+SEEDS = range(8)
+
+
+class State:
+    """A random state of the robot, and Pinocchio's own model to compare with."""
+
+    def __init__(self, seed):
+        random = np.random.default_rng(seed)
+        self.model = build_pinocchio_model(ROBOT).model
+        self.data = self.model.createData()
+        limits = ROBOT.joint_limits
+        self.q = np.empty(17)
+        self.q[:3] = random.uniform(-0.5, 0.5, 3)
+        quaternion = random.normal(size=4)
+        self.q[3:7] = quaternion / np.linalg.norm(quaternion)
+        self.q[7:] = random.uniform(limits[:, 0], limits[:, 1])
+        self.v = random.normal(size=16) * np.repeat([1.0, 3.0, 5.0], [3, 3, 10])
+        self.acceleration = random.normal(size=16) * 20.0
+
+    def moved(self, duration):
+        """The state after the acceleration has acted for a short time, to third order."""
+        other = State.__new__(State)
+        other.model, other.data = self.model, self.data
+        step = self.v * duration + 0.5 * self.acceleration * duration**2
+        other.q = pin.integrate(self.model, self.q, step)
+        other.v = self.v + self.acceleration * duration
+        return other
+
+
+def evaluate(bench, state):
+    rotation = pin.Quaternion(state.q[3:7]).toRotationMatrix()
+    bench.set(
+        "base",
+        position=state.q[:3],
+        orientation=state.q[3:7],
+        linear_velocity=rotation @ state.v[:3],
+        angular_velocity=state.v[3:6],
+    )
+    bench.set("joints", position=state.q[7:], velocity=state.v[6:])
+    bench.step()
+    return {name: array.copy() for name, array in bench.get("terms")}
+
+
+@pytest.fixture(scope="module")
+def bench():
+    return BlockBench(Dynamics, robot="bruce")
+
+
+def link_frame(state, foot_name, offset):
+    """A frame of Pinocchio's at a point of the foot."""
+    foot = next(f for f in ROBOT.feet if f.name == foot_name)
+    name = next(j.name for j in ROBOT.joints if j.child == foot.link)
+    joint = state.model.getJointId(name)
+    label = f"probe {len(state.model.frames)}"
+    frame = pin.Frame(label, joint, 0, pin.SE3(np.eye(3), np.array(offset)), pin.OP_FRAME)
+    return state.model.addFrame(frame)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_points_agree_with_frames_of_pinocchio(bench, seed):
+    state = State(seed)
+    probes = [link_frame(state, c.foot, c.position) for c in ROBOT.contacts]
+    terms = evaluate(bench, state)
+    data = state.model.createData()
+    pin.forwardKinematics(state.model, data, state.q, state.v, np.zeros(16))
+    pin.computeJointJacobians(state.model, data, state.q)
+    pin.updateFramePlacements(state.model, data)
+    aligned = pin.LOCAL_WORLD_ALIGNED
+    for point, frame in enumerate(probes):
+        jacobian = pin.getFrameJacobian(state.model, data, frame, aligned)[:3]
+        drift = pin.getFrameClassicalAcceleration(state.model, data, frame, aligned).linear
+        velocity = pin.getFrameVelocity(state.model, data, frame, aligned).linear
+        assert np.abs(terms["contact_position"][point] - data.oMf[frame].translation).max() < 1e-13
+        assert np.abs(terms["contact_jacobian"][point] - jacobian).max() < 1e-12
+        assert np.abs(terms["contact_velocity"][point] - velocity).max() < 1e-11
+        assert np.abs(terms["contact_drift"][point] - drift).max() < 1e-10
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_feet_agree_with_frames_of_pinocchio(bench, seed):
+    state = State(seed)
+    probes = [link_frame(state, foot.name, foot.sole) for foot in ROBOT.feet]
+    terms = evaluate(bench, state)
+    data = state.model.createData()
+    pin.framesForwardKinematics(state.model, data, state.q)
+    for foot, frame in enumerate(probes):
+        assert np.abs(terms["foot_position"][foot] - data.oMf[frame].translation).max() < 1e-13
+        assert np.abs(terms["foot_rotation"][foot] - data.oMf[frame].rotation).max() < 1e-13
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_inertia_has_the_coupled_rotors_and_momentum_does_not(bench, seed):
+    state = State(seed)
+    terms = evaluate(bench, state)
+    state.model.armature = np.zeros(16)
+    data = state.model.createData()
+    bare = np.triu(pin.crba(state.model, data, state.q))
+    bare = bare + np.triu(bare, 1).T
+    rotors = terms["mass_matrix"] - bare
+    b, inertia = ROBOT.joint_to_motor, ROBOT.profiles["koala"].rotor_inertia
+    assert np.abs(rotors[6:, 6:] - inertia * b.T @ b).max() < 1e-12
+    assert np.abs(rotors[:6]).max() < 1e-12
+    assert inertia * (b.T @ b)[3, 4] > 0.001  # the knee's motor does turn with the ankle
+    assert (
+        np.abs(terms["centroidal_matrix"] - pin.ccrba(state.model, data, state.q, state.v)).max()
+        < 1e-12
+    )
+    # The top of the bare inertia is the momentum at the base, seen from the base.
+    rotation = pin.Quaternion(state.q[3:7]).toRotationMatrix()
+    assert np.abs(rotation @ bare[:3] - terms["centroidal_matrix"][:3]).max() < 1e-12
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_momentum_is_the_matrix_times_velocity(bench, seed):
+    state = State(seed)
+    terms = evaluate(bench, state)
+    momentum = terms["centroidal_matrix"] @ terms["velocity"]
+    assert np.abs(terms["velocity"] - state.v).max() < 1e-14
+    assert np.abs(momentum[:3] - terms["linear_momentum"]).max() < 1e-12
+    assert np.abs(momentum[3:] - terms["angular_momentum"]).max() < 1e-12
+    assert np.abs(terms["com_velocity"] * ROBOT.total_mass - terms["linear_momentum"]).max() < 1e-12
+    assert np.abs(pin.centerOfMass(state.model, state.data, state.q) - terms["com"]).max() < 1e-13
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_accelerations_and_momentum_rates_are_numeric_derivatives(bench, seed):
+    state, step = State(seed), 1e-5
+    terms = evaluate(bench, state)
+    after, before = evaluate(bench, state.moved(step)), evaluate(bench, state.moved(-step))
+
+    def rate(name):
+        return (after[name] - before[name]) / (2.0 * step)
+
+    assert np.abs(rate("com") - terms["com_velocity"]).max() < 1e-6
+    assert np.abs(rate("contact_position") - terms["contact_velocity"]).max() < 1e-6
+    acceleration = terms["contact_jacobian"] @ state.acceleration + terms["contact_drift"]
+    assert np.abs(rate("contact_velocity") - acceleration).max() < 1e-4
+    momentum_rate = terms["centroidal_matrix"] @ state.acceleration + terms["centroidal_drift"]
+    measured = np.hstack([rate("linear_momentum"), rate("angular_momentum")])
+    assert np.abs(measured - momentum_rate).max() < 1e-5
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_newton_and_euler_hold_with_contact_forces(bench, seed):
+    """Forces through the equation of motion change the momentum by their sum and their moment."""
+    state = State(seed)
+    forces = np.random.default_rng(100 + seed).normal(size=(4, 3)) * 50.0
+    torque = np.random.default_rng(200 + seed).normal(size=10) * 5.0
+    terms = evaluate(bench, state)
+    load = np.zeros(16)
+    load[6:] = torque
+    for jacobian, force in zip(terms["contact_jacobian"], forces, strict=True):
+        load += jacobian.T @ force
+    # Rotors do not carry momentum in this model, so the balance is that of the bare inertia.
+    bare = terms["mass_matrix"].copy()
+    b, inertia = ROBOT.joint_to_motor, ROBOT.profiles["koala"].rotor_inertia
+    bare[6:, 6:] -= inertia * b.T @ b
+    acceleration = np.linalg.solve(bare, load - terms["nonlinear_effects"])
+    rate = terms["centroidal_matrix"] @ acceleration + terms["centroidal_drift"]
+    weight = np.array([0.0, 0.0, -9.81 * ROBOT.total_mass])
+    levers = terms["contact_position"] - terms["com"]
+    assert np.abs(rate[:3] - (forces.sum(0) + weight)).max() < 1e-8
+    assert np.abs(rate[3:] - np.cross(levers, forces).sum(0)).max() < 1e-8
+
+
+def test_outputs_do_not_depend_on_what_came_before(bench):
+    """The cached views of Pinocchio's memory still show the present tick after many."""
+    first = evaluate(bench, State(0))
+    for seed in range(1, 30):
+        evaluate(bench, State(seed))
+    again = evaluate(bench, State(0))
+    fresh = evaluate(BlockBench(Dynamics, robot="bruce"), State(0))
+    for name, array in first.items():
+        assert np.array_equal(array, again[name]), name
+        assert np.array_equal(array, fresh[name]), name
+
+
+def test_orientation_need_not_be_exactly_of_unit_length(bench):
+    state = State(3)
+    terms = evaluate(bench, state)
+    rotation = pin.Quaternion(state.q[3:7]).toRotationMatrix()
+    bench.set("base", orientation=2.0 * state.q[3:7], linear_velocity=rotation @ state.v[:3])
+    bench.step()
+    assert np.abs(bench.get("terms").mass_matrix - terms["mass_matrix"]).max() < 1e-14
+
+
+def test_unknown_actuator_profile_names_the_known_ones():
+    with pytest.raises(
+        BlockError, match=r"bruce has no actuator profile 'squirrel'; there is koala"
+    ):
+        BlockBench(Dynamics, {"actuators": "squirrel"}, robot="bruce")
+
+
+def test_needs_a_robot():
+    with pytest.raises(BlockError, match="name one in the graph"):
+        BlockBench(Dynamics, dimensions=dict(ROBOT.dimensions))

@@ -1,0 +1,186 @@
+"""Who commands which leg when, and that blending is the sum of both feedbacks."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from aloft.blocks.control.joint_pd import JointPD, stop
+from aloft.blocks.signals import CommandMode, Phase
+from aloft.robots.description import find_robot
+from aloft.runtime.language.errors import BlockError
+from aloft.runtime.testing import BlockBench
+
+ROBOT = find_robot("bruce")
+FLIGHT_KP = np.tile([40.0, 60.0, 60.0, 60.0, 15.0], 2)
+FLIGHT_KD = np.tile([1.0, 1.5, 1.5, 1.2, 0.3], 2)
+
+
+def make(**params):
+    bench = BlockBench(JointPD, params, robot="bruce")
+    bench.set("wbc", torque=np.arange(1.0, 11.0))
+    bench.set("legs", position=0.1, velocity=0.2)
+    bench.set("joints", position=np.linspace(-1, 1, 10), velocity=0.5)
+    return bench
+
+
+def settle(bench, phase, stance):
+    bench.set("phase", phase=int(phase), stance=stance)
+    bench.step(10)
+    return bench.get("command")
+
+
+@pytest.mark.parametrize("phase", [Phase.STAND, Phase.THRUST, Phase.LANDING, Phase.RECOVER])
+def test_on_the_ground_only_the_feedforward_acts(phase):
+    command = settle(make(), phase, True)
+    assert command.mode == CommandMode.ACTIVE
+    assert np.array_equal(command.torque, np.arange(1.0, 11.0))
+    assert not command.stiffness.any() and not command.damping.any()
+    assert np.array_equal(command.position, np.linspace(-1, 1, 10))
+
+
+def test_in_the_air_only_the_feedback_acts():
+    command = settle(make(), Phase.FLIGHT, False)
+    assert not command.torque.any()
+    assert np.array_equal(command.stiffness, FLIGHT_KP)
+    assert np.array_equal(command.damping, FLIGHT_KD)
+    assert (command.position == 0.1).all() and (command.velocity == 0.2).all()
+
+
+def test_planned_torques_are_fed_forward_while_plan_and_robot_fly():
+    bench = make(flight_feedforward=0.5)
+    bench.set("reference", phase=int(Phase.FLIGHT), joint_torque=np.arange(10.0))
+    assert np.array_equal(settle(bench, Phase.FLIGHT, False).torque, 0.5 * np.arange(10.0))
+    bench.set("reference", phase=int(Phase.LANDING), joint_torque=np.arange(10.0))
+    assert not settle(bench, Phase.FLIGHT, False).torque.any()
+
+
+def test_a_leg_that_lands_late_keeps_swinging():
+    command = settle(make(), Phase.LANDING, [True, False, False, False])
+    assert np.array_equal(command.torque, np.r_[np.arange(1.0, 6.0), np.zeros(5)])
+    assert np.array_equal(command.stiffness, np.r_[np.zeros(5), FLIGHT_KP[5:]])
+
+
+def test_a_standing_robot_without_contact_does_not_swing_its_legs():
+    command = settle(make(), Phase.STAND, False)
+    assert not command.stiffness.any()
+    assert command.torque.any()
+
+
+def test_blend_is_linear_in_time():
+    bench = make(blend=0.01)
+    settle(bench, Phase.STAND, True)
+    bench.set("phase", phase=int(Phase.FLIGHT), stance=False)
+    for tick in range(1, 8):
+        bench.step()
+        weight = min(tick / 5.0, 1.0)
+        assert bench.get("command").stiffness == pytest.approx(weight * FLIGHT_KP)
+        assert bench.get("command").torque == pytest.approx((1 - weight) * np.arange(1.0, 11.0))
+
+
+def test_no_blend_switches_at_once():
+    bench = make(blend=0.0)
+    bench.set("phase", phase=int(Phase.FLIGHT), stance=False)
+    bench.step()
+    assert np.array_equal(bench.get("command").stiffness, FLIGHT_KP)
+
+
+def test_half_way_the_torque_is_the_mean_of_both_controllers():
+    bench = make(blend=0.004, stance_stiffness=[20.0] * 5, stance_damping=[1.0] * 5)
+    settle(bench, Phase.STAND, True)
+    bench.set("phase", phase=int(Phase.FLIGHT), stance=False)
+    bench.step()
+    command = bench.get("command")
+    q, rate = np.linspace(-1, 1, 10), 0.5
+    torque = (
+        command.torque
+        + command.stiffness * (command.position - q)
+        + command.damping * (command.velocity - rate)
+    )
+    flight = FLIGHT_KP * (0.1 - q) + FLIGHT_KD * (0.2 - rate)
+    stance = np.arange(1.0, 11.0) + 1.0 * (0.0 - rate)
+    assert torque == pytest.approx(0.5 * flight + 0.5 * stance)
+
+
+def test_acceleration_targets_lead_the_joints_by_the_commanded_acceleration():
+    """A steady acceleration a leads a joint at rest by a times leak, and leak squared."""
+    bench = make(stance_targets="acceleration", leak=0.02, stance_stiffness=[20.0] * 5)
+    bench.set("joints", velocity=0.0)
+    acceleration = np.zeros(16)
+    acceleration[6 + 3] = 10.0
+    bench.set("wbc", acceleration=acceleration)
+    bench.set("phase", phase=int(Phase.STAND), stance=True)
+    bench.step(500)
+    command = bench.get("command")
+    lead = command.position - np.linspace(-1, 1, 10)
+    assert lead[3] == pytest.approx(10.0 * 0.02**2, rel=0.15)
+    assert np.abs(np.delete(lead, 3)).max() < 1e-12
+
+
+def test_the_legs_kinematics_can_be_what_the_stance_gains_act_towards():
+    gains = {"stance_stiffness": [20.0] * 5, "stance_damping": [1.0] * 5}
+    command = settle(make(stance_targets="legs", **gains), Phase.THRUST, True)
+    assert np.array_equal(command.torque, np.arange(1.0, 11.0))
+    assert (command.stiffness == 20.0).all() and (command.damping == 1.0).all()
+    assert (command.position == 0.1).all() and (command.velocity == 0.2).all()
+
+
+def test_friction_pushes_the_way_the_joint_moves():
+    bench = make(friction=0.07)
+    bench.set("wbc", torque=0.0)
+    bench.set("joints", velocity=np.r_[np.full(5, 10.0), np.full(5, -10.0)])
+    command = settle(bench, Phase.STAND, True)
+    assert command.torque == pytest.approx(np.r_[np.full(5, 0.07), np.full(5, -0.07)])
+
+
+def test_a_soft_stop_pushes_back_from_a_limit_and_brakes():
+    """The left knee stands 20 mrad from its upper limit and moves on at 2 rad/s."""
+    knee = 3
+    limit = ROBOT.joint_limits[knee, 1]
+    joints, rates = ROBOT.standing_position.copy(), np.zeros(10)
+    joints[knee], rates[knee] = limit - 0.02, 2.0
+    torques = {}
+    for gain in (0.0, 3.0):
+        bench = make(stop_gain=gain, stop_margin=0.05)
+        bench.set("joints", position=joints, velocity=rates)
+        command = settle(bench, Phase.LANDING, True)
+        torques[gain] = (
+            command.torque
+            + command.stiffness * (command.position - joints)
+            + command.damping * (command.velocity - rates)
+        )
+    added = torques[3.0] - torques[0.0]
+    depth = 0.03
+    expected = -3.0 * FLIGHT_KP[knee] * depth - 3.0 * depth / 0.05 * FLIGHT_KD[knee] * 2.0
+    assert added[knee] == pytest.approx(expected)
+    assert np.delete(added, knee) == pytest.approx(0.0, abs=1e-12)
+
+
+@given(
+    angle=st.floats(-2.5, 2.5),
+    rate=st.floats(-20, 20),
+    gains=st.tuples(*[st.floats(0, 100)] * 4),
+    targets=st.tuples(st.floats(-3, 3), st.floats(-3, 3)),
+)
+def test_a_soft_stop_adds_its_own_torque_to_any_feedback(angle, rate, gains, targets):
+    stiffness, damping = np.array([gains[0]]), np.array([gains[1]])
+    position, velocity = np.array([targets[0]]), np.array([targets[1]])
+    before = gains[0] * (targets[0] - angle) + gains[1] * (targets[1] - rate)
+    limits, springs, dampers = np.array([[-1.0, 0.5]]), np.array([gains[2]]), np.array([gains[3]])
+    stop(
+        np.array([angle]), limits, 0.1, 2.0, springs, dampers, stiffness, position, damping,
+        velocity,
+    )  # fmt: skip
+    after = stiffness[0] * (position[0] - angle) + damping[0] * (velocity[0] - rate)
+    edge = min(max(angle, -0.9), 0.4)
+    depth = abs(angle - edge) / 0.1
+    added = 2.0 * gains[2] * (edge - angle) - 2.0 * min(depth, 1.0) * gains[3] * rate
+    if stiffness[0] > 1e-9 and damping[0] > 1e-9:
+        assert after - before == pytest.approx(added, abs=1e-6, rel=1e-9)
+
+
+def test_gains_must_fit_the_leg():
+    with pytest.raises(BlockError, match=r"flight_damping has 2 gains; right_foot's leg has 5 "):
+        make(flight_damping=[1.0, 2.0])

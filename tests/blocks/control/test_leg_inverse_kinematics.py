@@ -1,0 +1,226 @@
+"""The block: exact where reachable, within limits and finite always, velocity the derivative."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from aloft.blocks.control.leg_inverse_kinematics import LegInverseKinematics
+from aloft.blocks.signals import Phase
+from aloft.robots import leg_kinematics
+from aloft.robots.description import find_robot
+from aloft.runtime.language.errors import BlockError
+from aloft.runtime.testing import BlockBench
+
+ROBOT = find_robot("bruce")
+LEGS = [leg_kinematics.read_leg(ROBOT, foot) for foot in range(2)]
+any_number = st.floats(allow_nan=False, allow_infinity=False)
+
+
+def feet_of(joints):
+    positions, rotations = np.empty((2, 3)), np.empty((2, 3, 3))
+    for leg, position, rotation in zip(LEGS, positions, rotations, strict=True):
+        angles = joints[list(leg.joints)]
+        leg_kinematics.forward(leg.hip, leg.plane, leg.signs, angles, position, rotation)
+    return positions, rotations
+
+
+def swing(time):
+    """A smooth motion of all joints, well inside their limits, and its rate."""
+    middle = ROBOT.standing_position
+    size = np.tile([0.3, 0.3, 0.2, 0.3, 0.3], 2)
+    shift = np.arange(10)
+    return middle + size * np.sin(9.0 * time + shift), size * 9.0 * np.cos(9.0 * time + shift)
+
+
+def test_standing_feet_give_the_standing_joints():
+    bench = BlockBench(LegInverseKinematics, robot="bruce")
+    position, rotation = feet_of(ROBOT.standing_position)
+    bench.set("feet", position=position, rotation=rotation)
+    bench.step()
+    target = bench.get("target")
+    assert np.abs(target.position - ROBOT.standing_position).max() < 1e-12
+    assert np.abs(target.velocity).max() == 0.0
+    assert target.reachable.all()
+
+
+def test_a_moving_foot_gives_the_joints_and_rates_that_move_it():
+    rate = 5000.0
+    bench = BlockBench(LegInverseKinematics, robot="bruce", rate=rate)
+    for tick in range(800):
+        joints, speeds = swing(tick / rate)
+        position, rotation = feet_of(joints)
+        after, _ = feet_of(joints + 1e-6 * speeds)
+        before, _ = feet_of(joints - 1e-6 * speeds)
+        bench.set("feet", position=position, rotation=rotation, velocity=(after - before) / 2e-6)
+        bench.step()
+        target = bench.get("target")
+        assert target.reachable.all()
+        assert np.abs(target.position - joints).max() < 1e-9
+        if tick:
+            assert np.abs(target.velocity - speeds).max() < 0.02 * 2.7  # of the largest rate
+
+
+@given(
+    arrays(np.float64, (2, 3), elements=any_number),
+    arrays(np.float64, (2, 3), elements=any_number),
+    arrays(np.float64, (2, 3, 3), elements=any_number),
+    arrays(np.float64, 10, elements=st.floats(-10.0, 10.0)),
+)
+def test_anything_finite_gives_finite_targets_within_limits(position, velocity, rotation, joints):
+    bench = BlockBench(LegInverseKinematics, robot="bruce")
+    bench.set("feet", position=position, velocity=velocity, rotation=rotation)
+    bench.set("joints", position=joints)
+    for _ in range(2):
+        bench.step()
+    target = bench.get("target")
+    limits = ROBOT.joint_limits
+    assert (target.position >= limits[:, 0] + 0.049).all()
+    assert (target.position <= limits[:, 1] - 0.049).all()
+    assert (np.abs(target.velocity) <= 30.0).all()
+
+
+def test_a_stretched_leg_is_not_reachable_and_its_knee_does_not_move():
+    bench = BlockBench(LegInverseKinematics, robot="bruce")
+    position, rotation = feet_of(ROBOT.standing_position)
+    position[0, 2] -= 0.2
+    bench.set("feet", position=position, rotation=rotation, velocity=[[0, 0, -1.0], [0, 0, 0]])
+    bench.step()
+    target = bench.get("target")
+    assert target.reachable.tolist() == [False, True]
+    assert target.position[3] == pytest.approx(ROBOT.joint_limits[3, 1] - 0.05)
+    assert target.velocity[3] == pytest.approx(0.0, abs=1e-3)
+
+
+def tilted(angle, axis):
+    """The axes of a level sole, seen from a base that has turned by ``angle``."""
+    cosine, sine = math.cos(angle), math.sin(angle)
+    if axis == "roll":
+        return np.array([[1.0, 0, 0], [0, cosine, sine], [0, -sine, cosine]])
+    return np.array([[cosine, 0, -sine], [0, 1.0, 0], [sine, 0, cosine]])
+
+
+@pytest.mark.parametrize(
+    ("turn", "away"),
+    [(tilted(-0.6, "roll"), [0.0, 0.12, 0.0]), (tilted(-0.6, "pitch"), [-0.12, 0.0, 0.0])],
+)
+def test_beyond_reach_the_foot_slides_in_the_plane_of_its_sole(turn, away):
+    """The torso has tilted, so the hip's limit keeps the leg from going as far as it should."""
+    hip = LEGS[0].hip
+    soles = {}
+    for beyond in ("slide", "turn"):
+        bench = BlockBench(LegInverseKinematics, {"beyond": beyond}, robot="bruce")
+        wanted = np.array([0.0, 0.0, -0.30]) + away
+        position = np.tile(hip + turn @ wanted, (2, 1))
+        bench.set("feet", position=position, rotation=np.tile(turn, (2, 1, 1)), velocity=0.0)
+        bench.set("joints", position=ROBOT.standing_position)
+        bench.step()
+        assert not bench.get("target").reachable[0]
+        place, rotation = (x[0] for x in feet_of(bench.get("target").position))
+        soles[beyond] = turn.T @ (place - hip), turn.T @ rotation[:, 0]
+    (place, line), (turned_place, turned_line) = soles["slide"], soles["turn"]
+    assert place[2] == pytest.approx(wanted[2], abs=1e-9)
+    assert line == pytest.approx([1.0, 0.0, 0.0], abs=1e-9)
+    side = np.abs(away).argmax()
+    assert 0.0 < place[side] / wanted[side] < 1.0
+    assert abs(turned_place[2] - wanted[2]) > 1e-3 or abs(turned_line[2]) > 1e-2
+
+
+def test_sliding_is_continuous_where_reach_ends():
+    """From within reach to beyond it the joints do not jump."""
+    turn = tilted(-0.6, "roll")
+    bench = BlockBench(LegInverseKinematics, {"beyond": "slide"}, robot="bruce")
+    bench.set("joints", position=ROBOT.standing_position)
+    last, reachable = None, []
+    for aside in np.linspace(0.0, 0.14, 141):
+        place = LEGS[0].hip + turn @ np.array([0.0, aside, -0.31])
+        bench.set(
+            "feet", position=np.tile(place, (2, 1)), rotation=np.tile(turn, (2, 1, 1)), velocity=0.0
+        )
+        bench.step()
+        joints = bench.get("target").position[:5].copy()
+        reachable.append(bool(bench.get("target").reachable[0]))
+        if last is not None:
+            assert np.abs(joints - last).max() < 0.03
+        last = joints
+    assert reachable[0]
+    assert not reachable[-1]
+
+
+def test_a_leg_that_stretches_slows_down_and_its_velocity_is_that_of_its_position():
+    """Through the soft zone and beyond, at 0.3 m/s: no jump, and the rates are the derivatives."""
+    bench = BlockBench(LegInverseKinematics, robot="bruce", rate=500.0)
+    position, rotation = feet_of(ROBOT.standing_position)
+    bench.set("feet", rotation=rotation, velocity=[[0.0, 0.0, -0.3]] * 2)
+    angles, speeds = [], []
+    for tick in range(100):
+        lower = position - np.array([0.0, 0.0, 0.3 * tick / 500.0])
+        bench.set("feet", position=lower)
+        bench.step()
+        angles.append(bench.get("target").position.copy())
+        speeds.append(bench.get("target").velocity.copy())
+    assert not bench.get("target").reachable.any()
+    measured = np.diff(angles, axis=0) * 500.0
+    assert np.abs(measured).max() < 12.0
+    expected = 0.5 * (np.array(speeds[1:]) + np.array(speeds[:-1]))
+    assert np.abs(measured - expected).max() < 0.5
+
+
+def test_a_line_given_anew_is_not_a_motion():
+    bench = BlockBench(LegInverseKinematics, robot="bruce")
+    position, rotation = feet_of(ROBOT.standing_position)
+    bench.set("feet", position=position, rotation=rotation)
+    bench.step()
+    slope = 0.3
+    turned = np.array(
+        [[math.cos(slope), 0, -math.sin(slope)], [0, 1, 0], [math.sin(slope), 0, math.cos(slope)]]
+    )
+    bench.set("feet", rotation=np.stack([turned, turned]))
+    bench.step()
+    assert np.abs(bench.get("target").velocity).max() == 0.0
+    assert bench.get("target").reachable.all()
+
+
+def test_the_margin_is_kept_and_the_description_is_not_changed():
+    before = ROBOT.joint_limits.copy()
+    BlockBench(LegInverseKinematics, {"margin": 0.1}, robot="bruce")
+    assert np.array_equal(ROBOT.joint_limits, before)
+
+
+def test_needs_a_robot():
+    with pytest.raises(BlockError, match="name one in the graph"):
+        BlockBench(LegInverseKinematics, dimensions=dict(ROBOT.dimensions))
+
+
+def test_the_soles_have_the_planned_pitch_where_asked_for():
+    position, flat = feet_of(ROBOT.standing_position)
+    found = {}
+    for follow in ("feet", "pitch"):
+        bench = BlockBench(LegInverseKinematics, {"follow": follow}, robot="bruce")
+        bench.set("feet", position=position, rotation=flat)
+        bench.set("reference", foot_pitch=[0.3, -0.1])
+        bench.step()
+        found[follow] = feet_of(bench.get("target").position)
+    assert found["feet"][1] == pytest.approx(flat, abs=1e-9)
+    places, turned = found["pitch"]
+    assert places == pytest.approx(position, abs=1e-9)
+    for foot, pitch in enumerate((0.3, -0.1)):
+        assert turned[foot, :, 0] == pytest.approx([math.cos(pitch), 0.0, -math.sin(pitch)])
+
+
+def test_the_plans_joints_are_followed_as_long_as_the_plan_flies():
+    bench = BlockBench(LegInverseKinematics, {"follow": "plan"}, robot="bruce")
+    planned = {"joint_position": np.linspace(-0.5, 0.5, 10), "joint_velocity": 2.0}
+    bench.set("reference", phase=int(Phase.FLIGHT), **planned)
+    bench.step()
+    target = bench.get("target")
+    assert np.array_equal(target.position, np.linspace(-0.5, 0.5, 10))
+    assert (target.velocity == 2.0).all() and target.reachable.all()
+    bench.set("reference", phase=int(Phase.LANDING), **planned)
+    bench.step()
+    assert not np.array_equal(bench.get("target").position, np.linspace(-0.5, 0.5, 10))

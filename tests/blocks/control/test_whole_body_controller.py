@@ -1,0 +1,318 @@
+"""The whole-body controller: optimality, physics, limits, priorities and what it does on failure."""
+
+from __future__ import annotations
+
+from itertools import product
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from aloft.blocks.control.dynamics import Dynamics
+from aloft.blocks.control.whole_body_controller import WholeBodyController
+from aloft.blocks.signals import Phase
+from aloft.robots.description import find_robot
+from aloft.runtime.language.errors import BlockError
+from aloft.runtime.testing import BlockBench
+
+ROBOT = find_robot("bruce")
+WEIGHT = ROBOT.total_mass * 9.81
+SUBSETS = [s for s in product([False, True], repeat=4) if any(s)]
+LEVEL = [0.0, 0.0, 0.0, 1.0]
+
+
+@pytest.fixture(scope="module")
+def dynamics():
+    return BlockBench(Dynamics, robot=ROBOT)
+
+
+def model(dynamics, seed=None, speed=1.0):
+    """The terms of standing still, or of a random state near it."""
+    joints, velocity = ROBOT.standing_position.copy(), np.zeros(10)
+    base, turn = np.zeros(3), np.zeros(3)
+    if seed is not None:
+        random = np.random.default_rng(seed)
+        joints += random.uniform(-0.15, 0.15, 10)
+        velocity = random.normal(size=10) * speed
+        base, turn = random.normal(size=3) * 0.3 * speed, random.normal(size=3) * speed
+    dynamics.set("base", position=[0.0, 0.0, 0.38], orientation=LEVEL)
+    dynamics.set("base", linear_velocity=base, angular_velocity=turn)
+    dynamics.set("joints", position=joints, velocity=velocity)
+    dynamics.step()
+    return {name: array.copy() for name, array in dynamics.get("terms")}
+
+
+def make(terms, *, phase=Phase.STAND, stance=(True,) * 4, target=None, **params):
+    bench = BlockBench(WholeBodyController, params, robot=ROBOT)
+    feed(bench, terms, phase=phase, stance=stance, target=target)
+    return bench
+
+
+def feed(bench, terms, *, phase=Phase.STAND, stance=(True,) * 4, target=None):
+    bench.set("terms", **terms)
+    bench.set("joints", velocity=terms["velocity"][6:])
+    bench.set("phase", phase=phase, stance=list(stance))
+    wanted = {"com": terms["com"], "orientation": LEVEL, **(target or {})}
+    bench.set("target", **wanted)
+
+
+def solve(terms, **keywords):
+    bench = make(terms, **keywords)
+    bench.step()
+    command = bench.get("command")
+    assert bool(command.solved)
+    return {name: array.copy() for name, array in command}, bench
+
+
+def residual(terms, command):
+    """M a + h - S' tau - sum J' f over all rows."""
+    left = terms["mass_matrix"] @ command["acceleration"] + terms["nonlinear_effects"]
+    left[6:] -= command["torque"]
+    return left - np.einsum("ikn,ik->n", terms["contact_jacobian"], command["force"])
+
+
+def cost(bench, command, active):
+    """The program's cost, recomputed from its own matrices."""
+    block = bench.block
+    program = block._programs[len(active)]
+    x = np.concatenate([command["acceleration"], command["force"][active].ravel()])
+    return 0.5 * x @ program.hessian @ x + program.gradient @ x, program, x
+
+
+@pytest.mark.parametrize("stance", SUBSETS)
+@pytest.mark.parametrize("limits", ["none", "joint", "motor"])
+def test_every_stance_obeys_the_dynamics_the_cones_and_the_limits(dynamics, stance, limits):
+    terms = model(dynamics, seed=sum(stance))
+    target = {"com_acceleration": [2.0, 1.0, 15.0]}
+    command, _ = solve(
+        terms, phase=Phase.LANDING, stance=stance, target=target, limits=limits, torque_margin=0.5
+    )
+    assert np.abs(residual(terms, command)).max() < 1e-6
+    force = command["force"]
+    for point, loaded in enumerate(stance):
+        if not loaded:
+            assert (force[point] == 0.0).all()
+        assert np.abs(force[point, :2]).max() <= 0.5 * force[point, 2] + 1e-6
+        assert -1e-6 <= force[point, 2] <= 400.0 + 1e-6
+    if limits == "joint":
+        assert np.abs(command["torque"]).max() <= 0.5 * 10.5 + 1e-6
+    if limits == "motor":
+        motor = ROBOT.torque_to_motor @ command["torque"]
+        assert np.abs(motor).max() <= 0.5 * 10.5 + 1e-6
+
+
+@given(st.integers(0, 10_000), st.sampled_from(SUBSETS), st.sampled_from(list(Phase)[:6]))
+@settings(max_examples=40, deadline=None)
+def test_two_solvers_find_the_same_optimum(dynamics, seed, stance, phase):
+    terms = model(dynamics, seed, speed=3.0)
+    target = {"com_acceleration": [1.0, -1.0, 8.0], "angular_momentum_rate": [0.1, 1.0, 0.0]}
+    first, bench = solve(terms, phase=phase, stance=stance, target=target)
+    second, _ = solve(terms, phase=phase, stance=stance, target=target, solver="quadprog")
+    active = np.flatnonzero(stance)
+    best, program, x = cost(bench, first, active)
+    other, _, _ = cost(bench, second, active)
+    assert other == pytest.approx(best, rel=1e-9, abs=1e-6)
+    assert second["torque"] == pytest.approx(first["torque"], abs=1e-4)
+    # Optimality: minus the gradient is a combination of the active rows, pushing outwards.
+    slack = program.bound - program.inequality @ x
+    assert slack.min() > -1e-6
+    tight = program.inequality[slack < 1e-6]
+    basis = np.vstack([program.equality, tight])
+    gradient = program.hessian @ x + program.gradient
+    multipliers = np.linalg.lstsq(basis.T, -gradient, rcond=None)[0]
+    size = 1.0 + np.abs(program.gradient).max()
+    assert np.abs(basis.T @ multipliers + gradient).max() < 1e-7 * size
+    assert np.abs(program.equality @ x - program.right).max() < 1e-7
+
+
+def test_motor_limits_follow_the_speed(dynamics):
+    """At a speed between corner and no-load a motor drives with less and brakes with all."""
+    terms = model(dynamics)
+    terms["velocity"][9] = 24.0  # the right knee extends; the ankle motor turns as fast
+    target = {"com_acceleration": [0.0, 0.0, 60.0]}
+    command, _ = solve(terms, phase=Phase.THRUST, target=target)
+    motor = ROBOT.torque_to_motor @ command["torque"]
+    speed = ROBOT.joint_to_motor @ terms["velocity"][6:]
+    half = 0.97 * 10.5 * (30.0 - 24.0) / (30.0 - 18.0)
+    for value, turning in zip(motor, speed, strict=True):
+        most = half if value * turning > 0.0 else 0.97 * 10.5
+        assert abs(value) <= most + 1e-6
+    assert np.abs(motor[3]) == pytest.approx(half, abs=1e-6)
+
+
+def test_standing_still_it_carries_the_weight_and_accelerates_nothing(dynamics):
+    terms = model(dynamics)
+    command, _ = solve(terms)
+    assert np.abs(command["acceleration"]).max() < 0.05
+    assert command["force"].sum(axis=0) == pytest.approx([0.0, 0.0, WEIGHT], abs=0.05)
+    # The same torques as the static ones of these forces.
+    static = terms["nonlinear_effects"][6:] - np.einsum(
+        "ikn,ik->n", terms["contact_jacobian"][:, :, 6:], command["force"]
+    )
+    assert command["torque"] == pytest.approx(static, abs=0.05)
+
+
+def test_left_and_right_mirror(dynamics):
+    terms = model(dynamics)
+    command, _ = solve(terms, target={"com_acceleration": [0.5, 0.0, 2.0]})
+    mirror = np.array([-1.0, 1.0, -1.0, 1.0, 1.0])
+    assert command["torque"][5:] == pytest.approx(mirror * command["torque"][:5], abs=1e-6)
+
+
+def test_the_centre_of_mass_is_accelerated_as_asked(dynamics):
+    """x = a_ref + K_p (p_ref - p) + K_d (v_ref - v), to the accuracy soft tasks give."""
+    terms = model(dynamics)
+    target = {
+        "com": terms["com"] + [0.002, -0.001, 0.01],
+        "com_velocity": [0.02, 0.0, 0.05],
+        "com_acceleration": [0.1, 0.2, 1.0],
+    }
+    command, _ = solve(terms, target=target, torque_margin=1.0)
+    found = command["force"].sum(axis=0) / ROBOT.total_mass - [0.0, 0.0, 9.81]
+    wanted = 100.0 * np.array([0.002, -0.001, 0.01]) + 20.0 * np.array([0.02, 0.0, 0.05])
+    assert found == pytest.approx(np.add(wanted, [0.1, 0.2, 1.0]), rel=0.02, abs=0.02)
+
+
+def test_the_torso_turns_towards_its_target(dynamics):
+    terms = model(dynamics)
+    turned = [0.0, np.sin(0.05), 0.0, np.cos(0.05)]
+    command, _ = solve(terms, target={"orientation": turned})
+    assert command["acceleration"][4] == pytest.approx(200.0 * 0.1, rel=0.1)
+
+
+def test_priorities_stance_then_momentum_then_torso(dynamics):
+    """Asked for what cannot be had together, the heavier task keeps more of it."""
+    terms = model(dynamics)
+    turned = [0.0, np.sin(0.4), 0.0, np.cos(0.4)]
+    wanted = 200.0 * 0.8
+    command, _ = solve(terms, target={"orientation": turned, "com_acceleration": [3.0, 0.0, 0.0]})
+    stance = terms["contact_jacobian"] @ command["acceleration"] + terms["contact_drift"]
+    com = command["force"].sum(axis=0) / ROBOT.total_mass - [0.0, 0.0, 9.81]
+    lost_torso = abs(command["acceleration"][4] - wanted) / wanted
+    lost_com = abs(com[0] - 3.0) / 3.0
+    assert np.abs(stance).max() < 0.1 * wanted
+    heavy, _ = solve(
+        terms,
+        target={"orientation": turned, "com_acceleration": [3.0, 0.0, 0.0]},
+        stand={"torso_weight": [1e4] * 3},
+    )
+    assert abs(heavy["acceleration"][4] - wanted) / wanted < lost_torso
+    com = heavy["force"].sum(axis=0) / ROBOT.total_mass - [0.0, 0.0, 9.81]
+    assert abs(com[0] - 3.0) / 3.0 > lost_com
+
+
+def test_damping_or_tracking_angular_momentum(dynamics):
+    terms = model(dynamics, seed=3)
+    rates = {}
+    for track in (False, True):
+        gains = {
+            "angular_weight": [1e6] * 3, "angular_damping": [5.0] * 3, "torso_weight": [0.0] * 3,
+            "linear_weight": [0.0] * 3, "track_angular_momentum": track,
+        }  # fmt: skip
+        target = {"angular_momentum": [0.0, 0.02, 0.0], "angular_momentum_rate": [0.0, 0.3, 0.0]}
+        command, _ = solve(terms, target=target, stand=gains, limits="none")
+        rates[track] = (
+            terms["centroidal_matrix"][3:] @ command["acceleration"] + terms["centroidal_drift"][3:]
+        )
+    k = terms["angular_momentum"]
+    assert rates[False] == pytest.approx(-5.0 * k, abs=0.02)
+    assert rates[True] == pytest.approx(
+        np.array([0.0, 0.3, 0.0]) + 5.0 * (np.array([0.0, 0.02, 0.0]) - k), abs=0.02
+    )
+
+
+def test_a_hovering_point_falls_to_the_height_of_the_others(dynamics):
+    terms = model(dynamics)
+    terms["contact_position"][3, 2] += 0.004
+    command, _ = solve(
+        terms,
+        phase=Phase.LANDING,
+        stance=(True, True, True, False),
+        landing={"swing_weight": 1e3},
+    )
+    drop = terms["contact_jacobian"][3] @ command["acceleration"]
+    assert drop[2] == pytest.approx(-3000.0 * 0.004, rel=0.3)
+
+
+def test_the_ankle_of_a_foot_on_its_toes_follows_the_plan(dynamics):
+    """Feedforward and feedback, while the other foot's ankle does what keeps it flat."""
+    terms = model(dynamics)
+    joints = [joint.name for joint in ROBOT.joints]
+    ankle = joints.index("left_ankle")
+    planned, rates, bends = ROBOT.standing_position.copy(), np.zeros(10), np.zeros(10)
+    planned[ankle] += 0.01
+    rates[ankle], bends[ankle] = 0.5, -40.0
+    target = {"joint_position": planned, "joint_velocity": rates, "joint_acceleration": bends}
+    stance = [True] * 4
+    stance[[c.name for c in ROBOT.contacts].index("left_heel")] = False
+    bench = make(terms, phase=Phase.THRUST, stance=stance, target=target)
+    bench.set("joints", position=ROBOT.standing_position)
+    bench.step()
+    acceleration = bench.get("command").acceleration
+    assert acceleration[6 + ankle] == pytest.approx(-40.0 + 1000.0 * 0.01 + 60.0 * 0.5, abs=1.0)
+    heel = terms["contact_jacobian"][[c.name for c in ROBOT.contacts].index("right_heel")]
+    assert np.abs(heel @ acceleration).max() < 0.1
+
+
+def test_in_the_air_it_asks_for_nothing(dynamics):
+    terms = model(dynamics)
+    bench = make(terms)
+    bench.step()
+    assert np.abs(bench.get("command").torque).max() > 0.1
+    feed(bench, terms, phase=Phase.FLIGHT, stance=(False,) * 4)
+    bench.step()
+    command = bench.get("command")
+    assert bool(command.solved)
+    for name in ("torque", "acceleration", "force"):
+        assert (getattr(command, name) == 0.0).all()
+
+
+def test_the_fallback_is_the_defined_one(dynamics):
+    terms = model(dynamics)
+    bench = make(terms, fallback_ticks=3, fallback_decay=0.8)
+    bench.step()
+    command = bench.get("command")
+    last = command.torque.copy()
+    works = bench.block._solver
+    bench.block._solver = type("Broken", (), {"solve": lambda self, *args: None})()
+    for failed in (1, 2, 3):
+        bench.step()
+        assert command.torque == pytest.approx(0.8**failed * last, abs=1e-12)
+        assert not bool(command.solved)
+        assert int(command.failures) == failed
+        assert (command.force == 0.0).all()
+    bench.step()
+    quarter = np.array([0.0, 0.0, WEIGHT / 4.0])
+    wanted = terms["nonlinear_effects"][6:] - sum(
+        terms["contact_jacobian"][i, :, 6:].T @ quarter for i in range(4)
+    )
+    assert command.torque == pytest.approx(wanted, abs=1e-10)
+    assert command.force == pytest.approx(np.tile(quarter, (4, 1)))
+    assert int(command.failures) == 4
+    bench.block._solver = works
+    bench.step()
+    assert bool(command.solved)
+    assert int(command.failures) == 4
+    assert command.torque == pytest.approx(last, abs=1e-12)
+
+
+def test_the_fallback_survives_a_snapshot(dynamics):
+    bench = make(model(dynamics))
+    bench.step()
+    bench.block._solver = type("Broken", (), {"solve": lambda self, *args: None})()
+    bench.step(2)
+    snapshot = bench.snapshot()
+    bench.step()
+    wanted = bench.get("command").torque.copy()
+    bench.step(3)
+    bench.restore(snapshot)
+    bench.step()
+    assert (bench.get("command").torque == wanted).all()
+
+
+def test_errors_name_the_fix(dynamics):
+    with pytest.raises(BlockError, match=r"no quadratic-program solver 'magic'.*daqp"):
+        BlockBench(WholeBodyController, {"solver": "magic"}, robot=ROBOT)
+    with pytest.raises(BlockError, match="no actuator profile 'steam'; there is koala"):
+        BlockBench(WholeBodyController, {"actuators": "steam"}, robot=ROBOT)

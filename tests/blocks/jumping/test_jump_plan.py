@@ -1,0 +1,111 @@
+"""JumpPlan: the shipped plans without a solver, inline tasks, and refusals that say why."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from aloft.blocks.jumping.jump_plan import JumpPlan
+from aloft.blocks.signals import Phase
+from aloft.planner.library.library import SHIPPED, PlanLibrary
+from aloft.planner.task.task import read_task
+from aloft.robots.description import find_robot
+from aloft.runtime.language.errors import AloftError
+from aloft.runtime.testing import BlockBench
+
+
+def bench(**parameters: object) -> BlockBench:
+    return BlockBench(JumpPlan, {"solve": False, **parameters}, robot="bruce", rate=500.0)
+
+
+def test_it_plays_the_shipped_plan_through() -> None:
+    block = bench(task="tasks/forward_10cm.yaml", stand_time=0.1)
+    task = read_task(SHIPPED.parent / "tasks" / "forward_10cm.yaml")
+    plan = PlanLibrary(find_robot("bruce"), Path("nowhere")).find(task)
+    assert plan is not None
+    phases, heights, reference = [], [], block.get("reference")
+    for _ in range(round((plan.duration + 0.3) * 500)):
+        block.step()
+        phases.append(int(reference.phase))
+        heights.append(float(reference.com[2]))
+        assert reference.contact.all() == (phases[-1] != Phase.FLIGHT)
+    order = [phase for k, phase in enumerate(phases) if k == 0 or phase != phases[k - 1]]
+    assert order[:5] == [Phase.STAND, Phase.SQUAT, Phase.THRUST, Phase.FLIGHT, Phase.LANDING]
+    assert max(heights) - heights[0] == pytest.approx(0.15, abs=1e-3)
+    assert float(reference.foot_position[:, 0].mean()) == pytest.approx(0.1, abs=2e-3)
+    np.testing.assert_allclose(reference.com_velocity, 0.0, atol=1e-3)
+
+
+def test_an_inline_task_that_is_not_kept_is_refused_without_a_solver() -> None:
+    with pytest.raises(AloftError, match=r"there is no plan for the task .*'aloft plan', or set"):
+        bench(task={"rise": 0.0701})
+
+
+def test_an_inline_task_finds_the_plan_of_the_same_task() -> None:
+    block = bench(task={"rise": "15 cm"})
+    block.step()
+    assert float(block.get("reference").lift_off_time) > 0.5
+
+
+@pytest.mark.parametrize(
+    ("task", "words"),
+    [
+        ("tasks/none.yaml", "there is no task 'tasks/none.yaml' beside the graph.*tasks/in_situ"),
+        ({"rise": -1}, "rise: Input should be greater than 0, found -1"),
+        ({"rise": 0.1, "robot": "atlas"}, "is for atlas, but the graph's robot is bruce"),
+    ],
+)
+def test_what_cannot_be_asked_for_is_said(task: object, words: str) -> None:
+    with pytest.raises(AloftError, match=words):
+        bench(task=task)
+
+
+def test_it_needs_a_robot() -> None:
+    dimensions = {"n_joints": 10, "n_feet": 2, "n_contacts": 4, "n_velocities": 16}
+    with pytest.raises(AloftError, match="JumpPlan needs a robot"):
+        BlockBench(JumpPlan, {}, dimensions=dimensions)
+
+
+def test_a_kept_plan_that_is_not_valid_never_starts(tmp_path: Path) -> None:
+    robot = find_robot("bruce")
+    task = read_task(SHIPPED.parent / "tasks" / "in_situ.yaml")
+    plan = PlanLibrary(robot, Path("nowhere")).find(task)
+    assert plan is not None
+    PlanLibrary(robot, tmp_path).add(
+        type(plan)(**{**vars(plan), "joint_torque": 2.0 * plan.joint_torque})
+    )
+    with pytest.raises(AloftError, match="is not valid:\njoint_torque"):
+        bench(task="tasks/in_situ.yaml", library=str(tmp_path))
+
+
+REDUCED = {"task": {"rise": "6 cm", "impact": True}, "formulation": "srbm", "solve": True}
+
+
+def test_it_is_followed_where_that_is_asked_for_and_called_invalid(tmp_path: Path) -> None:
+    block = bench(**REDUCED, library=str(tmp_path), check="reported")
+    assert block.block.metrics() == {"plan_valid": False, "plan_tests_failed": 9}
+    (caution,) = block.block.cautions()
+    assert caution.startswith("THE PLAN IS NOT VALID and is followed all the same")
+    assert "\nflight_rotation: the base's error at touchdown is" in caution
+    kept = list(tmp_path.rglob("*.npz"))
+    assert [path.parent for path in kept] == [tmp_path / "invalid"]
+    # What the single rigid body believes of its momentum, not what the legs make of it.
+    reference, momentum = block.get("reference"), []
+    while float(reference.time) < float(reference.lift_off_time) or not momentum:
+        block.step()
+        momentum.append(float(reference.angular_momentum[1]))
+    assert abs(momentum[-1]) < 0.01
+    written = kept[0].stat().st_mtime_ns
+    again = bench(**REDUCED, library=str(tmp_path), check="reported")
+    assert again.block.cautions() == block.block.cautions()
+    assert kept[0].stat().st_mtime_ns == written, "it was solved anew"
+    # It is kept, but for nobody else.
+    with pytest.raises(AloftError, match="is not valid:\nangular_momentum: its error at the knots"):
+        bench(**REDUCED, library=str(tmp_path))
+    assert list(tmp_path.rglob("*.npz")) == kept
+
+
+def test_a_valid_plan_has_nothing_to_report(tmp_path: Path) -> None:
+    block = bench(task="tasks/in_situ.yaml", check="reported", library=str(tmp_path))
+    assert block.block.metrics() == {"plan_valid": True, "plan_tests_failed": 0}
+    assert not block.block.cautions()

@@ -1,0 +1,299 @@
+"""Every criterion on made-up truth: a good jump passes, and each criterion can fail alone."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+import pytest
+
+from aloft.blocks.scoring.jump_score import JumpScore
+from aloft.runtime.testing.bench import BlockBench
+
+PERIOD = 0.002
+LIFT_OFF = 1.0
+SPEED = 1.2
+TOUCHDOWN = LIFT_OFF + 2 * SPEED / 9.81
+STANDING = 0.3287
+WEIGHT = 5.118 * 9.81
+FEET = np.array([[0.0425, -0.076], [-0.0425, -0.076], [0.0425, 0.076], [-0.0425, 0.076]])
+Fields = dict[str, Any]
+
+
+def quaternion(angle: float, axis: int = 1) -> list[float]:
+    """The turn by ``angle`` about one axis of the world, as x, y, z, w."""
+    values = [0.0, 0.0, 0.0, math.cos(angle / 2)]
+    values[axis] = math.sin(angle / 2)
+    return values
+
+
+def in_air(time: float) -> bool:
+    """Whether the whole tick that ends at ``time`` is spent in the air."""
+    return LIFT_OFF + PERIOD - 1e-9 <= time < TOUCHDOWN
+
+
+def com_of(time: float) -> tuple[float, float]:
+    """Height and vertical speed of the centre of mass of the perfect jump."""
+    if time < 0.5 or time > TOUCHDOWN:
+        return STANDING, 0.0
+    if time < LIFT_OFF:
+        return STANDING - 0.08 * (1 - abs(time - 0.75) / 0.25), 0.0 if time < 0.75 else SPEED
+    flown = time - LIFT_OFF
+    return STANDING + SPEED * flown - 9.81 / 2 * flown**2, SPEED - 9.81 * flown
+
+
+def perfect(time: float) -> Fields:
+    """The truth of a perfect jump on the spot."""
+    height, speed = com_of(time)
+    air = in_air(time)
+    return {
+        "base_position": [0.0, 0.0, height + 0.05],
+        "base_orientation": quaternion(0.01),
+        "com": [0.0, 0.0, height],
+        "com_velocity": [0.0, 0.0, speed],
+        "angular_momentum": [0.0, time, 0.0] if time < LIFT_OFF else [0.03, -0.04, 0.0],
+        "contact_position": np.column_stack([FEET, np.full(4, 0.05 if air else 0.0)]),
+        "contact_force": np.tile([0.0, 0.0, 0.0 if air else WEIGHT / 4], (4, 1)),
+        "contact_touched": np.full(4, not air),
+        "motor_torque": np.full(10, -3.0),
+        "motor_speed": np.full(10, 2.0),
+        "saturated_share": 0.25 if air else 0.0,
+        "base_angular_velocity": np.zeros(3),
+        "ground_height": np.zeros(4),
+        "forbidden_contacts": 0,
+        "joint_limit_violation": 0.0,
+        "motor_overload": 0.0,
+    }
+
+
+def plan(time: float) -> Fields:
+    """The reference of that jump."""
+    height, speed = com_of(time)
+    return {
+        "time": time, "lift_off_time": LIFT_OFF, "touchdown_time": TOUCHDOWN,
+        "com": [0.0, 0.0, height], "com_velocity": [0.0, 0.0, speed],
+        "foot_position": [[0.0, -0.076, 0.0], [0.0, 0.076, 0.0]],
+    }  # fmt: skip
+
+
+def run(
+    change: Callable[[float, Fields], None] = lambda time, truth: None,
+    change_plan: Callable[[float, Fields], None] = lambda time, plan: None,
+    *,
+    until: float = 10.0,
+    wired: tuple[str, ...] = ("truth", "reference", "wbc"),
+    **params: Any,
+) -> tuple[Mapping[str, Any], BlockBench[JumpScore]]:
+    bench = BlockBench(JumpScore, params, robot="bruce", rate=1 / PERIOD, wired=wired)
+    while bench.stop_reason is None and bench.clock.tick * PERIOD < until:
+        time = bench.clock.tick * PERIOD
+        truth, reference = perfect(time), plan(time)
+        change(time, truth)
+        change_plan(time, reference)
+        bench.set("truth", **truth)
+        if "reference" in wired:
+            bench.set("reference", **reference)
+        if "wbc" in wired:
+            bench.set("wbc", failures=3)
+        bench.step()
+    return bench.block.metrics(), bench
+
+
+def test_a_perfect_jump_succeeds_with_the_right_figures() -> None:
+    metrics, bench = run()
+    assert metrics["success"] is True and metrics["reason"] == "all criteria hold"
+    rise = SPEED**2 / 2 / 9.81
+    assert metrics["apex_above_standing_m"] == pytest.approx(rise, abs=1e-4)
+    assert metrics["apex_from_squat_m"] == pytest.approx(rise + 0.08, abs=1e-4)
+    assert metrics["lift_off_speed_m_s"] == pytest.approx(SPEED, abs=1e-9)
+    assert metrics["lift_off_angular_momentum_nms"] == pytest.approx(0.05)
+    assert metrics["lift_off_pitch_momentum_nms"] == pytest.approx(-0.04)
+    assert metrics["touchdown_speed_m_s"] == pytest.approx(SPEED, abs=0.03)
+    assert metrics["flight_time_s"] == pytest.approx(TOUCHDOWN - LIFT_OFF, abs=PERIOD)
+    assert metrics["planned_flight_time_s"] == pytest.approx(TOUCHDOWN - LIFT_OFF)
+    assert metrics["planned_lift_off_speed_m_s"] == pytest.approx(SPEED)
+    assert metrics["planned_apex_above_standing_m"] == pytest.approx(rise, abs=1e-4)
+    assert metrics["peak_tilt_deg"] == pytest.approx(math.degrees(0.01))
+    assert metrics["final_tilt_deg"] == pytest.approx(math.degrees(0.01))
+    assert metrics["final_support_margin_m"] == pytest.approx(0.0425)
+    assert metrics["final_load_share"] == pytest.approx(0.5)
+    assert metrics["foot_slip_m"] == 0.0 and metrics["final_com_speed_m_s"] == 0.0
+    assert metrics["peak_motor_torque_nm"] == 3.0 and metrics["peak_motor_speed_rad_s"] == 2.0
+    assert metrics["qp_failures"] == 3
+    ticks = bench.clock.tick
+    assert metrics["saturated_share"] == pytest.approx(0.25 * 122 / ticks, rel=0.02)
+    assert metrics["jump_distance_x_m"] == 0.0 and metrics["jump_yaw_deg"] == 0.0
+    assert bench.clock.tick * PERIOD == pytest.approx(TOUCHDOWN + 1.6, abs=2 * PERIOD)
+    assert "after touchdown" in str(bench.stop_reason)
+
+
+def after(start: float, **fields: Any) -> Callable[[float, Fields], None]:
+    """Replace fields of the truth from ``start`` seconds after touchdown on."""
+
+    def change(time: float, truth: Fields) -> None:
+        if time >= TOUCHDOWN + start:
+            truth.update(fields)
+
+    return change
+
+
+def at(instant: float, **fields: Any) -> Callable[[float, Fields], None]:
+    """Replace fields of the truth in the one tick at ``instant``."""
+
+    def change(time: float, truth: Fields) -> None:
+        if abs(time - instant) < PERIOD / 2:
+            truth.update(fields)
+
+    return change
+
+
+def moved(x: float, y: float, turn: float = 0.0) -> np.ndarray:
+    """The contact points after a jump by (x, y) and a turn to the left."""
+    rotation = np.array([[math.cos(turn), -math.sin(turn)], [math.sin(turn), math.cos(turn)]])
+    return np.column_stack([FEET @ rotation.T + [x, y], np.zeros(4)])
+
+
+def scaled_flight(factor: float) -> Callable[[float, Fields], None]:
+    """A flight that ends after ``factor`` of the planned time."""
+
+    def change(time: float, truth: Fields) -> None:
+        if time >= LIFT_OFF + factor * (TOUCHDOWN - LIFT_OFF):
+            truth["contact_touched"] = np.full(4, True)
+
+    return change
+
+
+def faster_lift_off(time: float, truth: Fields) -> None:
+    if abs(time - LIFT_OFF) < PERIOD / 2:
+        truth["com_velocity"] = [0.0, 0.0, 1.15 * SPEED]
+
+
+def higher(time: float, truth: Fields) -> None:
+    if in_air(time):
+        truth["com"] = [0.0, 0.0, STANDING + (com_of(time)[0] - STANDING) * 1.15]
+
+
+def lifted_foot(time: float, truth: Fields) -> None:
+    if TOUCHDOWN + 0.5 < time < TOUCHDOWN + 0.53:
+        truth["contact_touched"] = [True, True, False, False]
+
+
+CASES: dict[str, tuple[Callable[[float, Fields], None], str]] = {
+    "knee": (at(0.7, forbidden_contacts=2), r"other than toes and heels touched, first at 0.700 s, in 2 "),
+    "tilt": (at(1.5, base_orientation=quaternion(1.3)), r"^fell at 1.500 s: tilt 74.5 deg"),
+    "low": (at(0.8, base_position=[0, 0, 0.11]), r"^fell at 0.800 s: .* base 0.110 m"),
+    "flight": (scaled_flight(0.85), r"^flight of 0.20\d s is below 90% of the planned 0.245 s"),
+    "speed": (faster_lift_off, r"^lift-off at 1.380 m/s is not within 10% of the planned 1.200"),
+    "limit": (at(0.7, joint_limit_violation=0.01), r"^a joint went 0.0100 rad over its limit"),
+    "motor": (at(0.7, motor_overload=0.2), r"^a motor gave 0.2 N m more than its speed allows"),
+    "peak": (at(1.5, base_orientation=quaternion(0.3)), r"^tilted by 17.2 deg after touchdown"),
+    "final tilt": (after(0.1, base_orientation=quaternion(0.1, 0)), r"^tilt at rest 5.73 deg"),
+    "speed at rest": (after(1.4, com_velocity=[0.06, 0, 0]), r"^centre of mass at rest moves at 0.060"),
+    "turning": (after(1.4, base_angular_velocity=[0, 0, 0.3]), r"^torso at rest turns at 0.300 rad/s"),
+    "heel": (after(1.4, contact_touched=[True, False, True, True]), r"^1 contact points carry no load"),
+    "load": (
+        after(1.4, contact_force=np.array([[0, 0, 1.0], [0, 0, 1.0], [0, 0, 24.0], [0, 0, 24.0]])),
+        r"^a foot carries 4% of the weight at rest, limit 20%",
+    ),
+    "margin": (after(1.4, com=[0.035, 0.0, 0.32]), r"^centre of mass 7.5 mm inside the support"),
+    "step": (lifted_foot, r"^stepped: a foot was off the ground for 0.03\d s after landing"),
+    "slip": (after(0.6, contact_position=moved(0.006, 0.0)), r"^feet slid 6.0 mm after landing"),
+    "apex": (higher, r"^rose 84.\d mm above standing, not within 10% of 73.4 mm"),
+    "place": (after(0.0, contact_position=moved(0.03, 0.0), com=[0.03, 0, 0.32]),
+              r"^jumped \(30.0, 0.0\) mm, not within 20 mm of \(0.0, 0.0\) mm"),
+    "turn": (after(0.0, contact_position=moved(0.0, 0.0, 0.1)), r"^turned 5.7 deg, not within 5.0 deg"),
+    "ground": (after(0.0, ground_height=[0.0, -0.1, 0.0, 0.0]), r"ended above ground at -0.100 to 0.000 m"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_each_criterion_can_fail_alone(name: str) -> None:
+    change, reason = CASES[name]
+    metrics, _ = run(change)
+    assert metrics["success"] is False
+    assert re.search(reason, str(metrics["reason"])), metrics["reason"]
+
+
+def test_a_fall_ends_the_run() -> None:
+    _, bench = run(at(0.8, base_position=[0.0, 0.0, 0.1]))
+    assert bench.stop_reason == "the robot fell"
+    assert bench.clock.tick == 401
+
+
+def test_runs_that_end_too_early() -> None:
+    assert run(until=0.9)[0]["reason"] == "never left the ground for 0.02 s"
+    assert "no touchdown before the run ended at 1.09" in str(run(until=1.1)[0]["reason"])
+    early, _ = run(until=2.0)
+    assert early["success"] is False
+    assert "s after touchdown, before 1.5 s" in str(early["reason"])
+    assert "final_tilt_deg" not in early and "peak_tilt_deg" in early
+    bench = BlockBench(JumpScore, {}, robot="bruce")
+    assert bench.block.metrics()["reason"] == "the run had no ticks"
+
+
+def test_a_short_hop_is_no_flight() -> None:
+    def bounce(time: float, truth: Fields) -> None:
+        if 0.3 < time < 0.315:
+            truth["contact_touched"] = np.full(4, False)
+
+    metrics, _ = run(bounce)
+    assert metrics["success"] is True
+    assert metrics["flight_time_s"] == pytest.approx(TOUCHDOWN - LIFT_OFF, abs=PERIOD)
+
+
+def test_targets_given_as_parameters_win_over_the_reference() -> None:
+    change = after(0.0, contact_position=moved(0.1, 0.0, 0.5), com=[0.1, 0.0, 0.32],
+                   ground_height=[0.05] * 4, base_position=[0.1, 0.0, 0.4])  # fmt: skip
+    good = {"distance": [0.1, 0.0], "yaw": 0.5, "landing_height": 0.05}
+    metrics, _ = run(change, **good)
+    assert metrics["success"] is True, metrics["reason"]
+    assert metrics["jump_distance_x_m"] == pytest.approx(0.1)
+    assert metrics["jump_yaw_deg"] == pytest.approx(math.degrees(0.5))
+    for name, value, reason in (
+        ("distance", [0.13, 0.0], "jumped"), ("yaw", 0.4, "turned"), ("rise", 0.06, "rose"),
+        ("landing_height", 0.08, "contact points ended"),
+    ):  # fmt: skip
+        assert str(run(change, **{**good, name: value})[0]["reason"]).startswith(reason)
+
+
+def test_targets_of_the_reference() -> None:
+    def forward(time: float, reference: Fields) -> None:
+        if time > LIFT_OFF:
+            reference["foot_position"] = [[0.1, -0.076, 0.0], [0.1, 0.076, 0.0]]
+            reference["foot_yaw"] = [0.5, 0.5]
+
+    change = after(0.0, contact_position=moved(0.1, 0.0, 0.5), com=[0.1, 0.0, 0.32])
+    assert run(change, forward)[0]["success"] is True
+    assert "jumped (0.0, 0.0) mm" in str(run(change_plan=forward)[0]["reason"])
+
+
+def test_the_planned_rise_is_above_the_plans_own_standing_height() -> None:
+    def raised(time: float, reference: Fields) -> None:
+        x, y, z = reference["com"]
+        reference["com"] = [x, y, z + 0.02]  # the plan's model has its com elsewhere
+
+    assert run(change_plan=raised)[0]["success"] is True
+
+
+def test_without_a_reference_only_what_is_given_is_judged() -> None:
+    metrics, _ = run(faster_lift_off, wired=("truth",))
+    assert metrics["success"] is True and "planned_flight_time_s" not in metrics
+    assert metrics["qp_failures"] == 0
+    metrics, _ = run(higher, wired=("truth",), rise=0.0734)
+    assert str(metrics["reason"]).startswith("rose")
+
+
+def test_tolerances_are_parameters() -> None:
+    change, _ = CASES["slip"]
+    assert run(change, foot_slip="20 mm")[0]["success"] is True
+    change, _ = CASES["peak"]
+    assert run(change, peak_tilt="45 deg")[0]["success"] is True
+
+
+def test_a_robot_is_needed() -> None:
+    dimensions = {"n_joints": 10, "n_velocities": 16, "n_contacts": 4, "n_feet": 2}
+    with pytest.raises(ValueError, match="add `robot: bruce`"):
+        BlockBench(JumpScore, {}, dimensions=dimensions)

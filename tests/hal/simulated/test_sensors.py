@@ -1,0 +1,116 @@
+"""The simulated sensors have the noise, bias, range and bounce that their parameters state."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from aloft.blocks.signals import CommandMode
+from aloft.hal.simulated.mujoco_robot import MujocoRobot
+from aloft.runtime.testing.bench import BlockBench
+
+
+def bench(rate: float = 500.0, **params: Any) -> BlockBench[MujocoRobot]:
+    return BlockBench(MujocoRobot, params, robot="bruce", rate=rate)
+
+
+def hold(robot: BlockBench[MujocoRobot]) -> None:
+    """Command the robot to hold the pose it is in."""
+    robot.block.emit()
+    joints = robot.get("joints")
+    robot.set(
+        "command", mode=CommandMode.ACTIVE, torque=joints.torque.copy(),
+        position=joints.position.copy(), velocity=0.0, stiffness=300.0, damping=1.5,
+    )  # fmt: skip
+
+
+def lift(robot: BlockBench[MujocoRobot], height: float = 3.0) -> None:
+    """Put the robot high up, legs in their standing pose, at rest and without gravity's pull yet."""
+    data: Any = robot.block._data
+    data.qpos[2] += height
+    data.qvel[:] = 0.0
+    robot.block.freeze()
+    robot.block.thaw()
+
+
+def test_standing_sensors_have_the_stated_noise_and_bias() -> None:
+    robot = bench(
+        gyro_noise=0.02, gyro_bias=0.01, accelerometer_noise=0.1, joint_velocity_noise=0.05
+    )
+    hold(robot)
+    gyro, accelerometer, velocity = [], [], []
+    for _ in range(1000):
+        robot.step()
+        gyro.append(robot.get("imu").angular_velocity.copy())
+        accelerometer.append(robot.get("imu").specific_force.copy())
+        velocity.append(robot.get("joints").velocity.copy())
+    np.testing.assert_allclose(np.std(gyro, axis=0), 0.02, rtol=0.08)
+    np.testing.assert_allclose(np.std(accelerometer, axis=0), 0.1, rtol=0.08)
+    np.testing.assert_allclose(np.std(velocity, axis=0), 0.05, rtol=0.1)
+    bias = np.mean(gyro, axis=0)
+    assert (np.abs(bias) < 0.01 + 3 * 0.02 / np.sqrt(1000)).all()
+    assert np.abs(bias).max() > 3 * 0.02 / np.sqrt(1000)
+    white = np.array(gyro)[:, 0] - bias[0]
+    assert abs(np.mean(white[1:] * white[:-1])) < 4 * 0.02**2 / np.sqrt(1000)
+
+
+def test_biases_of_many_seeds_fill_their_range() -> None:
+    offsets = []
+    for seed in range(30):
+        robot = bench(seed=seed, encoder_offset=0.003)
+        robot.block.emit()
+        offsets.append(robot.get("joints").position - robot.get("truth").joint_position)
+    spread = np.abs(offsets)
+    assert spread.max() <= 0.003 and spread.max() > 0.0028
+    assert np.mean(spread) == pytest.approx(0.0015, abs=0.0002)
+
+
+def test_switching_one_noise_off_leaves_the_others_as_they_were() -> None:
+    noise = {"gyro_noise": 0.02, "joint_velocity_noise": 0.05, "encoder_offset": 0.003,
+             "jitter": 0.0005, "gyro_bias": 0.01}  # fmt: skip
+    with_noise, without = bench(**noise, accelerometer_noise=0.1), bench(**noise)
+    for robot in (with_noise, without):
+        hold(robot)
+        robot.step(20)
+    for port, name in (("imu", "angular_velocity"), ("joints", "velocity"), ("joints", "position")):
+        np.testing.assert_array_equal(
+            getattr(with_noise.get(port), name), getattr(without.get(port), name)
+        )
+    assert not np.array_equal(
+        with_noise.get("imu").specific_force, without.get("imu").specific_force
+    )
+
+
+def test_saturating_and_rounding_sensors() -> None:
+    robot = bench(gyro_range=0.01, gyro_noise=0.1, accelerometer_range=5.0, encoder_resolution=0.01)
+    hold(robot)
+    robot.step(5)
+    assert np.abs(robot.get("imu").angular_velocity).max() == 0.01
+    assert robot.get("imu").specific_force[2] == 5.0
+    ticks = robot.get("joints").position / 0.01
+    np.testing.assert_allclose(ticks, np.rint(ticks), atol=1e-9)
+
+
+def test_switches_open_in_the_air_and_chatter_when_they_bounce() -> None:
+    quiet, bouncy = bench(), bench(switch_bounce=0.006)
+    for robot in (quiet, bouncy):
+        robot.block.emit()
+        assert robot.get("contacts").closed.all()
+        lift(robot)
+        robot.step()
+        readings = []
+        for _ in range(4):
+            robot.step()
+            readings.append(robot.get("contacts").closed.tolist())
+        assert readings[-1] == [False] * 4
+        chattered = any(any(reading) for reading in readings)
+        assert chattered == (robot is bouncy)
+
+
+def test_threshold_is_between_its_limits_and_per_switch() -> None:
+    robot = bench(switch_threshold=[0.5, 3.0], seed=1)
+    thresholds: Any = robot.block._sensors.switch_threshold
+    assert len(set(thresholds.tolist())) == 4
+    assert (thresholds >= 0.5).all() and (thresholds <= 3.0).all()

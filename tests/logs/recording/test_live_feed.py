@@ -1,0 +1,81 @@
+"""A viewer that dies or hangs while it is fed: a warning, and the recording is whole."""
+
+import os
+import signal
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from aloft.logs.file.reader import read
+from aloft.logs.recording.recorder import Recorder
+from aloft.logs.viewing.viewer import start_viewer
+from aloft.runtime.language.block import Block, Output
+from aloft.runtime.language.signals import Field, Signal
+from aloft.runtime.language.stages import ClockSpec
+from aloft.runtime.running.executor import run
+from aloft.runtime.running.memory import BoundGraph
+from aloft.runtime.testing.graphs import Use, checked_graph
+
+
+class Numbers(Signal):
+    value = Field(60)
+
+
+class Count(Block):
+    """Counts, in sixty numbers."""
+
+    numbers = Output(Numbers)
+
+    def step(self) -> None:
+        self.numbers.value.fill(self.tick)
+
+
+class Strike:
+    """A sink that sends the viewer a signal at a tick."""
+
+    def __init__(self, tick: int, process: int, number: signal.Signals) -> None:
+        self._at, self._process, self._number = tick, process, number
+
+    def open(self, bound: BoundGraph) -> None:
+        pass
+
+    def record(self, tick: int) -> None:
+        if tick == self._at:
+            os.kill(self._process, self._number)
+
+    def close(self) -> None:
+        pass
+
+
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP])
+def test_a_viewer_that_fails_is_a_warning(tmp_path: Path, number: signal.Signals) -> None:
+    viewer = start_viewer("web")
+    try:
+        recorder = Recorder(tmp_path / "a.rrd", live=viewer.source)
+        strike = Strike(300, viewer.process.pid, number)
+        result = run(
+            checked_graph({"count": Use(Count)}, ticks=1000),
+            sinks=[recorder, strike],
+            clock=ClockSpec("paced"),
+        )
+        assert result.success and result.ticks == 1000 and recorder.dropped == 0
+        recorded = read(tmp_path / "a.rrd")
+        assert recorded.outcome is not None
+        np.testing.assert_array_equal(recorded["count.numbers.value"][:, 0], np.arange(1000.0))
+        if number is signal.SIGKILL:
+            (warning,) = result.warnings
+            assert warning.startswith("the viewer did not show all of the run: ")
+            assert "the viewer has been closed" in warning
+    finally:
+        os.kill(viewer.process.pid, signal.SIGCONT) if viewer.lives() else None
+        viewer.stop()
+
+
+def test_a_viewer_that_is_not_there_is_a_warning(tmp_path: Path) -> None:
+    recorder = Recorder(tmp_path / "a.rrd", live="rerun+http://127.0.0.1:9/proxy")
+    result = run(checked_graph({"count": Use(Count)}, ticks=100), sinks=[recorder])
+    assert result.success
+    (warning,) = result.warnings
+    assert warning.startswith("the viewer did not show all of the run: ")
+    assert len(read(tmp_path / "a.rrd").ticks) == 100

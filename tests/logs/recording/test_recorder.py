@@ -1,0 +1,312 @@
+"""A run recorded by another process: nothing is lost, whoever dies; what is dropped is counted."""
+
+import json
+import os
+import re
+import resource
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from threading import Timer
+
+import numpy as np
+import pytest
+
+from aloft.logs import RecordedRun, RecordingError, read
+from aloft.logs.recording import recorder_link
+from aloft.logs.recording.recorder import Recorder
+from aloft.runtime.language.block import Block, Output, State
+from aloft.runtime.language.signals import Field, Signal
+from aloft.runtime.language.stages import CheckedGraph, ClockSpec
+from aloft.runtime.running.executor import run
+from aloft.runtime.running.memory import BoundGraph
+from aloft.runtime.running.run_result import RunResult
+from aloft.runtime.testing.allocations import count_array_allocations
+from aloft.runtime.testing.graphs import Use, checked_graph
+
+
+class Numbers(Signal):
+    values = Field(16, unit="m")
+    count = Field(dtype="int64")
+
+
+class Walk(Block):
+    """A random walk whose generator is state only when frozen."""
+
+    y = Output(Numbers)
+    memory = State(Numbers)
+
+    def setup(self) -> None:
+        self.rng = np.random.default_rng(1)
+        self.frozen = 0
+
+    def step(self) -> None:
+        self.y.values[...] += self.rng.standard_normal(16)
+        self.y.count[...] += 1
+
+    def freeze(self) -> None:
+        self.frozen += 1
+        self.memory.count[...] = self.y.count
+
+
+class At:
+    """A sink that does something in one tick."""
+
+    def __init__(self, tick: int, action: Callable[[], object]) -> None:
+        self.tick, self.action = tick, action
+
+    def open(self, bound: BoundGraph) -> None:
+        """Nothing."""
+
+    def record(self, tick: int) -> None:
+        if tick == self.tick:
+            self.action()
+
+    def close(self) -> None:
+        """Nothing."""
+
+
+def graph(ticks: int) -> CheckedGraph:
+    return checked_graph({"walk": Use(Walk)}, ticks=ticks)
+
+
+def process_of(recorder: Recorder) -> int:
+    assert recorder.link is not None
+    return recorder.link.process_id
+
+
+def until(condition: Callable[[], bool], seconds: float = 60.0) -> None:
+    end = time.monotonic() + seconds
+    while not condition() and time.monotonic() < end:
+        time.sleep(0.05)
+
+
+def ticks_in(path: Path) -> list[int]:
+    """What a file that is being written has by now."""
+    try:
+        return read(path).ticks.tolist()
+    except RecordingError:
+        return []
+
+
+def assert_whole(recorded: RecordedRun, result: RunResult) -> None:
+    assert result.log is not None
+    assert recorded.ticks.tolist() == result.log.ticks
+    assert recorded.rows.tobytes() == result.log.rows().tobytes()
+
+
+def test_a_run_is_recorded_exactly_and_stays_the_same(tmp_path: Path) -> None:
+    recorder = Recorder(tmp_path / "folder" / "walk.rrd", keyframe_period=0.5)
+    result = run(graph(1200), sinks=[recorder])
+    assert result.warnings == ()
+    assert recorder.dropped == 0
+    assert recorder.report is not None and recorder.report.rows == 1200
+    assert result.run_hash == run(graph(1200)).run_hash
+    recorded = read(tmp_path / "folder" / "walk.rrd")
+    assert_whole(recorded, result)
+    assert recorded.outcome == json.loads(json.dumps(result.to_json() | {"warnings": []}))
+    assert recorded.header.name == result.graph.name  # type: ignore[union-attr]
+    assert [note.text for note in recorded.notes] == [
+        "ready: every block has started", "running", "stopping: the end", "stopped",
+    ]  # fmt: skip
+    assert [note.tick for note in recorded.notes] == [0, 0, 1200, 1200]
+    assert recorded.keyframes == (250, 500, 750, 1000)
+    bound = BoundGraph(graph(1200))
+    bound.restore(recorded.snapshot(500))
+    assert bound.memory.state.field("walk.memory.count") == 500
+    assert bound.memory.bus.buffer.tobytes() == recorded.rows[499].tobytes()
+
+
+def test_no_tick_allocates(tmp_path: Path) -> None:
+    recorder = Recorder(tmp_path / "a.rrd", keyframe_period=0.0)
+    bound = BoundGraph(graph(10))
+    recorder.open(bound)
+    with count_array_allocations() as allocations:
+        for tick in range(5):
+            recorder.record(tick)
+    assert allocations.count == 0 and allocations.boxed == 0
+    recorder.finish(run(graph(1)))
+
+
+def test_virtual_time_waits_for_room(tmp_path: Path) -> None:
+    recorder = Recorder(tmp_path / "a.rrd", ring_time=0.01)
+    result = run(graph(20_000), sinks=[recorder])
+    assert recorder.dropped == 0 and result.warnings == ()
+    assert_whole(read(tmp_path / "a.rrd"), result)
+
+
+def test_virtual_time_waits_for_a_recorder_that_is_stuck(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(recorder_link, "STALL_TIME", 0.2)
+    told: list[str] = []
+    recorder = Recorder(tmp_path / "a.rrd", ring_time=0.01, on_warning=told.append)
+
+    def stop(tick: int) -> None:
+        os.kill(process_of(recorder), signal.SIGSTOP)
+        go_on = partial(os.kill, process_of(recorder), signal.SIGCONT)
+        Timer(1.0, go_on).start()
+
+    stops = [At(tick, partial(stop, tick)) for tick in (1000, 10_000)]
+    result = run(graph(20_000), sinks=[recorder, *stops])
+    assert recorder.dropped == 0
+    assert result.warnings == tuple(told) and len(told) == 1  # not one for every stop
+    assert re.fullmatch(r"the recorder has not gone on for \d+ s; the run waits for it", told[0])
+    assert_whole(read(tmp_path / "a.rrd"), result)
+
+
+def test_a_recorder_that_is_stuck_for_very_long_is_given_up(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(recorder_link, "STALL_TIME", 0.1)
+    monkeypatch.setattr(recorder_link, "GIVE_UP_TIME", 0.3)
+    recorder = Recorder(tmp_path / "a.rrd", ring_time=0.01)
+    stop = At(1000, lambda: os.kill(process_of(recorder), signal.SIGSTOP))
+    try:
+        result = run(graph(20_000), sinks=[recorder, stop])
+    finally:
+        os.kill(process_of(recorder), signal.SIGKILL)
+    assert result.success and result.ticks == 20_000
+    assert recorder.dropped > 10_000
+    waits, dropped, stuck = result.warnings
+    assert waits.endswith("the run waits for it")
+    assert dropped == f"{recorder.dropped} ticks were run but not recorded"
+    assert "the recording is not whole: the recorder has been stuck for" in stuck
+
+
+def test_what_finds_no_room_is_counted_and_noted(tmp_path: Path) -> None:
+    recorder = Recorder(tmp_path / "a.rrd", ring_time=0.01, when_full="drop")
+    freeze = At(1000, lambda: os.kill(process_of(recorder), signal.SIGSTOP))
+    thaw = At(15_000, lambda: os.kill(process_of(recorder), signal.SIGCONT))
+    pause = At(16_000, lambda: until(lambda: _is_empty(recorder)))
+    result = run(graph(20_000), sinks=[recorder, freeze, thaw, pause])
+    assert result.success
+    assert result.warnings == (f"{recorder.dropped} ticks were run but not recorded",)
+    recorded = read(tmp_path / "a.rrd")
+    assert recorder.dropped == recorded.dropped_ticks > 10_000
+    assert len(recorded.ticks) == 20_000 - recorder.dropped
+    gaps = [note for note in recorded.notes if note.kind == "dropped"]
+    missing = [k for note in gaps for k in range(note.data["first"], note.data["last"] + 1)]
+    assert sorted([*recorded.ticks.tolist(), *missing]) == list(range(20_000))
+    assert result.log is not None
+    assert recorded.rows.tobytes() == result.log.rows()[recorded.ticks].tobytes()
+
+
+def test_the_run_goes_on_when_the_recorder_is_killed(tmp_path: Path) -> None:
+    recorder = Recorder(tmp_path / "a.rrd", flush_period=0.05)
+    wait = At(999, lambda: until(lambda: len(ticks_in(tmp_path / "a.rrd")) >= 1000))
+    kill = At(2000, lambda: os.kill(process_of(recorder), signal.SIGKILL))
+    result = run(graph(5000), sinks=[recorder, wait, kill])
+    assert result.success and result.ticks == 5000
+    assert "is not whole: the recorder was killed by signal 9" in result.warnings[-1]
+    recorded = read(tmp_path / "a.rrd")
+    count = len(recorded.ticks)
+    assert count >= 1000  # what was flushed
+    assert result.log is not None
+    assert recorded.rows.tobytes() == result.log.rows()[:count].tobytes()
+    assert recorded.outcome is None
+
+
+def test_a_full_disk_is_a_warning(tmp_path: Path) -> None:
+    told: list[str] = []
+    recorder = Recorder(tmp_path / "a.rrd", on_warning=told.append)
+
+    def fill() -> None:
+        limit = 600_000
+        resource.prlimit(process_of(recorder), resource.RLIMIT_FSIZE, (limit, limit))
+
+    result = run(graph(20_000), sinks=[recorder, At(10, fill)])
+    assert result.success and result.ticks == 20_000
+    assert told == list(result.warnings)
+    (warning,) = result.warnings
+    assert "a.rrd cannot be written any further" in warning
+    assert recorder.report is not None
+    assert recorder.report.rows + recorder.report.lost == 20_000 and recorder.report.lost > 0
+    recorded = read(tmp_path / "a.rrd")
+    assert result.log is not None
+    count = len(recorded.ticks)
+    assert recorder.report.rows <= count < 20_000 and count > 0
+    assert recorded.rows.tobytes() == result.log.rows()[:count].tobytes()
+
+
+def test_a_place_that_cannot_be_written_is_a_warning(tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    recorder = Recorder(tmp_path / "file" / "a.rrd")
+    result = run(graph(10), sinks=[recorder])
+    assert result.success
+    assert recorder.recording is None
+    (warning,) = result.warnings
+    assert warning.startswith("no recording: ") and "a.rrd cannot be written" in warning
+
+
+SCRIPT = """
+import sys
+from aloft.logs.recording.recorder import Recorder
+from aloft.runtime.running.executor import Executor
+from aloft.runtime.language.stages import ClockSpec
+sys.path.insert(0, {folder!r})
+from test_recorder import At, graph
+recorder = Recorder({path!r})
+tell = At(300, lambda: print(recorder.link.process_id, flush=True))
+Executor(graph(1_000_000), sinks=[recorder, tell], clock=ClockSpec("paced"), log=False).run()
+"""
+
+
+def test_the_recorder_finishes_when_the_run_is_killed(tmp_path: Path) -> None:
+    path = tmp_path / "a.rrd"
+    script = SCRIPT.format(folder=str(Path(__file__).parent), path=str(path))
+    process = subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE, text=True)
+    assert process.stdout is not None
+    recorder = int(process.stdout.readline())  # tick 300 has run
+    process.kill()
+    process.wait(240)
+    end = time.monotonic() + 240.0
+    while time.monotonic() < end and _lives(recorder):
+        time.sleep(0.02)
+    assert not _lives(recorder)
+    recorded = read(path)
+    assert recorded.ticks.tolist() == list(range(len(recorded.ticks)))
+    assert len(recorded.ticks) > 300  # not even the last flush is lost: the ring outlived the run
+    assert recorded.notes[-1].kind == "fault"
+    assert recorded.notes[-1].text == "the process that ran the graph ended without a word"
+    assert recorded.notes[-1].tick == len(recorded.ticks)
+    assert recorded.outcome is None
+    assert recorded.header.clock == "paced"
+
+
+def _is_empty(recorder: Recorder) -> bool:
+    assert recorder.link is not None
+    return recorder.link.ring.read_back == recorder.link.ring.written
+
+
+def _lives(number: int) -> bool:
+    try:
+        state = Path(f"/proc/{number}/stat").read_text().rpartition(")")[2].split()[0]
+    except FileNotFoundError:
+        return False
+    return state != "Z"
+
+
+def test_overruns_and_faults_are_noted(tmp_path: Path) -> None:
+    class Slow(Walk):
+        def step(self) -> None:
+            if self.tick == 20:
+                time.sleep(0.05)
+            if self.tick == 40:
+                raise ValueError("the spring broke")
+
+    recorder = Recorder(tmp_path / "a.rrd")
+    slow = checked_graph({"walk": Use(Slow)}, ticks=100)
+    result = run(slow, sinks=[recorder], clock=ClockSpec("paced"))
+    assert not result.success
+    recorded = read(tmp_path / "a.rrd")
+    assert recorded.outcome is not None and recorded.outcome["success"] is False
+    overruns = [note for note in recorded.notes if note.kind == "overrun"]
+    assert any(note.tick == 21 and note.data["block"] == "walk" for note in overruns)
+    assert len(overruns) == result.overruns
+    (fault,) = [note for note in recorded.notes if note.kind == "fault"]
+    assert fault.level == "ERROR" and "the spring broke" in fault.text and fault.tick == 40

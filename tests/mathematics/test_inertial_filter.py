@@ -1,0 +1,186 @@
+"""The filter's pure functions one by one."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from aloft.mathematics import inertial_filter as inertial
+from aloft.mathematics import rotations
+
+small = st.floats(-0.1, 0.1)
+angles = st.floats(-1.0, 1.0)
+
+
+def quaternion(*vector):
+    out = np.empty(4)
+    rotations.exponential(np.array(vector, dtype=float), out)
+    return out
+
+
+def between(a, b):
+    """The rotation vector from b to a, in the world."""
+    inverse, product, out = np.empty(4), np.empty(4), np.empty(3)
+    rotations.conjugate(b, inverse)
+    rotations.multiply(a, inverse, product)
+    rotations.logarithm(product, out)
+    return out
+
+
+def turned_back(orientation, vector):
+    out = np.empty(3)
+    rotations.rotate_back(orientation, np.array(vector), out)
+    return out
+
+
+def test_propagate_follows_a_turning_and_accelerating_body():
+    """A body on a circle, spinning with it: everything about it is known in closed form."""
+    radius, spin, period = 0.3, 4.0, 0.002
+    q, p, v = np.array([0, 0, 0, 1.0]), np.array([radius, 0, 0]), np.array([0, radius * spin, 0])
+    last = np.array([0, 0, spin])
+    # In the body: centripetal acceleration along -x, gravity's reaction along z.
+    force = np.array([-radius * spin**2, 0.0, inertial.GRAVITY])
+    for _ in range(500):
+        last[:] = [0, 0, spin]
+        inertial.propagate(
+            q, p, v, last, np.array([0, 0, spin]), force, period, np.empty(4), np.empty(3)
+        )
+    angle = spin * 1.0
+    assert p == pytest.approx(np.array([math.cos(angle), math.sin(angle), 0]) * radius, abs=1e-5)
+    assert v[:2] == pytest.approx(
+        np.array([-math.sin(angle), math.cos(angle)]) * radius * spin, abs=1e-5
+    )
+    assert np.abs(between(q, quaternion(0, 0, angle))).max() < 1e-12
+
+
+def test_propagate_falls_freely():
+    q, p, v = quaternion(0.3, -0.2, 0.1), np.zeros(3), np.array([1.0, 0, 2.0])
+    for _ in range(100):
+        inertial.propagate(
+            q, p, v, np.zeros(3), np.zeros(3), np.zeros(3), 0.002, np.empty(4), np.empty(3)
+        )
+    assert v == pytest.approx([1.0, 0.0, 2.0 - inertial.GRAVITY * 0.2])
+    assert p == pytest.approx([0.2, 0.0, 0.4 - 0.5 * inertial.GRAVITY * 0.04])
+
+
+@given(small, small, small)
+def test_turn_is_the_exponential_from_the_left(x, y, z):
+    q = quaternion(0.4, 0.5, -0.6)
+    expected, turn = np.empty(4), quaternion(x, y, z)
+    rotations.multiply(turn, q, expected)
+    inertial.turn(q, x, y, z)
+    assert np.abs(between(q, expected)).max() < 1e-3
+    assert np.linalg.norm(q) == pytest.approx(1.0)
+
+
+@given(angles, angles, st.floats(-3.0, 3.0))
+def test_upright_finds_the_tilt_from_gravity(roll, pitch, heading):
+    lean = quaternion(roll, pitch, 0.0)
+    q, found, up = np.empty(4), np.empty(4), np.empty(3)
+    rotations.multiply(quaternion(0, 0, heading), lean, q)
+    force = turned_back(q, [0.0, 0.0, 9.7])
+    inertial.upright(force, found)
+    rotations.rotate(found, force, up)
+    assert up == pytest.approx([0.0, 0.0, 9.7], abs=1e-12)
+
+
+def test_upright_without_a_force_and_upside_down():
+    q = np.empty(4)
+    inertial.upright(np.zeros(3), q)
+    assert q.tolist() == [0, 0, 0, 1]
+    inertial.upright(np.array([0.0, 0.0, -9.81]), q)
+    assert np.linalg.norm(q) == pytest.approx(1.0)
+
+
+def test_right_up_converges_to_upright_and_keeps_the_heading():
+    q = np.empty(4)
+    rotations.multiply(quaternion(0.1, -0.2, 0), quaternion(0, 0, 0.5), q)
+    before = rotations.yaw(q)
+    force = turned_back(quaternion(0, 0, 0.5), [0.0, 0.0, 9.81])
+    for _ in range(2000):
+        inertial.right_up(q, force, 0.01, np.empty(3))
+    assert rotations.tilt(q) < 1e-6
+    assert rotations.yaw(q) == pytest.approx(before, abs=0.03)
+
+
+@given(small, small, small)
+def test_misalignment_levels_the_feet_and_faces_forward(x, y, z):
+    true = quaternion(0.5, 0.3, -0.2)
+    place = np.array([[0.05, -0.08, 0], [-0.035, -0.08, 0], [0.05, 0.08, 0], [-0.035, 0.08, 0]])
+    points = np.array([turned_back(true, row - [0.01, 0.02, 0.38]) for row in place])
+    forward = turned_back(true, [2.0, 0.0, 0.0])
+    q, error = true.copy(), np.empty(3)
+    inertial.turn(q, x, y, z)
+    for _ in range(10):
+        assert inertial.misalignment(q, points, forward, error, np.empty(3))
+        inertial.turn(q, *error.tolist())
+    assert np.abs(between(q, true)).max() < 1e-9
+
+
+def test_misalignment_is_first_order_exact():
+    """One step takes a small error away up to its square."""
+    points = np.array([[0.05, -0.08, -0.4], [-0.03, -0.08, -0.4], [0.05, 0.08, -0.4]])
+    q, error = quaternion(1e-3, -2e-3, 3e-3), np.empty(3)
+    inertial.misalignment(q, points, np.array([1.0, 0, 0]), error, np.empty(3))
+    assert error == pytest.approx([-1e-3, 2e-3, -3e-3], abs=1e-5)
+
+
+def test_points_in_one_line_say_nothing():
+    points = np.array([[0.05, 0.0, -0.4], [0.0, 0.0, -0.4], [-0.03, 0.0, -0.4]])
+    error = np.ones(3)
+    forward = np.array([1.0, 0, 0])
+    assert not inertial.misalignment(quaternion(0.1, 0, 0), points, forward, error, np.empty(3))
+    assert not error.any()
+
+
+def test_weights_fall_with_speed_and_are_zero_without_contact():
+    rates = np.array([[-1.0, 0, 0], [-0.92, 0, 0], [0.0, 0, 0], [-1.0, 0, 0]])
+    weights = np.empty(4)
+    active = np.array([True, True, True, False])
+    largest = inertial.weigh(rates, active, np.array([1.0, 0, 0]), 0.08, weights)
+    assert weights[0] == largest == 1.0
+    assert weights[1] == pytest.approx(0.25)
+    assert weights[2] < 1e-4
+    assert weights[3] == 0.0
+
+
+def stand(position, velocity, points, rates, weights, anchors, anchored, gain=0.1):
+    inertial.stand_on(
+        points, rates, np.ones(len(points), dtype=bool), weights, anchors, anchored, gain, gain,
+        position, velocity,
+    )  # fmt: skip
+
+
+def test_standing_points_pull_velocity_and_position():
+    position, velocity = np.array([0.1, 0.2, 0.4]), np.array([0.3, 0.0, -0.1])
+    points = np.array([[0.0, 0.1, -0.4], [0.0, -0.1, -0.4]])
+    anchors, anchored = np.zeros((2, 3)), np.zeros(2, dtype=bool)
+    stand(position, velocity, points, np.zeros((2, 3)), np.ones(2), anchors, anchored)
+    assert anchored.all()
+    assert anchors == pytest.approx(np.array([0.1, 0.2, 0.4]) + points)
+    assert velocity == pytest.approx([0.27, 0.0, -0.09])
+    position += [0.01, 0.0, 0.0]
+    stand(position, velocity, points, np.zeros((2, 3)), np.ones(2), anchors, anchored)
+    assert position == pytest.approx([0.109, 0.2, 0.4])
+
+
+def test_an_untrusted_point_drags_its_anchor_and_pulls_nothing():
+    position, velocity = np.zeros(3), np.zeros(3)
+    points, anchors = np.array([[0.0, 0.1, -0.4]]), np.array([[5.0, 5.0, 5.0]])
+    anchored = np.array([True])
+    stand(position, velocity, points, np.ones((1, 3)), np.zeros(1), anchors, anchored)
+    assert not position.any() and not velocity.any()
+    assert anchors == pytest.approx(points)
+
+
+def test_a_point_without_contact_loses_its_anchor():
+    anchored = np.array([True, True])
+    inertial.stand_on(
+        np.zeros((2, 3)), np.zeros((2, 3)), np.array([True, False]), np.array([1.0, 0.0]),
+        np.zeros((2, 3)), anchored, 0.1, 0.1, np.zeros(3), np.zeros(3),
+    )  # fmt: skip
+    assert anchored.tolist() == [True, False]

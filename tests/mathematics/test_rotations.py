@@ -1,0 +1,176 @@
+"""The group laws, the two maps and their inverses, also near zero and near a half turn."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from aloft.mathematics import rotations
+
+numbers = st.floats(-1.0, 1.0, allow_nan=False, width=64)
+vectors = arrays(np.float64, 3, elements=numbers)
+
+
+@st.composite
+def quaternions(draw):
+    raw = draw(arrays(np.float64, 4, elements=numbers).filter(lambda q: np.abs(q).max() > 1e-3))
+    out = np.empty(4)
+    rotations.normalise(raw, out)
+    return out
+
+
+@st.composite
+def rotation_vectors(draw):
+    """Axis times angle, with angles gathered at zero and at a half turn."""
+    axis = draw(vectors.filter(lambda v: np.linalg.norm(v) > 1e-3))
+    angle = draw(
+        st.one_of(
+            st.floats(0.0, math.pi),
+            st.floats(0.0, 1e-7),
+            st.floats(math.pi - 1e-7, math.pi),
+        )
+    )
+    return axis / np.linalg.norm(axis) * angle
+
+
+def matrix(q):
+    out = np.empty((3, 3))
+    rotations.to_matrix(q, out)
+    return out
+
+
+def product(a, b):
+    out = np.empty(4)
+    rotations.multiply(a, b, out)
+    return out
+
+
+@given(quaternions())
+def test_matrix_is_a_rotation(q):
+    r = matrix(q)
+    assert np.abs(r @ r.T - np.eye(3)).max() < 1e-14
+    assert np.linalg.det(r) == pytest.approx(1.0)
+
+
+@given(quaternions(), quaternions())
+def test_product_of_quaternions_is_product_of_matrices(a, b):
+    assert np.abs(matrix(product(a, b)) - matrix(a) @ matrix(b)).max() < 1e-14
+
+
+@given(quaternions(), quaternions(), quaternions())
+def test_product_is_associative(a, b, c):
+    assert np.abs(product(product(a, b), c) - product(a, product(b, c))).max() < 1e-14
+
+
+@given(quaternions())
+def test_conjugate_is_the_inverse(q):
+    inverse = np.empty(4)
+    rotations.conjugate(q, inverse)
+    assert np.abs(product(q, inverse) - [0, 0, 0, 1]).max() < 1e-15
+
+
+@given(quaternions(), vectors)
+def test_rotate_is_the_matrix_and_rotate_back_its_inverse(q, v):
+    out = np.empty(3)
+    rotations.rotate(q, v, out)
+    assert np.abs(out - matrix(q) @ v).max() < 1e-14
+    rotations.rotate_back(q, out, out)
+    assert np.abs(out - v).max() < 1e-14
+
+
+@given(quaternions())
+def test_from_matrix_inverts_to_matrix(q):
+    out = np.empty(4)
+    rotations.from_matrix(matrix(q), out)
+    sign = 1.0 if out @ q > 0 else -1.0
+    assert np.abs(out - sign * q).max() < 1e-14
+    assert out[3] >= 0.0
+
+
+@given(rotation_vectors())
+def test_logarithm_inverts_exponential(v):
+    q, out = np.empty(4), np.empty(3)
+    rotations.exponential(v, q)
+    assert np.linalg.norm(q) == pytest.approx(1.0, abs=1e-15)
+    rotations.logarithm(q, out)
+    # A half turn about an axis is the same rotation as one about the opposite axis.
+    error = np.abs(out - v).max()
+    if np.linalg.norm(v) > math.pi - 1e-7:
+        error = min(error, np.abs(out + v).max())
+    assert error < 3e-7 if np.linalg.norm(v) > math.pi - 1e-7 else error < 1e-14
+
+
+@given(rotation_vectors())
+def test_exponential_is_the_matrix_exponential(v):
+    """Against Rodrigues' formula, an independent route."""
+    q, k = np.empty(4), np.empty((3, 3))
+    rotations.exponential(v, q)
+    rotations.skew(v, k)
+    angle = np.linalg.norm(v)
+    a = np.sinc(angle / math.pi)
+    b = 0.5 * np.sinc(angle / (2.0 * math.pi)) ** 2
+    assert np.abs(matrix(q) - (np.eye(3) + a * k + b * k @ k)).max() < 1e-14
+
+
+@given(quaternions(), vectors, st.floats(1e-4, 0.1))
+def test_integrate_turns_on_the_right(q, rate, duration):
+    out, turn = np.empty(4), np.empty(4)
+    rotations.integrate(q, rate, duration, out)
+    rotations.exponential(rate * duration, turn)
+    assert np.abs(out - product(q, turn)).max() < 1e-14
+
+
+@given(vectors, vectors)
+def test_cross_and_skew_agree_with_numpy(a, b):
+    out, k = np.empty(3), np.empty((3, 3))
+    rotations.cross(a, b, out)
+    rotations.skew(a, k)
+    assert np.allclose(out, np.cross(a, b), atol=1e-15, rtol=0)
+    assert np.allclose(k @ b, np.cross(a, b), atol=1e-15, rtol=0)
+
+
+@pytest.mark.parametrize("heading", [-3.0, -1.0, 0.0, 0.5, 2.0])
+def test_yaw_and_tilt_of_a_turn_then_a_lean(heading):
+    a, b = np.empty(4), np.empty(4)
+    rotations.exponential(np.array([0.0, 0.0, heading]), a)
+    rotations.exponential(np.array([0.0, 0.3, 0.0]), b)
+    q = product(a, b)
+    assert rotations.yaw(q) == pytest.approx(heading)
+    assert rotations.tilt(q) == pytest.approx(0.3)
+
+
+def test_tilt_keeps_its_digits_near_upright():
+    q = np.empty(4)
+    rotations.exponential(np.array([1e-9, 0.0, 0.0]), q)
+    assert rotations.tilt(q) == pytest.approx(1e-9, rel=1e-9)
+
+
+@pytest.mark.parametrize("size", [1e-200, 1.0, 1e200])
+def test_normalise_of_any_size(size):
+    out = np.empty(4)
+    rotations.normalise(np.array([1.0, -1.0, 1.0, 1.0]) * size, out)
+    assert np.allclose(out, [0.5, -0.5, 0.5, 0.5], rtol=1e-15)
+
+
+def test_normalise_of_nothing_is_the_identity():
+    out = np.empty(4)
+    rotations.normalise(np.zeros(4), out)
+    assert out.tolist() == [0, 0, 0, 1]
+
+
+def test_out_may_be_an_argument():
+    q = np.array([0.5, 0.5, 0.5, 0.5])
+    expected = product(q, q)
+    rotations.multiply(q, q, q)
+    assert np.array_equal(q, expected)
+
+
+@given(st.floats(-100.0, 100.0))
+def test_wrap(angle):
+    assert abs(rotations.wrap(angle)) <= math.pi + 1e-12
+    assert math.cos(rotations.wrap(angle) - angle) == pytest.approx(1.0)

@@ -1,0 +1,138 @@
+"""The plan library: what is kept is found by its task alone, and only valid plans are kept."""
+
+import shutil
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from aloft.planner.checking.validity import InvalidPlanError
+from aloft.planner.errors import PlanError
+from aloft.planner.library.library import SHIPPED, PlanLibrary, kept_name, task_distance
+from aloft.planner.library.plan import JumpPlan
+from aloft.planner.task.task import JumpTask, make_task, read_task
+from aloft.robots.description import RobotDescription, find_robot
+
+ROBOT = find_robot("bruce")
+IN_SITU = read_task(SHIPPED.parent / "tasks" / "in_situ.yaml")
+
+
+class Planner:
+    """Stands in for the solver: gives the plan it has, under the task that is asked for."""
+
+    def __init__(self, plan: JumpPlan | None, fails_warm: bool = False) -> None:
+        self.plan = plan
+        self.fails_warm = fails_warm
+        self.started_from: list[str | None] = []
+
+    def __call__(
+        self, task: JumpTask, robot: RobotDescription, warm_start: JumpPlan | None
+    ) -> JumpPlan:
+        self.started_from.append(warm_start.task.name if warm_start else None)
+        if self.plan is None or (self.fails_warm and warm_start is not None):
+            raise PlanError("no plan", family="apex")
+        return replace(self.plan, task=task)
+
+
+@pytest.fixture(scope="module")
+def good() -> JumpPlan:
+    plan = PlanLibrary(ROBOT, Path("nowhere")).find(IN_SITU)
+    assert plan is not None
+    return plan
+
+
+def near(name: str = "near", **values: object) -> JumpTask:
+    """A task whose plan of 15 cm in place is valid too."""
+    return make_task({"name": name, "rise": 0.1503, **values})
+
+
+def test_a_kept_plan_needs_no_solver(tmp_path: Path, good: JumpPlan) -> None:
+    solver = Planner(None)
+    plan, kept = PlanLibrary(ROBOT, tmp_path).plan(IN_SITU, solver)
+    assert kept and solver.started_from == []
+    np.testing.assert_array_equal(plan.position, good.position)
+    assert list(tmp_path.iterdir()) == [], "a shipped plan is not copied"
+
+
+def test_what_is_not_there_is_solved_from_the_nearest_and_kept(
+    tmp_path: Path, good: JumpPlan
+) -> None:
+    library, solver = PlanLibrary(ROBOT, tmp_path), Planner(good)
+    plan, kept = library.plan(near(), solver)
+    assert not kept and solver.started_from == ["in_situ"]
+    assert plan.valid and plan.report["tests"]
+    again, kept = library.plan(near("another name"), solver)
+    assert kept and solver.started_from == ["in_situ"], "a name decides nothing"
+    assert again.task == near()
+    assert [path.name for path in tmp_path.iterdir()] == [kept_name(near(), ROBOT)]
+
+
+def test_a_warm_start_that_fails_is_tried_from_nothing(tmp_path: Path, good: JumpPlan) -> None:
+    solver = Planner(good, fails_warm=True)
+    PlanLibrary(ROBOT, tmp_path).plan(near(), solver)
+    assert solver.started_from == ["in_situ", None]
+
+
+def test_anew_starts_from_nothing(tmp_path: Path, good: JumpPlan) -> None:
+    solver = Planner(good)
+    _, kept = PlanLibrary(ROBOT, tmp_path).plan(IN_SITU, solver, anew=True)
+    assert not kept and solver.started_from == [None]
+
+
+def test_a_plan_that_is_not_valid_is_never_kept(tmp_path: Path, good: JumpPlan) -> None:
+    with pytest.raises(InvalidPlanError, match="rise: how far the apex") as caught:
+        PlanLibrary(ROBOT, tmp_path).plan(make_task({"name": "high", "rise": 0.2}), Planner(good))
+    assert not caught.value.plan.valid
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_kept_plan_that_is_not_valid_is_not_handed_over(tmp_path: Path, good: JumpPlan) -> None:
+    library, task = PlanLibrary(ROBOT, tmp_path), make_task({"name": "high", "rise": 0.2})
+    library.add(replace(good, task=task, report={"valid": True}))
+    with pytest.raises(InvalidPlanError, match="'high' is not valid"):
+        library.plan(task, Planner(good))
+
+
+def test_broken_files_are_as_if_they_were_not_there(tmp_path: Path, good: JumpPlan) -> None:
+    library = PlanLibrary(ROBOT, tmp_path, others=())
+    path = library.add(replace(good, task=near()))
+    path.write_bytes(path.read_bytes()[:5000])
+    assert library.find(near()) is None
+    assert library.nearest(near()) is None
+    assert list(library.tasks()) == []
+
+
+def test_the_nearest_is_by_scaled_distance(tmp_path: Path, good: JumpPlan) -> None:
+    library = PlanLibrary(ROBOT, tmp_path, others=())
+    assert library.nearest(near()) is None
+    for name, values in (("far", {"distance_x": 0.3}), ("close", {"twist": 0.2})):
+        library.add(replace(good, task=near(name, **values)))
+    found = library.nearest(near(twist=0.3))
+    assert found is not None
+    assert found[0].task.name == "close"
+    assert found[1] == pytest.approx(0.2)
+
+
+def test_tasks_that_differ_in_kind_have_no_distance() -> None:
+    base = near()
+    assert task_distance(base, near("other")) == 0.0
+    assert task_distance(base, near(rise=0.2003)) == pytest.approx(1.0)
+    assert task_distance(base, near(formulation="paper")) is None
+    assert task_distance(base, near(knots={"flight": 30})) is None
+    assert task_distance(base, near(flight_time=0.3)) is None
+
+
+def test_another_robot_finds_nothing(tmp_path: Path) -> None:
+    other = ROBOT.model_copy(update={"text": "another"})
+    shutil.copytree(SHIPPED, tmp_path / "plans")
+    assert PlanLibrary(other, tmp_path / "plans").find(IN_SITU) is None
+
+
+def test_pruning_leaves_the_tasks_that_are_named(tmp_path: Path, good: JumpPlan) -> None:
+    library = PlanLibrary(ROBOT, tmp_path)
+    kept, gone = (library.add(replace(good, task=near(rise=rise))) for rise in (0.1501, 0.1502))
+    (tmp_path / "notes.txt").write_text("mine")
+    assert library.prune([near(rise=0.1501)]) == [gone]
+    assert sorted(path.name for path in tmp_path.iterdir()) == [kept.name, "notes.txt"]
+    assert library.find(IN_SITU) is not None, "other folders are left alone"

@@ -1,0 +1,97 @@
+"""Exact dynamics: against the whole equations of motion, a free fall, and conservation."""
+
+import numpy as np
+import pytest
+
+from aloft.planner.models.exact_dynamics import ExactDynamics, JointMotion, rotation_between
+from aloft.robots.description import find_robot
+
+
+@pytest.fixture(scope="module")
+def dynamics() -> ExactDynamics:
+    return ExactDynamics(find_robot("bruce"), "koala")
+
+
+def random_state(dynamics: ExactDynamics, seed: int) -> tuple[np.ndarray, np.ndarray]:
+    rng = np.random.default_rng(seed)
+    q = rng.normal(size=17) * 0.4
+    q[3:7] = rng.normal(size=4)
+    q[3:7] /= np.linalg.norm(q[3:7])
+    return q, rng.normal(size=16)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_base_and_torque_solve_the_whole_equations_of_motion(
+    dynamics: ExactDynamics, seed: int
+) -> None:
+    q, v = random_state(dynamics, seed)
+    rng = np.random.default_rng(seed + 100)
+    torque, force = rng.normal(size=10), rng.normal(size=(4, 3)) * 20
+    bias = dynamics.pin.rnea(dynamics.model, dynamics.data, q, v, np.zeros(16))
+    pushed = dynamics.contact_jacobians(q)[1].T @ force.ravel()
+    right = np.concatenate([np.zeros(6), torque]) + pushed - bias
+    whole = np.linalg.solve(dynamics.mass_matrix(q), right)
+    base = dynamics.base_acceleration(q, v, whole[6:], force)
+    np.testing.assert_allclose(base, whole[:6], atol=1e-11)
+    found = dynamics.joint_torque(q, v, whole[6:], force)
+    np.testing.assert_allclose(found, torque, atol=1e-11)
+
+
+def test_in_flight_the_centre_falls_and_the_angular_momentum_stays(
+    dynamics: ExactDynamics,
+) -> None:
+    q, v = random_state(dynamics, 7)
+    end = q[7:] + np.random.default_rng(1).normal(size=10) * 0.3
+    joints = JointMotion(q[7:], end, v[6:], np.zeros(10), 0.3)
+    com, speed, momentum = dynamics.centroidal(q, v)
+    last_time, last_q, last_v = dynamics.integrate(q, v, joints, np.zeros((4, 3)), 1e-3)[-1]
+    assert last_time == pytest.approx(0.3)
+    after, after_speed, after_momentum = dynamics.centroidal(last_q, last_v)
+    gravity = np.array([0.0, 0.0, -9.81])
+    np.testing.assert_allclose(after_speed, speed + 0.3 * gravity, atol=1e-9)
+    np.testing.assert_allclose(after, com + 0.3 * speed + 0.045 * gravity, atol=1e-9)
+    np.testing.assert_allclose(after_momentum, momentum, atol=1e-9)
+    np.testing.assert_allclose(last_q[7:], end, atol=1e-12)
+
+
+def test_an_impulse_changes_the_momentum_by_itself(dynamics: ExactDynamics) -> None:
+    q, v = random_state(dynamics, 3)
+    impulse = np.random.default_rng(5).normal(size=(4, 3))
+    behind, motors = dynamics.velocity_after_impact(q, v, impulse)
+    np.testing.assert_array_equal(motors, np.zeros(10))
+    com, before, spin = dynamics.centroidal(q, v)
+    _, after, spin_after = dynamics.centroidal(q, behind)
+    np.testing.assert_allclose(dynamics.mass * (after - before), impulse.sum(axis=0), atol=1e-10)
+    moment = np.cross(dynamics.points(q) - com, impulse).sum(axis=0)
+    np.testing.assert_allclose(spin_after - spin, moment, atol=1e-10)
+
+
+def test_held_joints_keep_their_speed_by_their_motors_impulse(dynamics: ExactDynamics) -> None:
+    q, v = random_state(dynamics, 4)
+    impulse = np.random.default_rng(6).normal(size=(4, 3))
+    held = np.arange(10) % 3 == 0
+    behind, motors = dynamics.velocity_after_impact(q, v, impulse, held)
+    np.testing.assert_array_equal(behind[6:][held], v[6:][held])
+    assert np.all(motors[~held] == 0.0)
+    pushed = dynamics.contact_jacobians(q)[1].T @ impulse.ravel()
+    pushed[6:] += motors
+    np.testing.assert_allclose(dynamics.mass_matrix(q) @ (behind - v), pushed, atol=1e-10)
+
+
+def test_the_joints_cubic_meets_both_ends_and_a_constant_acceleration() -> None:
+    start, speed, bend, t = np.array([0.3]), np.array([-2.0]), np.array([40.0]), 0.02
+    motion = JointMotion(
+        start, start + t * speed + 0.5 * t**2 * bend, speed, speed + t * bend, t
+    )  # fmt: skip
+    position, velocity, acceleration = motion.at(0.013)
+    assert position[0] == pytest.approx(0.3 - 2.0 * 0.013 + 20.0 * 0.013**2, abs=1e-14)
+    assert velocity[0] == pytest.approx(-2.0 + 40.0 * 0.013, abs=1e-11)
+    assert acceleration[0] == pytest.approx(40.0, rel=1e-9)
+
+
+@pytest.mark.parametrize("angle", [0.0, 1e-9, 0.3, 3.0])
+def test_rotation_between(angle: float) -> None:
+    first = np.array([0.0, 0.0, 0.0, 1.0])
+    second = np.array([np.sin(angle / 2), 0.0, 0.0, np.cos(angle / 2)])
+    assert rotation_between(first, second) == pytest.approx(angle, abs=1e-15)
+    assert rotation_between(first, -second) == pytest.approx(angle, abs=1e-15)

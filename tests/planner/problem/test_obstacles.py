@@ -1,0 +1,91 @@
+"""Legs and body keep above a step."""
+
+import numpy as np
+import pytest
+
+from aloft.planner.library.library import solve_and_check
+from aloft.planner.models.coordinates import full_coordinates, sagittal_coordinates
+from aloft.planner.models.symbolic_model import SymbolicModel
+from aloft.planner.problem.layout import layout
+from aloft.planner.problem.obstacles import (
+    ObstacleRows,
+    heights_above_step,
+    obstacle_points,
+    step_parameters,
+)
+from aloft.planner.task.task import make_task
+from aloft.robots.description import find_robot
+
+ROBOT = find_robot("bruce")
+MODEL = SymbolicModel(ROBOT)
+
+
+def standing(x: float) -> np.ndarray:
+    return np.concatenate([[x, 0.0, 0.3796, 0.0, 0.0, 0.0], ROBOT.standing_position])
+
+
+def toe_ahead() -> float:
+    import casadi as ca
+
+    q = ca.SX.sym("q", MODEL.size)
+    place = ca.Function("toe", [q], [MODEL.contact_points(q)[0]])
+    return float(np.array(place(standing(0.0)))[0, 0])
+
+
+def heights(x: float, **hop: float) -> dict[str, float]:
+    """The standing robot's points with its base at ``x``, by index and kind."""
+    import casadi as ca
+
+    coordinates = full_coordinates(MODEL)
+    task = make_task({"name": "step", "rise": 0.15, **hop}).hops()[0]
+    w = step_parameters(task, hop.get("step_edge"), 0.0, 0.3)
+    q = ca.SX.sym("q", coordinates.size)
+    rows = ca.vertcat(*heights_above_step(MODEL, coordinates, q, w))
+    found = np.array(ca.Function("rows", [q], [rows])(standing(x))).ravel()
+    kinds = [kind for kind, _, _ in obstacle_points(MODEL, coordinates)]
+    return {f"{kind} {k}": found[k] for k, kind in enumerate(kinds)}
+
+
+def test_points_are_contacts_then_capsules_of_the_computed_limbs() -> None:
+    full = [kind for kind, _, _ in obstacle_points(MODEL, full_coordinates(MODEL))]
+    assert full[:4] == ["foot"] * 4
+    assert full.count("calf") == 6
+    assert full.count("body") == len(full) - 10 == 3 * 5
+    plane = sagittal_coordinates(MODEL)
+    assert plane is not None
+    half = [kind for kind, _, _ in obstacle_points(MODEL, plane)]
+    assert (half.count("foot"), half.count("calf")) == (2, 3)
+
+
+@pytest.mark.parametrize(("step", "way"), [(0.1, 1.0), (-0.2, 1.0), (0.1, -1.0), (-0.2, -1.0)])
+def test_a_step_counts_from_its_edge_on_and_the_higher_ground_a_little_further(
+    step: float, way: float
+) -> None:
+    hop = {"landing_height": step, "distance_x": 0.4 * way, "step_edge": 0.2 * way}
+    before, after = heights(-0.3 * way, **hop), heights(0.7 * way, **hop)
+    for name, height in before.items():
+        assert height - after[name] == pytest.approx(step, abs=1e-3)
+    toe = "foot 0"
+    at_edge = heights(0.2 * way - toe_ahead(), **hop)[toe]
+    higher = min(before[toe], after[toe])
+    assert at_edge == pytest.approx(higher, abs=0.01 * abs(step))
+
+
+def test_which_points_are_watched() -> None:
+    rows = ObstacleRows(MODEL, full_coordinates(MODEL))
+    for values, in_flight, on_ground in (
+        ({}, 0, 0),
+        ({"landing_height": 0.05, "distance_x": 0.1}, 6, 6),
+        ({"rotation": "360 deg"}, 25, 21),
+    ):
+        task = make_task({"name": "jump", "rise": 0.15, **values})
+        hop, edge = task.hops()[0], 0.05 if values.get("distance_x") else None
+        squat, _, flight, _ = layout(task, ROBOT)
+        assert len(rows.rows(hop, edge, flight, False)) == in_flight
+        assert len(rows.rows(hop, edge, squat, True)) == on_ground
+
+
+@pytest.mark.parametrize("ahead", [0.15, 0.2])
+def test_a_high_step_is_jumped_onto_and_not_touched(ahead: float) -> None:
+    task = {"name": "up", "rise": 0.15, "landing_height": 0.1, "distance_x": ahead}
+    assert solve_and_check(make_task(task), ROBOT).valid

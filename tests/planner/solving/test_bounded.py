@@ -1,0 +1,49 @@
+"""A call that may never end: its answer, its error, and its end."""
+
+from __future__ import annotations
+
+import os
+import time
+
+import numpy as np
+import pytest
+
+from aloft.planner.solving.bounded import bounded, cpu_time
+
+
+def spin() -> None:
+    while True:
+        pass
+
+
+def test_what_the_call_returns_comes_back() -> None:
+    ended, value = bounded(lambda: (np.arange(200_000.0), {"n": 3}), 10)
+    assert ended and value[1] == {"n": 3}
+    assert np.array_equal(value[0], np.arange(200_000.0))
+
+
+def test_a_call_that_never_ends_is_given_up_and_its_time_counts() -> None:
+    before = cpu_time()
+    assert bounded(spin, 1) == (False, None)
+    assert cpu_time() - before > 0.8
+
+
+def test_an_error_is_raised_here() -> None:
+    with pytest.raises(RuntimeError, match="ValueError: no such thing"):
+        bounded(lambda: (_ for _ in ()).throw(ValueError("no such thing")), 5)
+
+
+def test_it_changes_nothing_here() -> None:
+    found: list[int] = []
+    bounded(lambda: found.append(1), 5)
+    assert found == []
+
+
+def test_a_call_that_kills_its_process_is_given_up() -> None:
+    assert bounded(lambda: os.kill(os.getpid(), 9), 5) == (False, None)
+
+
+def test_no_process_is_left_behind() -> None:
+    bounded(time.process_time, 5)
+    with pytest.raises(ChildProcessError):
+        os.waitpid(-1, os.WNOHANG)

@@ -1,0 +1,102 @@
+"""Functions are compiled once, whoever asks for them, and are the same without a compiler."""
+
+from __future__ import annotations
+
+import fcntl
+from pathlib import Path
+from typing import Any
+
+import casadi as ca
+import pytest
+
+from aloft.planner.models.symbolic_model import SymbolicModel
+from aloft.planner.problem.stage_functions import Piece, derived
+from aloft.planner.solving import compilation
+from aloft.planner.solving.compilation import FunctionSet, load_functions
+from aloft.robots.description import find_robot
+
+PIECES = ("slow", "quick")
+needs_compiler = pytest.mark.skipif(compilation._compiler() is None, reason="no C compiler")
+
+
+def make(name: str) -> Piece:
+    z, w = ca.SX.sym("z", 2), ca.SX.sym("w")
+    return derived(f"test_{name}", z, w, w * z[0] ** 2, ca.vertcat(z[0] * z[1]))
+
+
+FUNCTIONS = FunctionSet("test", PIECES, (), make)
+
+
+def load(**options: Any) -> dict[str, Piece]:
+    model: Any = type("Model", (SymbolicModel,), {"__init__": lambda self: None})()
+    model.robot = find_robot("bruce")
+    return load_functions(FUNCTIONS, model, "koala", **options)
+
+
+@pytest.fixture(autouse=True)
+def made(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """An empty cache; what is compiled, in its order."""
+    compiled: list[str] = []
+    real = compilation._compile
+
+    def compile_piece(compiler: str, piece: Piece, library: Path) -> bool:
+        compiled.append(library.stem)
+        return real(compiler, piece, library)
+
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    monkeypatch.setattr(compilation, "_held", {})
+    monkeypatch.setattr(compilation, "_compile", compile_piece)
+    return compiled
+
+
+def values(pieces: dict[str, Piece]) -> list[list[float]]:
+    return [[float(v) for v in pieces[name].value([3.0, 2.0], 0.5)] for name in PIECES]
+
+
+@needs_compiler
+def test_once_compiled_always_there(made: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    assert values(load()) == [[4.5, 6.0]] * 2
+    monkeypatch.setattr(compilation, "_held", {})
+    assert values(load()) == [[4.5, 6.0]] * 2
+    assert made == list(PIECES)
+
+
+def test_without_a_compiler(made: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(compilation, "_compiler", lambda: None)
+    assert values(load()) == [[4.5, 6.0]] * 2
+    assert made == []
+    assert not list(compilation.cache_folder().rglob("*"))
+
+
+@needs_compiler
+def test_what_another_process_compiles_is_waited_for_last(
+    made: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    robot = find_robot("bruce")
+    key = compilation.content_hash(robot, robot.profiles["koala"].rotor_inertia, "test", ())
+    library = compilation.cache_folder() / key / "slow.so"
+    library.parent.mkdir(parents=True)
+    # A second description of the open file: this process holds the lock as another one would.
+    other = library.with_suffix(".lock").open("w")
+    fcntl.flock(other, fcntl.LOCK_EX)
+    counted = compilation._compile
+
+    def and_meanwhile(compiler: str, piece: Piece, made_here: Path) -> bool:
+        done = counted(compiler, piece, made_here)
+        if made_here.stem == "quick":  # now the other process has made the slow one
+            assert counted(compiler, make("slow"), library)
+            other.close()
+        return done
+
+    monkeypatch.setattr(compilation, "_compile", and_meanwhile)
+    assert values(load()) == [[4.5, 6.0]] * 2
+    assert made == ["quick", "slow"], "the slow one once, by the other"
+
+
+@needs_compiler
+def test_a_cache_that_cannot_be_written_is_done_without(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "file").touch()
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
+    assert values(load()) == [[4.5, 6.0]] * 2

@@ -1,0 +1,90 @@
+"""Tasks: what is read, what is refused and with which words, and what decides the hash."""
+
+import math
+from pathlib import Path
+
+import pytest
+
+from aloft.planner.task.task import JumpTask, Knots, TaskError, make_task, read_task
+from aloft.robots.description import find_robot
+
+
+def test_quantities_are_read_with_their_units() -> None:
+    task = make_task({"name": "a", "rise": "15 cm", "twist": "30 deg", "thrust_time": "200 ms"})
+    assert task.rise == pytest.approx(0.15)
+    assert task.twist == pytest.approx(math.pi / 6)
+    assert task.thrust_time == pytest.approx(0.2)
+
+
+def test_about_sixty_intervals() -> None:
+    assert 55 <= Knots().total <= 70
+
+
+@pytest.mark.parametrize(
+    ("values", "words"),
+    [
+        ({"rise": 0.1, "take_off_speed": 1.0}, "give rise or take_off_speed, not both"),
+        ({}, "say how high the jump is: rise, take_off_speed or flight_time"),
+        (
+            {"rise": 0.05, "landing_height": 0.3},
+            "a rise of 0.05 m cannot reach ground that is 0.3 m higher; ask for",
+        ),
+        ({"rise": "3 kg"}, "rise: expected a number in m, found '3 kg'"),
+        ({"rise": -0.1}, "rise: Input should be greater than 0, found -0.1"),
+        ({"rise": 0.1, "hight": 2}, "hight: is no parameter of a task; the nearest is "),
+        ({"rise": 0.1, "knots": {"flight": 1}}, "knots.flight: Input should be greater than"),
+        ({"rise": 0.1, "formulation": "fast"}, "formulation: Input should be 'full', 'paper'"),
+    ],
+)
+def test_what_is_wrong_is_said_with_its_key(values: dict[str, object], words: str) -> None:
+    with pytest.raises(TaskError) as caught:
+        make_task({"name": "a", **values}, where="jump.yaml")
+    assert f"jump.yaml: {words}" in str(caught.value)
+
+
+def test_all_that_is_wrong_is_said_at_once() -> None:
+    with pytest.raises(TaskError) as caught:
+        make_task({"name": "a", "rise": -1.0, "friction": 9.0, "distance_x": 7.0})
+    assert len(str(caught.value).splitlines()) == 3
+
+
+def test_a_file_gives_the_task_its_name(tmp_path: Path) -> None:
+    path = tmp_path / "hop.yaml"
+    path.write_text("rise: 5 cm\ninitial: {right_knee: -40 deg}\n")
+    task = read_task(path)
+    assert task.name == "hop"
+    assert task.initial["right_knee"] == pytest.approx(math.radians(-40))
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [("rise: [", "broken.yaml:1:8: did not find"), ("- 3", "expected keys such as")],
+)
+def test_a_file_that_is_no_task(tmp_path: Path, text: str, words: str) -> None:
+    path = tmp_path / "broken.yaml"
+    path.write_text(text)
+    with pytest.raises(TaskError, match=words):
+        read_task(path)
+
+
+def test_a_file_that_is_not_there(tmp_path: Path) -> None:
+    with pytest.raises(TaskError, match=r"cannot read .*no\.yaml: No such file"):
+        read_task(tmp_path / "no.yaml")
+
+
+def test_an_unknown_joint_of_a_stance_is_named() -> None:
+    task = make_task({"name": "a", "rise": 0.1, "final": {"right_elbow": 0.1}})
+    with pytest.raises(TaskError, match="final: bruce has no joint right_elbow; there is right_"):
+        task.end_joints(find_robot("bruce"))
+    assert task.start_joints(find_robot("bruce"))["left_knee"] == -0.8
+
+
+def test_the_hash_follows_what_decides_the_plan() -> None:
+    robot = find_robot("bruce")
+    base = JumpTask(name="a", rise=0.15)
+    assert base.hash(robot) == JumpTask(name="b", rise=0.15).hash(robot), "a name decides nothing"
+    assert base.hash(robot) != JumpTask(name="a", rise=0.16).hash(robot)
+    assert base.hash(robot) != JumpTask(name="a", rise=0.15, touchdown_lean=0.2).hash(robot)
+    assert "touchdown_lean" not in base.content(), "what is not given decides nothing"
+    heavier = robot.model_copy(update={"text": "another robot"})
+    assert base.hash(robot) != base.hash(heavier)

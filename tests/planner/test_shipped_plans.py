@@ -1,0 +1,55 @@
+"""The plans that come with aloft: one for every shipped task, of that very task, and valid."""
+
+from pathlib import Path
+
+import pytest
+
+from aloft.planner.checking.validity import check_plan
+from aloft.planner.library.library import SHIPPED, PlanLibrary
+from aloft.planner.library.plan import read_plan
+from aloft.planner.task.task import read_task
+from aloft.robots.description import find_robot
+
+TASKS = sorted((SHIPPED.parent / "tasks").glob("*.yaml"))
+REMEDY = "run: make plans"
+
+
+def test_there_are_the_basic_tasks() -> None:
+    names = {path.stem for path in TASKS}
+    assert {"in_situ", "forward_10cm", "back_10cm", "side_10cm", "twist_30deg"} <= names
+    assert {"step_up_5cm", "step_down_5cm"} <= names
+    assert {"hops_10", "hops_forward_10", "step_up_and_down"} <= names
+
+
+@pytest.mark.parametrize("path", TASKS, ids=[path.stem for path in TASKS])
+def test_every_task_has_its_valid_plan(path: Path, tmp_path: Path) -> None:
+    task = read_task(path)
+    robot = find_robot(task.robot)
+    plan = PlanLibrary(robot, tmp_path).find(task)
+    assert plan is not None, f"{path.name} has changed or is new, and has no plan; {REMEDY}"
+    report = check_plan(plan, robot)
+    assert report.valid, f"{report.explain()}\nthe planner or the check has changed; {REMEDY}"
+    assert plan.valid, "the file says so itself"
+
+
+def test_no_plan_is_there_without_its_task() -> None:
+    robot = find_robot("bruce")
+    wanted = {read_task(path).hash(robot) for path in TASKS}
+    stale = [p.name for p in SHIPPED.glob("*.npz") if p.stem.rpartition("-")[2] not in wanted]
+    assert stale == [], f"plans of tasks that are no more; {REMEDY}"
+
+
+def test_the_remedy_is_one_command_that_makes_them_all() -> None:
+    """What the messages above say is there, makes every task anew, and removes what is stale."""
+    makefile = (SHIPPED.parents[1] / "Makefile").read_text()
+    rule = makefile.partition("\nplans: ")[2].partition("\n\n")[0]
+    command = rule.splitlines()[1]
+    for part in ("graphs/tasks/*.yaml", "--anew", "--prune", "--keep graphs/plans"):
+        assert part in command
+
+
+def test_every_plan_names_what_made_it() -> None:
+    for path in SHIPPED.glob("*.npz"):
+        plan = read_plan(path)
+        assert plan.statistics["violation"] <= 1e-6
+        assert "casadi" in plan.versions

@@ -1,0 +1,83 @@
+"""The robot's description: validation, derived figures and finding one by name."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+from pydantic import ValidationError
+
+from aloft.robots.description import RobotDescription, find_robot, read_description
+
+
+def hopper() -> dict[str, Any]:
+    """A one-legged robot with a hip and a knee whose motors are coupled."""
+    inertia = [0.01, 0.01, 0.01, 0.0, 0.0, 0.0]
+    link = {"mass": 1.0, "com": [0, 0, 0], "inertia": inertia}
+    return {
+        "name": "hopper",
+        "base": "body",
+        "links": [{"name": name, **link} for name in ("body", "thigh", "shank")],
+        "joints": [
+            {"name": "hip", "parent": "body", "child": "thigh", "origin": [0, 0, 0],
+             "axis": [0, 1, 0], "limits": [-1, 1]},
+            {"name": "knee", "parent": "thigh", "child": "shank", "origin": [0, 0, -0.2],
+             "axis": [0, 1, 0], "limits": [0, 2]},
+        ],
+        "feet": [{"name": "foot", "link": "shank", "sole": [0, 0, -0.2]}],
+        "contacts": [
+            {"name": "toe", "foot": "foot", "position": [0, 0, -0.2], "radius": 0.005}
+        ],
+        "transmission": {"motors": ["a", "b"], "joint_to_motor": [[1, 0], [1, 1]]},
+        "profiles": {},
+        "standing": {"knee": 0.5},
+    }  # fmt: skip
+
+
+def test_derived_figures() -> None:
+    robot = RobotDescription.model_validate(hopper())
+    assert robot.dimensions == {"n_joints": 2, "n_velocities": 8, "n_contacts": 1, "n_feet": 1}
+    assert robot.total_mass == 3.0
+    assert robot.standing_position.tolist() == [0.0, 0.5]
+    assert robot.foot_of_contact() == (0,)
+    # power is the same on both sides of the transmission
+    torque, velocity = np.array([3.0, -2.0]), np.array([0.7, 1.1])
+    motor_power = (robot.torque_to_motor @ torque) @ (robot.joint_to_motor @ velocity)
+    assert motor_power == pytest.approx(torque @ velocity)
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "message"),
+    [
+        (("base",), "torso", "base 'torso' is not one of body, thigh, shank"),
+        (("joints", 1, "parent"), "thig", "joint knee: parent 'thig' is not one of"),
+        (("joints", 1, "name"), "hip", "joint 'hip' is there twice"),
+        (("feet", 0, "link"), "toe", "foot foot: link 'toe' is not one of"),
+        (("contacts", 0, "foot"), "feet", "contact toe: foot 'feet' is not one of foot"),
+        (("standing",), {"nee": 1}, "standing 'nee' is not one of hip, knee"),
+        (("transmission", "joint_to_motor"), [[1, 0]], "joint_to_motor must be 2 x 2"),
+        (("links", 0, "weight"), 2, "Extra inputs are not permitted"),
+    ],
+)
+def test_wrong_names_are_named(path: tuple[Any, ...], value: object, message: str) -> None:
+    data = hopper()
+    place: Any = data
+    for key in path[:-1]:
+        place = place[key]
+    place[path[-1]] = value
+    with pytest.raises(ValidationError) as error:
+        RobotDescription.model_validate(data)
+    assert message in str(error.value)
+
+
+def test_a_robot_of_the_users_own_file(tmp_path: Path) -> None:
+    (tmp_path / "hopper.yaml").write_text(yaml.safe_dump(hopper()))
+    assert find_robot("hopper.yaml", tmp_path) == read_description(tmp_path / "hopper.yaml")
+    with pytest.raises(LookupError, match=r"no robot description at .*other\.yaml"):
+        find_robot("other.yaml", tmp_path)
+
+
+def test_an_unknown_robot_names_those_there_are() -> None:
+    with pytest.raises(LookupError, match=r"no robot called 'brus'; there is .*bruce"):
+        find_robot("brus")

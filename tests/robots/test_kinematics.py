@@ -1,0 +1,102 @@
+"""Forward kinematics for pictures: known poses, and Pinocchio's answer for the shipped robot."""
+
+import numpy as np
+import pytest
+
+from aloft.robots.description import RobotDescription, find_robot
+from aloft.robots.kinematics import (
+    from_base_outwards,
+    link_poses,
+    matrices_of_quaternions,
+    rotations_about,
+)
+from aloft.robots.pinocchio_model import build_pinocchio_model
+
+INERTIA = (0.01, 0.01, 0.01, 0.0, 0.0, 0.0)
+
+
+def two_links(**changes: object) -> RobotDescription:
+    """A base with an arm of two links, its joints listed from the tip inwards."""
+    link = {"mass": 1.0, "com": (0, 0, 0), "inertia": INERTIA}
+    joint = {"axis": (0, 1, 0), "limits": (-3, 3)}
+    return RobotDescription.model_validate(
+        {
+            "name": "arm",
+            "base": "base",
+            "links": [{"name": name, **link} for name in ("base", "upper", "lower")],
+            "joints": [
+                {"name": "elbow", "parent": "upper", "child": "lower", "origin": (0, 0, -0.2), **joint},
+                {"name": "shoulder", "parent": "base", "child": "upper", "origin": (0, 0.1, 0), **joint},
+            ],
+            "feet": [],
+            "contacts": [],
+            "transmission": {"motors": ["a", "b"], "joint_to_motor": [[1, 0], [0, 1]]},
+            "profiles": {},
+            "standing": {},
+            **changes,
+        }
+    )  # fmt: skip
+
+
+def test_a_bent_arm_is_where_geometry_puts_it() -> None:
+    robot = two_links()
+    # elbow, shoulder: a right angle at the shoulder about +y takes -z to -x
+    joints = np.array([[0.0, 0.0], [0.0, np.pi / 2], [np.pi / 2, 0.0]])
+    base = np.array([[0.0, 0.0, 1.0]] * 3)
+    upright = np.array([[0.0, 0.0, 0.0, 1.0]] * 3)
+    poses = link_poses(robot, base, upright, joints)
+    assert poses.names == ("base", "upper", "lower")
+    position, rotation = poses.of("lower")
+    expected = [[0, 0.1, 0.8], [-0.2, 0.1, 1.0], [0, 0.1, 0.8]]
+    np.testing.assert_allclose(position, expected, atol=1e-15)
+    np.testing.assert_allclose(rotation[2] @ [0, 0, -1], [-1, 0, 0], atol=1e-15)
+
+
+def test_the_base_carries_everything_with_it() -> None:
+    robot = two_links()
+    quarter_left = np.array([[0.0, 0.0, np.sqrt(0.5), np.sqrt(0.5)]])
+    poses = link_poses(robot, np.array([[1.0, 2.0, 3.0]]), quarter_left, np.zeros((1, 2)))
+    np.testing.assert_allclose(poses.of("upper")[0], [[0.9, 2.0, 3.0]], atol=1e-15)
+
+
+def test_rotations_are_right_handed_and_orthonormal() -> None:
+    angles = np.linspace(-7.0, 7.0, 9)
+    axis = np.array([1.0, 2.0, -2.0]) / 3.0
+    about = rotations_about(tuple(axis), angles)
+    quaternions = np.column_stack([np.sin(angles / 2)[:, None] * axis, np.cos(angles / 2)])
+    np.testing.assert_allclose(about, matrices_of_quaternions(quaternions), atol=1e-14)
+    np.testing.assert_allclose(about @ np.swapaxes(about, 1, 2), [np.eye(3)] * 9, atol=1e-14)
+
+
+def test_a_joint_that_hangs_on_nothing_is_named() -> None:
+    joints = [
+        {"name": "elbow", "parent": "upper", "child": "lower", "origin": (0, 0, 0),
+         "axis": (0, 1, 0), "limits": (-3, 3)},
+        {"name": "loose", "parent": "lower", "child": "upper", "origin": (0, 0, 0),
+         "axis": (0, 1, 0), "limits": (-3, 3)},
+    ]  # fmt: skip
+    with pytest.raises(
+        ValueError, match="joints elbow, loose are not connected to the base 'base'"
+    ):
+        from_base_outwards(two_links(joints=joints))
+
+
+def test_bruce_is_where_pinocchio_puts_it() -> None:
+    import pinocchio
+
+    robot = find_robot("bruce")
+    model = build_pinocchio_model(robot).model
+    data = model.createData()
+    random = np.random.default_rng(5)
+    orientation = random.standard_normal((4, 4))
+    orientation /= np.linalg.norm(orientation, axis=1, keepdims=True)
+    base, joints = random.standard_normal((4, 3)), random.uniform(-1.5, 1.5, (4, 10))
+    poses = link_poses(robot, base, orientation, joints)
+    for row in range(4):
+        q = np.concatenate([base[row], orientation[row], joints[row]])
+        pinocchio.framesForwardKinematics(model, data, q)
+        for joint in robot.joints:
+            placement = data.oMi[model.getJointId(joint.name)]
+            position, rotation = poses.of(joint.child)
+            np.testing.assert_allclose(position[row], placement.translation, atol=1e-12)
+            np.testing.assert_allclose(rotation[row], placement.rotation, atol=1e-12)

@@ -1,0 +1,189 @@
+"""Simulator and controller must see the same robot: same inertia, same gravity, same points."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import mujoco
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from aloft.hal.simulated.mujoco_model import Variation, build_mujoco_model
+from aloft.hal.simulated.scenes import platform, step
+from aloft.robots.description import find_robot
+from aloft.robots.pinocchio_model import build_pinocchio_model
+
+ROBOT = find_robot("bruce")
+SIMULATED = build_mujoco_model(ROBOT)
+CONTROLLER = build_pinocchio_model(ROBOT)
+
+
+def random_state(seed: int) -> tuple[Any, Any, Any]:
+    """The same random state for both: MuJoCo's data and Pinocchio's q and v."""
+    random = np.random.default_rng(seed)
+    limits = ROBOT.joint_limits
+    data = mujoco.MjData(SIMULATED)
+    data.qpos[:3] = random.normal(loc=(0.0, 0.0, 10.0))
+    quaternion = random.normal(size=4)
+    data.qpos[3:7] = quaternion / np.linalg.norm(quaternion)
+    data.qpos[7:] = random.uniform(limits[:, 0], limits[:, 1])
+    data.qvel[:] = 3.0 * random.normal(size=16)
+    q = np.concatenate([data.qpos[:3], data.qpos[[4, 5, 6, 3]], data.qpos[7:]])
+    v = data.qvel.copy()
+    rotation = pin.Quaternion(q[3:7]).toRotationMatrix()
+    v[:3] = rotation.T @ v[:3]
+    mujoco.mj_forward(SIMULATED, data)
+    return data, q, v
+
+
+def world_linear(q: Any) -> Any:
+    """The matrix that takes Pinocchio's velocity to MuJoCo's (linear part in the world)."""
+    turn = np.eye(16)
+    turn[:3, :3] = pin.Quaternion(q[3:7]).toRotationMatrix()
+    return turn
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_mass_matrix_with_rotors(seed: int) -> None:
+    data, q, _ = random_state(seed)
+    ours = np.zeros((16, 16))
+    mujoco.mj_fullM(SIMULATED, data, ours)
+    model = CONTROLLER.model
+    theirs = pin.crba(model, model.createData(), q) + CONTROLLER.rotor_coupling
+    turn = world_linear(q)
+    np.testing.assert_allclose(turn.T @ ours @ turn, theirs, rtol=0, atol=1e-10)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_bias_forces(seed: int) -> None:
+    data, q, v = random_state(seed)
+    model = CONTROLLER.model
+    theirs = pin.nonLinearEffects(model, model.createData(), q, v)
+    # The bias of MuJoCo's linear coordinates lacks the Coriolis term of a rotating frame.
+    turn = world_linear(q)
+    rate = np.zeros(16)
+    rate[:3] = np.cross(v[3:6], v[:3])
+    mass = pin.crba(model, model.createData(), q)
+    np.testing.assert_allclose(turn.T @ data.qfrc_bias + mass @ rate, theirs, rtol=0, atol=1e-10)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_centre_of_mass_momentum_and_contact_points(seed: int) -> None:
+    data, q, v = random_state(seed)
+    model = CONTROLLER.model
+    memory = model.createData()
+    pin.computeCentroidalMomentum(model, memory, q, v)
+    pin.framesForwardKinematics(model, memory, q)
+    com = pin.centerOfMass(model, memory, q)
+    np.testing.assert_allclose(data.sensor("com").data, com, rtol=0, atol=1e-10)
+    velocity = memory.hg.linear / ROBOT.total_mass
+    np.testing.assert_allclose(data.sensor("com_velocity").data, velocity, rtol=0, atol=1e-10)
+    np.testing.assert_allclose(
+        data.sensor("angular_momentum").data, memory.hg.angular, rtol=0, atol=1e-10
+    )
+    for contact, frame in zip(ROBOT.contacts, CONTROLLER.contact_frames, strict=True):
+        np.testing.assert_allclose(
+            data.site(contact.name).xpos, memory.oMf[frame].translation, rtol=0, atol=1e-10
+        )
+
+
+def test_total_mass_is_the_papers() -> None:
+    assert ROBOT.total_mass == pytest.approx(5.118, abs=1e-12)
+    assert mujoco.mj_getTotalmass(SIMULATED) == pytest.approx(5.118, abs=1e-12)
+    assert pin.computeTotalMass(CONTROLLER.model) == pytest.approx(5.118, abs=1e-12)
+
+
+def upright(pitch: float, knee: float, ankle: float) -> Any:
+    """Pinocchio's q with both legs at these angles and the torso upright."""
+    q = pin.neutral(CONTROLLER.model)
+    q[7:] = [0.0, pitch, 0.0, knee, ankle] * 2
+    return q
+
+
+@pytest.mark.parametrize(
+    ("flexion", "pitch", "ankle", "base", "com"),
+    [
+        (0.0, -0.04, 0.04, 0.407, 0.353),
+        (0.4, 0.19, 0.21, 0.400, 0.346),
+        (0.8, 0.42, 0.38, 0.380, 0.329),
+        (1.2, 0.65, 0.55, 0.346, 0.301),
+        (1.6, 0.90, 0.70, 0.301, 0.264),
+        (2.0, 1.16, 0.84, 0.245, 0.220),
+    ],
+)
+def test_published_heights_by_knee_flexion(
+    flexion: float, pitch: float, ankle: float, base: float, com: float
+) -> None:
+    q = upright(pitch, -flexion, ankle)
+    memory = CONTROLLER.model.createData()
+    pin.framesForwardKinematics(CONTROLLER.model, memory, q)
+    sole = memory.oMf[CONTROLLER.sole_frames[0]].translation
+    height = pin.centerOfMass(CONTROLLER.model, memory, q)[2] - sole[2]
+    assert -sole[2] == pytest.approx(base, abs=0.002)
+    assert height == pytest.approx(com, abs=0.002)
+
+
+def test_standing_pose_balances_over_mid_foot() -> None:
+    q = pin.neutral(CONTROLLER.model)
+    q[7:] = ROBOT.standing_position
+    memory = CONTROLLER.model.createData()
+    pin.framesForwardKinematics(CONTROLLER.model, memory, q)
+    com = pin.centerOfMass(CONTROLLER.model, memory, q)
+    soles = [memory.oMf[frame] for frame in CONTROLLER.sole_frames]
+    np.testing.assert_allclose(com[:2], (soles[0].translation + soles[1].translation)[:2] / 2,
+                               atol=1e-9)  # fmt: skip
+    for sole in soles:
+        np.testing.assert_allclose(sole.rotation, np.eye(3), atol=1e-9)
+    pin.ccrba(CONTROLLER.model, memory, q, np.zeros(16))
+    np.testing.assert_allclose(np.diag(memory.Ig.inertia), [0.1044, 0.0820, 0.0352], rtol=0.005)
+
+
+def test_reflected_rotor_inertia() -> None:
+    inertia = ROBOT.profiles["koala"].rotor_inertia
+    matrix = CONTROLLER.rotor_coupling[6:, 6:] + np.diag(CONTROLLER.model.armature[6:])
+    leg = np.diag([1.0, 2.0, 2.0, 2.0, 1.0])
+    leg[3, 4] = leg[4, 3] = 1.0
+    np.testing.assert_allclose(matrix[:5, :5], inertia * leg, atol=1e-15)
+    np.testing.assert_allclose(matrix[5:, 5:], inertia * leg, atol=1e-15)
+    np.testing.assert_array_equal(matrix[:5, 5:], 0.0)
+
+
+@pytest.mark.parametrize("flexion", [0.02, 0.8, 1.6, 2.1])
+def test_no_pose_on_the_ground_touches_anything_but_toes_and_heels(flexion: float) -> None:
+    data = mujoco.MjData(SIMULATED)
+    ankle = min(0.95, 0.05 + 0.4 * flexion)
+    data.qpos[7:] = [0.0, flexion - ankle, 0.0, -flexion, ankle] * 2
+    mujoco.mj_kinematics(SIMULATED, data)
+    data.qpos[2] = 1e-4 - data.site("right_toe").xpos[2] - 2e-4
+    mujoco.mj_forward(SIMULATED, data)
+    touching = {SIMULATED.geom(int(g)).name for g in data.contact.geom.ravel()}
+    assert touching == {"floor"} | {contact.name for contact in ROBOT.contacts}
+
+
+def test_legs_collide_with_each_other() -> None:
+    data = mujoco.MjData(SIMULATED)
+    data.qpos[2] = 2.0
+    data.qpos[7:] = ROBOT.standing_position
+    mujoco.mj_forward(SIMULATED, data)
+    assert data.ncon == 0
+    data.qpos[[7 + 2, 7 + 7]] = [0.5, -0.5]  # hip roll: both legs inward
+    mujoco.mj_forward(SIMULATED, data)
+    assert data.ncon > 0
+
+
+def test_variation_and_scenes_reach_the_model() -> None:
+    variation = Variation(friction=0.5, contact_stiffness=4.0, mass=1.05,
+                          base_com_offset=(0.005, 0.0, -0.005))  # fmt: skip
+    model = build_mujoco_model(ROBOT, variation=variation, scene=step(0.05, 0.1))
+    assert mujoco.mj_getTotalmass(model) == pytest.approx(1.05 * 5.118)
+    assert model.geom("right_toe").friction[0] == 0.5
+    assert model.geom("box/0").solref[0] == pytest.approx(0.002)
+    assert model.body("torso").ipos[0] == pytest.approx(0.02325 + 0.005)
+    assert step(0.05, 0.1).ground_height(0.2, 0.0) == 0.05
+    assert step(0.05, 0.1).ground_height(0.05, 0.0) == 0.0
+    off = platform(0.35, 0.1)
+    assert off.ground_height(0.0, 0.0) == 0.0
+    assert off.ground_height(0.2, 0.0) == -0.35
+    behind = platform(0.35, -0.1)
+    assert [behind.ground_height(x, 0.0) for x in (-0.2, 0.0, 0.2)] == [-0.35, 0.0, 0.0]

@@ -1,0 +1,133 @@
+"""Units: parsing, algebra and conversion."""
+
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from aloft.runtime.language.errors import UnitError
+from aloft.runtime.language.units import known_symbols, parse_quantity, parse_unit
+
+SYMBOLS = known_symbols()
+UNITS = st.lists(st.tuples(st.sampled_from(SYMBOLS), st.integers(-3, 3)), min_size=1, max_size=4)
+
+
+def text_of(factors: list[tuple[str, int]]) -> str:
+    return " ".join(f"{symbol}^{power}" for symbol, power in factors)
+
+
+@pytest.mark.parametrize(
+    ("left", "right"),
+    [
+        ("N", "kg m/s^2"),
+        ("N m", "kg m^2 s^-2"),
+        ("N*m", "J"),
+        ("V", "kg m^2/(s^3 A)"),
+        ("W", "N m/s"),
+        ("ohm", "V/A"),
+        ("Pa", "N/m^2"),
+        ("m/s/s", "m/s^2"),
+        ("m/(s s)", "m/s^2"),
+        ("", "1"),
+        ("1/s", "Hz"),
+        ("N·m", "N m"),
+    ],
+)
+def test_two_texts_of_one_unit_match(left: str, right: str) -> None:
+    assert parse_unit(left).matches(parse_unit(right))
+
+
+@pytest.mark.parametrize(
+    ("left", "right"),
+    [
+        ("rad", "1"),
+        ("rad/s", "Hz"),
+        ("N m", "N/m"),
+        ("mm", "m"),
+        ("deg", "rad"),
+        ("m/s s", "m/s^2"),
+    ],
+)
+def test_different_units_do_not_match(left: str, right: str) -> None:
+    assert not parse_unit(left).matches(parse_unit(right))
+
+
+def test_a_slash_divides_by_one_factor_only() -> None:
+    assert parse_unit("m/s kg").exponents == parse_unit("m kg/s").exponents
+
+
+@pytest.mark.parametrize(
+    ("text", "unit", "value"),
+    [
+        ("70 N", "N", 70.0),
+        ("10 ms", "s", 0.01),
+        ("-3.5e-1 mrad", "rad", -3.5e-4),
+        ("180 deg", "rad", math.pi),
+        ("500 dps", "rad/s", 500 * math.pi / 180),
+        ("0.5", "m", 0.5),
+        (".5 kN", "N", 500.0),
+        ("5 %", "", 0.05),
+        ("9 g", "kg", 0.009),
+    ],
+)
+def test_quantity(text: str, unit: str, value: float) -> None:
+    assert parse_quantity(text, unit) == pytest.approx(value, rel=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("N q", "cannot read unit 'N q': unknown symbol 'q'"),
+        ("N^^2", "cannot read unit 'N^^2' at '^^2'"),
+        ("m/", "cannot read unit 'm/': nothing behind an operator"),
+        ("m*/s", "cannot read unit 'm*/s': two operators in a row"),
+        ("(m", "cannot read unit '(m': a bracket is not closed"),
+        ("m)", "cannot read unit 'm)': unexpected ')'"),
+        ("(m/)s", "cannot read unit '(m/)s': nothing behind an operator"),
+    ],
+)
+def test_errors_of_units(text: str, message: str) -> None:
+    with pytest.raises(UnitError) as error:
+        parse_unit(text)
+    assert str(error.value) == message
+
+
+@pytest.mark.parametrize(
+    ("text", "unit", "message"),
+    [
+        ("fast", "m/s", "cannot read 'fast' as a number with a unit"),
+        ("70 N", "m", "'70 N' is not in m"),
+    ],
+)
+def test_errors_of_quantities(text: str, unit: str, message: str) -> None:
+    with pytest.raises(UnitError) as error:
+        parse_quantity(text, unit)
+    assert str(error.value) == message
+
+
+def test_conversion_between_dimensions_is_an_error() -> None:
+    with pytest.raises(UnitError, match="cannot convert 'm' to 's'"):
+        parse_unit("m").factor_to(parse_unit("s"))
+
+
+@given(UNITS, UNITS)
+def test_exponents_add_under_multiplication(
+    left: list[tuple[str, int]], right: list[tuple[str, int]]
+) -> None:
+    product = parse_unit(text_of(left + right))
+    expected = parse_unit(text_of(left)) * parse_unit(text_of(right))
+    assert product.exponents == expected.exponents
+    assert product.scale == pytest.approx(expected.scale, rel=1e-12)
+
+
+@given(UNITS, st.floats(1e-6, 1e6))
+def test_conversion_there_and_back_is_the_identity(
+    factors: list[tuple[str, int]], value: float
+) -> None:
+    unit = parse_unit(text_of(factors))
+    base = parse_unit(text_of([(s, e) for s, e in zip(BASE, unit.exponents, strict=True)]))
+    assert value * unit.factor_to(base) * base.factor_to(unit) == pytest.approx(value, rel=1e-12)
+
+
+BASE = ("m", "kg", "s", "A", "K", "mol", "cd", "rad")

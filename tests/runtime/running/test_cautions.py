@@ -1,0 +1,50 @@
+"""Cautions: what a block wants the readers of its results to know."""
+
+from __future__ import annotations
+
+from aloft.blocks.general.primitives import Vector
+from aloft.runtime.language.block import Block, Output
+from aloft.runtime.running.executor import run
+from aloft.runtime.running.notes import Note
+from aloft.runtime.testing.graphs import Use, checked_graph
+
+
+class Waiver(Block):
+    """Has something to say."""
+
+    y = Output(Vector, text="nothing")
+
+    @classmethod
+    def local_dimensions(cls, params: object, robot: object) -> dict[str, int]:
+        return {"n": 1}
+
+    def step(self) -> None: ...
+
+    def cautions(self) -> list[str]:
+        return ["the check was waived"]
+
+
+class Listener:
+    """Keeps the notes."""
+
+    def __init__(self) -> None:
+        self.notes: list[Note] = []
+
+    def open(self, bound: object) -> None: ...
+
+    def record(self, tick: int) -> None: ...
+
+    def note(self, note: Note) -> None:
+        self.notes.append(note)
+
+    def close(self) -> None: ...
+
+
+def test_a_caution_is_in_the_result_and_told_to_the_sinks() -> None:
+    listener = Listener()
+    result = run(checked_graph({"b0": Use(Waiver, {})}, ticks=3), sinks=[listener])
+    assert result.success
+    assert result.cautions == ("b0: the check was waived",)
+    assert result.to_json()["cautions"] == ["b0: the check was waived"]
+    (note,) = (note for note in listener.notes if note.kind == "caution")
+    assert (note.tick, note.level, note.text) == (0, "WARN", "b0: the check was waived")

@@ -1,0 +1,52 @@
+"""The finite check: silent on every finite number, exact about the first that is not."""
+
+import numpy as np
+import pytest
+
+from aloft.runtime.language.layout import Layout, PortLayout
+from aloft.runtime.language.signals import Field, Signal
+from aloft.runtime.running.finite import FiniteCheck, NotFiniteError
+from aloft.runtime.running.memory import Region
+
+
+class Many(Signal):
+    scalar = Field(text="one")
+    vector = Field(20_000, text="more than one piece")
+    count = Field(dtype="int64", text="not checked")
+
+
+def region() -> Region:
+    return Region(Layout.of([PortLayout("a/b.y", Many, {})]))
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
+@pytest.mark.parametrize(
+    ("field", "index", "place"),
+    [("scalar", (), "a/b.y.scalar"), ("vector", 19_999, "a/b.y.vector[19999]")],
+)
+def test_it_names_the_element(bad: float, field: str, index: object, place: str) -> None:
+    memory = region()
+    check = FiniteCheck(memory)
+    check.check()
+    memory.field(f"a/b.y.{field}")[index] = bad
+    with pytest.raises(NotFiniteError) as caught:
+        check.check()
+    assert str(caught.value) == f"{place} is {bad}"
+
+
+def test_the_first_of_several_is_named() -> None:
+    memory = region()
+    memory.field("a/b.y.vector")[[5, 17]] = np.nan
+    with pytest.raises(NotFiniteError, match=r"vector\[5\] is nan"):
+        FiniteCheck(memory).check()
+
+
+@pytest.mark.parametrize("size", [1e-308, 1.0, 1e300, 1.7e308])
+def test_finite_numbers_of_any_size_pass(size: float) -> None:
+    memory = region()
+    memory.field("a/b.y.vector").fill(size)
+    FiniteCheck(memory).check()
+
+
+def test_a_region_without_floats_passes() -> None:
+    FiniteCheck(Region(Layout.of([]))).check()

@@ -1,0 +1,182 @@
+"""Clocks in virtual time: exact deadlines, overruns, both policies, blame; and a little real time."""
+
+from collections.abc import Sequence
+
+import pytest
+
+from aloft.blocks.general.primitives import Vector
+from aloft.runtime.language.block import Block, Output
+from aloft.runtime.language.errors import AloftError, ExitCode
+from aloft.runtime.language.parameters import Parameters
+from aloft.runtime.language.stages import ClockSpec
+from aloft.runtime.running.executor import Executor, run
+from aloft.runtime.running.pacing import Paced
+from aloft.runtime.testing.graphs import Use, checked_graph
+
+MS = 1_000_000
+
+
+class VirtualTime:
+    """Time passes only when somebody sleeps, polls (1 us) or works."""
+
+    def __init__(self) -> None:
+        self.instant = 0
+        self.slept: list[float] = []
+
+    def now(self) -> int:
+        return self.instant
+
+    def sleep(self, seconds: float) -> None:
+        self.slept.append(seconds)
+        self.instant += round(seconds * 1e9)
+
+
+class PollingTime(VirtualTime):
+    """Also looking at the clock takes time, so that a spin ends."""
+
+    def now(self) -> int:
+        self.instant += 10
+        return self.instant
+
+
+TIME = PollingTime()
+
+
+class Worker(Block):
+    """Takes its time: so many milliseconds in the given ticks."""
+
+    class Params(Parameters):
+        n: int = 1
+        slow_ticks: list[int] = []
+        takes: float = 0.0
+
+    y = Output(Vector, text="nothing")
+    begun: list[int] = []
+
+    def step(self) -> None:
+        if self.context.path == "a":
+            self.begun.append(TIME.instant)
+        if self.tick in self.params.slow_ticks:
+            TIME.instant += round(self.params.takes * MS)
+
+
+def paced(clock: ClockSpec, slow: Sequence[int], takes: float, ticks: int = 8) -> Executor:
+    global TIME
+    TIME = PollingTime()
+    Worker.begun = []
+    graph = checked_graph(
+        {"a": Use(Worker), "b": Use(Worker, {"slow_ticks": list(slow), "takes": takes})},
+        rate=500.0,
+        ticks=ticks,
+        clock=clock,
+    )
+    return Executor(graph, time_source=TIME)
+
+
+def begun_ms() -> list[float]:
+    return [round((instant - Worker.begun[0]) / MS, 2) for instant in Worker.begun]
+
+
+def test_ticks_begin_at_whole_periods() -> None:
+    result = paced(ClockSpec("paced"), [2], 1.5).run()
+    assert begun_ms() == [0.0, 2.0, 4.0, 6.0, 8.0, 10.0, 12.0, 14.0]
+    assert (result.overruns, result.skipped_periods, result.success) == (0, 0, True)
+    assert max(TIME.slept) == pytest.approx(1.8e-3, abs=1e-6)  # the rest is spun
+
+
+def test_an_overrun_skips_to_the_next_whole_period_and_blames_the_block() -> None:
+    result = paced(ClockSpec("paced"), [2, 3], 4.5).run()
+    # ticks 2 and 3 take 4.5 ms each: the tick after begins at the third deadline from theirs
+    assert begun_ms() == [0.0, 2.0, 4.0, 10.0, 16.0, 18.0, 20.0, 22.0]
+    assert (result.overruns, result.skipped_periods) == (2, 4)
+    assert (result.blocks["a"].overruns, result.blocks["b"].overruns) == (0, 2)
+    assert result.success
+
+
+def test_the_stop_policy_ends_the_run() -> None:
+    result = paced(ClockSpec("paced", "stop", 1), [2], 3.25).run()
+    assert result.reason.startswith("overrun at tick 3 (0.006 s): 1.25")
+    assert result.reason.endswith(
+        " ms late, 1 in a row; block 'b' was running when the deadline passed, and the overrun "
+        "policy is 'stop'"
+    )
+    assert (result.ticks, result.exit_code) == (3, ExitCode.RUN_FAILED)
+    assert result.error is not None and result.error.block == "b"
+
+
+def test_the_stop_policy_can_bear_some_in_a_row() -> None:
+    assert paced(ClockSpec("paced", "stop", 3), [1, 2, 4, 5], 3.0).run().success
+    result = paced(ClockSpec("paced", "stop", 3), [1, 2, 3], 3.0).run()
+    assert not result.success and "3 in a row" in result.reason
+    assert result.ticks == 4
+
+
+def test_deadlines_do_not_drift_when_the_period_is_no_whole_number_of_nanoseconds() -> None:
+    time = VirtualTime()
+    pacer = Paced(300.0, time)
+    for tick in range(30_001):
+        pacer.wait(tick)
+        time.instant += 1_000
+        # a virtual spin cannot end by itself: go to the deadline
+        time.instant = max(time.instant, int((tick + 1) * 1e9 / 300.0))
+    assert time.instant == int(30_001 * 1e9 / 300.0)
+    assert pacer.overruns == 0
+
+
+def test_without_pacing_nothing_is_waited_for() -> None:
+    result = paced(ClockSpec("free"), [1, 2], 50.0).run()
+    assert TIME.slept == []
+    assert (result.overruns, result.blocks["b"].overruns) == (0, 0)
+
+
+class Driver(Block):
+    """A robot that says when: every cycle; two were missed before the fourth."""
+
+    class Params(Parameters):
+        n: int = 1
+
+    y = Output(Vector, text="nothing")
+    waits = 0
+
+    def wait(self) -> int:
+        Driver.waits += 1
+        if Driver.waits == 7:
+            raise OSError("the bus is gone")
+        return 2 if Driver.waits == 4 else 0
+
+    def step(self) -> None:
+        self.y.value.fill(Driver.waits)
+
+
+def test_a_robot_drives_the_clock() -> None:
+    Driver.waits = 0
+    graph = checked_graph({"robot": Use(Driver)}, clock=ClockSpec("robot"))
+    result = run(graph, ticks=5)
+    assert result.signal("robot.y.value")[:, 0].tolist() == [1.0, 2.0, 3.0, 4.0, 5.0]
+    assert (result.overruns, result.skipped_periods) == (1, 2)
+
+
+def test_a_failing_wait_names_the_robot() -> None:
+    Driver.waits = 0
+    result = run(checked_graph({"robot": Use(Driver)}, clock=ClockSpec("robot")))
+    assert result.reason == "block 'robot' failed at tick 6 (0.012 s): OSError: the bus is gone"
+
+
+def test_the_robot_clock_needs_one_driver() -> None:
+    for blocks, found in (
+        ({"a": Use(Worker)}, "none"),
+        ({"a": Use(Driver), "b": Use(Driver)}, "a, b"),
+    ):
+        with pytest.raises(AloftError) as caught:
+            Executor(checked_graph(blocks, clock=ClockSpec("robot")))
+        assert str(caught.value) == (
+            f"clock 'robot' needs exactly one block with a wait() method; there is {found}"
+        )
+
+
+def test_wall_time_is_kept_to() -> None:
+    graph = checked_graph({"a": Use(Worker)}, rate=1000.0, ticks=101, clock=ClockSpec("paced"))
+    results = [run(graph) for _ in range(5)]
+    assert all(result.wall_time_s >= 0.1 for result in results)
+    # not later either, unless the machine had no time for it, which shows as skipped periods
+    assert any(result.skipped_periods or result.wall_time_s < 0.11 for result in results)

@@ -1,0 +1,83 @@
+"""Jobs on a Dask cluster: a real scheduler and real worker processes, on the loopback only."""
+
+import math
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+
+import pytest
+
+from aloft.runtime.language.errors import AloftError
+from aloft.studies.batch.jobs import JobResult, run_jobs
+
+pytest.importorskip("distributed")
+
+CLUSTER = """
+import sys
+from distributed import LocalCluster
+if __name__ == "__main__":
+    with LocalCluster(
+        n_workers=int(sys.argv[1]), threads_per_worker=1, host="127.0.0.1", dashboard_address=None,
+        worker_dashboard_address=None, silence_logs=50,
+    ) as cluster:
+        print(cluster.scheduler_address, flush=True)
+        sys.stdin.read()
+"""
+
+
+@pytest.fixture(scope="module")
+def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+    """The address of a cluster of two workers."""
+    folder = tmp_path_factory.mktemp("cluster")
+    script = folder / "cluster.py"
+    script.write_text(CLUSTER)
+    with subprocess.Popen(
+        [sys.executable, script, "2"], cwd=folder, text=True,
+        stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
+    ) as process:  # fmt: skip
+        assert process.stdout is not None
+        yield process.stdout.readline().strip()
+        process.terminate()
+
+
+def results(function: object, jobs: object, address: str) -> dict[int, JobResult]:
+    found: list[JobResult] = []
+    run_jobs(function, jobs, cluster=address, on_result=found.append)  # type: ignore[arg-type]
+    assert len({result.index for result in found}) == len(found)
+    return {result.index: result for result in found}
+
+
+def test_every_job_gives_one_result(cluster: str) -> None:
+    found = results(math.sqrt, [4.0, -1.0, *[9.0] * 30], cluster)
+    assert found[0].value == 2.0
+    assert found[1].error.startswith("ValueError")
+    assert [found[k].value for k in range(2, 32)] == [3.0] * 30
+
+
+def test_it_is_the_workers_that_work(cluster: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("WHO", "the test")
+    found = results(os.getenv, ["WHO", "OMP_NUM_THREADS"], cluster)
+    assert [found[k].value for k in (0, 1)] == [None, "1"]
+
+
+def test_a_job_that_kills_its_workers_is_given_up_and_the_others_are_done(cluster: str) -> None:
+    found = results(signal.raise_signal, [signal.SIGKILL, *[0] * 10], cluster)
+    assert found[0].error.startswith("the cluster gave up: ")
+    assert all(not found[k].error for k in range(1, 11))
+
+
+@pytest.mark.parametrize("address", ["tcp://127.0.0.1:1", "nonsense://x", "127.0.0.1"])
+def test_no_scheduler_is_one_clear_error(address: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    from aloft.studies.batch import cluster as module
+
+    monkeypatch.setattr(module, "WAIT", 0.5)
+    with pytest.raises(AloftError, match=f"there is no Dask scheduler at '{address}'"):
+        results(math.sqrt, [1.0], address)
+
+
+def test_without_dask_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    with pytest.raises(AloftError, match=r"pip install 'aloft\[cluster\]'"):
+        results(math.sqrt, [1.0], "tcp://127.0.0.1:1")

@@ -1,0 +1,201 @@
+"""Jobs over processes: every result, also of what fails or is killed, and a prompt clean end."""
+
+import math
+import operator
+import os
+import signal
+import subprocess
+import sys
+import time
+from contextlib import closing
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from aloft.runtime.language.units import parse_unit
+from aloft.studies.batch.jobs import JobResult, attempt, job_results, processors, run_jobs
+
+
+def results(function: Any, jobs: Any, workers: int = 2) -> dict[int, JobResult]:
+    found: list[JobResult] = []
+    run_jobs(function, jobs, workers=workers, on_result=found.append)
+    assert len({result.index for result in found}) == len(found)
+    return {result.index: result for result in found}
+
+
+def running(pid: int) -> bool:
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return False
+    state = Path(f"/proc/{pid}/stat")
+    return not (state.is_file() and state.read_text().rpartition(")")[2].split()[0] == "Z")
+
+
+def wait_until(condition: Any) -> None:
+    end = time.monotonic() + 240.0
+    while not condition():
+        assert time.monotonic() < end, "it never happened"
+        time.sleep(0.01)
+
+
+def test_every_job_gives_one_result() -> None:
+    found = results(math.sqrt, [4.0, 9.0, -1.0, "x", 16.0])
+    assert [found[k].value for k in (0, 1, 4)] == [2.0, 3.0, 4.0]
+    assert found[2].error.startswith("ValueError: ") and found[2].value is None
+    assert found[3].error.startswith("TypeError: must be real number, not str (")
+
+
+def test_no_jobs_need_no_process() -> None:
+    assert results(math.sqrt, []) == {}
+
+
+def test_errors_of_ours_are_told_as_they_are() -> None:
+    value, error = attempt(parse_unit, "furlong")
+    assert value is None
+    assert error == "cannot read unit 'furlong': unknown symbol 'furlong'"
+
+
+def test_workers_use_one_thread_and_this_process_what_it_did(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setenv("OMP_NUM_THREADS", "8")
+    monkeypatch.delenv("MKL_NUM_THREADS", raising=False)
+    found = results(os.getenv, ["OMP_NUM_THREADS", "MKL_NUM_THREADS"])
+    assert [found[k].value for k in (0, 1)] == ["1", "1"]
+    assert os.environ["OMP_NUM_THREADS"] == "8"
+    assert "MKL_NUM_THREADS" not in os.environ
+
+
+def test_jobs_are_taken_as_they_are_needed() -> None:
+    taken = 0
+
+    def jobs() -> Any:
+        nonlocal taken
+        for number in range(1000):
+            taken += 1
+            yield float(number)
+
+    with closing(job_results(math.sqrt, jobs(), workers=1)) as found:
+        for _ in range(5):
+            next(found)
+    assert taken <= 6
+
+
+def test_a_job_that_kills_its_process_costs_no_other() -> None:
+    found = results(signal.raise_signal, [signal.SIGKILL, 0, 0, signal.SIGKILL, 0], workers=2)
+    assert len(found) == 5
+    for index in (0, 3):
+        assert found[index].error == "its process was killed by SIGKILL, 2 times"
+    assert [found[k].error for k in (1, 2, 4)] == ["", "", ""]
+    assert results(os._exit, [3])[0].error == "its process ended with exit code 3, 2 times"
+
+
+def test_a_process_that_is_killed_is_replaced_and_its_job_done_again(tmp_path: Path) -> None:
+    """Killed from outside, once: the job's second attempt is left alone."""
+    first = tmp_path / "first"
+    script = f"echo $PPID >> {first}; [ $(wc -l < {first}) = 1 ] && kill -9 $PPID; exit 7"
+    found = results(os.system, [script], workers=1)
+    assert os.waitstatus_to_exitcode(found[0].value) == 7
+    assert len(set(first.read_text().split())) == 2
+
+
+def test_a_result_that_cannot_be_sent_is_an_error() -> None:
+    found = results(open, [os.devnull])
+    assert found[0].error.startswith("the result cannot be sent: cannot pickle")
+
+
+def test_what_on_result_raises_stops_the_jobs() -> None:
+    def refuse(result: JobResult) -> None:
+        raise KeyboardInterrupt
+
+    started = time.monotonic()
+    with pytest.raises(KeyboardInterrupt):
+        run_jobs(time.sleep, [0.0, 300.0, 300.0, 300.0], workers=2, on_result=refuse)
+    assert time.monotonic() - started < 300.0
+
+
+def test_a_function_that_has_no_name_is_refused() -> None:
+    with pytest.raises(Exception, match=r"[Pp]ickle"):
+        results(lambda x: x, [1])
+
+
+def test_processors() -> None:
+    assert 1 <= processors() <= (os.cpu_count() or 1)
+
+
+def test_a_script_without_a_guard_is_told(tmp_path: Path) -> None:
+    script = tmp_path / "script.py"
+    script.write_text(
+        "import math\nfrom aloft.studies.batch.jobs import run_jobs\n"
+        "run_jobs(math.sqrt, [1.0] * 50, workers=2, on_result=print)\n"
+    )
+    done = subprocess.run(
+        [sys.executable, script], capture_output=True, check=False, text=True, timeout=240
+    )
+    assert done.returncode == 1
+    assert "a worker process cannot start" in done.stderr
+    assert "if __name__ ==" in done.stderr
+
+
+WORK = """
+import os, time
+def work(seconds):
+    with open("pids", "a") as file:
+        file.write(f"{os.getpid()}\\n")
+    time.sleep(seconds)
+"""
+PARENT = """
+import sys
+from aloft.studies.batch.jobs import run_jobs
+from work import work
+if __name__ == "__main__":
+    try:
+        print("go", flush=True)
+        run_jobs(work, [600.0] * 4, workers=2, on_result=print)
+    except KeyboardInterrupt:
+        sys.exit(130)
+"""
+
+
+def start_parent(folder: Path) -> subprocess.Popen[str]:
+    (folder / "work.py").write_text(WORK)
+    (folder / "parent.py").write_text(PARENT)
+    parent = subprocess.Popen(
+        [sys.executable, "parent.py"], cwd=folder, stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE, text=True, start_new_session=True,
+    )  # fmt: skip
+    assert parent.stdout is not None
+    assert parent.stdout.readline() == "go\n"
+    return parent
+
+
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGINT])
+def test_workers_end_with_the_process_that_wants_their_results(
+    tmp_path: Path, number: signal.Signals
+) -> None:
+    parent = start_parent(tmp_path)
+    pids = tmp_path / "pids"
+    wait_until(lambda: pids.is_file() and len(pids.read_text().split()) == 2)
+    parent.send_signal(number)
+    _, errors = parent.communicate(timeout=240)
+    workers = [int(pid) for pid in pids.read_text().split()]
+    wait_until(lambda: not any(map(running, workers)))
+    assert errors == ""
+    assert parent.returncode == (130 if number == signal.SIGINT else -number)
+
+
+def test_interrupting_while_processes_start_prints_nothing(tmp_path: Path) -> None:
+    """As a terminal does it: the whole process group gets the signal."""
+    for pause in (0.0, 0.1, 0.3):
+        parent = start_parent(tmp_path)
+        time.sleep(pause)
+        os.killpg(parent.pid, signal.SIGINT)
+        _, errors = parent.communicate(timeout=240)
+        assert parent.returncode == 130
+        assert errors == ""
+
+
+def test_the_function_is_what_the_jobs_go_through() -> None:
+    assert results(operator.neg, range(40), workers=3).keys() == set(range(40))
