@@ -7,9 +7,11 @@ they cannot disagree. All frames are parallel to the base's at the zero pose; qu
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
+from fnmatch import fnmatchcase
 from functools import cached_property, lru_cache
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal, Self
 
 import numpy as np
 import yaml
@@ -17,6 +19,10 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, model_validator
 
 Vector3 = tuple[float, float, float]
+Array = NDArray[np.float64]
+
+BASE_VELOCITIES = {"floating": 6, "planar": 3, "fixed": 0}
+"""How many velocities the base has."""
 
 
 class _Data(BaseModel):
@@ -43,15 +49,19 @@ class Link(_Data):
 
 
 class Joint(_Data):
-    """A hinge from ``parent`` to ``child`` at ``origin`` [m, parent frame] about ``axis``, with
-    ``limits`` [rad]."""
+    """A joint from ``parent`` to ``child`` at ``origin`` [m, parent frame].
+
+    A ``hinge`` turns the child about ``axis`` [rad]; a ``slide`` moves it along ``axis`` [m].
+    ``limits`` are in the same unit; ``None`` is a joint without limits.
+    """
 
     name: str
+    kind: Literal["hinge", "slide"] = "hinge"
     parent: str
     child: str
     origin: Vector3
     axis: Vector3
-    limits: tuple[float, float]
+    limits: tuple[float, float] | None = None
 
 
 class Foot(_Data):
@@ -72,11 +82,30 @@ class ContactPoint(_Data):
     radius: float
 
 
+class MotorRating(_Data):
+    """What one motor can do, at the gearbox output, where it differs from its profile's others.
+
+    The meaning of each value is that of ``ActuatorProfile``; ``None`` is the profile's own value.
+    """
+
+    peak_torque: float | None = None
+    corner_speed: float | None = None
+    no_load_speed: float | None = None
+    continuous_torque: float | None = None
+    rotor_inertia: float | None = None
+    friction: float | None = None
+    damping: float | None = None
+
+
 class ActuatorProfile(_Data):
-    """What one motor can do, at the gearbox output. ``peak_torque`` [N m] holds up to
+    """What the motors can do, at the gearbox output. ``peak_torque`` [N m] holds up to
     ``corner_speed`` and falls linearly to zero at ``no_load_speed`` [rad/s]; braking torque is
-    ``peak_torque`` at any speed. ``rotor_inertia`` [kg m^2], ``friction`` [N m] and ``damping``
-    [N m s/rad] act at each joint's side of the gearbox."""
+    ``peak_torque`` at any speed. ``rotor_inertia`` [kg m^2] counts at the gearbox output;
+    ``friction`` [N m] and ``damping`` [N m s/rad] act at each joint's side of the gearbox.
+
+    ``motors`` gives other values for motors by name or by a shell pattern such as ``*_knee_*``;
+    later entries win. For a motor that drives a slide, N stands for N m and m for rad.
+    """
 
     peak_torque: float
     corner_speed: float
@@ -85,6 +114,25 @@ class ActuatorProfile(_Data):
     rotor_inertia: float
     friction: float
     damping: float
+    motors: Mapping[str, MotorRating] = {}
+
+
+@dataclass(frozen=True, eq=False)
+class Motors:
+    """The chosen profile's values, one element a motor (n_joints,), at the gearbox output.
+
+    ``friction`` and ``damping`` are one element a joint: the joint at the motor's place in the
+    order of the description.
+    """
+
+    profile: str
+    peak_torque: Array
+    corner_speed: Array
+    no_load_speed: Array
+    continuous_torque: Array
+    rotor_inertia: Array
+    friction: Array
+    damping: Array
 
 
 class Transmission(_Data):
@@ -95,20 +143,40 @@ class Transmission(_Data):
     joint_to_motor: tuple[tuple[float, ...], ...]
 
 
+class Sensors(_Data):
+    """Which sensors the robot has besides its joint encoders: an ``imu`` at the base's origin,
+    parallel to the base, and a tactile switch at every contact point."""
+
+    imu: bool = True
+    switches: bool = True
+
+
 class RobotDescription(_Data):
-    """A legged robot: links, joints, feet, contact points, transmission, actuators, stance."""
+    """A robot: links, joints, feet, contact points, transmission, actuators, sensors, stance.
+
+    ``base_joint`` says how the base link is held: ``floating`` moves freely, ``planar`` moves in
+    the x-z plane and turns about y, ``fixed`` is bolted to the world at its origin. Feet and
+    contacts may be missing. ``held`` are joints that stand still at an angle while the robot is
+    at work: the planner leaves them out, and the controller holds them.
+    """
 
     name: str
     text: str = ""
     base: str
+    base_joint: Literal["floating", "planar", "fixed"] = "floating"
     links: tuple[Link, ...]
     joints: tuple[Joint, ...]
-    feet: tuple[Foot, ...]
-    contacts: tuple[ContactPoint, ...]
+    feet: tuple[Foot, ...] = ()
+    contacts: tuple[ContactPoint, ...] = ()
     transmission: Transmission
     profiles: Mapping[str, ActuatorProfile]
-    standing: Mapping[str, float]
-    """Joint angles [rad] by name of the pose the robot stands in."""
+    profile: str = ""
+    """The profile in use; empty: the first."""
+    sensors: Sensors = Sensors()
+    standing: Mapping[str, float] = {}
+    """Joint angles [rad] by name of the pose the robot stands in; zero where none is given."""
+    held: Mapping[str, float] = {}
+    """Angles [rad] by name of joints that stand still while the robot is at work."""
     points: Mapping[str, tuple[str, Vector3]] = {}
     """Named points [m, link frame] where something may push: name -> (link, position)."""
 
@@ -142,10 +210,59 @@ class RobotDescription(_Data):
         """The named dimensions every graph with this robot has."""
         return {
             "n_joints": len(self.joints),
-            "n_velocities": len(self.joints) + 6,
+            "n_velocities": len(self.joints) + self.base_velocities,
             "n_contacts": len(self.contacts),
             "n_feet": len(self.feet),
         }
+
+    @property
+    def base_velocities(self) -> int:
+        """How many velocities the base has: 6 floating, 3 planar, 0 fixed."""
+        return BASE_VELOCITIES[self.base_joint]
+
+    def with_profile(self, name: str) -> Self:
+        """The same robot with another actuator profile in use.
+
+        Raises:
+            LookupError: it has no such profile; the message names those that it has.
+        """
+        if name not in self.profiles:
+            there = ", ".join(self.profiles)
+            raise LookupError(f"{self.name} has no actuator profile {name!r}; there is {there}")
+        return self if name == self.motors.profile else self.model_copy(update={"profile": name})
+
+    @cached_property
+    def motors(self) -> Motors:
+        """What every motor of the profile in use can do."""
+        name = self.profile or next(iter(self.profiles))
+        profile = self.profiles[name]
+
+        def values(what: str, names: tuple[str, ...]) -> Array:
+            found = np.full(len(names), getattr(profile, what))
+            for pattern, rating in profile.motors.items():
+                value = getattr(rating, what)
+                for k, each in enumerate(names):
+                    if value is not None and fnmatchcase(each, pattern):
+                        found[k] = value
+            return found
+
+        names = self.transmission.motors
+        return Motors(
+            name,
+            *(
+                values(what, names)
+                for what in (
+                    "peak_torque", "corner_speed", "no_load_speed", "continuous_torque",
+                    "rotor_inertia", "friction", "damping",
+                )
+            ),
+        )  # fmt: skip
+
+    @cached_property
+    def rotor_matrix(self) -> Array:
+        """The rotors' inertia as seen by the joints [kg m^2], (n_joints, n_joints)."""
+        matrix = self.joint_to_motor
+        return np.asarray((matrix.T * self.motors.rotor_inertia) @ matrix)
 
     @cached_property
     def joint_to_motor(self) -> NDArray[np.float64]:
@@ -164,8 +281,9 @@ class RobotDescription(_Data):
 
     @cached_property
     def joint_limits(self) -> NDArray[np.float64]:
-        """Lower and upper joint limits [rad], (n_joints, 2)."""
-        return np.array([j.limits for j in self.joints])
+        """Lower and upper joint limits [rad], (n_joints, 2); infinite where there are none."""
+        free = (-np.inf, np.inf)
+        return np.array([j.limits or free for j in self.joints]).reshape(-1, 2)
 
     @cached_property
     def total_mass(self) -> float:

@@ -26,7 +26,7 @@ A small one::
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, ClassVar, Generic, Literal, Self, TypeVar, overload
@@ -41,6 +41,8 @@ from .signals import Signal
 S = TypeVar("S", bound=Signal)
 Metric = float | int | bool | str
 """The type of one named result of a run."""
+Need = Literal["robot", "floating base", "feet", "imu", "switches"]
+"""What a block may need of the graph's robot."""
 
 
 class Port(Generic[S]):
@@ -114,6 +116,21 @@ class State(Port[S]):
     """What the block remembers from tick to tick, kept in the graph's state buffer."""
 
 
+@dataclass(frozen=True)
+class Misfit:
+    """Something about the graph's robot or a parameter that a block cannot work with.
+
+    ``message`` says what is wrong, ``parameter`` names the parameter that it is about, if any, and
+    ``fix`` is what to write instead.
+    """
+
+    message: str
+    parameter: str = ""
+    expected: str = ""
+    found: str = ""
+    fix: str = ""
+
+
 @dataclass
 class Clock:
     """The time of a run: the present tick, the seconds one takes, and how it is paced (the
@@ -167,6 +184,9 @@ class Block:
     class then says which in ``allocation_reason``."""
     allocation_reason: ClassVar[str] = ""
 
+    needs: ClassVar[tuple[Need, ...]] = ()
+    """What the graph's robot must have for this block; missing ones are in the load report."""
+
     params: Parameters
     context: Context
 
@@ -213,6 +233,15 @@ class Block:
         """
         values = {name: getattr(params, name) for name in type(params).model_fields}
         return {n: v for n, v in values.items() if isinstance(v, int) and not isinstance(v, bool)}
+
+    @classmethod
+    def requires(cls, params: Parameters, robot: RobotDescription | None) -> Iterable[Misfit]:
+        """What does not fit this block, asked at load; nothing when all is well.
+
+        Called only if the robot has all that ``needs`` names, so a block that needs a robot is
+        never asked without one. What is found here is part of the load report.
+        """
+        return ()
 
     @classmethod
     def state_dimensions(

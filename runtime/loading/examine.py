@@ -12,6 +12,7 @@ from ..language.registry import BlockImportError, find_block, nearest_names
 from ..language.schedule import ScheduleBlock, find_loops, order_blocks
 from ..language.signals import Signal
 from ..language.stages import BlockSpec, CheckedGraph, Position, Wire
+from .fit import check_fit
 from .flat import FlatBlock, FlatGraph
 from .inserted import insert_constant, insert_delay, read_values
 from .parameter_check import check_parameters
@@ -70,6 +71,8 @@ def _draft(flat: FlatBlock, graph: FlatGraph, settings: Settings, problems: Prob
         return draft
     draft.dimensions = {**settings.dimensions, **local}
     draft.complete = _check_dimensions(draft, settings, problems)
+    if settings.robot_known:
+        check_fit(draft, settings.robot, problems)
     return draft
 
 
