@@ -55,7 +55,8 @@ def build_pinocchio_model(robot: RobotDescription, profile: str = "koala") -> Pi
         revolute = pin.JointModelRevoluteUnaligned(np.array(joint.axis)) if kind is None else kind()
         place = pin.SE3(np.eye(3), np.array(joint.origin))
         carrier[joint.child] = model.addJoint(carrier[joint.parent], revolute, place, joint.name)
-        model.lowerPositionLimit[-1], model.upperPositionLimit[-1] = joint.limits
+        lower, upper = joint.limits or (-np.inf, np.inf)
+        model.lowerPositionLimit[-1], model.upperPositionLimit[-1] = lower, upper
     for link in robot.links:
         xx, yy, zz, xy, xz, yz = link.inertia
         tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])

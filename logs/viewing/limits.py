@@ -20,7 +20,7 @@ def limits_of(field: RecordedField, header: Header) -> list[tuple[str, float]]:
         named = [
             (f"{joint.name} {side}", value)
             for joint in robot.joints
-            for side, value in zip(("least", "most"), joint.limits, strict=True)
+            for side, value in zip(("least", "most"), joint.limits or (), strict=False)
         ]
         return _once(named)
     names = {str(value) for value in header.parameters.values()}

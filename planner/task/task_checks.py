@@ -47,7 +47,7 @@ def _unknown_names(task: JumpTask, robot: RobotDescription) -> Iterator[Contradi
     if task.profile not in robot.profiles:
         there = ", ".join(robot.profiles)
         yield "profile", f"{robot.name} has no actuator profile {task.profile!r}; there is {there}"
-    joints = {joint.name: joint.limits for joint in robot.joints}
+    joints = dict(zip((j.name for j in robot.joints), robot.joint_limits.tolist(), strict=True))
     for key, given in (("initial", task.initial), ("final", task.final)):
         for name, angle in given.items():
             if name not in joints:
