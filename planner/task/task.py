@@ -25,8 +25,6 @@ from .sequence import FreeTimes, Hop, Place, Span, check_spans, places_of
 
 __all__ = ["JumpTask", "Knots", "TaskError", "Weights", "make_task", "read_task"]
 
-GRAVITY = 9.81
-"""m/s^2"""
 
 PLAN_FORMAT = 1
 """Part of every task's hash: plans of an older format or meaning are not taken from a library."""
