@@ -11,12 +11,18 @@ from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from functools import cached_property, lru_cache
 from pathlib import Path
-from typing import Any, Literal, Self
+from typing import Any, ClassVar, Literal, Self
 
 import numpy as np
 import yaml
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, model_validator
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    SerializerFunctionWrapHandler,
+    model_serializer,
+    model_validator,
+)
 
 Vector3 = tuple[float, float, float]
 Array = NDArray[np.float64]
@@ -27,6 +33,19 @@ BASE_VELOCITIES = {"floating": 6, "planar": 3, "fixed": 0}
 
 class _Data(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, ignored_types=(cached_property,))
+
+    later: ClassVar[tuple[str, ...]] = ()
+    """Fields that came after version 0.1. They are left out where they have their default, so that
+    a description that does not use them keeps its content, and plans made for it their keys."""
+
+    @model_serializer(mode="wrap")
+    def _without_unused(self, serialize: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        data: dict[str, Any] = serialize(self)
+        fields = type(self).model_fields
+        for name in self.later:
+            if getattr(self, name) == fields[name].default:
+                data.pop(name, None)
+        return data
 
 
 class Shape(_Data):
@@ -54,6 +73,8 @@ class Joint(_Data):
     A ``hinge`` turns the child about ``axis`` [rad]; a ``slide`` moves it along ``axis`` [m].
     ``limits`` are in the same unit; ``None`` is a joint without limits.
     """
+
+    later = ("kind",)
 
     name: str
     kind: Literal["hinge", "slide"] = "hinge"
@@ -107,6 +128,8 @@ class ActuatorProfile(_Data):
     later entries win. For a motor that drives a slide, N stands for N m and m for rad.
     """
 
+    later = ("motors",)
+
     peak_torque: float
     corner_speed: float
     no_load_speed: float
@@ -159,6 +182,8 @@ class RobotDescription(_Data):
     contacts may be missing. ``held`` are joints that stand still at an angle while the robot is
     at work: the planner leaves them out, and the controller holds them.
     """
+
+    later = ("base_joint", "profile", "sensors", "held")
 
     name: str
     text: str = ""
@@ -229,7 +254,15 @@ class RobotDescription(_Data):
         if name not in self.profiles:
             there = ", ".join(self.profiles)
             raise LookupError(f"{self.name} has no actuator profile {name!r}; there is {there}")
-        return self if name == self.motors.profile else self.model_copy(update={"profile": name})
+        return self if name == self.motors.profile else self.changed(profile=name)
+
+    def changed(self, **fields: Any) -> Self:
+        """A copy with other values in some fields, which are not validated again."""
+        copy = self.model_copy(update=fields)
+        for name in list(vars(copy)):  # pydantic copies cached properties too
+            if name not in type(self).model_fields:
+                del vars(copy)[name]
+        return copy
 
     @cached_property
     def motors(self) -> Motors:
