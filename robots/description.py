@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from fnmatch import fnmatchcase
 from functools import cached_property
 from pathlib import Path
-from typing import Literal, Self
+from typing import Any, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -62,6 +62,8 @@ class RobotDescription(Part):
     at work: the planner leaves them out, and the controller holds them.
     """
 
+    later = ("base_joint", "profile", "sensors", "held")
+
     name: str
     text: str = ""
     base: str
@@ -107,7 +109,15 @@ class RobotDescription(Part):
         if name not in self.profiles:
             there = ", ".join(self.profiles)
             raise LookupError(f"{self.name} has no actuator profile {name!r}; there is {there}")
-        return self if name == self.motors.profile else self.model_copy(update={"profile": name})
+        return self if name == self.motors.profile else self.changed(profile=name)
+
+    def changed(self, **fields: Any) -> Self:
+        """A copy with other values in some fields, which are not validated again."""
+        copy = self.model_copy(update=fields)
+        for name in list(vars(copy)):  # pydantic copies cached properties too
+            if name not in type(self).model_fields:
+                del vars(copy)[name]
+        return copy
 
     @cached_property
     def motors(self) -> Motors:

@@ -8,11 +8,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict
+from pydantic import BaseModel, ConfigDict, SerializerFunctionWrapHandler, model_serializer
 
 Vector3 = tuple[float, float, float]
 Array = NDArray[np.float64]
@@ -22,6 +22,19 @@ class Part(BaseModel):
     """Unchangeable data with no keys but those declared."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, ignored_types=(cached_property,))
+
+    later: ClassVar[tuple[str, ...]] = ()
+    """Fields that came after version 0.1. They are left out where they have their default, so that
+    a description that does not use them keeps its content, and plans made for it their keys."""
+
+    @model_serializer(mode="wrap")
+    def _without_unused(self, serialize: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        data: dict[str, Any] = serialize(self)
+        fields = type(self).model_fields
+        for name in self.later:
+            if getattr(self, name) == fields[name].default:
+                data.pop(name, None)
+        return data
 
 
 class Shape(Part):
@@ -49,6 +62,8 @@ class Joint(Part):
     A ``hinge`` turns the child about ``axis`` [rad]; a ``slide`` moves it along ``axis`` [m].
     ``limits`` are in the same unit; ``None`` is a joint without limits.
     """
+
+    later = ("kind",)
 
     name: str
     kind: Literal["hinge", "slide"] = "hinge"
@@ -100,7 +115,10 @@ class ActuatorProfile(Part):
 
     ``motors`` gives other values for motors by name or by a shell pattern such as ``*_knee_*``;
     later entries win. For a motor that drives a slide, N stands for N m and m for rad.
+    A joint that no motor drives has one of ``peak_torque`` zero among ``motors``.
     """
+
+    later = ("motors",)
 
     peak_torque: float
     corner_speed: float
