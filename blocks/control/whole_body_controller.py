@@ -9,6 +9,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from ...mathematics.constants import GRAVITY
 from ...mathematics.quadratic_program import QuadraticProgramSolver
 from ...mathematics.rotations import from_matrix
 from ...mathematics.whole_body_qp import (
@@ -41,7 +42,6 @@ from ..signals import (
 from .task_gains import GainArrays, TaskGains
 
 Array = NDArray[np.float64]
-_GRAVITY = 9.81
 
 
 class SolverMemory(Signal):
@@ -337,7 +337,7 @@ class WholeBodyController(Block):
         if failed <= p.fallback_ticks:
             np.multiply(memory.torque, p.fallback_decay**failed, out=command.torque)
             return
-        share_weight(self.phase.stance, self._mass * _GRAVITY, command.force)
+        share_weight(self.phase.stance, self._mass * GRAVITY, command.force)
         joint_torque(
             terms.mass_matrix, terms.nonlinear_effects, terms.contact_jacobian, self._still,
             command.force, self._product, command.torque,

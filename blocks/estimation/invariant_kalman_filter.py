@@ -8,8 +8,9 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from ...mathematics.constants import GRAVITY
 from ...mathematics.extended_pose import retract
-from ...mathematics.inertial_filter import GRAVITY, misalignment, propagate, turn, upright
+from ...mathematics.inertial_filter import misalignment, propagate, turn, upright
 from ...mathematics.invariant_contacts import (
     admit,
     centre,

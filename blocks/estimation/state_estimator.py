@@ -8,8 +8,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from ...mathematics.constants import GRAVITY
 from ...mathematics.inertial_filter import (
-    GRAVITY,
     misalignment,
     propagate,
     right_up,

@@ -7,13 +7,13 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from ...mathematics.constants import GRAVITY
 from ...mathematics.kernel import kernel
 from ...runtime.language.block import Block, Input, Output, State
 from ...runtime.language.parameters import Parameters, live_parameter
 from ...runtime.language.signals import Field, Signal
 from ..signals import ContactState, DynamicsTerms, JumpReference, Phase, PhaseState
 
-_GRAVITY = 9.81
 _THRUST = int(Phase.THRUST)
 
 
@@ -157,14 +157,14 @@ def count_unloaded(
 @kernel
 def planned_touchdown_height(height: float, velocity: float, remaining: float) -> float:
     """Where a body at ``height`` with ``velocity`` will be after falling for ``remaining``."""
-    return height + remaining * (velocity - 0.5 * _GRAVITY * remaining)
+    return height + remaining * (velocity - 0.5 * GRAVITY * remaining)
 
 
 @kernel
 def time_to_height(height: float, velocity: float, goal: float) -> float:
     """The time [s] until a falling body comes down to ``goal``; its apex where it is below that."""
-    square = velocity * velocity + 2.0 * _GRAVITY * (height - goal)
-    return max(0.0, (velocity + math.sqrt(max(square, 0.0))) / _GRAVITY)
+    square = velocity * velocity + 2.0 * GRAVITY * (height - goal)
+    return max(0.0, (velocity + math.sqrt(max(square, 0.0))) / GRAVITY)
 
 
 @kernel

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ...mathematics.constants import GRAVITY
 from ...mathematics.polynomials import minimum_jerk, quintic
 from ...robots.description import RobotDescription
 from ...robots.pinocchio_model import PinocchioModel
@@ -22,9 +23,6 @@ from .guided_motion import GuidedBody, Motion, MotionRecorder
 from .jump_table import JumpTable
 
 Array = NDArray[np.float64]
-
-GRAVITY = 9.81
-"""m/s^2"""
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,7 @@ from math import degrees, hypot, sqrt
 
 import numpy as np
 
+from ...mathematics.constants import GRAVITY
 from ...mathematics.support_margin import support_margin
 from ...runtime.language.block import Block, Input, Metric, State
 from ..signals import JumpReference, RobotTruth, WholeBodyCommand
@@ -20,8 +21,6 @@ from .jump_series import (
     note_place,
     series_failure,
 )
-
-GRAVITY = 9.81
 
 
 class JumpScore(Block):

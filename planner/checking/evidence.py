@@ -9,10 +9,10 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from ...mathematics.constants import GRAVITY
 from ...robots.description import RobotDescription
 from ...robots.kinematics import LinkPoses, link_poses, matrices_of_quaternions
 from ..library.plan import JumpPlan
-from ..task.task import GRAVITY
 from .clearance import ground_height
 from .replay import Replay
 

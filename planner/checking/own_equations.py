@@ -10,12 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...blocks.signals import Phase
+from ...mathematics.constants import GRAVITY
 from ...robots.description import RobotDescription
 from ...robots.kinematics import matrices_of_quaternions
 from ..library.plan import JumpPlan
 from ..models.exact_dynamics import ExactDynamics
 from ..models.quaternions import product
-from ..task.task import GRAVITY
 from .midpoint import angular_motion, euler_angles, euler_rates, rotation
 
 Array = NDArray[np.float64]

@@ -16,9 +16,9 @@ from typing import Any
 
 import numpy as np
 
+from ...mathematics.constants import GRAVITY
 from ...robots.description import Joint, Link, RobotDescription
 
-GRAVITY = 9.81
 Expression = Any
 """A CasADi SX or DM; the library has no types of its own."""
 

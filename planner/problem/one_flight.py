@@ -9,9 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...blocks.signals import Phase
+from ...mathematics.constants import GRAVITY
 from ..errors import PlanError
 from ..models.exact_dynamics import ExactDynamics, joint_motion
-from ..task.task import GRAVITY, JumpTask
+from ..task.task import JumpTask
 
 Array = NDArray[np.float64]
 

@@ -25,8 +25,6 @@ from .sequence import FreeTimes, Hop, Place, Span, check_spans, places_of
 
 __all__ = ["JumpTask", "Knots", "TaskError", "Weights", "make_task", "read_task"]
 
-GRAVITY = 9.81
-"""m/s^2"""
 
 PLAN_FORMAT = 1
 """Part of every task's hash: plans of an older format or meaning are not taken from a library."""
@@ -250,7 +248,8 @@ class JumpTask(FreeTimes):
         whole = {
             "format": PLAN_FORMAT,
             "task": self.content(),
-            "robot": robot.model_dump(mode="json"),
+            # The task says itself which actuators it is planned for.
+            "robot": robot.changed(profile="").model_dump(mode="json"),
         }
         text = json.dumps(whole, sort_keys=True, separators=(",", ":"))
         return hashlib.sha256(text.encode()).hexdigest()[:20]
