@@ -14,7 +14,7 @@ from .jump_table import JumpTableReader
 
 if TYPE_CHECKING:
     from ...planner.checking.validity import ValidityReport
-    from ...planner.library.plan import JumpPlan as Plan
+    from ...planner.task.plan import JumpPlan as Plan
     from ...planner.task.task import JumpTask
     from ...robots.description import RobotDescription
 
@@ -148,8 +148,8 @@ class JumpPlan(Block):
             raise BlockError(str(error)) from error
 
     def _plan(self, task: JumpTask, robot: RobotDescription) -> Plan:
-        from ...planner.errors import TaskError
         from ...planner.library.library import PlanLibrary
+        from ...planner.task.errors import TaskError
 
         folder = Path(self.params.library) if self.params.library else None
         library = PlanLibrary(robot, folder)

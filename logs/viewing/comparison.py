@@ -10,7 +10,7 @@ from os import PathLike
 from pathlib import Path
 
 from ..file.reader import RecordedRun
-from ..file.run_stream import RunStream
+from ..recording.run_stream import RunStream
 from .blueprint import recording_blueprint
 from .plot_views import Shown
 from .scene_part import OTHER_RUN, Colors

@@ -8,12 +8,7 @@ import pytest
 import yaml
 from pydantic import ValidationError
 
-from aloft.robots.description import (
-    MotorRating,
-    RobotDescription,
-    find_robot,
-    read_description,
-)
+from aloft.robots.description import MotorRating, RobotDescription, find_robot, read_description
 
 
 def hopper() -> dict[str, Any]:
