@@ -6,11 +6,11 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
+from ...planner.library.jump_table import JumpTableReader
 from ...runtime.language.block import Block, Metric, Output
 from ...runtime.language.errors import BlockError
 from ...runtime.language.parameters import Parameters, parameter
 from ..signals import JumpReference
-from .jump_table import JumpTableReader
 
 if TYPE_CHECKING:
     from ...planner.checking.validity import ValidityReport

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from aloft.blocks.jumping.jump_table import JumpTable
+from aloft.planner.library.jump_table import JumpTable
 from aloft.planner.library.library import SHIPPED, PlanLibrary
 from aloft.planner.library.reference_table import reference_table
 from aloft.planner.task.plan import JumpPlan
