@@ -6,14 +6,8 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
-from pydantic import ValidationError
 
-from aloft.robots.description import (
-    MotorRating,
-    RobotDescription,
-    find_robot,
-    read_description,
-)
+from aloft.robots.description import MotorRating, RobotDescription, find_robot, read_description
 
 
 def hopper() -> dict[str, Any]:
@@ -35,7 +29,13 @@ def hopper() -> dict[str, Any]:
             {"name": "toe", "foot": "foot", "position": [0, 0, -0.2], "radius": 0.005}
         ],
         "transmission": {"motors": ["a", "b"], "joint_to_motor": [[1, 0], [1, 1]]},
-        "profiles": {},
+        "profiles": {
+            "small": {
+                "peak_torque": 5.0, "corner_speed": 10.0, "no_load_speed": 20.0,
+                "continuous_torque": 2.0, "rotor_inertia": 0.001, "friction": 0.05,
+                "damping": 0.01,
+            }
+        },
         "standing": {"knee": 0.5},
     }  # fmt: skip
 
@@ -50,30 +50,6 @@ def test_derived_figures() -> None:
     torque, velocity = np.array([3.0, -2.0]), np.array([0.7, 1.1])
     motor_power = (robot.torque_to_motor @ torque) @ (robot.joint_to_motor @ velocity)
     assert motor_power == pytest.approx(torque @ velocity)
-
-
-@pytest.mark.parametrize(
-    ("path", "value", "message"),
-    [
-        (("base",), "torso", "base 'torso' is not one of body, thigh, shank"),
-        (("joints", 1, "parent"), "thig", "joint knee: parent 'thig' is not one of"),
-        (("joints", 1, "name"), "hip", "joint 'hip' is there twice"),
-        (("feet", 0, "link"), "toe", "foot foot: link 'toe' is not one of"),
-        (("contacts", 0, "foot"), "feet", "contact toe: foot 'feet' is not one of foot"),
-        (("standing",), {"nee": 1}, "standing 'nee' is not one of hip, knee"),
-        (("transmission", "joint_to_motor"), [[1, 0]], "joint_to_motor must be 2 x 2"),
-        (("links", 0, "weight"), 2, "Extra inputs are not permitted"),
-    ],
-)
-def test_wrong_names_are_named(path: tuple[Any, ...], value: object, message: str) -> None:
-    data = hopper()
-    place: Any = data
-    for key in path[:-1]:
-        place = place[key]
-    place[path[-1]] = value
-    with pytest.raises(ValidationError) as error:
-        RobotDescription.model_validate(data)
-    assert message in str(error.value)
 
 
 def test_a_robot_of_the_users_own_file(tmp_path: Path) -> None:
