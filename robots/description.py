@@ -195,9 +195,9 @@ def read_description(path: Path) -> RobotDescription:
     Raises:
         RobotError: the file cannot be read, or describes no robot; it carries every fault.
     """
-    from .reading import read_robot
+    from .reading import read
 
-    return read_robot(path)
+    return read(path).description
 
 
 def find_robot(name: str, folder: Path | None = None) -> RobotDescription:
