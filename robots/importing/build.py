@@ -66,7 +66,8 @@ class Built:
 
 def tidy(values: Any) -> list[float]:
     """Plain numbers without the rounding errors of a rotation."""
-    return [float(value) for value in np.round(np.asarray(values, dtype=float), 11) + 0.0]
+    numbers = np.round(np.asarray(values, dtype=float), 13)
+    return [float(value) for value in np.where(np.abs(numbers) < 1e-11, 0.0, numbers)]
 
 
 def build(model: RawModel, welded: Collection[str] = (), base_joint: str = "") -> Built:
