@@ -9,7 +9,6 @@ import pytest
 from aloft.blocks.control.dynamics import Dynamics
 from aloft.robots.description import find_robot
 from aloft.robots.pinocchio_model import build_pinocchio_model
-from aloft.runtime.language.errors import BlockError
 from aloft.runtime.testing import BlockBench
 
 ROBOT = find_robot("bruce")
@@ -199,13 +198,13 @@ def test_orientation_need_not_be_exactly_of_unit_length(bench):
     assert np.abs(bench.get("terms").mass_matrix - terms["mass_matrix"]).max() < 1e-14
 
 
-def test_unknown_actuator_profile_names_the_known_ones():
-    with pytest.raises(
-        BlockError, match=r"bruce has no actuator profile 'squirrel'; there is koala"
-    ):
-        BlockBench(Dynamics, {"actuators": "squirrel"}, robot="bruce")
-
-
-def test_needs_a_robot():
-    with pytest.raises(BlockError, match="name one in the graph"):
-        BlockBench(Dynamics, dimensions=dict(ROBOT.dimensions))
+def test_the_rotors_are_those_of_the_profile_in_use(bench):
+    heavy = ROBOT.profiles["koala"].model_copy(update={"rotor_inertia": 0.05})
+    robot = ROBOT.model_copy(update={"profiles": {"koala": ROBOT.profiles["koala"], "heavy": heavy}})
+    state = State(5)
+    light = evaluate(BlockBench(Dynamics, robot=robot), state)["mass_matrix"]
+    loaded = evaluate(BlockBench(Dynamics, robot=robot.with_profile("heavy")), state)["mass_matrix"]
+    change = (0.05 - ROBOT.profiles["koala"].rotor_inertia) * (
+        ROBOT.joint_to_motor.T @ ROBOT.joint_to_motor
+    )
+    assert (loaded - light)[6:, 6:] == pytest.approx(change, abs=1e-12)
