@@ -200,7 +200,7 @@ def test_orientation_need_not_be_exactly_of_unit_length(bench):
 
 def test_the_rotors_are_those_of_the_profile_in_use(bench):
     heavy = ROBOT.profiles["koala"].model_copy(update={"rotor_inertia": 0.05})
-    robot = ROBOT.model_copy(update={"profiles": {"koala": ROBOT.profiles["koala"], "heavy": heavy}})
+    robot = ROBOT.changed(profiles={"koala": ROBOT.profiles["koala"], "heavy": heavy})
     state = State(5)
     light = evaluate(BlockBench(Dynamics, robot=robot), state)["mass_matrix"]
     loaded = evaluate(BlockBench(Dynamics, robot=robot.with_profile("heavy")), state)["mass_matrix"]

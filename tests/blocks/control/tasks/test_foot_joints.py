@@ -19,12 +19,12 @@ def test_a_line_foot_rolls_with_its_ankle():
 
 def test_a_point_foot_does_not_roll():
     toes = [contact for contact in BRUCE.contacts if contact.name.endswith("toe")]
-    points = BRUCE.model_copy(update={"contacts": tuple(toes)})
+    points = BRUCE.changed(contacts=tuple(toes))
     assert [rolling_joint(points, foot) for foot in (0, 1)] == [None, None]
 
 
 def test_an_ankle_that_ends_in_a_roll_axis_rolls_with_the_pitch_axis_before_it():
     joints = list(BRUCE.joints)
     joints[4] = joints[4].model_copy(update={"axis": (1.0, 0.0, 0.0)})
-    sideways = BRUCE.model_copy(update={"joints": tuple(joints)})
+    sideways = BRUCE.changed(joints=tuple(joints))
     assert rolling_joint(sideways, 0) == 3

@@ -37,7 +37,7 @@ def test_a_joint_accelerates_by_feedforward_and_feedback():
 
 def test_by_default_it_is_for_joints_of_no_leg_and_held_ones():
     assert chosen_joints(BRUCE, PostureChoice()) == []
-    held = BRUCE.model_copy(update={"held": {"left_hip_yaw": 0.1}})
+    held = BRUCE.changed(held={"left_hip_yaw": 0.1})
     assert chosen_joints(held, PostureChoice()) == [5]
 
 
