@@ -35,7 +35,7 @@ class Dynamics(Block):
     feet, loaded or not.
     """
 
-    needs = ("robot", "floating base")
+    needs = ("floating base",)
 
     base = Input(BaseState, text="pose and velocity of the base")
     joints = Input(JointState, text="joint angles and velocities")
@@ -44,8 +44,7 @@ class Dynamics(Block):
     def setup(self) -> None:
         import pinocchio
 
-        robot = self.context.robot
-        assert robot is not None
+        robot = self.robot
         built = build_pinocchio_model(robot)
         self._pinocchio: Any = pinocchio
         self._model: Any = built.model

@@ -26,8 +26,7 @@ from ...mathematics.whole_body_qp import (
     torque_limits,
 )
 from ...robots.description import RobotDescription
-from ...runtime.language.block import Block, Input, Misfit, Output, State
-from ...runtime.language.errors import BlockError
+from ...runtime.language.block import Block, Context, Input, Misfit, Output, State
 from ...runtime.language.parameters import Parameters, live_parameter, parameter
 from ...runtime.language.signals import Field, Signal
 from ..signals import (
@@ -91,15 +90,12 @@ class WholeBodyController(Block):
 
     Works for any robot with a floating base and feet. It does no feedback on joints (``JointPD``
     does) and keeps no solver state: a cold start makes the answer a function of the inputs alone.
-
-    Raises:
-        BlockError: at load, for a solver that is not installed, an unknown task or a gain that a
-            task does not have.
+    The load report has a problem where the solver is not installed, where a task is unknown or
+    has no such gain, and where the feet can carry nothing.
     """
 
     array_allocations = 12
     allocation_reason = "qpsolvers and the solver behind it return new arrays for every problem"
-    needs = ("robot", "floating base", "feet")
 
     class Params(Parameters):
         tasks: list[str | TaskChoice] = parameter(
@@ -148,6 +144,7 @@ class WholeBodyController(Block):
             0.9, ge=0.0, le=1.0, text="factor on it per tick since the last solved program"
         )
 
+    needs = ("floating base", "feet")
     params: Params
     terms = Input(DynamicsTerms, text="the whole-body model at the present state")
     target = Input(WholeBodyTarget, text="what to achieve")
@@ -158,22 +155,32 @@ class WholeBodyController(Block):
 
     @classmethod
     def requires(cls, params: Parameters, robot: RobotDescription | None) -> Iterable[Misfit]:
-        """Contact points and an installed solver."""
-        assert robot is not None and isinstance(params, cls.Params)
+        """A solver that is installed, and feet with contact points that joints carry."""
+        assert isinstance(params, cls.Params) and robot is not None
         if not robot.contacts:
             yield Misfit(f"{robot.name} has no contact points, so its feet can carry no load")
         try:
-            QuadraticProgramSolver(params.solver)
+            QuadraticProgramSolver.check_name(params.solver)
         except LookupError as error:
-            yield Misfit(str(error), parameter="solver", found=params.solver, fix="daqp")
+            yield Misfit(str(error), parameter="solver", found=params.solver, fix="solver: daqp")
+        for foot in robot.feet:
+            if foot.link == robot.base:
+                yield Misfit(f"foot {foot.name} of {robot.name} is part of the base, not of a leg")
+
+    @classmethod
+    def requires_of_graph(cls, params: Parameters, context: Context) -> Iterable[Misfit]:
+        """Tasks that can be found, each with gains that it has."""
+        assert isinstance(params, cls.Params)
+        try:
+            for chosen in choose_tasks(params.tasks, context.folder):
+                for kind in PHASE_KINDS:
+                    chosen.gains(kind, getattr(params, kind))
+        except TaskChoiceError as error:
+            yield Misfit(str(error), parameter="tasks")
 
     def setup(self) -> None:
-        robot, p = self.context.robot, self.params
-        assert robot is not None
-        try:
-            self._solver = QuadraticProgramSolver(p.solver)
-        except LookupError as error:
-            raise BlockError(str(error)) from error
+        robot, p = self.robot, self.params
+        self._solver = QuadraticProgramSolver(p.solver)
         self._weight = robot.total_mass * GRAVITY
         n_joints, n_contacts, n = len(robot.joints), len(robot.contacts), 6 + len(robot.joints)
         self._motors, self._to_motor = robot.motors, robot.joint_to_motor
@@ -205,16 +212,11 @@ class WholeBodyController(Block):
     def _build_tasks(self, robot: RobotDescription, n: int) -> None:
         """The chosen tasks, each with its part of the rows."""
         situation = Situation(robot, self.terms, self.target, self.phase, self.joints)
-        try:
-            self._chosen: tuple[ChosenTask, ...] = choose_tasks(
-                self.params.tasks, self.context.folder
-            )
-            counts = [
-                chosen.kind.row_count(robot, chosen.gains("stand", self.params.stand))
-                for chosen in self._chosen
-            ]
-        except TaskChoiceError as error:
-            raise BlockError(str(error)) from error
+        self._chosen: tuple[ChosenTask, ...] = choose_tasks(self.params.tasks, self.context.folder)
+        counts = [
+            chosen.kind.row_count(robot, chosen.gains("stand", self.params.stand))
+            for chosen in self._chosen
+        ]
         total = sum(counts)
         self._rows = TaskRows(np.zeros((total, n)), np.zeros(total), np.zeros(total))
         self._scratch = CostScratch(np.zeros((total, n)), np.zeros((n, n)), np.zeros(n))
@@ -230,16 +232,13 @@ class WholeBodyController(Block):
         most = 8.0 * self._weight if p.force_max is None else p.force_max
         self._cone = FrictionCone(p.friction, p.force_min, most)
         np.multiply(p.torque_margin, self._motors.peak_torque, out=self._curves.peak)
-        try:
-            self._gains = {
-                kind: [
-                    task.prepare(chosen.gains(kind, getattr(p, kind)))
-                    for chosen, task in zip(self._chosen, self._tasks, strict=True)
-                ]
-                for kind in PHASE_KINDS
-            }
-        except TaskChoiceError as error:
-            raise BlockError(str(error)) from error
+        self._gains = {
+            kind: [
+                task.prepare(chosen.gains(kind, getattr(p, kind)))
+                for chosen, task in zip(self._chosen, self._tasks, strict=True)
+            ]
+            for kind in PHASE_KINDS
+        }
 
     def step(self) -> None:
         memory, command = self.memory, self.command
