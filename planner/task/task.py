@@ -18,7 +18,7 @@ from pydantic import ValidationError, model_validator
 
 from ...robots.description import RobotDescription, find_robot
 from ...runtime.language.parameters import Parameters, parameter
-from ..errors import TaskError
+from .errors import TaskError
 from .margins import Margins
 from .placed_file import PlacedFile, read_placed
 from .sequence import FreeTimes, Hop, Place, Span, check_spans, places_of
@@ -248,7 +248,8 @@ class JumpTask(FreeTimes):
         whole = {
             "format": PLAN_FORMAT,
             "task": self.content(),
-            "robot": robot.model_dump(mode="json"),
+            # The task says itself which actuators it is planned for.
+            "robot": robot.changed(profile="").model_dump(mode="json"),
         }
         text = json.dumps(whole, sort_keys=True, separators=(",", ":"))
         return hashlib.sha256(text.encode()).hexdigest()[:20]

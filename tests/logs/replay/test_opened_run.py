@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from aloft.logs.file.header import make_header
-from aloft.logs.file.writer import RecordingWriter
+from aloft.logs.recording.writer import RecordingWriter
 from aloft.logs.replay.opened_run import OpenedRun
 from aloft.logs.replay.replay import replay
 from aloft.logs.replay.replayable import Keyframes

@@ -67,7 +67,7 @@ def test_listing_names_imports_no_block(monkeypatch: pytest.MonkeyPatch) -> None
 
 
 def test_an_unknown_block() -> None:
-    with pytest.raises(UnknownBlockError, match=r"there is no block called 'runtime\.Gian'"):
+    with pytest.raises(UnknownBlockError, match=r"there is no block called 'blocks\.Gian'"):
         find_block("blocks.Gian")
     assert nearest_names("blocks.Gian") == ("blocks.Gain",)
     assert nearest_names("Gain")[0] == "blocks.Gain"

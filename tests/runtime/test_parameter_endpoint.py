@@ -10,14 +10,9 @@ from pathlib import Path
 import pytest
 
 from aloft.blocks.general.primitives import Gain, SineWave
+from aloft.runtime.parameter_endpoint import EndpointError, ParameterEndpoint, ask, set_parameters
 from aloft.runtime.running.executor import Executor
 from aloft.runtime.running.memory import BoundGraph
-from aloft.runtime.running.parameter_endpoint import (
-    EndpointError,
-    ParameterEndpoint,
-    ask,
-    set_parameters,
-)
 from aloft.runtime.testing import Use, checked_graph
 
 
