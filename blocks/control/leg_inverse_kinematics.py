@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...mathematics.kernel import kernel
+from ...robots.description import RobotDescription
 from ...robots.leg_kinematics import forward, inverse, inverse_velocity, jacobian, read_leg
-from ...runtime.language.block import Block, Input, Output, State
+from ...runtime.language.block import Block, Input, Misfit, Output, State
 from ...runtime.language.errors import BlockError
 from ...runtime.language.parameters import Parameters, live_parameter, parameter
 from ...runtime.language.signals import Field, Signal
@@ -55,12 +57,12 @@ class LegInverseKinematics(Block):
     its limit. A line that turns by more than 0.1 rad in one tick is a new target, not a motion.
 
     With ``follow: pitch`` the soles have the pitch they have in the plan, so that heels that rose
-    before lift-off come down as planned and not at once. With ``follow: plan`` the targets are the plan's joints while the plan flies, and the landing
-    law has no say: a somersault turns as fast as its legs are tucked, so its rotation is right
-    only if all joints are where they should be.
+    before lift-off come down as planned and not at once. With ``follow: plan`` the targets are the
+    plan's joints while the plan flies, and the landing law has no say: a somersault turns as fast
+    as its legs are tucked, so its rotation is right only if all joints are where they should be.
 
     Joints that belong to no leg keep their measured angle. Does not avoid collisions between the
-    legs. Raises ``BlockError`` at load for a leg that is not a hip yaw, pitch and roll with
+    legs. The load report has a problem for every leg that is not a hip yaw, pitch and roll with
     intersecting axes, a knee and an ankle.
     """
 
@@ -86,6 +88,7 @@ class LegInverseKinematics(Block):
             "turn", text="what is given up first for a target out of reach"
         )
 
+    needs = ("feet",)
     params: Params
 
     feet = Input(FootTarget, text="where the feet should be, from the base")
@@ -94,10 +97,18 @@ class LegInverseKinematics(Block):
     target = Output(JointTarget, text="joint angles and velocities to track")
     lines = State(FootLines, text="to difference the lines")
 
+    @classmethod
+    def requires(cls, params: Parameters, robot: RobotDescription | None) -> Iterable[Misfit]:
+        """Legs that the closed form can solve."""
+        assert robot is not None
+        for foot in range(len(robot.feet)):
+            try:
+                read_leg(robot, foot)
+            except BlockError as error:
+                yield Misfit(str(error))
+
     def setup(self) -> None:
-        robot = self.context.robot
-        if robot is None:
-            raise BlockError("LegInverseKinematics needs a robot: name one in the graph")
+        robot = self.robot
         self._legs = [read_leg(robot, foot) for foot in range(len(robot.feet))]
         margin = self.params.margin
         for leg in self._legs:

@@ -10,7 +10,7 @@ import numpy as np
 
 from ...blocks.signals import ExternalForce, RobotTruth
 from ...robots.description import RobotDescription
-from ...runtime.language.block import Input, Metric, Misfit, Output, State
+from ...runtime.language.block import Context, Input, Metric, Misfit, Output, State
 from ...runtime.language.parameters import Parameters
 from ..robot import Robot
 from .base import BASES
@@ -24,7 +24,7 @@ from .sensors import Sensors
 from .stance import centre_on_origin, holding_torque, place_standing
 from .state import DriveState, PhysicsState, TickRecord
 from .truth import TruthReport
-from .world import build_world, choose_profile, draw_variation
+from .world import build_world, draw_variation
 
 SETTLING_TIME = 0.3
 
@@ -60,16 +60,14 @@ class MujocoRobot(Robot):
     contact of a limb with the torso or with itself, an IMU lever arm, wind.
 
     Raises:
-        ValueError: a timestep that does not divide the control period.
         StartError: the robot does not stand as its description says.
         IndexError: a push at a point the robot does not have.
     """
 
     outside = "simulated"
 
-    needs = ("robot",)
-
     Params = SimulatorParameters
+    needs = ("robot",)
     params: SimulatorParameters
 
     push = Input(ExternalForce, default={}, text="a force from outside, held for the tick")
@@ -91,20 +89,25 @@ class MujocoRobot(Robot):
 
     @classmethod
     def requires(cls, params: Parameters, robot: RobotDescription | None) -> Iterable[Misfit]:
-        """The actuator profile exists, and the simulator can express the transmission."""
-        assert isinstance(params, SimulatorParameters) and robot is not None
-        if params.profile and params.profile not in robot.profiles:
-            yield Misfit(
-                f"{robot.name} has no actuator profile {params.profile!r}",
-                "profile",
-                ", ".join(robot.profiles),
-                params.profile,
-                f"profile: {robot.motors.profile}",
-            )
-            return
-        complaint = unfit_motor(choose_profile(params, robot))
+        """A transmission that the simulator can express."""
+        complaint = unfit_motor(robot) if robot is not None else ""
         if complaint:
             yield Misfit(complaint, fix="correct `transmission` in the robot's description")
+
+    @classmethod
+    def requires_of_graph(cls, params: Parameters, context: Context) -> Iterable[Misfit]:
+        """A physics step that divides the block's period."""
+        assert isinstance(params, SimulatorParameters)
+        steps = context.period / params.timestep
+        if abs(steps - round(steps)) > 1e-6 or round(steps) < 1:
+            yield Misfit(
+                f"timestep {params.timestep} s does not divide the control period "
+                f"{context.period} s",
+                parameter="timestep",
+                expected=f"a whole fraction of {context.period} s",
+                found=f"{params.timestep} s",
+                fix=f"timestep: {context.period / max(1, math.ceil(steps)):.10g} s",
+            )
 
     @classmethod
     def local_dimensions(
@@ -121,7 +124,7 @@ class MujocoRobot(Robot):
         import mujoco
 
         assert isinstance(params, SimulatorParameters) and robot is not None
-        model = build_world(params, choose_profile(params, robot), Variation())
+        model = build_world(params, robot, Variation())
         everything = mujoco.mjtState.mjSTATE_INTEGRATION
         flight = params.latency + params.jitter + params.timestep
         return {
@@ -134,19 +137,12 @@ class MujocoRobot(Robot):
         """Draw the world from the seed and build it."""
         import mujoco
 
-        params = self.params
-        assert self.context.robot is not None
-        robot = self._robot = choose_profile(params, self.context.robot)
+        robot, params = self.robot, self.params
         self._variation = draw_variation(params)
         self._model = build_world(params, robot, self._variation)
+        self._robot = robot
         self._step1, self._step2 = mujoco.mj_step1, mujoco.mj_step2
-        steps = self.period / params.timestep
-        self._steps = round(steps)
-        if abs(steps - self._steps) > 1e-6 or self._steps < 1:
-            raise ValueError(
-                f"timestep {params.timestep} s does not divide the control period "
-                f"{self.period} s; try {self.period / max(1, math.ceil(steps))} s"
-            )
+        self._steps = round(self.period / params.timestep)
         self._streams = RandomStreams(params.seed)
         self._jitter = self._streams[Purpose.JITTER]
         self._sensors = Sensors(robot, params, self._streams)

@@ -35,15 +35,6 @@ def draw_variation(params: SimulatorParameters) -> Variation:
     return Variation(friction, stiffness, mass, (x, y, z))
 
 
-def choose_profile(params: SimulatorParameters, robot: RobotDescription) -> RobotDescription:
-    """The robot with the actuator profile that these parameters ask for, if they do.
-
-    Raises:
-        LookupError: it has no such profile.
-    """
-    return robot.with_profile(params.profile) if params.profile else robot
-
-
 def build_world(
     params: SimulatorParameters, robot: RobotDescription, variation: Variation
 ) -> MjModel:

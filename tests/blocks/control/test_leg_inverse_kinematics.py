@@ -193,7 +193,7 @@ def test_the_margin_is_kept_and_the_description_is_not_changed():
 
 
 def test_needs_a_robot():
-    with pytest.raises(BlockError, match="name one in the graph"):
+    with pytest.raises(BlockError, match="it needs a robot, and the graph names none"):
         BlockBench(LegInverseKinematics, dimensions=dict(ROBOT.dimensions))
 
 

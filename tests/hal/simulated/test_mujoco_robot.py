@@ -14,8 +14,8 @@ from pydantic import ValidationError
 
 from aloft.blocks.signals import CommandMode
 from aloft.hal.simulated.mujoco_robot import MujocoRobot
-from aloft.hal.simulated.parameters import SimulatorParameters
 from aloft.robots.description import find_robot
+from aloft.runtime.language.errors import BlockError
 from aloft.runtime.testing.bench import BlockBench
 
 ROBOT = find_robot("bruce")
@@ -301,11 +301,10 @@ def test_platform_and_step_tell_the_ground_under_each_point() -> None:
 
 
 def test_errors_say_what_is_there() -> None:
-    (misfit,) = MujocoRobot.requires(SimulatorParameters(profile="kodiak"), ROBOT)
-    assert misfit.message == "bruce has no actuator profile 'kodiak'"
-    assert (misfit.expected, misfit.fix) == ("koala, relaxed", "profile: koala")
-    with pytest.raises(ValueError, match=r"timestep 0.0003 s does not divide the control period"):
+    with pytest.raises(BlockError, match=r"timestep 0.0003 s does not divide the control period"):
         bench(timestep=0.0003)
+    with pytest.raises(BlockError, match="it needs a robot, and the graph names none"):
+        BlockBench(MujocoRobot, {}, dimensions=ROBOT.dimensions)
     with pytest.raises(ValidationError, match="two positive numbers in rising order"):
         bench(friction_range=[1.0, 0.5])
 

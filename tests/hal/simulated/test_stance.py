@@ -6,8 +6,8 @@ import mujoco
 import numpy as np
 import pytest
 
-from aloft.hal.simulated.mujoco_model import build_mujoco_model
 from aloft.hal.simulated.base import FloatingBase
+from aloft.hal.simulated.mujoco_model import build_mujoco_model
 from aloft.hal.simulated.stance import (
     StartError,
     centre_on_origin,
