@@ -30,6 +30,8 @@ NOT_HOT = {
     "hal.simulated.random_streams._signed": "of exact integers, when a run is restored",
     "hal.simulated.scenes.step": "makes a scene, when a run is loaded",
     "hal.simulated.scenes.platform": "makes a scene, when a run is loaded",
+    "hal.simulated.stance._solve_positive": "before a run, by MuJoCo's linear algebra",
+    "hal.simulated.holding._two_digits": "before a run, of the holding gains",
     "hal.simulated.stance._solve_normal": "before a run, by MuJoCo's linear algebra",
 }
 """Functions of numbers and arrays only that need not compile, and why."""
