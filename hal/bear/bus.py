@@ -33,7 +33,7 @@ class SerialPort(Protocol):
 
     timeout: float | None
 
-    def write(self, data: bytes, /) -> int | None:
+    def write(self, data: bytes | bytearray, /) -> int | None:
         """Send all bytes."""
 
     def read(self, size: int = 1, /) -> bytes:
