@@ -20,7 +20,7 @@ import pytest
 import aloft
 from aloft.mathematics.kernel import kernel, kernels
 from aloft.robots.description import find_robot
-from aloft.robots.leg_kinematics import read_leg
+from aloft.robots.five_joint_leg import read_leg
 
 ROOT = Path(__file__).parent.parent
 HOT = [path for folder in ("blocks", "hal") for path in sorted((ROOT / folder).glob("*.py"))]

@@ -12,13 +12,13 @@ from hypothesis.extra.numpy import arrays
 
 from aloft.blocks.control.leg_inverse_kinematics import LegInverseKinematics
 from aloft.blocks.signals import Phase
-from aloft.robots import leg_kinematics
+from aloft.robots import five_joint_leg
 from aloft.robots.description import find_robot
 from aloft.runtime.language.errors import BlockError
 from aloft.runtime.testing import BlockBench
 
 ROBOT = find_robot("bruce")
-LEGS = [leg_kinematics.read_leg(ROBOT, foot) for foot in range(2)]
+LEGS = [five_joint_leg.read_leg(ROBOT, foot) for foot in range(2)]
 any_number = st.floats(allow_nan=False, allow_infinity=False)
 
 
@@ -26,7 +26,7 @@ def feet_of(joints):
     positions, rotations = np.empty((2, 3)), np.empty((2, 3, 3))
     for leg, position, rotation in zip(LEGS, positions, rotations, strict=True):
         angles = joints[list(leg.joints)]
-        leg_kinematics.forward(leg.hip, leg.plane, leg.signs, angles, position, rotation)
+        five_joint_leg.forward(leg.hip, leg.plane, leg.signs, angles, position, rotation)
     return positions, rotations
 
 

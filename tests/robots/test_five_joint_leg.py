@@ -10,7 +10,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from aloft.robots import leg_kinematics as legs
+from aloft.robots import five_joint_leg as legs
 from aloft.robots.description import find_robot
 from aloft.robots.kinematics import link_poses
 from aloft.runtime.language.errors import BlockError
