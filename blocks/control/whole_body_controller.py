@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal
 
@@ -26,8 +27,8 @@ from ...mathematics.whole_body_qp import (
     torque_limits,
     torso_task,
 )
-from ...runtime.language.block import Block, Input, Output, State
-from ...runtime.language.errors import BlockError
+from ...robots.description import RobotDescription
+from ...runtime.language.block import Block, Input, Misfit, Output, State
 from ...runtime.language.parameters import Parameters, live_parameter, parameter
 from ...runtime.language.signals import Field, Signal
 from ..signals import (
@@ -90,8 +91,8 @@ class WholeBodyController(Block):
     shared equally by the points in stance, with no acceleration. Failures are counted.
 
     Does no feedback on joints (``JointPD`` does) and keeps no solver state: a cold start makes
-    the answer a function of the inputs alone. Raises ``BlockError`` at load for a solver that is
-    not installed or an unknown actuator profile.
+    the answer a function of the inputs alone. The load report has a problem where
+    the solver is not installed, or a foot is part of the base.
     """
 
     array_allocations = 12
@@ -100,7 +101,6 @@ class WholeBodyController(Block):
     class Params(Parameters):
         solver: str = parameter("daqp", text="any dense solver that qpsolvers finds installed")
         limits: Literal["none", "joint", "motor"] = parameter("motor", text="torque limits")
-        actuators: str = parameter("koala", text="the actuator profile of the limits")
         torque_margin: float = live_parameter(
             0.97, gt=0.0, le=1.0, text="share of the limits that is used"
         )
@@ -140,6 +140,7 @@ class WholeBodyController(Block):
             0.9, ge=0.0, le=1.0, text="factor on it per tick since the last solved program"
         )
 
+    needs = ("floating base", "feet")
     params: Params
     terms = Input(DynamicsTerms, text="the whole-body model at the present state")
     target = Input(WholeBodyTarget, text="what to achieve")
@@ -148,20 +149,22 @@ class WholeBodyController(Block):
     command = Output(WholeBodyCommand, text="torque, acceleration and contact forces")
     memory = State(SolverMemory, text="for when the solver fails")
 
-    def setup(self) -> None:
-        robot, p = self.context.robot, self.params
-        if robot is None:
-            raise BlockError("WholeBodyController needs a robot: name one, e.g. robot: bruce")
-        if p.actuators not in robot.profiles:
-            raise BlockError(
-                f"{robot.name} has no actuator profile {p.actuators!r}; there is "
-                + ", ".join(robot.profiles)
-            )
+    @classmethod
+    def requires(cls, params: Parameters, robot: RobotDescription | None) -> Iterable[Misfit]:
+        """A solver that is installed, and feet that joints carry."""
+        assert isinstance(params, cls.Params) and robot is not None
         try:
-            self._solver = QuadraticProgramSolver(p.solver)
+            QuadraticProgramSolver.check_name(params.solver)
         except LookupError as error:
-            raise BlockError(str(error)) from error
-        self._profile = robot.profiles[p.actuators]
+            yield Misfit(str(error), parameter="solver", found=params.solver, fix="solver: daqp")
+        for foot in robot.feet:
+            if foot.link == robot.base:
+                yield Misfit(f"foot {foot.name} of {robot.name} is part of the base, not of a leg")
+
+    def setup(self) -> None:
+        robot, p = self.robot, self.params
+        self._solver = QuadraticProgramSolver(p.solver)
+        self._profile = robot.profiles[robot.motors.profile]
         self._mass = robot.total_mass
         n_joints, n_contacts = len(robot.joints), len(robot.contacts)
         self._to_motor = robot.joint_to_motor

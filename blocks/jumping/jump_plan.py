@@ -72,6 +72,7 @@ class JumpPlan(Block):
             None, text="which one plans, in place of the task's"
         )
 
+    needs = ("floating base", "feet")
     params: Params
     reference = Output(JumpReference, text="the plan at the present instant")
 

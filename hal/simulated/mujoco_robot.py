@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
 
 from ...blocks.signals import ExternalForce, RobotTruth
 from ...robots.description import RobotDescription
-from ...runtime.language.block import Input, Metric, Output, State
+from ...runtime.language.block import Context, Input, Metric, Misfit, Output, State
 from ...runtime.language.parameters import Parameters
 from ..robot import Robot
 from .drives import Drives
@@ -55,14 +55,13 @@ class MujocoRobot(Robot):
     contact of a leg with the torso or with itself, an IMU lever arm, wind.
 
     Raises:
-        ValueError: no robot in the graph, no such actuator profile, or a timestep that does not
-            divide the control period.
         IndexError: a push at a point the robot does not have.
     """
 
     outside = "simulated"
 
     Params = SimulatorParameters
+    needs = ("robot",)
     params: SimulatorParameters
 
     push = Input(ExternalForce, default={}, text="a force from outside, held for the tick")
@@ -83,6 +82,21 @@ class MujocoRobot(Robot):
         }  # fmt: skip
 
     @classmethod
+    def requires_of_graph(cls, params: Parameters, context: Context) -> Iterable[Misfit]:
+        """A physics step that divides the block's period."""
+        assert isinstance(params, SimulatorParameters)
+        steps = context.period / params.timestep
+        if abs(steps - round(steps)) > 1e-6 or round(steps) < 1:
+            yield Misfit(
+                f"timestep {params.timestep} s does not divide the control period "
+                f"{context.period} s",
+                parameter="timestep",
+                expected=f"a whole fraction of {context.period} s",
+                found=f"{params.timestep} s",
+                fix=f"timestep: {context.period / max(1, math.ceil(steps)):.10g} s",
+            )
+
+    @classmethod
     def local_dimensions(
         cls, params: Parameters, robot: RobotDescription | None
     ) -> Mapping[str, int]:
@@ -97,6 +111,7 @@ class MujocoRobot(Robot):
         import mujoco
 
         assert isinstance(params, SimulatorParameters)
+        assert robot is not None
         model = build_world(params, robot, Variation())
         everything = mujoco.mjtState.mjSTATE_INTEGRATION
         flight = params.latency + params.jitter + params.timestep
@@ -110,24 +125,21 @@ class MujocoRobot(Robot):
         """Draw the world from the seed and build it."""
         import mujoco
 
-        robot, params = self.context.robot, self.params
+        robot, params = self.robot, self.params
         self._variation = draw_variation(params)
         self._model = build_world(params, robot, self._variation)
-        assert robot is not None
         self._robot = robot
         self._step1, self._step2 = mujoco.mj_step1, mujoco.mj_step2
-        steps = self.period / params.timestep
-        self._steps = round(steps)
-        if abs(steps - self._steps) > 1e-6 or self._steps < 1:
-            raise ValueError(
-                f"timestep {params.timestep} s does not divide the control period "
-                f"{self.period} s; try {self.period / max(1, math.ceil(steps))} s"
-            )
+        self._steps = round(self.period / params.timestep)
         self._streams = RandomStreams(params.seed)
         self._jitter = self._streams[Purpose.JITTER]
         self._sensors = Sensors(robot, params, self._streams)
         self._drives = Drives(
-            robot, robot.profiles[params.profile], params.drive_damping, self.drives, self.record
+            robot,
+            robot.profiles[robot.motors.profile],
+            params.drive_damping,
+            self.drives,
+            self.record,
         )
         self._limits = (robot.joint_limits[:, 0].copy(), robot.joint_limits[:, 1].copy())
         n = len(robot.joints)

@@ -15,7 +15,6 @@ class SimulatorParameters(Parameters):
     around the nominal value, drawn once from the seed; a *noise* is the standard deviation of a
     normal distribution, drawn for every sample."""
 
-    profile: str = parameter("koala", text="the actuator profile of the robot's description")
     seed: int = parameter(0, ge=0, text="the seed of everything random")
     timestep: float = parameter(
         0.0005, unit="s", gt=0, le=0.002, text="physics step; it must divide the control period"

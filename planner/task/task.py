@@ -248,7 +248,8 @@ class JumpTask(FreeTimes):
         whole = {
             "format": PLAN_FORMAT,
             "task": self.content(),
-            "robot": robot.model_dump(mode="json"),
+            # The task says itself which actuators it is planned for.
+            "robot": robot.changed(profile="").model_dump(mode="json"),
         }
         text = json.dumps(whole, sort_keys=True, separators=(",", ":"))
         return hashlib.sha256(text.encode()).hexdigest()[:20]

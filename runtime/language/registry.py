@@ -122,13 +122,6 @@ def block_name(block_type: type[Block]) -> str:
     return f"{module.partition('@')[0]}:{block_type.__name__}"
 
 
-def with_present_names(text: str) -> str:
-    """The text of a graph with blocks called by their present names, for graphs kept by earlier
-    versions."""
-    old = "|".join(re.escape(name) for name in MOVED)
-    return re.sub(rf"\b(use: *[\"']?)({old})\b", lambda found: found[1] + MOVED[found[2]], text)
-
-
 def find_block(name: str, folder: Path | None = None) -> type[Block]:
     """The block class called ``name``; files in ``folder`` can be imported as modules.
 
