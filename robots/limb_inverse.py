@@ -11,8 +11,8 @@ by Levenberg and Marquardt's method: from the present angles, with L = mu |e|^2,
 
     dq = (J'J + L I)^-1 J'e,
 
-the step is cut off at the limits and taken if it makes the error smaller; mu shrinks then, and
-grows otherwise. A joint that stands at its limit and would have to go beyond it is left out. Damping
+the step is cut off at the limits and taken if it makes the error smaller; mu shrinks or grows with
+how much of the promised gain came true (Nielsen's rule), and grows where there was none. A joint that stands at its limit and would have to go beyond it is left out. Damping
 by the squared error makes the last steps Newton's, so the error's digits double with each of them.
 
 Vectors are in the base's frame, in m and rad. The kernels allocate nothing, take a bounded number
@@ -236,18 +236,23 @@ def approach(
                 normal[j, k] = value
             normal[j, j] += damping if free else 1.0
         solve_positive(normal, step)
+        promised = 0.0
         for j in range(n):
             angle = float(angles[j]) + min(max(float(step[j]), -1.0), 1.0)
             trial[j] = min(max(angle, float(limits[j, 0])), float(limits[j, 1]))
+            moved = float(trial[j]) - float(angles[j])
+            promised += moved * (damping * moved + float(gradient[j]))
         place_limb(links, tip, trial, anchors, pose)
         found = foot_error(tip, pose, target, weights, error)
         fresh = found < square
         if fresh:
-            ease, square = 0.1 * ease, found
+            # What the linear model promised came true, or less of it (Nielsen's rule).
+            ratio = 2.0 * min((square - found) / max(promised, 1e-300), 1.0) - 1.0
+            ease, square = ease * max(0.1, 1.0 - ratio * ratio * ratio), found
             for j in range(n):
                 angles[j] = trial[j]
         else:
-            ease = 10.0 * max(ease, 1e-3)
+            ease = 4.0 * max(ease, 1e-3)
     return square
 
 

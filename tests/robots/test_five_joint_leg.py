@@ -214,7 +214,7 @@ def test_inverse_velocity_undoes_the_jacobian(side, fraction, rate):
     assume(np.linalg.svd(rows)[1][-1] > 0.02)
     out = np.empty(5)
     legs.inverse_velocity(
-        sole_jacobian, rotation, twist[:3], np.cross(twist[3:], rotation[:, 0]), 1e-5,
+        sole_jacobian, rotation, twist[:3], np.cross(twist[3:], rotation[:, 0]), 0.3, 1e-5,
         np.empty((5, 5)), np.empty((3, 5)), np.empty((5, 5)), out,
     )  # fmt: skip
     assert np.abs(out - rate).max() < 1e-5
