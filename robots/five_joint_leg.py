@@ -105,7 +105,9 @@ def _mismatch(robot: RobotDescription, foot: int, chain: tuple[int, ...]) -> str
             return f"joint {joint.name} is held"
     if any(joint.origin != (0.0, 0.0, 0.0) for joint in joints[1:3]):
         return "the hip axes do not meet in one point"
-    if any(place[1] != 0.0 for place in (joints[3].origin, joints[4].origin, robot.feet[foot].sole)):
+    if any(
+        place[1] != 0.0 for place in (joints[3].origin, joints[4].origin, robot.feet[foot].sole)
+    ):
         return "knee, ankle or sole lies beside the leg plane"
     kind, line = foot_shape(robot, foot)
     if kind != FootKind.LINE or abs(float(line[0]) - 1.0) > 1e-9:

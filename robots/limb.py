@@ -195,7 +195,11 @@ def limb_jacobian(links: Array, anchors: Array, pose: Array, out: Array) -> None
             out[0, j], out[1, j], out[2, j] = ax, ay, az
             out[3, j] = out[4, j] = out[5, j] = 0.0
         else:
-            x, y, z = px - float(anchors[j, 0]), py - float(anchors[j, 1]), pz - float(anchors[j, 2])
+            x, y, z = (
+                px - float(anchors[j, 0]),
+                py - float(anchors[j, 1]),
+                pz - float(anchors[j, 2]),
+            )
             out[0, j] = ay * z - az * y
             out[1, j] = az * x - ax * z
             out[2, j] = ax * y - ay * x

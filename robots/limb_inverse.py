@@ -376,7 +376,9 @@ def limb_velocity(
 
 
 @kernel
-def turning(tip: Array, last: Array, target: Array, period: float, limit: float, out: Array) -> None:
+def turning(
+    tip: Array, last: Array, target: Array, period: float, limit: float, out: Array
+) -> None:
     """The angular velocity (3,) [rad/s] of a target, from its orientation one period before.
 
     It is that of a line's direction for a line foot and zero for a point foot. A target that has

@@ -25,13 +25,14 @@ from aloft.robots.limb import read_limb
 from aloft.robots.limb_inverse import limb_scratch
 
 ROOT = Path(__file__).parent.parent
-HOT = [path for folder in ("blocks", "hal") for path in sorted((ROOT / folder).glob("*.py"))]
+ROOMS = ("mathematics", "blocks", "hal")
+HOT = [path for room in ROOMS for path in sorted((ROOT / room).rglob("*.py"))]
 PLAIN = {"Array", "Flags", "Indices", "float", "int", "bool"}
 NOT_HOT = {
-    "hal.random_streams._signed": "of exact integers, when a run is restored",
-    "hal.scenes.step": "makes a scene, when a run is loaded",
-    "hal.scenes.platform": "makes a scene, when a run is loaded",
-    "hal.stance._solve_normal": "before a run, by MuJoCo's linear algebra",
+    "hal.simulated.random_streams._signed": "of exact integers, when a run is restored",
+    "hal.simulated.scenes.step": "makes a scene, when a run is loaded",
+    "hal.simulated.scenes.platform": "makes a scene, when a run is loaded",
+    "hal.simulated.stance._solve_normal": "before a run, by MuJoCo's linear algebra",
 }
 """Functions of numbers and arrays only that need not compile, and why."""
 

@@ -40,7 +40,6 @@ class ContactDetector(Block):
             1, ge=1, text="ticks a switch must be closed before its point is active"
         )
 
-    needs = ("switches",)
     params: Params
 
     switches = Input(ContactSwitches, text="the raw switches")

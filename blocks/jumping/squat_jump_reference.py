@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterable
 from functools import lru_cache
 
+from ...planner.library.jump_table import JumpTable, JumpTableReader
 from ...robots.description import RobotDescription
 from ...robots.pinocchio_model import build_pinocchio_model
 from ...runtime.language.block import Block, Misfit, Output
 from ...runtime.language.parameters import Parameters, parameter
 from ..signals import JumpReference
-from .jump_table import JumpTable, JumpTableReader
 from .squat_jump import SquatJumpTask, plan_squat_jump
 
 

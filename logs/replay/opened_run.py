@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 
 from ...runtime.language.errors import AloftError, ExitCode
 from ...runtime.language.layout import Layout
+from ...runtime.language.parameter_change import ParameterChange
 from ...runtime.language.stages import CheckedGraph
 from ...runtime.loading import load_text
 from ...runtime.loading.earlier_versions import in_present_form
-from ...runtime.running.live_parameters import ParameterChange
 from ...runtime.running.memory import Snapshot
 from ..file.header import machine, versions
 from ..file.reader import RecordedRun, read

@@ -8,11 +8,11 @@ from typing import Any
 
 from ..language.block import Block
 from ..language.fit import find_misfits
+from ..language.parameter_change import Adjustment
 from ..language.parameters import Parameters, is_live, unit_of
 from ..language.registry import block_name
 from ..language.signals import Field
 from ..language.stages import Position
-from ..running.live_parameters import Adjustment
 from .flat import FlatBlock
 from .nodes import MapNode, from_plain
 from .overrides import Override, Overrides, read_overrides

@@ -15,9 +15,10 @@ import pytest
 
 from aloft.blocks.signals import Phase
 from aloft.runtime.language.block import Block
+from aloft.runtime.language.parameter_change import Adjustment
 from aloft.runtime.language.parameters import Parameters, is_live
 from aloft.runtime.language.registry import find_block, known_names
-from aloft.runtime.running.live_parameters import Adjustment, LiveParameters
+from aloft.runtime.running.live_parameters import LiveParameters
 from aloft.runtime.testing import BlockBench
 from aloft.runtime.testing.examples import live_changes, random_inputs
 

@@ -92,5 +92,7 @@ def test_limits_keep_their_margin_and_a_held_joint_its_angle():
 def test_a_link_that_nothing_carries_is_named():
     robot = quadruped()
     lost = robot.model_copy(update={"joints": robot.joints[1:]})
-    with pytest.raises(ValueError, match="no joint leads from 'base' to 'front_left_hip_roll_link'"):
+    with pytest.raises(
+        ValueError, match="no joint leads from 'base' to 'front_left_hip_roll_link'"
+    ):
         chain_to(lost, "front_left_knee_link")

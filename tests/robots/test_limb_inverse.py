@@ -110,9 +110,7 @@ def test_agrees_with_the_closed_form_of_a_five_joint_leg(foot, fraction):
         return
     target, out = np.zeros((4, 3)), closed + 0.02 * np.array([1.0, -1.0, 1.0, -1.0, 1.0])
     aim(sole, rotation, target)
-    square = approach(
-        limb.links, limb.tip, limb.limits, target, WEIGHTS, 40, limb_scratch(5), out
-    )
+    square = approach(limb.links, limb.tip, limb.limits, target, WEIGHTS, 40, limb_scratch(5), out)
     assert square <= REACHED
     rows = _rows(limb, out)
     if np.linalg.svd(rows)[1][-1] > 0.01:  # away from where two answers meet
@@ -145,9 +143,7 @@ def test_out_of_reach_the_nearest_place_within_the_limits(name):
         target = pose_of(limb, middle)
         target[0] += random.normal(0.0, 1.0, 3)
         target[0] *= 1.5 / np.linalg.norm(target[0])
-        square = reach(
-            limb.links, limb.tip, limb.limits, target, WEIGHTS, starts, 3, 60, work, out
-        )
+        square = reach(limb.links, limb.tip, limb.limits, target, WEIGHTS, starts, 3, 60, work, out)
         assert square > REACHED
         assert error(limb, pose_of(limb, out), target) == pytest.approx(math.sqrt(square))
         for _ in range(60):

@@ -15,6 +15,7 @@ from aloft.blocks.signals import Phase
 from aloft.robots import five_joint_leg
 from aloft.robots.description import find_robot
 from aloft.robots.limb import place_limb, read_limb
+from aloft.runtime.language.errors import BlockError
 from aloft.runtime.testing import BlockBench
 
 from ...robots.limbed_robots import humanoid, quadruped
@@ -194,6 +195,11 @@ def test_the_margin_is_kept_and_the_description_is_not_changed():
     assert np.array_equal(ROBOT.joint_limits, before)
 
 
+def test_needs_a_robot():
+    with pytest.raises(BlockError, match="it needs a robot, and the graph names none"):
+        BlockBench(LegInverseKinematics, dimensions=dict(ROBOT.dimensions))
+
+
 def test_the_soles_have_the_planned_pitch_where_asked_for():
     position, flat = feet_of(ROBOT.standing_position)
     found = {}
@@ -345,4 +351,6 @@ def test_a_joint_that_carries_two_feet_must_be_held():
         "itself, so it can only hold such a joint"
     ]
     assert misfits[0].fix == "in the robot's description: held: {waist: 0.0}"
-    assert not list(LegInverseKinematics.requires(params, both.model_copy(update={"held": {"waist": 0.1}})))
+    assert not list(
+        LegInverseKinematics.requires(params, both.model_copy(update={"held": {"waist": 0.1}}))
+    )

@@ -314,5 +314,3 @@ def test_the_fallback_survives_a_snapshot(dynamics):
 def test_errors_name_the_fix(dynamics):
     with pytest.raises(BlockError, match=r"no quadratic-program solver 'magic'.*daqp"):
         BlockBench(WholeBodyController, {"solver": "magic"}, robot=ROBOT)
-    with pytest.raises(BlockError, match="no actuator profile 'steam'; there is koala"):
-        BlockBench(WholeBodyController, {"actuators": "steam"}, robot=ROBOT)

@@ -301,7 +301,7 @@ def test_restores_exactly():
 
 
 def test_needs_a_robot():
-    with pytest.raises(BlockError, match="name one in the graph"):
+    with pytest.raises(BlockError, match="it needs a robot, and the graph names none"):
         BlockBench(StateEstimator, dimensions=dict(ROBOT.dimensions))
 
 

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from aloft.blocks.jumping.jump_table import JumpTable, JumpTableReader, locate, planned_phase
 from aloft.blocks.signals import JumpReference, Phase
+from aloft.planner.library.jump_table import JumpTable, JumpTableReader, locate, planned_phase
 from aloft.robots.description import find_robot
 
 TIMES = np.array([0.0, 0.1, 0.1, 0.4])

@@ -7,11 +7,11 @@ from typing import Any
 
 import pytest
 
-from aloft.planner.errors import PlanError
+from aloft.planner.library import nearest_feasible as module
 from aloft.planner.library.library import SHIPPED, PlanLibrary
-from aloft.planner.library.plan import JumpPlan
-from aloft.planner.solving import nearest_feasible as module
-from aloft.planner.solving.nearest_feasible import candidates, nearest_feasible, values_towards
+from aloft.planner.library.nearest_feasible import candidates, nearest_feasible, values_towards
+from aloft.planner.task.errors import PlanError
+from aloft.planner.task.plan import JumpPlan
 from aloft.planner.task.task import JumpTask, make_task, read_task
 from aloft.robots.description import RobotDescription, find_robot
 

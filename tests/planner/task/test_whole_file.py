@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from aloft.planner.whole_file import ABANDONED, remove_abandoned, write_whole
+from aloft.planner.task.whole_file import ABANDONED, remove_abandoned, write_whole
 
 
 def test_it_replaces_what_is_there(tmp_path: Path) -> None:

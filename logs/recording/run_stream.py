@@ -11,15 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...runtime.running.notes import Note
-from ..viewing.block_times import times_table
-from ..viewing.limits import limits_of
-from ..viewing.scene import Scene
-from ..viewing.scene_part import Colors
-from ..viewing.scene_ports import scene_ports
-from ..viewing.signal_names import axis_colors, element_names
-from ..viewing.state_lanes import LaneReader, lanes_of
-from .changed_rows import ChangedRows
-from .format import (
+from ..file.changed_rows import ChangedRows
+from ..file.format import (
     EVENTS,
     EXACT,
     GRAPH,
@@ -33,7 +26,14 @@ from .format import (
     RecordedRows,
     entity_of,
 )
-from .time_columns import time_columns
+from ..file.time_columns import time_columns
+from ..viewing.block_times import times_table
+from ..viewing.limits import limits_of
+from ..viewing.scene import Scene
+from ..viewing.scene_part import Colors
+from ..viewing.scene_ports import scene_ports
+from ..viewing.signal_names import axis_colors, element_names
+from ..viewing.state_lanes import LaneReader, lanes_of
 
 LIMIT_COLOR = 0x9E9E9EB0
 

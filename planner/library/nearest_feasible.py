@@ -13,11 +13,11 @@ from dataclasses import dataclass
 
 from ...robots.description import RobotDescription
 from ..checking.validity import InvalidPlanError
-from ..errors import PlanError, TaskError
-from ..library.library import SCALES, Solver, solve_and_check
-from ..library.plan import JumpPlan
+from ..solving.bounded import cpu_time
+from ..task.errors import PlanError, TaskError
+from ..task.plan import JumpPlan
 from ..task.task import JumpTask
-from .bounded import cpu_time
+from .library import SCALES, Solver, solve_and_check
 
 MOST_SOLVES = 10
 MOST_SECONDS = 20.0

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ..runtime.language.errors import AloftError
+from ...runtime.language.errors import AloftError
 
 
 class TaskError(AloftError, ValueError):

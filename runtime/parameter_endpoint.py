@@ -23,11 +23,11 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from ..language.errors import AloftError
-from ..loading.adjust import adjust, entries
-from ..loading.problems import LoadError
-from .live_parameters import LiveParameters
-from .memory import BoundGraph
+from .language.errors import AloftError
+from .loading.adjust import adjust, entries
+from .loading.problems import LoadError
+from .running.live_parameters import LiveParameters
+from .running.memory import BoundGraph
 
 LONGEST_REQUEST = 1 << 16
 """Bytes of one request."""

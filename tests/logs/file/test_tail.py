@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from aloft.blocks.general.primitives import Constant
+from aloft.blocks.general.constant import Constant
 from aloft.logs import read
 from aloft.logs.file.header import header_of
-from aloft.logs.file.tail_repair import take_in_tail
-from aloft.logs.file.writer import RecordingWriter
-from aloft.logs.recording.tail import TailWriter, read_tail, record_type, tail_of
+from aloft.logs.file.tail import TailWriter, read_tail, record_type, tail_of
+from aloft.logs.recording.tail_repair import take_in_tail
+from aloft.logs.recording.writer import RecordingWriter
 from aloft.runtime.running.memory import BoundGraph
 from aloft.runtime.testing.graphs import Use, checked_graph
 

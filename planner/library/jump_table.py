@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ...blocks.signals import JumpReference, Phase
 from ...mathematics.kernel import kernel
 from ...mathematics.rotations import normalise
-from ..signals import JumpReference, Phase
 
 Array = NDArray[np.float64]
 

@@ -22,8 +22,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...runtime.language.errors import AloftError
-from ..task.task import JumpTask, TaskError, make_task
-from ..whole_file import write_whole
+from .task import JumpTask, TaskError, make_task
+from .whole_file import write_whole
 
 Array = NDArray[np.float64]
 

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...robots.kinematics import matrices_of_quaternions
-from ..library.plan import JumpPlan
-from ..models.exact_dynamics import ExactDynamics
+from ..task.plan import JumpPlan
+from .exact_dynamics import ExactDynamics
 
 Array = NDArray[np.float64]
 

@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 
 from ...runtime.running.memory import Snapshot
 from ...runtime.running.notes import Note
+from ..file.format import BUS, KEYFRAMES, NOTE, RECORDED, SPAN, STATE, Header, spans
+from ..file.time_columns import time_columns
 from ..viewing.blueprint import recording_blueprint
-from .format import BUS, KEYFRAMES, NOTE, RECORDED, SPAN, STATE, Header, spans
 from .run_stream import RunStream
-from .time_columns import time_columns
 
 FLUSH_TIMEOUT = 30.0
 """Seconds a disk may take for what one flush hands over."""

@@ -10,10 +10,10 @@ from os import PathLike
 from pathlib import Path
 
 from ..file.reader import RecordedRun
-from ..file.run_stream import RunStream
-from .blueprint import recording_blueprint
-from .plot_views import Shown
-from .scene_part import OTHER_RUN, Colors
+from ..viewing.blueprint import recording_blueprint
+from ..viewing.plot_views import Shown
+from ..viewing.scene_part import OTHER_RUN, Colors
+from .run_stream import RunStream
 
 
 def write_comparison(path: str | PathLike[str], first: RecordedRun, second: RecordedRun) -> Path:

@@ -5,15 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from aloft.planner.checking.midpoint import (
+from aloft.planner.models.exact_dynamics import ExactDynamics
+from aloft.planner.models.midpoint import (
     angular_motion,
     euler_angles,
     euler_rates,
     midpoint_residuals,
     rotation,
 )
-from aloft.planner.library.plan import JumpPlan
-from aloft.planner.models.exact_dynamics import ExactDynamics
+from aloft.planner.task.plan import JumpPlan
 from aloft.robots.description import find_robot
 
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from os import PathLike
 from pathlib import Path
 
-from ..recording.tail import tail_of
-from .reader import read
-from .repair import repair
+from ..file.reader import read
+from ..file.repair import repair
+from ..file.tail import tail_of
 from .writer import RecordingWriter
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from aloft.planner.library.plan import (
+from aloft.planner.task.plan import (
     ARRAYS,
     JumpPlan,
     PlanFileError,
