@@ -109,8 +109,8 @@ def _mismatch(robot: RobotDescription, foot: int, chain: tuple[int, ...]) -> str
         place[1] != 0.0 for place in (joints[3].origin, joints[4].origin, robot.feet[foot].sole)
     ):
         return "knee, ankle or sole lies beside the leg plane"
-    kind, line = foot_shape(robot, foot)
-    if kind != FootKind.LINE or abs(float(line[0]) - 1.0) > 1e-9:
+    shape, line = foot_shape(robot, foot)
+    if shape != FootKind.LINE or abs(float(line[0]) - 1.0) > 1e-9:
         return "its contact points are not in a line along x"
     return ""
 

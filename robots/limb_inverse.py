@@ -33,8 +33,8 @@ from .limb import limb_jacobian, place_limb
 
 Array = NDArray[np.float64]
 
-FOUND = 1e-20
-"""A squared error [m^2] below which no further step is taken: a tenth of a nanometre."""
+FOUND = 1e-24
+"""A squared error [m^2] below which no further step is taken."""
 REACHED = 1e-18
 """A squared error [m^2] below which the target counts as reached: a nanometre."""
 _FAR = 10.0
@@ -295,11 +295,12 @@ def reach(
                 place_limb(links, tip, starts[k], anchors, pose)
                 starts[k, n] = foot_error(tip, pose, target, weights, error)
         if number > 0:
-            start = 1
-            for k in range(2, starts.shape[0]):
-                if starts[k, n] < starts[start, n]:
+            start = 0
+            for k in range(1, starts.shape[0]):
+                fresh = float(starts[k, n]) >= 0.0
+                if fresh and (start == 0 or float(starts[k, n]) < float(starts[start, n])):
                     start = k
-            starts[start, n] = math.inf
+            starts[start, n] = -1.0
         for j in range(n):
             attempt[j] = starts[start, j]
         square = approach(links, tip, limits, target, weights, steps, work, attempt)

@@ -179,7 +179,7 @@ def test_velocities_move_the_foot_as_asked(name):
     robot, foot = LIMBS[name]
     limb = read_limb(robot, foot)
     n, random = len(limb.joints), np.random.default_rng(2)
-    angles = robot.standing_position[list(limb.joints)] + 0.1
+    angles = robot.standing_position[list(limb.joints)] + 0.05
     rate, step = random.uniform(-1.0, 1.0, n), 1e-6
     target, before = pose_of(limb, angles), pose_of(limb, angles - step * rate)
     twist, speeds = np.zeros(6), np.zeros(n)
