@@ -32,6 +32,8 @@ NOT_HOT = {
     "hal.simulated.random_streams._signed": "of exact integers, when a run is restored",
     "hal.simulated.scenes.step": "makes a scene, when a run is loaded",
     "hal.simulated.scenes.platform": "makes a scene, when a run is loaded",
+    "hal.simulated.stance._solve_positive": "before a run, by MuJoCo's linear algebra",
+    "hal.simulated.holding._two_digits": "before a run, of the holding gains",
     "hal.simulated.stance._solve_normal": "before a run, by MuJoCo's linear algebra",
 }
 """Functions of numbers and arrays only that need not compile, and why."""
@@ -122,10 +124,21 @@ PYTHON = {bool, int, float}
 
 def copy(arguments):
     """The same arguments in arrays of the same memory order; named numbers as plain ones."""
-    return tuple(
-        a.copy(order="K") if isinstance(a, np.ndarray) else int(a) if type(a) not in PYTHON else a
-        for a in arguments
-    )
+
+    def one(a):
+        if isinstance(a, tuple):  # a record of arrays and numbers
+            return type(a)(*(one(part) for part in a))
+        if isinstance(a, np.ndarray):
+            return a.copy(order="K")
+        return a if type(a) in PYTHON else int(a)
+
+    return tuple(one(a) for a in arguments)
+
+
+def leaves(arguments):
+    """The arrays and numbers of arguments, also those in records."""
+    for a in arguments:
+        yield from leaves(a) if isinstance(a, tuple) else (a,)
 
 
 def load_all():
@@ -197,7 +210,7 @@ def is_exact(function):
 def replaced(arguments, random):
     """The arguments with other numbers of about the same size in every array of floats."""
     new = copy(arguments)
-    for a in new:
+    for a in leaves(new):
         if isinstance(a, np.ndarray) and a.dtype == np.float64:
             a += (0.1 * np.abs(a) + 1e-3) * random.standard_normal(a.shape)
         elif isinstance(a, np.ndarray) and a.dtype == np.bool_:
@@ -208,7 +221,7 @@ def replaced(arguments, random):
 def flat(arguments, result):
     """All that a call has written and returned, as arrays."""
     returned = result if isinstance(result, tuple) else () if result is None else (result,)
-    return [np.asarray(a) for a in (*arguments, *returned)]
+    return [np.asarray(a) for a in (*leaves(arguments), *returned)]
 
 
 @pytest.mark.filterwarnings("ignore::numba.core.errors.NumbaPerformanceWarning")

@@ -45,7 +45,7 @@ class Dynamics(Block):
         import pinocchio
 
         robot = self.robot
-        built = build_pinocchio_model(robot, robot.motors.profile)
+        built = build_pinocchio_model(robot)
         self._pinocchio: Any = pinocchio
         self._model: Any = built.model
         self._data: Any = built.model.createData()
