@@ -11,7 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .description import Joint, RobotDescription
+from .parts import Joint
+from .robot_description import RobotDescription
 
 Array = NDArray[np.float64]
 

@@ -14,7 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .description import Joint, RobotDescription
+from .parts import Joint
+from .robot_description import RobotDescription
 
 
 @dataclass(frozen=True)
@@ -32,7 +33,7 @@ class PinocchioModel:
     sole_frames: tuple[int, ...]
 
 
-def build_pinocchio_model(robot: RobotDescription, profile: str = "") -> PinocchioModel:
+def build_pinocchio_model(robot: RobotDescription, profile: str | None = None) -> PinocchioModel:
     """The model of the robot on its base, with the rotors of the actuator profile in use.
 
     The velocity of a floating base is that of its origin in the base's own frame, first linear,
@@ -41,14 +42,14 @@ def build_pinocchio_model(robot: RobotDescription, profile: str = "") -> Pinocch
 
     Args:
         robot: the description.
-        profile: of another profile to use than the robot's; empty for that in use.
+        profile: another actuator profile than the one in use.
 
     Raises:
         LookupError: the robot has no actuator profile of that name.
     """
     import pinocchio as pin
 
-    robot = robot.with_profile(profile) if profile else robot
+    robot = robot if profile is None else robot.with_profile(profile)
     model = pin.Model()
     model.name = robot.name
     carrier = {robot.base: _add_base(model, robot.base_joint)}
@@ -87,16 +88,13 @@ def _add_base(model: Any, base_joint: str) -> int:
 
     if base_joint == "fixed":
         return 0
+    nothing = pin.SE3.Identity()
     if base_joint == "floating":
-        held = pin.JointModelFreeFlyer()
-    else:
-        # Three joints after one another, so that positions and velocities are plain numbers.
-        slides = [("base_x", pin.JointModelPX()), ("base_z", pin.JointModelPZ())]
-        index = 0
-        for name, slide in slides:
-            index = model.addJoint(index, slide, pin.SE3.Identity(), name)
-        return int(model.addJoint(index, pin.JointModelRY(), pin.SE3.Identity(), "base_pitch"))
-    return int(model.addJoint(0, held, pin.SE3.Identity(), "base"))
+        return int(model.addJoint(0, pin.JointModelFreeFlyer(), nothing, "base"))
+    # Three joints after one another, so that positions and velocities are plain numbers.
+    along_x = model.addJoint(0, pin.JointModelPX(), nothing, "base_x")
+    along_z = model.addJoint(along_x, pin.JointModelPZ(), nothing, "base_z")
+    return int(model.addJoint(along_z, pin.JointModelRY(), nothing, "base_pitch"))
 
 
 def _joint_model(joint: Joint) -> Any:

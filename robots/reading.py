@@ -8,9 +8,10 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-from .description import RobotDescription
 from .importing.packages import SCHEME, find_file, package_of
 from .placed_yaml import PlacedYaml
+from .robot_description import RobotDescription
+from .shipped import robot_names
 from .validation import RobotError, RobotFault, find_faults
 
 SHIPPED = Path(__file__).parent
@@ -31,11 +32,6 @@ class ReadRobot:
     notes: tuple[str, ...] = ()
 
 
-def shipped_robots() -> list[str]:
-    """The names of the robots that ship with aloft."""
-    return sorted(path.stem for path in SHIPPED.glob("*/*.yaml") if path.stem == path.parent.name)
-
-
 def path_of(name: str, folder: Path | None = None) -> Path:
     """The file that describes the robot called ``name``, ours or relative to ``folder``.
 
@@ -49,12 +45,12 @@ def path_of(name: str, folder: Path | None = None) -> Path:
         return path
     path = SHIPPED / name / f"{name}.yaml"
     if not path.is_file():
-        raise LookupError(f"no robot called {name!r}; there is {', '.join(shipped_robots())}")
+        raise LookupError(f"no robot called {name!r}; there is {', '.join(robot_names())}")
     return path
 
 
 def find(name: str, folder: Path | None = None) -> RobotDescription:
-    """See ``description.find_robot``."""
+    """The robot called ``name``; see ``description.find_robot``."""
     path = path_of(name, folder)
     return (_read_shipped(path) if path.is_relative_to(SHIPPED) else read(path)).description
 

@@ -15,8 +15,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .description import RobotDescription
 from .kinematics import LinkPoses, link_poses
+from .link_poses import contact_centres
+from .robot_description import RobotDescription
 
 Array = NDArray[np.float64]
 
@@ -104,6 +105,7 @@ class _Search:
         self.masses = np.array([link.mass for link in robot.links])
         self.coms = np.array([link.com for link in robot.links])
         self.foot_of_point = np.array(robot.foot_of_contact())
+        self.centres = contact_centres(robot)
         self.flat = [k for k in range(len(robot.feet)) if self._is_flat(k)]
         straight = np.clip(np.zeros(len(robot.joints)), limits[:, 0], limits[:, 1])
         straight[held] = self.start[held]
@@ -128,9 +130,10 @@ class _Search:
     def _points(self, poses: LinkPoses) -> tuple[Array, Array]:
         """The height of each contact's lowest point (n, n_contacts), each sole (n, n_feet, 3)."""
         heights = []
-        for foot, contact in zip(self.foot_of_point, self.robot.contacts, strict=True):
+        for foot, centre, contact in zip(
+            self.foot_of_point, self.centres, self.robot.contacts, strict=True
+        ):
             k = self.index[self.robot.feet[foot].link]
-            centre = np.add(contact.position, (0.0, 0.0, contact.radius))
             place = poses.position[:, k] + poses.rotation[:, k] @ centre
             heights.append(place[:, 2] - contact.radius)
         soles = [

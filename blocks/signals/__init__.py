@@ -24,11 +24,7 @@ from .control import (
     WholeBodyCommand,
     WholeBodyTarget,
 )
-from .jumping import (
-    JumpReference,
-    Phase,
-    PhaseState,
-)
+from .jumping import JumpReference, Phase, PhaseState
 from .robot import (
     CommandMode,
     ContactSwitches,

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ...mathematics.constants import GRAVITY
 from ...robots.description import RobotDescription
 from ...robots.kinematics import LinkPoses, link_poses, matrices_of_quaternions
-from ..library.plan import JumpPlan
+from ..task.plan import JumpPlan
 from .clearance import ground_height
 from .replay import Replay
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import lru_cache
 
 from ...robots.description import RobotDescription
-from ..errors import PlanError
+from ..task.errors import PlanError
 from .stance import StanceFinder
 from .symbolic_model import SymbolicModel
 

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from ...blocks.signals import Phase
 from ...mathematics.constants import GRAVITY
-from ..errors import PlanError
 from ..models.exact_dynamics import ExactDynamics, joint_motion
+from ..task.errors import PlanError
 from ..task.task import JumpTask
 
 Array = NDArray[np.float64]

@@ -18,7 +18,7 @@ from pydantic import ValidationError, model_validator
 
 from ...robots.description import RobotDescription, find_robot
 from ...runtime.language.parameters import Parameters, parameter
-from ..errors import TaskError
+from .errors import TaskError
 from .margins import Margins
 from .placed_file import PlacedFile, read_placed
 from .sequence import FreeTimes, Hop, Place, Span, check_spans, places_of

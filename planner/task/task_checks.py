@@ -14,7 +14,7 @@ import numpy as np
 from ...mathematics.constants import GRAVITY
 from ...robots.description import RobotDescription
 from ...robots.kinematics import link_poses
-from ..errors import TaskError
+from .errors import TaskError
 from .margins import unknown_joints
 from .sequence import Hop, Place, edge_of
 from .task import JumpTask

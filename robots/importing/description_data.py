@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ..description import RobotDescription
 from ..parts import Joint, Link
+from ..robot_description import RobotDescription
 from ..validation import RobotFault
 from .build import Built, build
 from .overlay import Overlay

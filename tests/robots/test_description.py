@@ -7,12 +7,7 @@ import numpy as np
 import pytest
 import yaml
 
-from aloft.robots.description import (
-    MotorRating,
-    RobotDescription,
-    find_robot,
-    read_description,
-)
+from aloft.robots.description import MotorRating, RobotDescription, find_robot, read_description
 
 
 def hopper() -> dict[str, Any]:
