@@ -18,6 +18,7 @@ import numpy as np
 import pytest
 
 import aloft
+from aloft.mathematics.joint_feedback import Feedback, Motion, SoftStops
 from aloft.mathematics.kernel import kernel, kernels
 from aloft.robots.description import find_robot
 from aloft.robots.leg_kinematics import read_leg
@@ -36,7 +37,7 @@ NOT_HOT = {
 }
 """Functions of numbers and arrays only that need not compile, and why."""
 
-INEXACT = {"sin", "cos", "atan2", "acos", "exp", "hypot", "dot"}
+INEXACT = {"sin", "cos", "atan2", "acos", "exp", "hypot", "dot", "tanh"}
 """What another library, or another order of sums, may round differently."""
 
 LEG = read_leg(find_robot("bruce"), 0)
@@ -51,10 +52,16 @@ UNUSED = {
     "aloft.blocks.control.balance_target.lengthen": (
         np.array([0.01, -0.04, 0.0]), 0.7, 0.02, 0.25, 0.2, 0.6, *(np.ones(3) for _ in range(3)),
     ),
-    "aloft.blocks.control.joint_pd.follow": (0.002, 0.02, *(np.ones(10) for _ in range(5))),
-    "aloft.blocks.control.joint_pd.stop": (
-        np.linspace(-1.0, 1.0, 5), np.tile([-0.8, 0.7], (5, 1)), 0.1, 2.0,
-        *(np.full(5, x) for x in (60.0, 1.5, 40.0, 0.2, 1.0, 0.3)),
+    "aloft.mathematics.joint_feedback.integrate_accelerations": (
+        0.002, 0.02, np.ones(10), Motion(np.ones(10), np.ones(10)), Motion(np.ones(10), np.ones(10)),
+    ),
+    "aloft.mathematics.joint_feedback.add_friction": (
+        np.linspace(-1.0, 1.0, 10), np.full(10, 0.07), 0.3, np.zeros(10), np.ones(10),
+    ),
+    "aloft.mathematics.joint_feedback.add_soft_stops": (
+        np.linspace(-1.0, 1.0, 5),
+        SoftStops(np.tile([-0.8, 0.7], (5, 1)), 0.1, 2.0, np.full(5, 60.0), np.full(5, 1.5)),
+        Feedback(*(np.full(5, x) for x in (40.0, 0.2, 1.0, 0.3))),
     ),
     "aloft.blocks.control.leg_inverse_kinematics.keep_along": (
         np.array([0.0, 0.6, 0.8]), np.array([0.1, 0.2, 0.3]),
