@@ -81,6 +81,12 @@ UNUSED = {
     "aloft.blocks.control.balance_target.lengthen": (
         np.array([0.01, -0.04, 0.0]), 0.7, 0.02, 0.25, 0.2, 0.6, *(np.ones(3) for _ in range(3)),
     ),
+    "aloft.blocks.control.dynamics.lowest_point": (
+        np.array([0.01, 0.0, -0.2]), 0.022, np.eye(3), np.zeros(3),
+    ),
+    "aloft.blocks.control.dynamics.rolling_drift": (
+        *(np.linspace(-1.0, 2.0, 3) * k for k in range(1, 7)), np.zeros((2, 3)),
+    ),
     "aloft.blocks.control.joint_pd.follow": (0.002, 0.02, *(np.ones(10) for _ in range(5))),
     "aloft.blocks.control.joint_pd.stop": (
         np.linspace(-1.0, 1.0, 5), np.tile([-0.8, 0.7], (5, 1)), 0.1, 2.0,
