@@ -24,7 +24,7 @@ blocks:
 """
 GAINS = """
 import math
-from aloft.runtime import primitives
+from aloft.blocks.general import primitives
 
 
 class Gain(primitives.Gain):

@@ -30,7 +30,7 @@ blocks:
 """
 PARTS = """
 from aloft import BlockError, parameter
-from aloft.runtime import primitives
+from aloft.blocks.general import primitives
 
 
 class Fragile(primitives.Gain):
