@@ -9,7 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from aloft.blocks.general.primitives import Gain, SineWave
+from aloft.blocks.general.gain import Gain
+from aloft.blocks.general.sine_wave import SineWave
 from aloft.runtime.parameter_endpoint import EndpointError, ParameterEndpoint, ask, set_parameters
 from aloft.runtime.running.executor import Executor
 from aloft.runtime.running.memory import BoundGraph

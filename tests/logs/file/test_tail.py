@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from aloft.blocks.general.primitives import Constant
+from aloft.blocks.general.constant import Constant
 from aloft.logs import read
 from aloft.logs.file.header import header_of
 from aloft.logs.file.tail import TailWriter, read_tail, record_type, tail_of

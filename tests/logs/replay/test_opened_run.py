@@ -30,13 +30,13 @@ blocks:
 """
 PARTS = """
 from aloft import BlockError, parameter
-from aloft.blocks.general import primitives
+from aloft.blocks.general import gain
 
 
-class Fragile(primitives.Gain):
+class Fragile(gain.Gain):
     '''A gain that breaks at a tick.'''
 
-    class Params(primitives.Gain.Params):
+    class Params(gain.Gain.Params):
         breaks: int = parameter(-1, text="when")
 
     def step(self) -> None:
