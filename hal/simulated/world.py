@@ -38,13 +38,16 @@ def draw_variation(params: SimulatorParameters) -> Variation:
 def build_world(
     params: SimulatorParameters, robot: RobotDescription, variation: Variation
 ) -> MjModel:
-    """The simulator's model of the robot in the scene these parameters describe."""
+    """The simulator's model of the robot in the scene these parameters describe.
+
+    Raises:
+        ValueError: the simulator cannot express the robot; see ``build_mujoco_model``.
+    """
     import mujoco
 
     model = build_mujoco_model(
-        robot, profile=robot.motors.profile, scene=params.build_scene(), timestep=params.timestep,
-        variation=variation,
-    )  # fmt: skip
+        robot, scene=params.build_scene(), timestep=params.timestep, variation=variation
+    )
     # A state that has become NaN must be seen, not be quietly replaced by the initial one.
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
     return model

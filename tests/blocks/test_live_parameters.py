@@ -115,7 +115,8 @@ def pushed(tick: int) -> Inputs:
 
 SCENES: Mapping[str, list[Scene]] = {
     "blocks.JointPD": [
-        Scene({"stance_targets": "acceleration", "friction": 0.1, "stance_stiffness": [1.0] * 5}),
+        Scene({"flight_stiffness": {"*": 40.0}, "flight_damping": 1.0}, hopping),
+        Scene({"stance_targets": "acceleration", "friction": 0.1, "stance_stiffness": 1.0}),
         Scene({"stop_gain": 1.0}, lambda tick: {"joints": {"position": 0.9, "velocity": 1.0}}),
         Scene({}, hopping),
     ],
@@ -129,6 +130,7 @@ SCENES: Mapping[str, list[Scene]] = {
     "blocks.LegInverseKinematics": [Scene({"speed_limit": 0.5})],
     "blocks.WholeBodyController": [
         Scene({"force_max": 20.0, "force_min": 1.0}),
+        Scene({"tasks": ["ContactPoints", {"task": "Posture", "gains": {"joints": ["*"]}}]}),
         # no force is both, so the solver fails and the last torque fades
         Scene(
             {"force_max": 20.0, "force_min": 50.0, "fallback_ticks": 50},
