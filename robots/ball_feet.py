@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from .link_poses import contact_centres
 
 if TYPE_CHECKING:
-    from .description import RobotDescription
+    from .robot_description import RobotDescription
 
 Array = NDArray[np.float64]
 
