@@ -1,7 +1,8 @@
 # Everything starts here. Needs git, make and Python 3.11 to 3.14; all else goes into .venv.
 #
 #   make jump    set up, let BRUCE jump, write the recording
-#   make test    set up, run all tests
+#   make test    set up, run the tests that take a few minutes in all
+#   make test-all  the longer ones too
 #
 # PYTHON=/path/to/python chooses the interpreter; by default the first that will do is taken.
 
@@ -12,10 +13,10 @@ RECORDING := recordings/jump.rrd
 # One thread for each test process: the workers already take every core.
 SINGLE := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 
-.PHONY: setup jump test lint format bench plans docs clean help
+.PHONY: setup jump test test-all lint format bench plans docs clean help
 
 help:  ## list the targets
-	@sed -n 's/^\([a-z]*\):.*##/\1:/p' $(MAKEFILE_LIST)
+	@sed -n 's/^\([a-z-]*\):.*##/\1:/p' $(MAKEFILE_LIST)
 
 setup: $(READY)  ## create .venv with everything
 
@@ -30,7 +31,10 @@ $(READY): pyproject.toml scripts/find_python.sh
 jump: $(READY)  ## run graphs/jump.yaml and write recordings/jump.rrd
 	@$(BIN)/aloft run graphs/jump.yaml --record $(RECORDING)
 
-test: $(READY)  ## run all tests
+test: $(READY)  ## run the tests, without the long ones
+	@$(SINGLE) $(BIN)/python -m pytest --numprocesses auto -m "not long"
+
+test-all: $(READY)  ## run all tests
 	@$(SINGLE) $(BIN)/python -m pytest --numprocesses auto
 
 lint: $(READY)  ## check style and types

@@ -28,9 +28,9 @@ from typing import Any
 import numpy as np
 
 from ..planner.checking.validity import InvalidPlanError
-from ..planner.errors import PlanError
 from ..planner.library.library import solve_and_check
 from ..planner.solving.bounded import cpu_time
+from ..planner.task.errors import PlanError
 from ..planner.task.task import JumpTask, make_task
 from ..robots.description import RobotDescription, find_robot
 from .rows import Row

@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Any
 
 from ..planner.checking.validity import InvalidPlanError, check_plan
-from ..planner.errors import PlanError
 from ..planner.library.library import PlanLibrary, solve_and_check
 from ..planner.solving.bounded import cpu_time
+from ..planner.task.errors import PlanError
 from ..planner.task.task import make_task, read_task
 from ..robots.description import find_robot
 from .rows import Row

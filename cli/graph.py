@@ -51,7 +51,9 @@ def print_table(out: Console, graph: CheckedGraph) -> None:
     """Print one row a block, in the order of execution, and one line for each of its inputs."""
     from ..runtime.loading.picture import table as rows_of
 
-    robot = f", robot {graph.robot.name}" if graph.robot else ""
+    robot = ""
+    if graph.robot is not None:
+        robot = f", robot {graph.robot.name} with actuators {graph.robot.motors.profile}"
     length = "until stopped" if graph.ticks is None else f"{graph.ticks} ticks"
     say(out, f"{graph.name}: base rate {graph.base_rate:g} Hz, {length}{robot}\n")
     rows = []

@@ -88,7 +88,7 @@ def export(
 def repair(file: File, as_json: AsJson = False) -> None:
     """Mend a recording that was cut off, in place: what is incomplete at its end is removed."""
     from ..logs.file.repair import repair as mend
-    from ..logs.file.tail_repair import take_in_tail
+    from ..logs.recording.tail_repair import take_in_tail
 
     with errors_reported(as_json):
         try:

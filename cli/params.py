@@ -71,7 +71,7 @@ def set_(
     as_json: AsJson = False,
 ) -> None:
     """Change parameters, all in the same tick; nothing changes if one of them is wrong."""
-    from ..runtime.running.parameter_endpoint import set_parameters
+    from ..runtime.parameter_endpoint import set_parameters
     from .endpoints import find
 
     with errors_reported(as_json):
@@ -86,7 +86,7 @@ def set_(
 
 def ask_list(run: str) -> tuple[str, list[dict[str, Any]]]:
     """The graph's name and all its parameters. Raises ``AloftError``."""
-    from ..runtime.running.parameter_endpoint import ask
+    from ..runtime.parameter_endpoint import ask
     from .endpoints import find
 
     answer = ask(find(run), {"verb": "list"})

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from ..planner.library.library import PlanLibrary
-    from ..planner.library.plan import JumpPlan
+    from ..planner.task.plan import JumpPlan
     from ..planner.task.task import JumpTask
     from ..robots.description import RobotDescription
 
@@ -99,8 +99,8 @@ def plan_tasks(
     Raises:
         TaskError: what is wrong with any of them.
     """
-    from ..planner.errors import TaskError
     from ..planner.library.library import PlanLibrary
+    from ..planner.task.errors import TaskError
     from ..planner.task.task import read_task
     from ..robots.description import find_robot
 
@@ -134,8 +134,8 @@ def plan_task(
 ) -> dict[str, Any]:  # fmt: skip
     """Plan one task; print it, picture it, and return its row."""
     from ..planner.checking.validity import InvalidPlanError
-    from ..planner.errors import PlanError
     from ..planner.solving.bounded import cpu_time
+    from ..planner.task.errors import PlanError
 
     robot = library.robot
     started = cpu_time()
@@ -180,7 +180,7 @@ def search_nearest(
     task: JumpTask, library: PlanLibrary, family: str, screen: Console
 ) -> dict[str, Any]:
     """The nearest task that has a plan, which is kept; for the row of the one that has none."""
-    from ..planner.solving.nearest_feasible import nearest_feasible
+    from ..planner.library.nearest_feasible import nearest_feasible
 
     with screen.status("searching the nearest task that can be planned") as status:
 

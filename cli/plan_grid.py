@@ -82,8 +82,8 @@ def plan_grid(
 
 def compile_once(library: PlanLibrary, tasks: list[JumpTask], screen: Console) -> None:
     """Compile before there are workers, which would else all compile the same."""
-    from ..planner.errors import PlanError
     from ..planner.solving.solve import make_problem
+    from ..planner.task.errors import PlanError
     from ..planner.task.task import TaskError
 
     # In the plane and out of it there are other functions, and for every formulation.

@@ -16,9 +16,9 @@ if TYPE_CHECKING:
     from rich.table import Table
 
     from ..logs.recording.motion_recording import RecordedMotion
-    from ..planner.errors import PlanError
-    from ..planner.library.plan import JumpPlan
-    from ..planner.solving.nearest_feasible import NearestFeasible
+    from ..planner.library.nearest_feasible import NearestFeasible
+    from ..planner.task.errors import PlanError
+    from ..planner.task.plan import JumpPlan
     from ..planner.task.task import JumpTask
     from ..robots.description import RobotDescription
     from ..studies.batch.plan_grid import GridRow

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
     from ..logs.viewing.viewer import Viewer
     from ..runtime.graph import Graph
-    from ..runtime.running.parameter_endpoint import ParameterEndpoint
+    from ..runtime.parameter_endpoint import ParameterEndpoint
     from ..runtime.running.run_result import RunResult
     from ..runtime.running.sinks import Sink
     from ..studies.batch.seeds import SeedRow

@@ -52,7 +52,7 @@ def view(
 def compare(first: Path, second: Path, path: Path) -> Path:
     """Write both runs into one file."""
     from ..logs.file.reader import read
-    from ..logs.viewing.comparison import write_comparison
+    from ..logs.recording.comparison import write_comparison
 
     try:
         return write_comparison(path, read(first), read(second))

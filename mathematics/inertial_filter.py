@@ -12,13 +12,12 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from .constants import GRAVITY
 from .kernel import kernel
 from .rotations import integrate, normalise, rotate
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
-
-GRAVITY = 9.81
 
 
 @kernel

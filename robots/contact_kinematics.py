@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from ..mathematics.rotations import cross, rotate_back, skew
 from .description import RobotDescription
+from .link_poses import contact_centres, joints_above
 from .pinocchio_model import build_pinocchio_model
 
 Array = NDArray[np.float64]
@@ -55,11 +56,7 @@ class ContactKinematics:
         self._mass = robot.total_mass
         self._foot_of_point = robot.foot_of_contact()
         self._radii = [contact.radius for contact in robot.contacts]
-        self._centres = [
-            np.array([x, y, z + contact.radius])
-            for contact in robot.contacts
-            for x, y, z in [contact.position]
-        ]
+        self._centres = list(contact_centres(robot))
         self._sole_offsets = [np.array(foot.sole) for foot in robot.feet]
         self._down, self._arm, self._spare = np.zeros(3), np.zeros(3), np.zeros(3)
         self.points, self.rates = np.zeros((len(self._radii), 3)), np.zeros((len(self._radii), 3))
@@ -70,7 +67,7 @@ class ContactKinematics:
         self._joint_jacobians = data.J[:, 6:]
         self._linear, self._angular = np.zeros((3, n_joints)), np.zeros((3, n_joints))
         self._lever = np.zeros((3, 3))
-        self._of_leg = np.array([_joints_above(robot, foot.link) for foot in robot.feet], float)
+        self._of_leg = np.array([joints_above(robot, foot.link) for foot in robot.feet], float)
         self.centres = np.zeros((len(self._radii), 3))
         self.jacobians = np.zeros((len(self._radii), 3, n_joints))
 
@@ -125,13 +122,3 @@ class ContactKinematics:
             np.dot(self._lever, self._angular, jacobian)
             np.subtract(self._linear, jacobian, out=jacobian)
             jacobian *= self._of_leg[foot]
-
-
-def _joints_above(robot: RobotDescription, link: str) -> list[bool]:
-    """Which joints move a link."""
-    above = [False] * len(robot.joints)
-    while link != robot.base:
-        index = next(i for i, joint in enumerate(robot.joints) if joint.child == link)
-        above[index] = True
-        link = robot.joints[index].parent
-    return above

@@ -7,151 +7,53 @@ they cannot disagree. All frames are parallel to the base's at the zero pose; qu
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from fnmatch import fnmatchcase
-from functools import cached_property, lru_cache
+from functools import cached_property
 from pathlib import Path
 from typing import Any, Literal, Self
 
 import numpy as np
-import yaml
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, model_validator
 
-Vector3 = tuple[float, float, float]
-Array = NDArray[np.float64]
+from .parts import (
+    ActuatorProfile,
+    Array,
+    ContactPoint,
+    Foot,
+    Joint,
+    Link,
+    MotorRating,
+    Motors,
+    Part,
+    Sensors,
+    Shape,
+    Transmission,
+    Vector3,
+)
+
+__all__ = [
+    "BASE_VELOCITIES",
+    "ActuatorProfile",
+    "ContactPoint",
+    "Foot",
+    "Joint",
+    "Link",
+    "MotorRating",
+    "Motors",
+    "RobotDescription",
+    "Sensors",
+    "Shape",
+    "Transmission",
+    "Vector3",
+    "find_robot",
+    "read_description",
+]
 
 BASE_VELOCITIES = {"floating": 6, "planar": 3, "fixed": 0}
 """How many velocities the base has."""
 
 
-class _Data(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, ignored_types=(cached_property,))
-
-
-class Shape(_Data):
-    """A collision capsule from ``start`` to ``end`` [m, link frame] of ``radius`` [m]."""
-
-    start: Vector3
-    end: Vector3
-    radius: float
-
-
-class Link(_Data):
-    """A rigid body: ``mass`` [kg], ``com`` [m, link frame], ``inertia`` about the CoM [kg m^2]
-    as xx, yy, zz, xy, xz, yz, with products of inertia as they stand in the tensor."""
-
-    name: str
-    mass: float
-    com: Vector3
-    inertia: tuple[float, float, float, float, float, float]
-    shapes: tuple[Shape, ...] = ()
-
-
-class Joint(_Data):
-    """A joint from ``parent`` to ``child`` at ``origin`` [m, parent frame].
-
-    A ``hinge`` turns the child about ``axis`` [rad]; a ``slide`` moves it along ``axis`` [m].
-    ``limits`` are in the same unit; ``None`` is a joint without limits.
-    """
-
-    name: str
-    kind: Literal["hinge", "slide"] = "hinge"
-    parent: str
-    child: str
-    origin: Vector3
-    axis: Vector3
-    limits: tuple[float, float] | None = None
-
-
-class Foot(_Data):
-    """A foot: the ``link`` it belongs to and its ``sole`` centre [m, link frame]."""
-
-    name: str
-    link: str
-    sole: Vector3
-
-
-class ContactPoint(_Data):
-    """A point that may carry load: ``position`` of its lowest point [m, link frame] and the
-    ``radius`` [m] of the rubber there."""
-
-    name: str
-    foot: str
-    position: Vector3
-    radius: float
-
-
-class MotorRating(_Data):
-    """What one motor can do, at the gearbox output, where it differs from its profile's others.
-
-    The meaning of each value is that of ``ActuatorProfile``; ``None`` is the profile's own value.
-    """
-
-    peak_torque: float | None = None
-    corner_speed: float | None = None
-    no_load_speed: float | None = None
-    continuous_torque: float | None = None
-    rotor_inertia: float | None = None
-    friction: float | None = None
-    damping: float | None = None
-
-
-class ActuatorProfile(_Data):
-    """What the motors can do, at the gearbox output. ``peak_torque`` [N m] holds up to
-    ``corner_speed`` and falls linearly to zero at ``no_load_speed`` [rad/s]; braking torque is
-    ``peak_torque`` at any speed. ``rotor_inertia`` [kg m^2] counts at the gearbox output;
-    ``friction`` [N m] and ``damping`` [N m s/rad] act at each joint's side of the gearbox.
-
-    ``motors`` gives other values for motors by name or by a shell pattern such as ``*_knee_*``;
-    later entries win. For a motor that drives a slide, N stands for N m and m for rad.
-    """
-
-    peak_torque: float
-    corner_speed: float
-    no_load_speed: float
-    continuous_torque: float
-    rotor_inertia: float
-    friction: float
-    damping: float
-    motors: Mapping[str, MotorRating] = {}
-
-
-@dataclass(frozen=True, eq=False)
-class Motors:
-    """The chosen profile's values, one element a motor (n_joints,), at the gearbox output.
-
-    ``friction`` and ``damping`` are one element a joint: the joint at the motor's place in the
-    order of the description.
-    """
-
-    profile: str
-    peak_torque: Array
-    corner_speed: Array
-    no_load_speed: Array
-    continuous_torque: Array
-    rotor_inertia: Array
-    friction: Array
-    damping: Array
-
-
-class Transmission(_Data):
-    """``joint_to_motor``: motor velocity = matrix times joint velocity (n_joints square), so
-    joint torque = its transpose times motor torque."""
-
-    motors: tuple[str, ...]
-    joint_to_motor: tuple[tuple[float, ...], ...]
-
-
-class Sensors(_Data):
-    """Which sensors the robot has besides its joint encoders: an ``imu`` at the base's origin,
-    parallel to the base, and a tactile switch at every contact point."""
-
-    imu: bool = True
-    switches: bool = True
-
-
-class RobotDescription(_Data):
+class RobotDescription(Part):
     """A robot: links, joints, feet, contact points, transmission, actuators, sensors, stance.
 
     ``base_joint`` says how the base link is held: ``floating`` moves freely, ``planar`` moves in
@@ -159,6 +61,8 @@ class RobotDescription(_Data):
     contacts may be missing. ``held`` are joints that stand still at an angle while the robot is
     at work: the planner leaves them out, and the controller holds them.
     """
+
+    later = ("base_joint", "profile", "sensors", "held")
 
     name: str
     text: str = ""
@@ -174,36 +78,12 @@ class RobotDescription(_Data):
     """The profile in use; empty: the first."""
     sensors: Sensors = Sensors()
     standing: Mapping[str, float] = {}
-    """Joint angles [rad] by name of the pose the robot stands in; zero where none is given."""
+    """Joint angles [rad] by name of the pose the robot stands in. A joint that is not named is at
+    its angle in ``held``, else at zero."""
     held: Mapping[str, float] = {}
     """Angles [rad] by name of joints that stand still while the robot is at work."""
     points: Mapping[str, tuple[str, Vector3]] = {}
     """Named points [m, link frame] where something may push: name -> (link, position)."""
-
-    @model_validator(mode="after")
-    def _check_names(self) -> RobotDescription:
-        links = [link.name for link in self.links]
-        joints = [joint.name for joint in self.joints]
-        feet = [foot.name for foot in self.feet]
-        for kind, names in (("link", links), ("joint", joints), ("foot", feet)):
-            for name in names:
-                if names.count(name) > 1:
-                    raise ValueError(f"{kind} {name!r} is there twice")
-        known = [(self.base, links, "base")]
-        known += [(j.parent, links, f"joint {j.name}: parent") for j in self.joints]
-        known += [(j.child, links, f"joint {j.name}: child") for j in self.joints]
-        known += [(f.link, links, f"foot {f.name}: link") for f in self.feet]
-        known += [(c.foot, feet, f"contact {c.name}: foot") for c in self.contacts]
-        known += [(name, joints, "standing") for name in self.standing]
-        known += [(link, links, f"point {name}: link") for name, (link, _) in self.points.items()]
-        for name, names, where in known:
-            if name not in names:
-                raise ValueError(f"{where} {name!r} is not one of {', '.join(names)}")
-        n = len(joints)
-        rows = self.transmission.joint_to_motor
-        if len(rows) != n or any(len(row) != n for row in rows):
-            raise ValueError(f"joint_to_motor must be {n} x {n}")
-        return self
 
     @property
     def dimensions(self) -> Mapping[str, int]:
@@ -229,7 +109,15 @@ class RobotDescription(_Data):
         if name not in self.profiles:
             there = ", ".join(self.profiles)
             raise LookupError(f"{self.name} has no actuator profile {name!r}; there is {there}")
-        return self if name == self.motors.profile else self.model_copy(update={"profile": name})
+        return self if name == self.motors.profile else self.changed(profile=name)
+
+    def changed(self, **fields: Any) -> Self:
+        """A copy with other values in some fields, which are not validated again."""
+        copy = self.model_copy(update=fields)
+        for name in list(vars(copy)):  # pydantic copies cached properties too
+            if name not in type(self).model_fields:
+                del vars(copy)[name]
+        return copy
 
     @cached_property
     def motors(self) -> Motors:
@@ -276,8 +164,9 @@ class RobotDescription(_Data):
 
     @cached_property
     def standing_position(self) -> NDArray[np.float64]:
-        """The standing pose's joint angles [rad], (n_joints,), zero where none is given."""
-        return np.array([self.standing.get(j.name, 0.0) for j in self.joints])
+        """The standing pose's joint angles [rad], (n_joints,)."""
+        angles = {**self.held, **self.standing}
+        return np.array([angles.get(joint.name, 0.0) for joint in self.joints])
 
     @cached_property
     def joint_limits(self) -> NDArray[np.float64]:
@@ -301,26 +190,23 @@ class RobotDescription(_Data):
 
 
 def read_description(path: Path) -> RobotDescription:
-    """Read a description from a YAML file. Raises pydantic's ``ValidationError``."""
-    data: Any = yaml.load(path.read_text(), Loader=getattr(yaml, "CSafeLoader", yaml.SafeLoader))
-    return RobotDescription.model_validate(data)
+    """The robot that a file describes.
+
+    Raises:
+        RobotError: the file cannot be read, or describes no robot; it carries every fault.
+    """
+    from .reading import read_robot
+
+    return read_robot(path)
 
 
-@lru_cache(maxsize=8)
 def find_robot(name: str, folder: Path | None = None) -> RobotDescription:
-    """The description called ``name``: one of ours, or a YAML file relative to ``folder``.
+    """The description called ``name``: one of ours, or a file relative to ``folder``.
 
     Raises:
         LookupError: there is none; the message names those that exist.
+        RobotError: the file cannot be read, or describes no robot; it carries every fault.
     """
-    if name.endswith((".yaml", ".yml")):
-        path = (folder or Path()) / name
-        if not path.is_file():
-            raise LookupError(f"no robot description at {path}")
-        return read_description(path)
-    shipped = Path(__file__).parent
-    path = shipped / name / f"{name}.yaml"
-    if not path.is_file():
-        names = sorted(p.parent.name for p in shipped.glob("*/*.yaml") if p.stem == p.parent.name)
-        raise LookupError(f"no robot called {name!r}; there is {', '.join(names)}")
-    return read_description(path)
+    from .reading import find
+
+    return find(name, folder)

@@ -228,9 +228,7 @@ def _merged(robot: RobotDescription, places: dict[str, _Place], name: str) -> Li
     return robot.link(name).model_copy(update=changed)
 
 
-def _lumped(
-    places: dict[str, _Place], parts: Sequence[Link]
-) -> tuple[float, Array, Array]:
+def _lumped(places: dict[str, _Place], parts: Sequence[Link]) -> tuple[float, Array, Array]:
     """Mass, centre of mass and inertia about it of links that are welded to each other."""
     mass = float(sum(link.mass for link in parts))
     centres = [places[link.name].point(link.com) for link in parts]

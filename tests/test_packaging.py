@@ -45,7 +45,7 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_the_wheel_holds_all_code_and_data(wheel: Path) -> None:
     inside = set(zipfile.ZipFile(wheel).namelist())
-    expected = {"aloft/py.typed", "aloft/hal/bruce/bruce.yaml"}
+    expected = {"aloft/py.typed", "aloft/robots/bruce/bruce.yaml"}
     for package in LISTED:
         folder = ROOT.joinpath(*package.split(".")[1:])
         expected |= {f"{package.replace('.', '/')}/{path.name}" for path in folder.glob("*.py")}

@@ -11,8 +11,6 @@ from ...mathematics.kernel import kernel
 from ...mathematics.rotations import normalise, rotate_back, to_matrix
 from ...robots.pinocchio_model import build_pinocchio_model
 from ...runtime.language.block import Block, Input, Output
-from ...runtime.language.errors import BlockError
-from ...runtime.language.parameters import Parameters, parameter
 from ..signals import BaseState, DynamicsTerms, JointState
 
 Array = NDArray[np.float64]
@@ -34,13 +32,10 @@ class Dynamics(Block):
     the rotors out. Friction is in none of the terms.
 
     Does not filter or estimate anything, and knows no ground: contact points are points of the
-    feet, loaded or not. Raises ``BlockError`` at load for an unknown actuator profile.
+    feet, loaded or not.
     """
 
-    class Params(Parameters):
-        actuators: str = parameter("koala", text="the profile whose rotor inertia counts")
-
-    params: Params
+    needs = ("floating base",)
 
     base = Input(BaseState, text="pose and velocity of the base")
     joints = Input(JointState, text="joint angles and velocities")
@@ -49,15 +44,8 @@ class Dynamics(Block):
     def setup(self) -> None:
         import pinocchio
 
-        robot = self.context.robot
-        if robot is None:
-            raise BlockError("Dynamics needs a robot: name one in the graph, e.g. robot: bruce")
-        if self.params.actuators not in robot.profiles:
-            raise BlockError(
-                f"{robot.name} has no actuator profile {self.params.actuators!r}; there is "
-                + ", ".join(robot.profiles)
-            )
-        built = build_pinocchio_model(robot, self.params.actuators)
+        robot = self.robot
+        built = build_pinocchio_model(robot)
         self._pinocchio: Any = pinocchio
         self._model: Any = built.model
         self._data: Any = built.model.createData()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Literal
 
 import numpy as np
@@ -9,8 +10,7 @@ from numpy.typing import NDArray
 
 from ...mathematics.kernel import kernel
 from ...robots.description import RobotDescription
-from ...runtime.language.block import Block, Input, Output, State
-from ...runtime.language.errors import BlockError
+from ...runtime.language.block import Block, Input, Misfit, Output, State
 from ...runtime.language.parameters import Parameters, live_parameter, parameter
 from ...runtime.language.signals import Field, Signal
 from ..signals import (
@@ -25,6 +25,8 @@ from ..signals import (
 )
 
 Array = NDArray[np.float64]
+
+_GAINS = ("flight_stiffness", "flight_damping", "stance_stiffness", "stance_damping")
 
 
 class JointFollower(Signal):
@@ -61,8 +63,8 @@ class JointPD(Block):
 
     Gains are per leg joint from the hip outwards, the same for every leg. For a sampled drive keep
     Kd times its period below half the joint's inertia (ankle: 1.8e-3 kg m^2). Limits no torque:
-    the drives do, and the whole-body controller should. Raises ``BlockError`` at load where a
-    gain list does not fit a leg.
+    the drives do, and the whole-body controller should. The load report has a problem where
+    a list of gains does not fit a leg.
     """
 
     class Params(Parameters):
@@ -101,6 +103,7 @@ class JointPD(Block):
             0.3, unit="rad/s", gt=0.0, text="joint speed at which most of it is compensated"
         )
 
+    needs = ("robot",)
     params: Params
 
     wbc = Input(WholeBodyCommand, text="feedforward torques and accelerations")
@@ -111,10 +114,26 @@ class JointPD(Block):
     command = Output(JointCommand, text="what the drives execute")
     follower = State(JointFollower, text="blending and stance targets")
 
+    @classmethod
+    def requires(cls, params: Parameters, robot: RobotDescription | None) -> Iterable[Misfit]:
+        """One gain for every joint of a leg."""
+        assert robot is not None
+        for name in _GAINS:
+            values: list[float] = getattr(params, name)
+            for number, foot in enumerate(robot.feet):
+                joints = [robot.joints[j].name for j in leg_joints(robot, number)]
+                if len(values) != len(joints):
+                    yield Misfit(
+                        f"{name} has {len(values)} gains, and the leg of {foot.name} has "
+                        f"{len(joints)} joints",
+                        parameter=name,
+                        expected=f"one gain each for {', '.join(joints)}",
+                        found=f"{len(values)} gains",
+                    )
+                    break
+
     def setup(self) -> None:
-        robot = self.context.robot
-        if robot is None:
-            raise BlockError("JointPD needs a robot: name one in the graph, e.g. robot: bruce")
+        robot = self.robot
         self._chains = [leg_joints(robot, foot) for foot in range(len(robot.feet))]
         self._foot_of_point = robot.foot_of_contact()
         self.on_parameters()
@@ -127,19 +146,11 @@ class JointPD(Block):
         self._stance_velocity = np.zeros(n)
 
     def on_parameters(self) -> None:
-        robot = self.context.robot
-        assert robot is not None
+        robot = self.robot
         gains = np.zeros((4, len(robot.joints)))
-        for row, name in enumerate(
-            ("flight_stiffness", "flight_damping", "stance_stiffness", "stance_damping")
-        ):
+        for row, name in enumerate(_GAINS):
             values: list[float] = getattr(self.params, name)
-            for foot, chain in zip(robot.feet, self._chains, strict=True):
-                if len(values) != len(chain):
-                    raise BlockError(
-                        f"{name} has {len(values)} gains; {foot.name}'s leg has {len(chain)} "
-                        f"joints: {', '.join(robot.joints[j].name for j in chain)}"
-                    )
+            for chain in self._chains:
                 gains[row, list(chain)] = values
         self._flight_stiffness, self._flight_damping = gains[0], gains[1]
         self._stance_stiffness, self._stance_damping = gains[2], gains[3]

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from ...mathematics.kernel import kernel
 from ...mathematics.rotations import tilt
 from ...runtime.language.block import Block, Input, Metric, Output, State
-from ...runtime.language.errors import BlockError
 from ...runtime.language.parameters import Parameters, live_parameter, parameter
 from ...runtime.language.signals import Field, Signal
 from ..signals import BaseState, CommandMode, JointCommand, JointState, WholeBodyCommand
@@ -94,6 +93,7 @@ class SafetyMonitor(Block):
             0.5, unit="N m s/rad", ge=0.0, text="of every joint, when damped"
         )
 
+    needs = ("robot",)
     params: Params
 
     desired = Input(JointCommand, text="what the controller wants")
@@ -104,9 +104,7 @@ class SafetyMonitor(Block):
     state = State(SafetyState, text="timers and the fault")
 
     def setup(self) -> None:
-        robot = self.context.robot
-        if robot is None:
-            raise BlockError("SafetyMonitor needs a robot: name one in the graph")
+        robot = self.robot
         margin = self.params.limit_margin
         self._lower = robot.joint_limits[:, 0] - margin
         self._upper = robot.joint_limits[:, 1] + margin

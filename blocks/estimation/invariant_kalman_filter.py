@@ -8,8 +8,9 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from ...mathematics.constants import GRAVITY
 from ...mathematics.extended_pose import retract
-from ...mathematics.inertial_filter import GRAVITY, misalignment, propagate, turn, upright
+from ...mathematics.inertial_filter import misalignment, propagate, turn, upright
 from ...mathematics.invariant_contacts import (
     admit,
     centre,
@@ -26,7 +27,6 @@ from ...mathematics.rotations import rotate, to_matrix
 from ...robots.contact_kinematics import ContactKinematics
 from ...robots.description import RobotDescription
 from ...runtime.language.block import Block, Input, Output, State
-from ...runtime.language.errors import BlockError
 from ...runtime.language.parameters import Parameters
 from ..signals import BaseState, ContactState, EstimatorHealth, ImuReading, JointState
 from .invariant_estimate import InvariantEstimate, InvariantFilterParameters
@@ -82,12 +82,10 @@ class InvariantKalmanFilter(Block):
     Standard deviations are of one sample at the block's rate. The defaults are the standard
     trial's noise; offsets and biases are there uniform, with these as their deviations.
     Never waits, never raises in a run.
-
-    Raises:
-        BlockError: the graph has no robot.
     """
 
     Params = InvariantFilterParameters
+    needs = ("floating base", "imu", "feet")
     params: InvariantFilterParameters
 
     imu = Input(ImuReading, text="gyroscope, and accelerometer as the mean over the tick")
@@ -102,16 +100,13 @@ class InvariantKalmanFilter(Block):
         cls, params: Parameters, robot: RobotDescription | None
     ) -> Mapping[str, int]:
         """The vectors of the state and the size of the error."""
-        if robot is None:
-            return {"n_vectors": 2, "n_errors": 15}
+        assert robot is not None
         n = len(robot.contacts)
         return {"n_vectors": 2 + n, "n_errors": 15 + 3 * n + len(robot.joints)}
 
     def setup(self) -> None:
         """The robot's kinematics, constant matrices and scratch memory."""
-        robot, params = self.context.robot, self.params
-        if robot is None:
-            raise BlockError("InvariantKalmanFilter needs a robot: name one in the graph")
+        robot, params = self.robot, self.params
         self._kinematics = ContactKinematics(robot)
         self._points, n_joints = len(robot.contacts), len(robot.joints)
         self._radius = [contact.radius for contact in robot.contacts]

@@ -8,8 +8,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from ...mathematics.constants import GRAVITY
 from ...mathematics.inertial_filter import (
-    GRAVITY,
     misalignment,
     propagate,
     right_up,
@@ -21,7 +21,6 @@ from ...mathematics.inertial_filter import (
 from ...mathematics.rotations import rotate, rotate_back, wrap
 from ...robots.contact_kinematics import ContactKinematics
 from ...runtime.language.block import Block, Input, Output, State
-from ...runtime.language.errors import BlockError
 from ...runtime.language.parameters import Parameters, live_parameter, parameter
 from ...runtime.language.signals import Field, Signal
 from ..signals import BaseState, ContactState, ImuReading, JointState
@@ -138,6 +137,7 @@ class StateEstimator(Block):
             1.5, unit="rad/s", gt=0.0, text="rate below which its feet are surely flat"
         )
 
+    needs = ("floating base", "imu", "feet")
     params: Params
 
     imu = Input(ImuReading, text="gyroscope, and accelerometer as the mean over the tick")
@@ -148,9 +148,7 @@ class StateEstimator(Block):
     learning = State(BiasSamples, text="what the biases are learnt from")
 
     def setup(self) -> None:
-        robot = self.context.robot
-        if robot is None:
-            raise BlockError("StateEstimator needs a robot: name one in the graph")
+        robot = self.robot
         self._kinematics = ContactKinematics(robot)
         n = len(robot.contacts)
         self._world_points, self._world_rates = np.zeros((n, 3)), np.zeros((n, 3))

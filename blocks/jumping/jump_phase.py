@@ -7,14 +7,13 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from ...mathematics.constants import GRAVITY
 from ...mathematics.kernel import kernel
 from ...runtime.language.block import Block, Input, Output, State
-from ...runtime.language.errors import BlockError
 from ...runtime.language.parameters import Parameters, live_parameter
 from ...runtime.language.signals import Field, Signal
 from ..signals import ContactState, DynamicsTerms, JumpReference, Phase, PhaseState
 
-_GRAVITY = 9.81
 _THRUST = int(Phase.THRUST)
 
 
@@ -87,6 +86,7 @@ class JumpPhase(Block):
             0.2, unit="s", gt=0.0, text="how long without contact before it is a fault"
         )
 
+    needs = ("feet",)
     params: Params
     reference = Input(JumpReference, text="the plan")
     contacts = Input(ContactState, text="which points carry load")
@@ -95,10 +95,7 @@ class JumpPhase(Block):
     memory = State(PhaseMemory, text="the phase, its times, and contacts lately lost")
 
     def setup(self) -> None:
-        robot = self.context.robot
-        if robot is None:
-            raise BlockError("JumpPhase needs a robot: name one in the graph, e.g. robot: bruce")
-        self._foot_of_point = np.array(robot.foot_of_contact())
+        self._foot_of_point = np.array(self.robot.foot_of_contact())
 
     def start(self) -> None:
         self.memory.touchdown[()] = -1.0
@@ -160,14 +157,14 @@ def count_unloaded(
 @kernel
 def planned_touchdown_height(height: float, velocity: float, remaining: float) -> float:
     """Where a body at ``height`` with ``velocity`` will be after falling for ``remaining``."""
-    return height + remaining * (velocity - 0.5 * _GRAVITY * remaining)
+    return height + remaining * (velocity - 0.5 * GRAVITY * remaining)
 
 
 @kernel
 def time_to_height(height: float, velocity: float, goal: float) -> float:
     """The time [s] until a falling body comes down to ``goal``; its apex where it is below that."""
-    square = velocity * velocity + 2.0 * _GRAVITY * (height - goal)
-    return max(0.0, (velocity + math.sqrt(max(square, 0.0))) / _GRAVITY)
+    square = velocity * velocity + 2.0 * GRAVITY * (height - goal)
+    return max(0.0, (velocity + math.sqrt(max(square, 0.0))) / GRAVITY)
 
 
 @kernel

@@ -6,15 +6,15 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
+from ...planner.library.jump_table import JumpTableReader
 from ...runtime.language.block import Block, Metric, Output
 from ...runtime.language.errors import BlockError
 from ...runtime.language.parameters import Parameters, parameter
 from ..signals import JumpReference
-from .jump_table import JumpTableReader
 
 if TYPE_CHECKING:
     from ...planner.checking.validity import ValidityReport
-    from ...planner.library.plan import JumpPlan as Plan
+    from ...planner.task.plan import JumpPlan as Plan
     from ...planner.task.task import JumpTask
     from ...robots.description import RobotDescription
 
@@ -72,6 +72,7 @@ class JumpPlan(Block):
             None, text="which one plans, in place of the task's"
         )
 
+    needs = ("floating base", "feet")
     params: Params
     reference = Output(JumpReference, text="the plan at the present instant")
 
@@ -148,8 +149,8 @@ class JumpPlan(Block):
             raise BlockError(str(error)) from error
 
     def _plan(self, task: JumpTask, robot: RobotDescription) -> Plan:
-        from ...planner.errors import TaskError
         from ...planner.library.library import PlanLibrary
+        from ...planner.task.errors import TaskError
 
         folder = Path(self.params.library) if self.params.library else None
         library = PlanLibrary(robot, folder)

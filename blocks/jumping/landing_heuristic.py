@@ -22,7 +22,6 @@ from ...mathematics.rotations import (
 )
 from ...robots.description import RobotDescription
 from ...runtime.language.block import Block, Input, Output, State
-from ...runtime.language.errors import BlockError
 from ...runtime.language.parameters import Parameters, live_parameter, parameter
 from ...runtime.language.signals import Field, Signal
 from ..signals import DynamicsTerms, FootTarget, JumpReference, Phase, PhaseState
@@ -114,6 +113,7 @@ class LandingHeuristic(Block):
             0.06, unit="s", gt=0.0, text="how long before touchdown it begins"
         )
 
+    needs = ("feet",)
     params: Params
     reference = Input(JumpReference, text="the plan")
     phase = Input(PhaseState, text="the phase and the time to touchdown")
@@ -122,9 +122,7 @@ class LandingHeuristic(Block):
     memory = State(LandingMemory, text="lift-off, and the plan as long as it lasts")
 
     def setup(self) -> None:
-        robot = self.context.robot
-        if robot is None:
-            raise BlockError("LandingHeuristic needs a robot: name one, e.g. robot: bruce")
+        robot = self.robot
         self._mass = robot.total_mass
         self._sides = foot_sides(robot)
         self.on_parameters()

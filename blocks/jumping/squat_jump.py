@@ -14,17 +14,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ...mathematics.constants import GRAVITY
 from ...mathematics.polynomials import minimum_jerk, quintic
+from ...planner.library.jump_table import JumpTable
 from ...robots.description import RobotDescription
 from ...robots.pinocchio_model import PinocchioModel
 from ...runtime.language.errors import BlockError
 from .guided_motion import GuidedBody, Motion, MotionRecorder
-from .jump_table import JumpTable
 
 Array = NDArray[np.float64]
-
-GRAVITY = 9.81
-"""m/s^2"""
 
 
 @dataclass(frozen=True)

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from functools import lru_cache
 
+from ...planner.library.jump_table import JumpTable, JumpTableReader
 from ...robots.description import RobotDescription
 from ...robots.pinocchio_model import build_pinocchio_model
-from ...runtime.language.block import Block, Output
-from ...runtime.language.errors import BlockError
+from ...runtime.language.block import Block, Misfit, Output
 from ...runtime.language.parameters import Parameters, parameter
 from ..signals import JumpReference
-from .jump_table import JumpTable, JumpTableReader
 from .squat_jump import SquatJumpTask, plan_squat_jump
 
 
@@ -33,8 +33,8 @@ class SquatJumpReference(Block):
 
     The plan is made at load (about 0.2 s) and read by the time since the run began; after its end
     it stands still. It knows nothing of what the robot really does, plans no lateral jump and no
-    twist, and leaves forces and torque limits to the controller. Raises ``BlockError`` at load
-    where a joint would pass its limit or a motor its speed.
+    twist, and leaves forces and torque limits to the controller. It needs legs of five joints.
+    ``setup`` raises ``BlockError`` where a joint would pass its limit or a motor its speed.
     """
 
     class Params(Parameters):
@@ -82,31 +82,38 @@ class SquatJumpReference(Block):
             le=0.02,
             text="delay from sensing to torque that is made up for",
         )
-        actuators: str = parameter("koala", text="the actuator profile whose speed must suffice")
 
+    needs = ("floating base", "feet")
     params: Params
     reference = Output(JumpReference, text="the plan at the present instant")
 
-    def setup(self) -> None:
-        robot, p = self.context.robot, self.params
-        if robot is None:
-            raise BlockError("SquatJumpReference needs a robot: name one, e.g. robot: bruce")
-        if p.actuators not in robot.profiles:
-            raise BlockError(
-                f"{robot.name} has no actuator profile {p.actuators!r}; there is "
-                + ", ".join(robot.profiles)
+    @classmethod
+    def requires(cls, params: Parameters, robot: RobotDescription | None) -> Iterable[Misfit]:
+        """Legs of five joints, and no joint besides."""
+        assert robot is not None
+        joints, feet = len(robot.joints), len(robot.feet)
+        if joints != 5 * feet:
+            yield Misfit(
+                f"a squat jump is planned for legs of five joints each, and {robot.name} has "
+                f"{joints} joints for {feet} feet",
+                expected=f"{5 * feet} joints",
+                found=f"{joints} joints",
             )
+
+    def setup(self) -> None:
+        robot, p = self.robot, self.params
         names = set(SquatJumpTask.__dataclass_fields__)
         task = SquatJumpTask(**{k: v for k, v in p.model_dump().items() if k in names})
-        self._reader = JumpTableReader(_plan(robot.model_dump_json(), task, p.actuators))
+        self._reader = JumpTableReader(_plan(robot.model_dump_json(), task))
 
     def step(self) -> None:
         self._reader.read(self.time, self.reference, self.params.lead)
 
 
 @lru_cache(maxsize=8)
-def _plan(robot: str, task: SquatJumpTask, actuators: str) -> JumpTable:
+def _plan(robot: str, task: SquatJumpTask) -> JumpTable:
     """The plan for a robot given as JSON: the same for all runs of a process."""
     description = RobotDescription.model_validate_json(robot)
-    model = build_pinocchio_model(description, actuators)
-    return plan_squat_jump(model, description, task, actuators)
+    profile = description.motors.profile
+    model = build_pinocchio_model(description, profile)
+    return plan_squat_jump(model, description, task, profile)

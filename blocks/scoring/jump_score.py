@@ -7,6 +7,7 @@ from math import degrees, hypot, sqrt
 
 import numpy as np
 
+from ...mathematics.constants import GRAVITY
 from ...mathematics.support_margin import support_margin
 from ...runtime.language.block import Block, Input, Metric, State
 from ..signals import JumpReference, RobotTruth, WholeBodyCommand
@@ -20,8 +21,6 @@ from .jump_series import (
     note_place,
     series_failure,
 )
-
-GRAVITY = 9.81
 
 
 class JumpScore(Block):
@@ -56,12 +55,10 @@ class JumpScore(Block):
     ``series_distance_tolerance`` and the yaw's tolerance. Feet that leave the ground more than 0.1 s
     before the next planned lift-off count as a bounce. A row that does not go on ends the run 1.5 s
     after its last touchdown.
-
-    Raises:
-        ValueError: the graph has no robot.
     """
 
     Params = JumpCriteria
+    needs = ("floating base", "feet")
     params: JumpCriteria
     truth = Input(RobotTruth, reads_truth=True, text="what the simulator knows")
     reference = Input(JumpReference, default={}, text="the planned jump, for its targets")
@@ -71,9 +68,7 @@ class JumpScore(Block):
 
     def setup(self) -> None:
         """Group the contact points by foot."""
-        robot = self.context.robot
-        if robot is None:
-            raise ValueError("the score needs to know the robot; add `robot: bruce` to the graph")
+        robot = self.robot
         foot_of_contact = robot.foot_of_contact()
         self._points_of_foot = [
             [k for k, foot in enumerate(foot_of_contact) if foot == number]

@@ -1,6 +1,6 @@
 """The actuators: motor torque limits by speed, and the torque a drive produces for a command.
 
-Pure functions over arrays that write into ``out`` arrays. Motors are not joints: with ``A`` the
+Motors are not joints: with ``A`` the
 transmission's ``joint_to_motor``, motor speed is ``A qd``, motor torque ``kappa = A^-T tau`` and
 joint torque ``tau = A^T kappa``. A motor limit is therefore a box in motor space and a rotated box
 in joint space. Where every motor is geared 1:1 to at most two joints, as in BRUCE, these products
@@ -19,23 +19,24 @@ Array = NDArray[np.float64]
 
 @kernel
 def motor_torque_limits(
-    speed: Array, peak: float, corner: float, no_load: float, lower: Array, upper: Array
+    speed: Array, peak: Array, slope: Array, no_load: Array, lower: Array, upper: Array
 ) -> None:
-    """The torques [N m] a motor can produce at ``speed`` [rad/s], into ``lower`` and ``upper``.
+    """The torques [N m] that motors can produce at ``speed`` [rad/s], into ``lower`` and ``upper``.
 
-    ``peak`` is available up to the ``corner`` speed and falls linearly to zero at ``no_load``;
-    above that the motor cannot drive at all. Against the motion (braking) ``peak`` is available
-    at any speed.
+    ``peak`` is available up to the corner speed and falls linearly, by ``slope`` [N m s/rad],
+    to zero at ``no_load``; above that the motor cannot drive at all. Against the
+    motion (braking) ``peak`` is available at any speed. A motor with a peak of zero does nothing.
+    All arguments have one element a motor.
     """
     # fmin and fmax: NumPy wants the output of minimum and maximum as a keyword, which no kernel has.
-    slope = peak / (no_load - corner)
     np.subtract(no_load, speed, upper)
     np.multiply(upper, slope, upper)
     np.fmin(upper, peak, upper)
     np.fmax(upper, 0.0, upper)
     np.add(no_load, speed, lower)
-    np.multiply(lower, -slope, lower)
-    np.fmax(lower, -peak, lower)
+    np.multiply(lower, slope, lower)
+    np.fmin(lower, peak, lower)
+    np.negative(lower, lower)
     np.fmin(lower, 0.0, lower)
 
 

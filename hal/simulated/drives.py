@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...blocks.signals import CommandMode, JointCommand
-from ...robots.description import ActuatorProfile, RobotDescription
+from ...robots.description import RobotDescription
 from .actuator import clip_joint_torque, joint_feedback_torque, motor_torque_limits
 from .state import DriveState, TickRecord
 
@@ -18,23 +18,30 @@ class Drives:
 
     A command takes effect at the first physics step at or after its arrival and stays until the
     next one arrives. All that is remembered lives in the given ``state`` and ``record``.
+
+    Args:
+        robot: with the actuator profile in use.
+        damping: of every joint in the damping mode [N m s/rad], (n_joints,).
+        state: the commands in the drives and on their way.
+        record: where saturation, peaks and excesses are noted.
     """
 
     def __init__(
         self,
         robot: RobotDescription,
-        profile: ActuatorProfile,
-        damping: float,
+        damping: Array,
         state: DriveState,
         record: TickRecord,
     ) -> None:
-        self._profile = profile
-        self._damping = damping
+        self._negative_damping = -damping
         self._state = state
         self._record = record
         self._joint_to_motor = np.ascontiguousarray(robot.joint_to_motor)
         self._motor_to_torque = np.ascontiguousarray(robot.joint_to_motor.T)
         self._torque_to_motor = robot.torque_to_motor
+        motors = robot.motors
+        self._peak, self._no_load = motors.peak_torque, motors.no_load_speed
+        self._slope = motors.peak_torque / (motors.no_load_speed - motors.corner_speed)
         n = len(robot.joints)
         self._scratch, self._speed, self._wanted, self._motor = (np.zeros(n) for _ in range(4))
         self._lower, self._upper, self._excess = (np.zeros(n) for _ in range(3))
@@ -46,8 +53,9 @@ class Drives:
             for k in range(self._slots)
         ]  # fmt: skip
 
-    def hold(self, position: Array, torque: Array, stiffness: float, damping: float) -> None:
-        """Forget all commands and hold that position from now on."""
+    def hold(self, position: Array, torque: Array, stiffness: Array, damping: Array) -> None:
+        """Forget all commands and hold ``position`` [rad] around ``torque`` [N m] with these gains
+        from now on; all are of the joints, (n_joints,)."""
         self._state.active[()] = 0
         self._state.pending[()] = 0
         self._state.last_due[()] = 0
@@ -104,18 +112,17 @@ class Drives:
                 out, self._scratch,
             )  # fmt: skip
         elif mode == CommandMode.DAMPING:
-            np.multiply(velocity, -self._damping, out=out)
+            np.multiply(velocity, self._negative_damping, out=out)
         else:
             out.fill(0.0)
         self._limit(velocity, out)
 
     def _limit(self, velocity: Array, torque: Array) -> None:
         """Clip to what the motors can do at their speed, and record how near they came."""
-        profile, record = self._profile, self._record
+        record = self._record
         np.dot(self._joint_to_motor, velocity, out=self._speed)
         motor_torque_limits(
-            self._speed, profile.peak_torque, profile.corner_speed, profile.no_load_speed,
-            self._lower, self._upper,
+            self._speed, self._peak, self._slope, self._no_load, self._lower, self._upper
         )  # fmt: skip
         clip_joint_torque(
             torque, self._torque_to_motor, self._motor_to_torque, self._lower, self._upper,

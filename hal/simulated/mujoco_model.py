@@ -1,18 +1,24 @@
 """The simulator's model, built from the robot's description.
 
-One body and one hinge for every joint of the description, so the two rigid-body models (this one
-and the controller's) have the same links. Rotor inertia is exact: its diagonal is joint armature
-and every off-diagonal pair a fixed tendon with armature, because a motor that is geared to two
-joints couples their accelerations.
+One body and one joint for every joint of the description, so the two rigid-body models (this one
+and the controller's) have the same links. Rotor inertia is exact: a rotor that is geared to one
+joint is that joint's armature, and one that is geared to several is a fixed tendon with armature
+(``rotors.py``).
 
 Contact: spheres at the contact points and capsules for the rest of the robot. The capsules collide
-with the ground and with other legs, not with their own leg and not with the base; anything they
-touch is a forbidden contact. Cones are elliptic.
+with the ground and with other limbs, not with their own limb and not with the base; a limb is all
+that hangs on one joint of the base. Capsules of two limbs that overlap in the standing pose do not
+collide with each other, as they are only coarse pictures of the links. Anything that a capsule
+touches is a forbidden contact. Cones are elliptic.
+
+MuJoCo scales the stiffness of a contact with the mass that it carries: a time constant and a
+damping ratio are given, so robots of any mass sink in by the same fraction of a millimetre.
 
 Names in the model: links, joints and contact points as in the description (a contact point is a
-geom and a site), motors ``motor/<joint>``, named points sites ``point/<name>``, and the sensors
-``com``, ``com_velocity``, ``angular_momentum``, ``accelerometer``, ``contacts`` (how many contacts
-there are at all), ``load/<contact point>`` (how many with the ground, and their net force on it).
+geom and a site; a link called ``world`` is the body ``link/world``), motors ``motor/<joint>``,
+named points sites ``point/<name>``, and the sensors ``com``, ``com_velocity``,
+``angular_momentum``, ``accelerometer``, ``contacts`` (how many contacts there are at all),
+``load/<contact point>`` (how many with the ground, and their net force on it).
 """
 
 from __future__ import annotations
@@ -21,15 +27,20 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ...robots.description import ActuatorProfile, RobotDescription
+from ...mathematics.constants import GRAVITY
+from ...robots.description import RobotDescription
+from ...robots.link_poses import contact_centres
+from .base import BASES
+from .rotors import add_rotors, joint_armature
 from .scenes import Scene
 
 if TYPE_CHECKING:
     from mujoco import MjModel, MjSpec
 
 GROUND_BIT = 1
+MOST_LIMBS = 30
+"""Limbs that collision bits tell apart; further ones do not collide with the last of them."""
 CONTACT_TIME_CONSTANT = 0.004
 CONTACT_IMPEDANCE = (0.95, 0.99, 0.001, 0.5, 2.0)
 
@@ -48,38 +59,40 @@ class Variation:
 def build_mujoco_model(
     robot: RobotDescription,
     *,
-    profile: str = "koala",
     scene: Scene | None = None,
     timestep: float = 0.0005,
     variation: Variation | None = None,
 ) -> MjModel:
-    """The compiled model of the robot with that actuator profile in that scene.
+    """The compiled model of the robot, with the actuator profile in use, in that scene.
 
     Raises:
-        KeyError: the robot has no actuator profile of that name.
         ValueError: the description's joints are not in depth-first order, or its transmission
-            couples a joint more strongly to others than fixed tendons can express.
+            gears one motor to joints of different limbs, which the simulator cannot express.
     """
-    spec = mujoco_spec(robot, profile=profile, scene=scene, timestep=timestep, variation=variation)
+    spec = mujoco_spec(robot, scene=scene, timestep=timestep, variation=variation)
     model = spec.compile()
-    names = [model.joint(k).name for k in range(1, model.njnt)]
+    first = model.njnt - len(robot.joints)
+    names = [model.joint(k).name for k in range(first, model.njnt)]
     if names != [joint.name for joint in robot.joints]:
         raise ValueError(f"{robot.name}: the joints must be listed depth first: {', '.join(names)}")
-    return model
+    overlaps = _overlaps(model, robot)
+    for first_body, second_body in overlaps:
+        spec.add_exclude(bodyname1=first_body, bodyname2=second_body)
+    return spec.compile() if overlaps else model
 
 
 def mujoco_spec(
     robot: RobotDescription,
     *,
-    profile: str = "koala",
     scene: Scene | None = None,
     timestep: float = 0.0005,
     variation: Variation | None = None,
 ) -> MjSpec:
-    """The same before it is compiled, for who adds to it, such as colours.
+    """The same before it is compiled, for who adds to it, such as colours; limbs that overlap in
+    the standing pose do collide here.
 
     Raises:
-        KeyError, ValueError: as ``build_mujoco_model``, but for the order of the joints.
+        ValueError: as ``build_mujoco_model``, but for the order of the joints.
     """
     import mujoco
 
@@ -88,19 +101,38 @@ def mujoco_spec(
     spec.modelname = robot.name
     spec.compiler.degree = False
     spec.option.timestep = timestep
+    spec.option.gravity = [0.0, 0.0, -GRAVITY]
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
     spec.option.impratio = 10.0
     _add_ground(spec, scene or Scene(), variation)
-    _add_robot(spec, robot, robot.profiles[profile], variation)
+    _add_robot(spec, robot, variation)
     _add_sensors(spec, robot)
     return spec
 
 
-def rotor_inertia(robot: RobotDescription, profile: ActuatorProfile) -> NDArray[np.float64]:
-    """The inertia (n_joints, n_joints) that equal rotors add to the joint-space inertia."""
-    matrix = robot.joint_to_motor
-    return np.asarray(profile.rotor_inertia * matrix.T @ matrix)
+def body_name(link: str) -> str:
+    """The name of a link's body in the model; MuJoCo keeps ``world`` for itself."""
+    return "link/world" if link == "world" else link
+
+
+def _overlaps(model: MjModel, robot: RobotDescription) -> list[tuple[str, str]]:
+    """The pairs of bodies whose shapes overlap in the standing pose; for a robot on a fixed base
+    also those with the world, which it is mounted on."""
+    import mujoco
+
+    data = mujoco.MjData(model)
+    base = BASES[robot.base_joint](data)
+    base.place()
+    base.shift(np.array([0.0, 0.0, 1e3]))  # away from the ground
+    data.qpos[base.positions :] = robot.standing_position
+    mujoco.mj_kinematics(model, data)
+    mujoco.mj_collision(model, data)
+    pairs: dict[tuple[str, str], None] = {}
+    for first, second in data.contact.geom.tolist():
+        bodies = [model.body(int(model.geom_bodyid[geom])).name for geom in (first, second)]
+        pairs[(bodies[0], bodies[1])] = None
+    return list(pairs)
 
 
 def _surface(variation: Variation) -> dict[str, Any]:
@@ -131,21 +163,21 @@ def _add_ground(spec: MjSpec, scene: Scene, variation: Variation) -> None:
         )  # fmt: skip
 
 
-def _leg_of_link(robot: RobotDescription) -> dict[str, int]:
-    """For every link the number of its leg, 0 for the base; a leg is what hangs on one joint."""
-    leg = {robot.base: 0}
+def _limb_of_link(robot: RobotDescription) -> dict[str, int]:
+    """For every link the number of its limb, 0 for the base; a limb is what hangs on one joint."""
+    limb = {robot.base: 0}
     for joint in robot.joints:
         on_base = joint.parent == robot.base
-        leg[joint.child] = max(leg.values()) + 1 if on_base else leg[joint.parent]
-    return leg
+        following = min(max(limb.values()) + 1, MOST_LIMBS)
+        limb[joint.child] = following if on_base else limb[joint.parent]
+    return limb
 
 
-def _add_robot(
-    spec: MjSpec, robot: RobotDescription, profile: ActuatorProfile, variation: Variation
-) -> None:
+def _add_robot(spec: MjSpec, robot: RobotDescription, variation: Variation) -> None:
     import mujoco
 
-    leg = _leg_of_link(robot)
+    limb = _limb_of_link(robot)
+    centres = contact_centres(robot)
     bodies: dict[str, Any] = {}
 
     def add_link(name: str, parent: Any, position: tuple[float, float, float]) -> None:
@@ -154,15 +186,15 @@ def _add_robot(
         if name == robot.base:
             com = com + variation.base_com_offset
         body = parent.add_body(
-            name=name, pos=position, mass=link.mass * variation.mass, ipos=com,
+            name=body_name(name), pos=position, mass=link.mass * variation.mass, ipos=com,
             fullinertia=np.array(link.inertia) * variation.mass, explicitinertial=True,
         )  # fmt: skip
         bodies[name] = body
-        # A leg's geoms carry the leg's bit and accept those of legs before it: every pair once.
+        # A limb's geoms carry the limb's bit and accept those of limbs before it: every pair once.
         bits = {"contype": 0, "conaffinity": GROUND_BIT}
-        if leg[name]:
-            bits["contype"] = 1 << leg[name]
-            bits["conaffinity"] |= (1 << leg[name]) - 1
+        if limb[name]:
+            bits["contype"] = 1 << limb[name]
+            bits["conaffinity"] |= (1 << limb[name]) - 1
         for k, shape in enumerate(link.shapes):
             body.add_geom(
                 name=f"{name}/{k}", type=mujoco.mjtGeom.mjGEOM_CAPSULE, mass=0.0,
@@ -172,10 +204,9 @@ def _add_robot(
         for foot in robot.feet:
             if foot.link != name:
                 continue
-            for contact in robot.contacts:
+            for contact, centre in zip(robot.contacts, centres, strict=True):
                 if contact.foot != foot.name:
                     continue
-                centre = np.add(contact.position, (0.0, 0.0, contact.radius))
                 body.add_geom(
                     name=contact.name, type=mujoco.mjtGeom.mjGEOM_SPHERE, mass=0.0,
                     size=[contact.radius, 0, 0], pos=centre, **bits, **_surface(variation),
@@ -186,35 +217,24 @@ def _add_robot(
                 body.add_site(name=f"point/{point}", pos=place)
 
     add_link(robot.base, spec.worldbody, (0.0, 0.0, 0.0))
-    bodies[robot.base].add_freejoint(name="base")
+    BASES[robot.base_joint].add_joints(bodies[robot.base])
     bodies[robot.base].add_site(name="imu")
-    inertia = rotor_inertia(robot, profile)
-    coupling = inertia - np.diag(np.diag(inertia))
-    armature = np.diag(inertia) - np.abs(coupling).sum(axis=1)
+    armature, motors = joint_armature(robot), robot.motors
+    hinge, slide = mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE
+    yes, no = mujoco.mjtLimited.mjLIMITED_TRUE, mujoco.mjtLimited.mjLIMITED_FALSE
     for k, joint in enumerate(robot.joints):
-        if armature[k] < -1e-12:
-            raise ValueError(
-                f"{robot.name}: the transmission couples {joint.name} to other joints by more "
-                f"than its own reflected inertia, which fixed tendons cannot express"
-            )
         add_link(joint.child, bodies[joint.parent], joint.origin)
         bodies[joint.child].add_joint(
-            name=joint.name, type=mujoco.mjtJoint.mjJNT_HINGE, axis=joint.axis,
-            limited=mujoco.mjtLimited.mjLIMITED_TRUE, range=joint.limits,
-            solref_limit=[CONTACT_TIME_CONSTANT, 1.0], armature=max(armature[k], 0.0),
-            frictionloss=profile.friction, damping=[profile.damping, 0.0, 0.0],
+            name=joint.name, type=slide if joint.kind == "slide" else hinge, axis=joint.axis,
+            limited=no if joint.limits is None else yes, range=joint.limits or (0.0, 0.0),
+            solref_limit=[CONTACT_TIME_CONSTANT, 1.0], armature=armature[k],
+            frictionloss=motors.friction[k], damping=[motors.damping[k], 0.0, 0.0],
         )  # fmt: skip
         motor = spec.add_actuator(
             name=f"motor/{joint.name}", target=joint.name, trntype=mujoco.mjtTrn.mjTRN_JOINT
         )
         motor.set_to_motor()
-    for i, j in zip(*np.nonzero(np.triu(coupling)), strict=True):
-        first, second = robot.joints[i].name, robot.joints[j].name
-        tendon = spec.add_tendon(
-            name=f"rotor/{first}/{second}", armature=abs(float(coupling[i, j]))
-        )
-        tendon.wrap_joint(first, 1.0)
-        tendon.wrap_joint(second, float(np.sign(coupling[i, j])))
+    add_rotors(spec, robot)
 
 
 def _add_sensors(spec: MjSpec, robot: RobotDescription) -> None:
@@ -226,7 +246,9 @@ def _add_sensors(spec: MjSpec, robot: RobotDescription) -> None:
         ("com_velocity", kind.mjSENS_SUBTREELINVEL),
         ("angular_momentum", kind.mjSENS_SUBTREEANGMOM),
     ):
-        spec.add_sensor(name=name, type=sensor, objtype=thing.mjOBJ_BODY, objname=robot.base)
+        spec.add_sensor(
+            name=name, type=sensor, objtype=thing.mjOBJ_BODY, objname=body_name(robot.base)
+        )
     spec.add_sensor(
         name="accelerometer", type=kind.mjSENS_ACCELEROMETER, objtype=thing.mjOBJ_SITE,
         objname="imu",

@@ -3,28 +3,29 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
 
 from ...blocks.signals import ExternalForce, RobotTruth
 from ...robots.description import RobotDescription
-from ...runtime.language.block import Input, Metric, Output, State
+from ...runtime.language.block import Context, Input, Metric, Misfit, Output, State
 from ...runtime.language.parameters import Parameters
 from ..robot import Robot
+from .base import BASES
 from .drives import Drives
-from .mujoco_model import Variation
+from .holding import RELEASED, holding_gains, passive_joints
+from .mujoco_model import Variation, body_name
 from .parameters import SimulatorParameters
 from .random_streams import WORDS, Purpose, RandomStreams, stream
+from .rotors import unfit_motor
 from .sensors import Sensors
 from .stance import centre_on_origin, holding_torque, place_standing
 from .state import DriveState, PhysicsState, TickRecord
 from .truth import TruthReport
 from .world import build_world, draw_variation
 
-HOLD_STIFFNESS = 300.0
-HOLD_DAMPING = 1.5
 SETTLING_TIME = 0.3
 
 
@@ -38,31 +39,35 @@ class MujocoRobot(Robot):
     physics step before. The command computed from them takes effect at the first physics step at
     or after ``t_n + latency + jitter``, until the next one does. In between, the drives close the
     joint loop at the physics rate with the command's gains, on their own encoders, and clip in
-    motor space by the torque-speed curve (``actuator.py``; DESIGN.md, the standard trial).
+    motor space by the torque-speed curve.
 
     Command modes: ``OFF`` no torque; ``ACTIVE`` feedforward plus joint feedback; ``DAMPING``
     ``drive_damping`` on every joint, whatever the command's gains say.
 
     Start: the robot stands in its description's pose (torso turned by a drawn
-    ``initial_attitude_error``, soles flat), held by its drives at 300 N m/rad around the static
-    torques, settles for 0.3 s, and is centred: the middle between the soles is the world's origin.
-    It is held so until the first command arrives.
+    ``initial_attitude_error``, soles flat), held by its drives around the static torques with gains
+    that follow from its weight and inertia (``holding.py``), settles for 0.3 s, and is centred: the
+    middle between the soles is the world's origin. It is held so until the first command arrives.
+    Joints without a working motor are kept in the standing pose until the run begins. A fixed base
+    is at the world's origin from the start, and a robot without feet lies on its lowest shape.
+
+    For a slide, metres and newtons stand for radians and newton metres in every parameter.
 
     Everything random follows from ``seed``; every disturbance has a stream of its own, so setting
     one to zero changes no other. Snapshots are exact: a restored run continues bit for bit.
 
     It does not model: motor temperature and supply voltage, belt and cable elasticity, backlash,
-    contact of a leg with the torso or with itself, an IMU lever arm, wind.
+    contact of a limb with the torso or with itself, an IMU lever arm, wind.
 
     Raises:
-        ValueError: no robot in the graph, no such actuator profile, or a timestep that does not
-            divide the control period.
+        StartError: the robot does not stand as its description says.
         IndexError: a push at a point the robot does not have.
     """
 
     outside = "simulated"
 
     Params = SimulatorParameters
+    needs = ("robot",)
     params: SimulatorParameters
 
     push = Input(ExternalForce, default={}, text="a force from outside, held for the tick")
@@ -83,6 +88,28 @@ class MujocoRobot(Robot):
         }  # fmt: skip
 
     @classmethod
+    def requires(cls, params: Parameters, robot: RobotDescription | None) -> Iterable[Misfit]:
+        """A transmission that the simulator can express."""
+        complaint = unfit_motor(robot) if robot is not None else ""
+        if complaint:
+            yield Misfit(complaint, fix="correct `transmission` in the robot's description")
+
+    @classmethod
+    def requires_of_graph(cls, params: Parameters, context: Context) -> Iterable[Misfit]:
+        """A physics step that divides the block's period."""
+        assert isinstance(params, SimulatorParameters)
+        steps = context.period / params.timestep
+        if abs(steps - round(steps)) > 1e-6 or round(steps) < 1:
+            yield Misfit(
+                f"timestep {params.timestep} s does not divide the control period "
+                f"{context.period} s",
+                parameter="timestep",
+                expected=f"a whole fraction of {context.period} s",
+                found=f"{params.timestep} s",
+                fix=f"timestep: {context.period / max(1, math.ceil(steps)):.10g} s",
+            )
+
+    @classmethod
     def local_dimensions(
         cls, params: Parameters, robot: RobotDescription | None
     ) -> Mapping[str, int]:
@@ -96,7 +123,7 @@ class MujocoRobot(Robot):
         """Sizes of the simulator's state, of the random streams' and of the command ring."""
         import mujoco
 
-        assert isinstance(params, SimulatorParameters)
+        assert isinstance(params, SimulatorParameters) and robot is not None
         model = build_world(params, robot, Variation())
         everything = mujoco.mjtState.mjSTATE_INTEGRATION
         flight = params.latency + params.jitter + params.timestep
@@ -110,25 +137,21 @@ class MujocoRobot(Robot):
         """Draw the world from the seed and build it."""
         import mujoco
 
-        robot, params = self.context.robot, self.params
+        robot, params = self.robot, self.params
         self._variation = draw_variation(params)
         self._model = build_world(params, robot, self._variation)
-        assert robot is not None
         self._robot = robot
         self._step1, self._step2 = mujoco.mj_step1, mujoco.mj_step2
-        steps = self.period / params.timestep
-        self._steps = round(steps)
-        if abs(steps - self._steps) > 1e-6 or self._steps < 1:
-            raise ValueError(
-                f"timestep {params.timestep} s does not divide the control period "
-                f"{self.period} s; try {self.period / max(1, math.ceil(steps))} s"
-            )
+        self._steps = round(self.period / params.timestep)
         self._streams = RandomStreams(params.seed)
         self._jitter = self._streams[Purpose.JITTER]
         self._sensors = Sensors(robot, params, self._streams)
-        self._drives = Drives(
-            robot, robot.profiles[params.profile], params.drive_damping, self.drives, self.record
-        )
+        self._stiffness, self._damping = holding_gains(self._model, robot)
+        damping = RELEASED * self._damping
+        if params.drive_damping is not None:
+            damping = np.full(len(robot.joints), params.drive_damping)
+        self._drives = Drives(robot, damping, self.drives, self.record)
+        self._passive = passive_joints(robot)
         self._limits = (robot.joint_limits[:, 0].copy(), robot.joint_limits[:, 1].copy())
         n = len(robot.joints)
         self._encoder, self._excess = np.zeros(n), np.zeros(n)
@@ -139,19 +162,19 @@ class MujocoRobot(Robot):
         """Views into the simulator's memory, made once."""
         model = self._model
         self._data = data
-        self._position, self._velocity = data.qpos[7:], data.qvel[6:]
-        self._body_rates = data.qvel[3:6]
+        base = self._base = BASES[self._robot.base_joint](data)
+        self._position, self._velocity = data.qpos[base.positions :], data.qvel[base.velocities :]
         self._ctrl, self._external = data.ctrl, data.xfrc_applied
         self._accelerometer = data.sensor("accelerometer").data
         self._contacts = data.sensor("contacts").data
-        names = [contact.name for contact in self._robot.contacts]
-        first = int(model.sensor(f"load/{names[0]}").adr[0])
-        self._load = data.sensordata[first : first + 4 * len(names)].reshape(-1, 4)
+        # The sensors of the contact points are the model's last.
+        first = model.nsensordata - 4 * len(self._robot.contacts)
+        self._load = data.sensordata[first:].reshape(-1, 4)
         self._vertical = self._load[:, 3]
-        self._truth = TruthReport(data, self._robot, self.params.build_scene())
+        self._truth = TruthReport(data, base, self._robot, self.params.build_scene())
         self._points = []
         for point, (link, _) in self._robot.points.items():
-            body = model.body(link).id
+            body = model.body(body_name(link)).id
             place, centre = data.site(f"point/{point}").xpos, data.xipos[body]
             self._points.append((place, centre, self._external[body]))
 
@@ -162,32 +185,44 @@ class MujocoRobot(Robot):
         params = self.params
         attitude = stream(params.seed, Purpose.ATTITUDE).standard_normal(3)
         mujoco.mj_resetData(self._model, self._data)
-        place_standing(
-            self._model, self._data, self._robot, attitude * params.initial_attitude_error
-        )
-        torque = holding_torque(self._model, self._data, self._robot)
+        model, data, base, robot = self._model, self._data, self._base, self._robot
+        place_standing(model, data, base, robot, attitude * params.initial_attitude_error)
+        torque = holding_torque(model, data, base, robot)
         held = self._position + self._sensors.encoder_offset
-        self._drives.hold(held, torque, HOLD_STIFFNESS, HOLD_DAMPING)
+        self._drives.hold(held, torque, self._stiffness, self._damping)
         phase = 0.0
         if params.random_start_phase:
             phase = float(stream(params.seed, Purpose.START_PHASE).random()) * self.period
         early = math.floor(phase / params.timestep)
         self._late = phase - early * params.timestep
         self._step1(self._model, self._data)
-        self._simulate(math.ceil(SETTLING_TIME / params.timestep) + early)
-        centre_on_origin(self._data, self._robot)
+        self._settle(math.ceil(SETTLING_TIME / params.timestep) + early)
+        centre_on_origin(data, base, robot)
         self._data.time = 0.0
         self.physics.step[()] = -self._steps
         self.record.bounce_end.fill(-self._steps)
         self._step1(self._model, self._data)
         self._clear_record()
-        self._simulate(self._steps)
+        self._settle(self._steps)
+
+    def _settle(self, steps: int) -> None:
+        """Simulate that many physics steps while the joints that no motor can move are kept in the
+        standing pose, as if by hand."""
+        if not len(self._passive):
+            self._simulate(steps)
+            return
+        for _ in range(steps):
+            self._simulate(1)
+            self._position[self._passive] = self._robot.standing_position[self._passive]
+            self._velocity[self._passive] = 0.0
+            self._step1(self._model, self._data)
 
     def read(self) -> None:
         """Publish the sensors and the truth at the present instant."""
         record, steps = self.record, int(self.record.steps)
         np.divide(record.accelerometer, steps, out=self._mean_force)
-        self._sensors.read_imu(self._body_rates, self._mean_force, self.imu)
+        self._base.refresh()
+        self._sensors.read_imu(self._base.angular_velocity, self._mean_force, self.imu)
         self._sensors.read_joints(self._position, self._velocity, record.joint_torque, self.joints)
         self._sensors.read_switches(int(self.physics.step), record, self.contacts)
         self._truth.publish(record, self.truth)

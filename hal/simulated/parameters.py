@@ -15,13 +15,14 @@ class SimulatorParameters(Parameters):
     around the nominal value, drawn once from the seed; a *noise* is the standard deviation of a
     normal distribution, drawn for every sample."""
 
-    profile: str = parameter("koala", text="the actuator profile of the robot's description")
     seed: int = parameter(0, ge=0, text="the seed of everything random")
     timestep: float = parameter(
         0.0005, unit="s", gt=0, le=0.002, text="physics step; it must divide the control period"
     )
 
-    scene: Literal["flat", "step", "platform"] = parameter("flat", text="what the ground is like")
+    scene: Literal["flat", "step", "platform", "none"] = parameter(
+        "flat", text="what the ground is like; none: there is none"
+    )
     step_height: float = parameter(0.05, unit="m", gt=0, text="scene step: its height")
     step_distance: float = parameter(
         0.1, unit="m", text="scene step: from the start to its front edge"
@@ -94,9 +95,11 @@ class SimulatorParameters(Parameters):
         0.0, unit="s", ge=0, le=0.1, text="for how long a switch chatters after each change"
     )
 
-    drive_damping: float = parameter(
-        0.5, unit="N m s/rad", ge=0, text="joint damping of a drive in its damping mode"
-    )
+    drive_damping: float | None = parameter(
+        None, unit="N m s/rad", ge=0,
+        text="joint damping of a drive in its damping mode; none: a third of that which holds the "
+        "robot before the first command",
+    )  # fmt: skip
 
     @model_validator(mode="after")
     def _check_ranges(self) -> Self:
@@ -112,4 +115,6 @@ class SimulatorParameters(Parameters):
             return scenes.step(self.step_height, self.step_distance, self.step_depth)
         if self.scene == "platform":
             return scenes.platform(self.platform_height, self.platform_edge)
+        if self.scene == "none":
+            return scenes.nowhere()
         return scenes.flat()

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
+from difflib import get_close_matches
 from typing import Literal
 
 import numpy as np
 
 from ...blocks.signals import ExternalForce, RobotTruth
-from ...runtime.language.block import Block, Input, Output, State
+from ...robots.description import RobotDescription
+from ...runtime.language.block import Block, Input, Misfit, Output, State
 from ...runtime.language.parameters import Parameters, live_parameter, parameter
 from ...runtime.language.signals import Field, Signal
 
@@ -34,9 +37,6 @@ class Push(Block):
 
     The paper's test is 70 N for 0.01 s, 0.03 s after lift-off; it does not say where. The default
     is the torso's centre of mass, 0.12 m above the whole robot's, so the push also turns it.
-
-    Raises:
-        ValueError: the graph has no robot, or the robot no point of that name.
     """
 
     class Params(Parameters):
@@ -50,22 +50,30 @@ class Push(Block):
         delay: float = live_parameter(0.03, unit="s", ge=0, text="from the trigger to the push")
         point: str = parameter("torso_com", text="a named point of the robot's description")
 
+    needs = ("robot",)
     params: Params
     truth = Input(RobotTruth, reads_truth=True, text="whether the robot is in the air")
     push = Output(ExternalForce, text="the force, zero but during the push")
     progress = State(PushState, text="how far it has come")
 
+    @classmethod
+    def requires(cls, params: Parameters, robot: RobotDescription | None) -> Iterable[Misfit]:
+        """A point of that name."""
+        assert isinstance(params, cls.Params) and robot is not None
+        if params.point not in robot.points:
+            points = list(robot.points)
+            near = get_close_matches(params.point, points, 1) or points[:1]
+            yield Misfit(
+                f"{robot.name} has no point {params.point!r} to push at",
+                parameter="point",
+                expected=", ".join(points) or "a robot with named points",
+                found=params.point,
+                fix=f"point: {near[0]}" if near else "",
+            )
+
     def setup(self) -> None:
         """Find the point and the force."""
-        params, robot = self.params, self.context.robot
-        if robot is None:
-            raise ValueError("a push needs to know the robot; add `robot: bruce` to the graph")
-        points = list(robot.points)
-        if params.point not in points:
-            raise ValueError(
-                f"{robot.name} has no point {params.point!r}; it has {', '.join(points)}"
-            )
-        self._point = points.index(params.point)
+        self._point = list(self.robot.points).index(self.params.point)
         self.on_parameters()
 
     def on_parameters(self) -> None:

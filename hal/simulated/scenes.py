@@ -41,6 +41,12 @@ def flat() -> Scene:
     return Scene()
 
 
+def nowhere() -> Scene:
+    """No ground within reach: the floor is a kilometre below. For robots on a fixed base that
+    swing below it."""
+    return Scene(floor=-1000.0)
+
+
 def step(height: float, distance: float, depth: float = 1.5) -> Scene:
     """A step of ``height`` whose front edge is ``distance`` [m] ahead of the origin, and whose back
     edge, where it goes down again, is ``depth`` behind that."""

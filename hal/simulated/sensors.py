@@ -25,6 +25,7 @@ class Sensors:
     ) -> None:
         n, n_contacts = len(robot.joints), len(robot.contacts)
         self._params = params
+        self._has_imu, self._has_switches = robot.sensors.imu, robot.sensors.switches
         self._gyro = streams[Purpose.GYRO]
         self._accelerometer = streams[Purpose.ACCELEROMETER]
         self._velocity = streams[Purpose.JOINT_VELOCITY]
@@ -50,8 +51,12 @@ class Sensors:
         self._changed = np.zeros(n_contacts, dtype=np.bool_)
 
     def read_imu(self, angular_velocity: Array, specific_force: Array, out: ImuReading) -> None:
-        """A sample of the IMU from the true values, both in the body frame."""
+        """A sample of the IMU from the true values, both in the body frame; zero without one."""
         params = self._params
+        if not self._has_imu:
+            out.angular_velocity.fill(0.0)
+            out.specific_force.fill(0.0)
+            return
         for true, bias, noise, limit, generator, reading in (
             (angular_velocity, self.gyro_bias, params.gyro_noise, params.gyro_range,
              self._gyro, out.angular_velocity),
@@ -92,7 +97,11 @@ class Sensors:
         record.closed[:] = self._closed
 
     def read_switches(self, step: int, record: TickRecord, out: ContactSwitches) -> None:
-        """A sample of the switches; one that has just changed reads either way at random."""
+        """A sample of the switches; one that has just changed reads either way at random. Robots
+        without switches read none as closed."""
+        if not self._has_switches:
+            out.closed.fill(False)
+            return
         out.closed[:] = record.closed
         if self._bounce_steps:
             for k, end in enumerate(record.bounce_end.tolist()):

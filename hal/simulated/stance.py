@@ -6,42 +6,66 @@ of the same seed would then differ from their first tick on.
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...robots.description import RobotDescription
+from ...robots.link_poses import joints_above, standing_heights
+from ...runtime.language.errors import BlockError
+from .base import FixedBase
+from .mujoco_model import body_name
 
 if TYPE_CHECKING:
     from mujoco import MjData, MjModel
 
 Array = NDArray[np.float64]
 
+UNEVEN = 0.002
+"""By how much contact points may differ in height in the standing pose [m]."""
+_SINGULAR = 1e-12
+_DAMPING = 1e-8
 
-def place_standing(model: MjModel, data: MjData, robot: RobotDescription, attitude: Array) -> None:
+
+class StartError(BlockError):
+    """A simulated robot cannot start a run as its description says it stands."""
+
+
+def place_standing(
+    model: MjModel, data: MjData, base: FixedBase, robot: RobotDescription, attitude: Array
+) -> None:
     """Put the robot into its standing pose with the soles flat on the ground around the origin and
-    the torso rotated by the rotation vector ``attitude`` [rad, world].
+    the base rotated by the rotation vector ``attitude`` [rad, world].
 
-    The legs take the torso's rotation up (Newton's method on the contact points).
+    The legs take the base's rotation up (Newton's method on the contact points). A robot without
+    feet is put down upright on its lowest shape instead; a fixed base stays where it is.
 
     Raises:
-        ValueError: the legs cannot reach the ground with that attitude.
+        StartError: the contact points are not at one height in the standing pose, the legs cannot
+            reach the ground with that attitude, or there is nothing to put the robot down on.
     """
     import mujoco
 
-    names = [contact.name for contact in robot.contacts]
-    data.qpos[:3] = 0.0
-    data.qpos[3:7] = [1.0, 0.0, 0.0, 0.0]
-    data.qpos[7:] = robot.standing_position
+    data.qpos[base.positions :] = robot.standing_position
+    base.place()
     mujoco.mj_kinematics(model, data)
+    if base.velocities == 0:
+        return
+    if not robot.contacts:
+        _put_down(model, data, base, robot)
+        return
+    check_level(robot)
+    names = [contact.name for contact in robot.contacts]
     places = np.array([data.site(name).xpos for name in names])
-    data.qpos[:3] -= _sole_middle(data, robot)
-    places += data.qpos[:3]
-    angle = math.sqrt(sum(float(x) ** 2 for x in attitude))
-    if angle > 0.0:
-        mujoco.mju_axisAngle2Quat(data.qpos[3:7], attitude / angle, angle)
+    down = -_sole_middle(data, robot)
+    height = float(places[:, 2].mean() + down[2])
+    if abs(height) > 1e-9:  # the sole centre is not at the height of the contact points
+        down[2] -= height
+    base.shift(down)
+    places += down
+    base.turn(attitude)
+    legs = _leg_joints(robot)
     jacobian = np.zeros((3, model.nv))
     for _ in range(20):
         mujoco.mj_kinematics(model, data)
@@ -52,54 +76,117 @@ def place_standing(model: MjModel, data: MjData, robot: RobotDescription, attitu
         rows = []
         for name in names:
             mujoco.mj_jacSite(model, data, jacobian, None, data.site(name).id)
-            rows.append(jacobian[:, 6:].copy())
-        data.qpos[7:] += _solve_normal(np.vstack(rows), error.ravel())
-    limits = robot.joint_limits
-    outside = np.any(data.qpos[7:] < limits[:, 0]) or np.any(data.qpos[7:] > limits[:, 1])
+            rows.append(jacobian[:, base.velocities + legs])
+        data.qpos[base.positions + legs] += _solve_normal(np.vstack(rows), error.ravel())
+    position, limits = data.qpos[base.positions :], robot.joint_limits
+    outside = np.any(position < limits[:, 0]) or np.any(position > limits[:, 1])
     if outside or float(np.abs(error).max()) > 1e-6:
-        raise ValueError(f"{robot.name} cannot stand with its torso rotated by {attitude} rad")
+        raise StartError(
+            f"{robot.name} cannot stand with its torso rotated by {attitude} rad and its feet where "
+            "they are in the standing pose; legs of fewer than five joints cannot take up any "
+            "attitude: set initial_attitude_error to 0"
+        )
 
 
-def holding_torque(model: MjModel, data: MjData, robot: RobotDescription) -> Array:
+def check_level(robot: RobotDescription) -> None:
+    """Raise ``StartError`` unless all contact points are at one height in the standing pose."""
+    heights = standing_heights(robot)
+    above = heights - heights.min(initial=np.inf)
+    if float(above.max(initial=0.0)) <= UNEVEN:
+        return
+    found = [
+        f"{contact.name} by {1e3 * height:.0f} mm"
+        for contact, height in zip(robot.contacts, above.tolist(), strict=True)
+        if height > UNEVEN
+    ]
+    raise StartError(
+        f"{robot.name} cannot stand on level ground: in its standing pose these contact points are "
+        f"above the lowest one: {', '.join(found)}; correct `standing` or the positions under "
+        "`contacts` in its description"
+    )
+
+
+def holding_torque(model: MjModel, data: MjData, base: FixedBase, robot: RobotDescription) -> Array:
     """The joint torques [N m] that hold the robot still in its present pose, with the smallest
     contact forces at the contact points that carry its weight."""
     import mujoco
 
     mujoco.mj_forward(model, data)
+    size = base.velocities
+    if size == 0 or not robot.contacts:
+        return np.array(data.qfrc_bias[size:])
     jacobian = np.zeros((3 * len(robot.contacts), model.nv))
     for k, contact in enumerate(robot.contacts):
         rows = jacobian[3 * k : 3 * k + 3]
         mujoco.mj_jacSite(model, data, rows, None, data.site(contact.name).id)
     # The force of least norm among those that carry the base: base_rows (base_rows' base_rows)^-1 w.
-    base_rows = np.ascontiguousarray(jacobian[:, :6])
-    square = np.zeros((6, 6))
+    base_rows = np.ascontiguousarray(jacobian[:, :size])
+    square, multiplier = np.zeros((size, size)), np.zeros(size)
     mujoco.mju_mulMatTMat(square, base_rows, base_rows)
-    mujoco.mju_cholFactor(square, 0.0)
-    multiplier = np.zeros(6)
-    mujoco.mju_cholSolve(multiplier, square, data.qfrc_bias[:6])
+    _solve_positive(square, np.array(data.qfrc_bias[:size]), multiplier)
     force = np.zeros(len(jacobian))
     mujoco.mju_mulMatVec(force, base_rows, multiplier)
     carried = np.zeros(model.nv)
     mujoco.mju_mulMatTVec(carried, jacobian, force)
-    return np.asarray(data.qfrc_bias[6:] - carried[6:])
+    return np.asarray(data.qfrc_bias[size:] - carried[size:])
+
+
+def centre_on_origin(data: MjData, base: FixedBase, robot: RobotDescription) -> None:
+    """Shift the robot horizontally so that the middle between its soles is above the origin; a
+    robot without feet stays where it is."""
+    if robot.feet:
+        offset = -_sole_middle(data, robot)
+        offset[2] = 0.0
+        base.shift(offset)
+
+
+def _leg_joints(robot: RobotDescription) -> NDArray[np.int64]:
+    """The joints that move a foot."""
+    legs = np.zeros(len(robot.joints), dtype=np.bool_)
+    for foot in robot.feet:
+        legs |= joints_above(robot, foot.link)
+    return np.flatnonzero(legs)
+
+
+def _put_down(model: MjModel, data: MjData, base: FixedBase, robot: RobotDescription) -> None:
+    """Lower the robot until its lowest shape touches the ground."""
+    lowest = np.inf
+    for link in robot.links:
+        for k, shape in enumerate(link.shapes):
+            geom = data.geom(f"{link.name}/{k}")
+            half = float(model.geom(f"{link.name}/{k}").size[1])
+            reach = abs(half * geom.xmat.item(8)) + shape.radius
+            lowest = min(lowest, geom.xpos.item(2) - reach)
+    if lowest == np.inf:
+        raise StartError(
+            f"{robot.name} has neither feet nor shapes to rest on; give its description feet and "
+            "contacts, shapes, or `base_joint: fixed`"
+        )
+    base.shift(np.array([0.0, 0.0, -lowest]))
 
 
 def _solve_normal(matrix: Array, right: Array) -> Array:
-    """The least-squares solution of a full-rank overdetermined system."""
+    """The least-squares solution of an overdetermined system, damped where it is singular."""
     import mujoco
 
     size = matrix.shape[1]
     square, projected, solution = np.zeros((size, size)), np.zeros(size), np.zeros(size)
-    mujoco.mju_mulMatTMat(square, matrix, matrix)
-    mujoco.mju_mulMatTVec(projected, matrix, right)
-    mujoco.mju_cholFactor(square, 0.0)
-    mujoco.mju_cholSolve(solution, square, projected)
+    mujoco.mju_mulMatTMat(square, np.ascontiguousarray(matrix), np.ascontiguousarray(matrix))
+    mujoco.mju_mulMatTVec(projected, np.ascontiguousarray(matrix), right)
+    _solve_positive(square, projected, solution)
     return solution
 
 
-def centre_on_origin(data: MjData, robot: RobotDescription) -> None:
-    """Shift the robot horizontally so that the middle between its soles is above the origin."""
-    data.qpos[:2] -= _sole_middle(data, robot)[:2]
+def _solve_positive(square: Array, right: Array, solution: Array) -> None:
+    """Solve a symmetric positive system; a singular one with a little damping."""
+    import mujoco
+
+    largest = float(np.diag(square).max())
+    factor = square.copy()
+    if mujoco.mju_cholFactor(factor, _SINGULAR * largest) < len(square):
+        factor = square + np.eye(len(square)) * (_DAMPING * largest)
+        mujoco.mju_cholFactor(factor, 0.0)
+    mujoco.mju_cholSolve(solution, factor, right)
 
 
 def _sole_middle(data: MjData, robot: RobotDescription) -> Array:
@@ -107,7 +194,7 @@ def _sole_middle(data: MjData, robot: RobotDescription) -> Array:
 
     middle, offset = np.zeros(3), np.zeros(3)
     for foot in robot.feet:
-        body = data.body(foot.link)
+        body = data.body(body_name(foot.link))
         mujoco.mju_mulMatVec(offset, body.xmat.reshape(3, 3), np.array(foot.sole))
         middle += (body.xpos + offset) / len(robot.feet)
     return middle

@@ -8,6 +8,7 @@ import numpy as np
 
 from ...blocks.signals import RobotTruth
 from ...robots.description import RobotDescription
+from .base import FixedBase
 from .scenes import Scene
 from .state import TickRecord
 
@@ -22,10 +23,15 @@ class TruthReport:
     and counts are over the physics steps of the last tick.
     """
 
-    def __init__(self, data: MjData, robot: RobotDescription, scene: Scene) -> None:
-        self._data = data
+    def __init__(
+        self, data: MjData, base: FixedBase, robot: RobotDescription, scene: Scene
+    ) -> None:
+        self._base = base
         self._scene = scene
-        self._position, self._velocity = data.qpos[7:], data.qvel[6:]
+        self._position, self._velocity = (
+            data.qpos[base.positions :],
+            data.qvel[base.velocities :],
+        )
         self._com, self._com_velocity, self._angular_momentum = (
             data.sensor(name).data for name in ("com", "com_velocity", "angular_momentum")
         )
@@ -35,12 +41,8 @@ class TruthReport:
 
     def publish(self, record: TickRecord, truth: RobotTruth) -> None:
         """Write all fields of ``truth``."""
-        data, steps = self._data, int(record.steps)
-        truth.base_position[:] = data.qpos[:3]
-        truth.base_orientation[:3] = data.qpos[4:7]
-        truth.base_orientation[3] = data.qpos[3]
-        truth.base_linear_velocity[:] = data.qvel[:3]
-        truth.base_angular_velocity[:] = data.qvel[3:6]
+        steps = int(record.steps)
+        self._base.publish(truth)
         truth.joint_position[:] = self._position
         truth.joint_velocity[:] = self._velocity
         truth.com[:] = self._com

@@ -36,26 +36,18 @@ def draw_variation(params: SimulatorParameters) -> Variation:
 
 
 def build_world(
-    params: SimulatorParameters, robot: RobotDescription | None, variation: Variation
+    params: SimulatorParameters, robot: RobotDescription, variation: Variation
 ) -> MjModel:
     """The simulator's model of the robot in the scene these parameters describe.
 
     Raises:
-        ValueError: there is no robot, or it has no such actuator profile.
+        ValueError: the simulator cannot express the robot; see ``build_mujoco_model``.
     """
     import mujoco
 
-    if robot is None:
-        raise ValueError("the graph has no robot; add `robot: bruce` to it")
-    if params.profile not in robot.profiles:
-        raise ValueError(
-            f"{robot.name} has no actuator profile {params.profile!r}; "
-            f"it has {', '.join(robot.profiles)}"
-        )
     model = build_mujoco_model(
-        robot, profile=params.profile, scene=params.build_scene(), timestep=params.timestep,
-        variation=variation,
-    )  # fmt: skip
+        robot, scene=params.build_scene(), timestep=params.timestep, variation=variation
+    )
     # A state that has become NaN must be seen, not be quietly replaced by the initial one.
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
     return model

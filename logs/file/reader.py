@@ -25,10 +25,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...runtime.language.errors import AloftError
-from ...runtime.running.live_parameters import ParameterChange
+from ...runtime.language.parameter_change import ParameterChange
 from ...runtime.running.memory import Snapshot
 from ...runtime.running.notes import Note
-from ..recording.tail import read_tail
 from .changed_rows import filled
 from .format import (
     BUS,
@@ -45,6 +44,7 @@ from .format import (
     RecordedField,
     entity_of,
 )
+from .tail import read_tail
 
 
 class RecordingError(AloftError):

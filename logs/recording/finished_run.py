@@ -12,7 +12,7 @@ import numpy as np
 from ...runtime.running.notes import parameter_note
 from ...runtime.running.run_result import RunResult
 from ..file.header import make_header
-from ..file.writer import RecordingWriter
+from .writer import RecordingWriter
 
 
 @dataclass(frozen=True)

@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from ...runtime.running.life_cycle import describe
 from ...runtime.running.notes import Note
 from ..file.format import Header
-from ..file.run_stream import RunStream
 from ..viewing.blueprint import recording_blueprint
+from .run_stream import RunStream
 
 LIVE_RATE = 100.0
 """Rows a second that are shown [Hz]; the recording has all."""

@@ -19,7 +19,7 @@ from os import PathLike
 from pathlib import Path
 from typing import Literal
 
-from ...runtime.running.live_parameters import ParameterChange
+from ...runtime.language.parameter_change import ParameterChange
 from ...runtime.running.memory import BoundGraph
 from ...runtime.running.notes import Note, parameter_note
 from ...runtime.running.run_result import RunResult

@@ -19,7 +19,7 @@ from .ring import ALIGNMENT, RingWriter, make_memory, space_of
 
 _MAIN = (
     "import sys, json; sys.path[:] = json.loads(sys.argv[2]); "
-    "from aloft.logs.recording.finished_run.recorder_process import main; main(sys.argv[1])"
+    "from aloft.logs.recording.recorder_process import main; main(sys.argv[1])"
 )
 START_TIME = 30.0
 """Seconds the process may take to be ready for a run in real time."""

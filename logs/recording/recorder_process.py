@@ -29,10 +29,10 @@ from ...runtime.running.memory import Snapshot
 from ...runtime.running.notes import Note
 from ..file.format import Header
 from ..file.repair import RepairError, repair
-from ..file.writer import RecordingWriter, warm_up
+from ..file.tail import TailWriter, record_type
 from .live_feed import LiveFeed
 from .ring import Record, RingReader
-from .tail import TailWriter, record_type
+from .writer import RecordingWriter, warm_up
 
 HEADER, ROW, KEYFRAME, NOTE = 1, 2, 3, 4
 """The kinds of records in the ring; a keyframe is the bytes of the bus, then of the state."""

@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 
 from ...runtime.language.errors import AloftError, ExitCode
 from ...runtime.language.layout import Layout
-from ...runtime.language.registry import with_present_names
+from ...runtime.language.parameter_change import ParameterChange
 from ...runtime.language.stages import CheckedGraph
 from ...runtime.loading import load_text
-from ...runtime.running.live_parameters import ParameterChange
+from ...runtime.loading.earlier_versions import in_present_form
 from ...runtime.running.memory import Snapshot
 from ..file.header import machine, versions
 from ..file.reader import RecordedRun, read
@@ -53,7 +53,7 @@ class OpenedRun:
         """The recorded graph, with something changed. Raises ``LoadError``."""
         header = self.file.header
         name = Path(header.source).name or f"{header.name}.yaml"
-        return load_text(with_present_names(header.graph), self.folder / name, overrides)
+        return load_text(in_present_form(header.graph), self.folder / name, overrides)
 
     @cached_property
     def graph(self) -> CheckedGraph:

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...runtime.language.layout import Layout
+from ...runtime.language.parameter_change import ParameterChange
 from ...runtime.language.stages import CheckedGraph
-from ...runtime.running.live_parameters import ParameterChange
 from ...runtime.running.memory import BoundGraph, Snapshot
 from ...runtime.running.run_result import RunResult
 

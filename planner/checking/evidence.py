@@ -9,12 +9,12 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from ...mathematics.constants import GRAVITY
 from ...robots.description import Motors, RobotDescription
-from ...robots.welding import welded
 from ...robots.kinematics import LinkPoses, link_poses, matrices_of_quaternions
-from ..library.plan import JumpPlan
+from ...robots.welding import welded
 from ..models.symmetry import mirrored_pairs, symmetrised
-from ..task.task import GRAVITY
+from ..task.plan import JumpPlan
 from .clearance import ground_height
 from .replay import Replay
 

@@ -10,13 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...blocks.signals import Phase
+from ...mathematics.constants import GRAVITY
 from ...robots.description import RobotDescription
 from ...robots.kinematics import matrices_of_quaternions
-from ..library.plan import JumpPlan
 from ..models.exact_dynamics import ExactDynamics
+from ..models.midpoint import angular_motion, euler_angles, euler_rates, rotation
 from ..models.quaternions import product
-from ..task.task import GRAVITY
-from .midpoint import angular_motion, euler_angles, euler_rates, rotation
+from ..task.plan import JumpPlan
 
 Array = NDArray[np.float64]
 WEIGHT = np.array([0.0, 0.0, -GRAVITY])

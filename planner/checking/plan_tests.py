@@ -81,7 +81,13 @@ def discretisation(e: Evidence) -> Iterator[Found]:
     gap, wrench = e.replay.gap, e.replay.wrench
     for name, found, limit, unit, text in (
         ("violation", gap, 1e-6, "m or rad", "what the states miss of a constant acceleration"),
-        ("force_balance", wrench, e.model_error(1e-3, 1e-3 * e.weight), "N or N m", "what forces miss in an interval's middle"),
+        (
+            "force_balance",
+            wrench,
+            e.model_error(1e-3, 1e-3 * e.weight),
+            "N or N m",
+            "what forces miss in an interval's middle",
+        ),
     ):
         k = int(found.argmax())
         yield Found(name, found[k], limit, unit, text, f"from {e.plan.time[k]:.3f} s")
@@ -252,7 +258,7 @@ def momentum(e: Evidence) -> Iterator[Found]:
 
 def machine(e: Evidence) -> Iterator[Found]:
     """Joints stay within their limits, motors within what they can do at their speed."""
-    robot, task, s = e.robot, e.plan.task, e.replay.samples
+    robot, s = e.robot, e.replay.samples
     angles, limits = s.position[:, 7:], robot.joint_limits
     excess = np.maximum(angles - limits[:, 1], limits[:, 0] - angles)
     sample, joint = worst(excess)

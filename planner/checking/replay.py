@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from ...blocks.signals import Phase
 from ...robots.description import RobotDescription
-from ..library.plan import JumpPlan
 from ..models.exact_dynamics import ExactDynamics, joint_motion, rotation_between
-from .midpoint import midpoint_residuals
+from ..models.midpoint import midpoint_residuals
+from ..task.plan import JumpPlan
 
 Array = NDArray[np.float64]
 

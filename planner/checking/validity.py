@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from ...robots.description import RobotDescription
 from ...runtime.language.errors import AloftError
-from ..library.plan import ARRAYS, JumpPlan
+from ..task.plan import ARRAYS, JumpPlan
 from .evidence import Evidence
 from .plan_tests import PLAN_TESTS
 from .replay import replay

@@ -12,7 +12,7 @@ from ...robots.kinematics import link_poses
 from ..checking.clearance import legs
 from ..checking.evidence import Evidence
 from ..checking.replay import replay
-from ..library.plan import JumpPlan
+from ..task.plan import JumpPlan
 from .line_chart import COLOURS, page
 from .plan_charts import charts_of
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ...blocks.signals import Phase
 from ..checking.evidence import Evidence
 from ..checking.plan_tests import allowed_motor_torque
-from ..library.plan import JumpPlan
+from ..task.plan import JumpPlan
 from .line_chart import Chart, Line
 
 Array = NDArray[np.float64]

@@ -14,10 +14,10 @@ import numpy as np
 
 from ...robots.description import RobotDescription
 from ..checking.validity import InvalidPlanError, checked, require_valid
-from ..errors import PlanError
 from ..solving.refinement import ROUNDS, curable
+from ..task.errors import PlanError
+from ..task.plan import JumpPlan, PlanFileError, read_plan, write_plan
 from ..task.task import JumpTask, TaskError, make_task
-from .plan import JumpPlan, PlanFileError, read_plan, write_plan
 
 SHIPPED = Path(__file__).parents[2] / "graphs" / "plans"
 """The plans that come with aloft; ``make plans`` makes them anew."""

@@ -19,14 +19,14 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from ...blocks.jumping.jump_table import JumpTable
 from ...blocks.signals import Phase
+from ...mathematics.constants import GRAVITY
 from ...robots.description import RobotDescription
-from ..checking.midpoint import angular_motion, euler_angles, euler_rates, rotation
 from ..checking.replay import flight_knots
 from ..models.exact_dynamics import ExactDynamics, JointMotion, joint_motion
-from ..task.task import GRAVITY
-from .plan import JumpPlan
+from ..models.midpoint import angular_motion, euler_angles, euler_rates, rotation
+from ..task.plan import JumpPlan
+from .jump_table import JumpTable
 
 Array = NDArray[np.float64]
 State = tuple[float, int, Array, Array, Array]

@@ -8,7 +8,7 @@ import numpy as np
 
 from ...robots.description import RobotDescription
 from ...robots.welding import HeldLoad, welded
-from ..errors import PlanError
+from ..task.errors import PlanError
 from .stance import StanceFinder
 from .symbolic_model import SymbolicModel
 from .symmetry import mirrored_pairs, symmetrised

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...robots.description import RobotDescription
-from ..errors import PlanError
+from ..task.errors import PlanError
 from ..task.task import JumpTask
 from .symbolic_model import SymbolicModel
 

@@ -16,11 +16,11 @@ from typing import Any
 
 import numpy as np
 
+from ...mathematics.constants import GRAVITY
 from ...robots.description import Joint, Link, RobotDescription
 from ...robots.welding import HeldLoad
 from .symmetry import limbs_of
 
-GRAVITY = 9.81
 Expression = Any
 """A CasADi SX or DM; the library has no types of its own."""
 

@@ -76,7 +76,9 @@ def mirrored_pairs(robot: RobotDescription) -> tuple[Pair, ...] | None:
     left, found = list(range(len(limbs))), list[Pair]()
     while left:
         first = left.pop(0)
-        pair = next((p for other in left if (p := _pair(robot, limbs, of_link, first, other))), None)
+        pair = next(
+            (p for other in left if (p := _pair(robot, limbs, of_link, first, other))), None
+        )
         if pair is None:
             return None
         left.remove(pair.limbs[1])
@@ -252,9 +254,7 @@ def _averaged_joints(one: Joint, other: Joint, sign: float) -> tuple[Joint, Join
     return one.model_copy(update=first), other.model_copy(update=second)
 
 
-def _averaged_contacts(
-    one: ContactPoint, other: ContactPoint
-) -> tuple[ContactPoint, ContactPoint]:
+def _averaged_contacts(one: ContactPoint, other: ContactPoint) -> tuple[ContactPoint, ContactPoint]:
     position = 0.5 * (np.array(one.position) + np.array(other.position) * PLACE)
     return (
         one.model_copy(update={"position": _numbers(position)}),

@@ -18,8 +18,9 @@ from __future__ import annotations
 
 from typing import Any
 
+from ...mathematics.constants import GRAVITY
 from ..models import centroidal_model as centroidal
-from ..models.symbolic_model import GRAVITY, SymbolicModel
+from ..models.symbolic_model import SymbolicModel
 from .stage_functions import Piece, derived
 
 NAME = "paper"

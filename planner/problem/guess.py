@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...blocks.signals import Phase
-from ..models.symbolic_model import GRAVITY
+from ...mathematics.constants import GRAVITY
 from .layout import Stretch
 from .problem import Problem
 

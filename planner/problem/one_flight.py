@@ -9,9 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...blocks.signals import Phase
-from ..errors import PlanError
+from ...mathematics.constants import GRAVITY
 from ..models.exact_dynamics import ExactDynamics, joint_motion
-from ..task.task import GRAVITY, JumpTask
+from ..task.errors import PlanError
+from ..task.task import JumpTask
 
 Array = NDArray[np.float64]
 
@@ -106,7 +107,7 @@ def joint_torques(
     """The torques [N m] that a planned motion needs in the middle of its intervals, (N, n_joints),
     by exact inverse dynamics under the planned contact forces (N, n_contacts, 3); zero at impacts."""
     torque = np.zeros((len(time), velocity.shape[1] - 6))
-    for k in np.flatnonzero(np.diff(time) > 0.0):
+    for k in map(int, np.flatnonzero(np.diff(time) > 0.0)):
         motion = joint_motion(position, velocity, time, k)
         half = 0.5 * motion.duration
         _, q, v = dynamics.integrate(position[k], velocity[k], motion, force[k], half)[0]

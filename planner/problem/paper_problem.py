@@ -23,9 +23,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...blocks.signals import Phase
+from ...mathematics.constants import GRAVITY
 from ..models.quaternions import pose_of
 from ..models.stance import Stance
-from ..models.symbolic_model import GRAVITY, SymbolicModel
+from ..models.symbolic_model import SymbolicModel
 from ..task.task import JumpTask
 from . import centroidal_stages as stages
 from .assembly import Knot

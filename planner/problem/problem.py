@@ -236,7 +236,10 @@ class ProblemBuilder:
     def _motor_rows(self) -> list[Rows]:
         peak, top = self._peak_torque(), self._top_speed()
         line = self._slope() * top
-        links = ["", *(j.child for i in self.coordinates.joints for j in [self.model.robot.joints[i]])]
+        links = [
+            "",
+            *(j.child for i in self.coordinates.joints for j in [self.model.robot.joints[i]]),
+        ]
         links[0] = self.model.robot.base
         held = self.task.effort * np.array(
             [load.most for load in self.model.loads if load.link in links]

@@ -14,9 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...blocks.signals import Phase
+from ...mathematics.constants import GRAVITY
 from ..models.rigid_body import RigidBody, ankles
 from ..models.stance import Stance
-from ..models.symbolic_model import GRAVITY, SymbolicModel
+from ..models.symbolic_model import SymbolicModel
 from ..task.task import JumpTask
 from . import rigid_body_stages as stages
 from .assembly import Knot

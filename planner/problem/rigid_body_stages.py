@@ -17,8 +17,8 @@ from __future__ import annotations
 
 from typing import Any
 
+from ...mathematics.constants import GRAVITY
 from ..models.symbolic_model import (
-    GRAVITY,
     SymbolicModel,
     base_angular_acceleration,
     base_angular_velocity,

@@ -35,13 +35,14 @@ from typing import Any
 
 import numpy as np
 
+from ...mathematics.constants import GRAVITY
 from ..models.coordinates import (
     Coordinates,
     full_coordinates,
     mirrored_coordinates,
     sagittal_coordinates,
 )
-from ..models.symbolic_model import GRAVITY, SymbolicModel, base_rotation
+from ..models.symbolic_model import SymbolicModel, base_rotation
 from .obstacles import heights_above_step
 
 DRIFT_RATE = 10.0

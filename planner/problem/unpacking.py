@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..checking.midpoint import angular_motion, euler_angles, euler_rates, rotation
-from ..library.plan import JumpPlan
+from ..models.midpoint import angular_motion, euler_angles, euler_rates, rotation
 from ..models.quaternions import pose_of
 from ..models.symbolic_model import SymbolicModel
+from ..task.plan import JumpPlan
 from .problem import Problem
 from .resampling import matching_times, means_over, same_phases, states_at
 

@@ -12,8 +12,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..library.plan import ARRAYS, JumpPlan
 from ..problem.problem import Problem
+from ..task.plan import ARRAYS, JumpPlan
 from .solver import Solution, solve
 
 Array = NDArray[np.float64]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..library.plan import JumpPlan
+from ..task.plan import JumpPlan
 from ..task.task import Knots
 from .compilation import Progress
 

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import PlanError
 from ..problem.program import Program
+from ..task.errors import PlanError
 from ..task.task import JumpTask
 from .solver import Solution
 

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from ...blocks.signals import Phase
 from ...robots.description import RobotDescription
 from ...robots.kinematics import matrices_of_quaternions
-from ..library.plan import JumpPlan
 from ..models.exact_dynamics import ExactDynamics
 from ..models.robot_model import model_of
 from ..models.stance import stances_of
@@ -18,6 +17,7 @@ from ..problem import centroidal_stages as stages
 from ..problem.one_flight import joint_torques
 from ..problem.paper_problem import PaperProblemBuilder
 from ..problem.program import Program
+from ..task.plan import JumpPlan
 from ..task.task import JumpTask
 from .bounded import cpu_time
 from .compilation import FunctionSet, Progress, load_functions

@@ -10,8 +10,8 @@ from __future__ import annotations
 import math
 
 from ...blocks.signals import Phase
-from ..library.plan import JumpPlan
 from ..problem.resampling import segments
+from ..task.plan import JumpPlan
 from ..task.task import JumpTask, Knots
 
 FACTOR = 1.5

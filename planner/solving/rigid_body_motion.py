@@ -14,10 +14,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import PlanError
 from ..models.rigid_body import BLEND
 from ..models.stance import Stance
 from ..models.symbolic_model import SymbolicModel
+from ..task.errors import PlanError
 
 Array = NDArray[np.float64]
 RATE_STEP = 1e-6

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from ...blocks.signals import Phase
 from ...robots.description import RobotDescription
 from ...robots.kinematics import matrices_of_quaternions
-from ..library.plan import JumpPlan
 from ..models.exact_dynamics import ExactDynamics
 from ..models.quaternions import pose_of
 from ..models.rigid_body import RigidBody, lump
@@ -21,6 +20,7 @@ from ..problem.one_flight import joint_torques
 from ..problem.program import Program
 from ..problem.rigid_body_problem import STATES, RigidBodyProblemBuilder
 from ..problem.unpacking import twist
+from ..task.plan import JumpPlan
 from ..task.task import JumpTask
 from .bounded import cpu_time
 from .compilation import FunctionSet, Progress, load_functions

@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from ...robots.description import RobotDescription
 from ...robots.welding import welded
-from ..library.plan import JumpPlan
 from ..models.coordinates import Coordinates
 from ..models.robot_model import model_of, symmetric_model_of
 from ..models.stance import Stance, stances_of
@@ -20,6 +19,7 @@ from ..problem.layout import Stretch, layout
 from ..problem.problem import Problem, ProblemBuilder
 from ..problem.stage_functions import PIECES, make_coordinates
 from ..problem.unpacking import can_start, knot_times, pack, unpack
+from ..task.plan import JumpPlan
 from ..task.sequence import PHASES
 from ..task.task import JumpTask, Knots
 from .bounded import cpu_time

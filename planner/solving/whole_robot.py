@@ -5,12 +5,15 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...robots.description import RobotDescription
 from ...robots.welding import WeldedRobot
-from ..library.plan import JumpPlan
 from ..models.exact_dynamics import ExactDynamics
 from ..problem.one_flight import joint_torques
+from ..task.plan import JumpPlan
+
+Array = NDArray[np.float64]
 
 
 def for_all_joints(plan: JumpPlan, part: WeldedRobot, robot: RobotDescription) -> JumpPlan:
@@ -20,7 +23,9 @@ def for_all_joints(plan: JumpPlan, part: WeldedRobot, robot: RobotDescription) -
     """
     if not part.held:
         return plan
-    position = np.hstack([plan.position[:, :7], part.expand(plan.position[:, 7:], held=part.angles)])
+    position = np.hstack(
+        [plan.position[:, :7], part.expand(plan.position[:, 7:], held=part.angles)]
+    )
     velocity = np.hstack([plan.velocity[:, :6], part.expand(plan.velocity[:, 6:])])
     bend = np.hstack([plan.acceleration[:, :6], part.expand(plan.acceleration[:, 6:])])
     torque = part.expand(plan.joint_torque)
@@ -38,7 +43,7 @@ def for_moving_joints(plan: JumpPlan, part: WeldedRobot) -> JumpPlan:
     if not part.held:
         return plan
 
-    def reduced(rows: np.ndarray, base: int) -> np.ndarray:  # type: ignore[type-arg]
+    def reduced(rows: Array, base: int) -> Array:
         return np.hstack([rows[:, :base], part.reduce(rows[:, base:])])
 
     return replace(

@@ -12,7 +12,7 @@ from ...runtime.language.stages import Position
 from ...runtime.loading.document import read_value
 from ...runtime.loading.nodes import ListNode, MapNode, Node, plain
 from ...runtime.loading.problems import Problems
-from ..errors import TaskError
+from .errors import TaskError
 
 Key = str | int
 

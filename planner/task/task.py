@@ -18,7 +18,7 @@ from pydantic import ValidationError, model_validator
 
 from ...robots.description import RobotDescription, find_robot
 from ...runtime.language.parameters import Parameters, parameter
-from ..errors import TaskError
+from .errors import TaskError
 from .margins import Margins
 from .placed_file import PlacedFile, read_placed
 from .scaling import scaled_defaults
@@ -26,8 +26,6 @@ from .sequence import FreeTimes, Hop, Place, Span, check_spans, places_of
 
 __all__ = ["JumpTask", "Knots", "TaskError", "Weights", "make_task", "read_task"]
 
-GRAVITY = 9.81
-"""m/s^2"""
 
 PLAN_FORMAT = 1
 """Part of every task's hash: plans of an older format or meaning are not taken from a library."""

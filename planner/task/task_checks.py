@@ -11,12 +11,13 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from ...mathematics.constants import GRAVITY
 from ...robots.description import RobotDescription
 from ...robots.kinematics import link_poses
-from ..errors import TaskError
+from .errors import TaskError
 from .margins import unknown_joints
 from .sequence import Hop, Place, edge_of
-from .task import GRAVITY, JumpTask
+from .task import JumpTask
 
 LENIENCE = 0.03
 """What the centre of mass may move within the body [m], beyond what the legs' length allows."""

@@ -34,7 +34,7 @@ from typing import Any, ClassVar, Generic, Literal, Self, TypeVar, overload
 import numpy as np
 
 from ...robots.description import RobotDescription
-from .errors import DeclarationError
+from .errors import BlockError, DeclarationError
 from .parameters import Parameters
 from .signals import Signal
 
@@ -160,6 +160,11 @@ class Context:
     wired: tuple[str, ...] = ()
     folder: Path = Path()
 
+    @property
+    def period(self) -> float:
+        """The seconds between two runs of the block."""
+        return self.clock.base_period * self.period_ticks
+
 
 class Block:
     """The base of all blocks; see the module's text for how to write one.
@@ -244,6 +249,15 @@ class Block:
         return ()
 
     @classmethod
+    def requires_of_graph(cls, params: Parameters, context: Context) -> Iterable[Misfit]:
+        """What does not fit the graph the block is in, asked at load together with ``requires``.
+
+        ``context`` is the one the block will be constructed with: it knows the period of the
+        block, which of its inputs are wired, and the folder to which files are relative.
+        """
+        return ()
+
+    @classmethod
     def state_dimensions(
         cls, params: Parameters, robot: RobotDescription | None
     ) -> Mapping[str, int]:
@@ -268,6 +282,19 @@ class Block:
         return {}
 
     @property
+    def robot(self) -> RobotDescription:
+        """The graph's robot, with its actuator profile in use.
+
+        A block that declares what it needs of a robot is never set up without one.
+
+        Raises:
+            BlockError: the graph has no robot.
+        """
+        if self.context.robot is None:
+            raise BlockError(f"{type(self).__name__} needs a robot, and the graph names none")
+        return self.context.robot
+
+    @property
     def tick(self) -> int:
         """The present base tick."""
         return self.context.clock.tick
@@ -275,7 +302,7 @@ class Block:
     @property
     def period(self) -> float:
         """The seconds between two runs of this block."""
-        return self.context.clock.base_period * self.context.period_ticks
+        return self.context.period
 
     @property
     def time(self) -> float:

@@ -122,13 +122,6 @@ def block_name(block_type: type[Block]) -> str:
     return f"{module.partition('@')[0]}:{block_type.__name__}"
 
 
-def with_present_names(text: str) -> str:
-    """The text of a graph with blocks called by their present names, for graphs kept by earlier
-    versions."""
-    old = "|".join(re.escape(name) for name in MOVED)
-    return re.sub(rf"\b(use: *[\"']?)({old})\b", lambda found: found[1] + MOVED[found[2]], text)
-
-
 def find_block(name: str, folder: Path | None = None) -> type[Block]:
     """The block class called ``name``; files in ``folder`` can be imported as modules.
 
@@ -151,6 +144,21 @@ def find_block(name: str, folder: Path | None = None) -> type[Block]:
         module_name, _, class_name = point.partition(":")
         return _class_of(_import(module_name), class_name, name)
     raise UnknownBlockError(f"there is no block called {name!r}")
+
+
+def find_class(name: str, folder: Path | None = None) -> object:
+    """What ``module:Class`` names; files in ``folder`` can be imported as modules.
+
+    Raises:
+        UnknownBlockError: there is no such module, or it has no such name.
+        BlockImportError: the module fails when imported.
+    """
+    module_name, _, class_name = name.partition(":")
+    module = _user_module(module_name, folder, name)
+    found = getattr(module, class_name, None)
+    if found is None:
+        raise UnknownBlockError(f"module {module_name!r} has no class {class_name!r}")
+    return found
 
 
 def _own_module(package: str, class_name: str) -> ModuleType | None:

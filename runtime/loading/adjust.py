@@ -7,11 +7,12 @@ from dataclasses import dataclass
 from typing import Any
 
 from ..language.block import Block
+from ..language.fit import find_misfits
+from ..language.parameter_change import Adjustment
 from ..language.parameters import Parameters, is_live, unit_of
 from ..language.registry import block_name
 from ..language.signals import Field
 from ..language.stages import Position
-from ..running.live_parameters import Adjustment
 from .flat import FlatBlock
 from .nodes import MapNode, from_plain
 from .overrides import Override, Overrides, read_overrides
@@ -128,9 +129,17 @@ def _flat(path: str, block: Block, parameters: MapNode) -> FlatBlock:
 
 
 def _fits(path: str, block: Block, params: Parameters, where: Position, problems: Problems) -> bool:
-    """Whether no port changes its size, which would need other memory."""
+    """Whether the block still fits its robot and no port changes its size, which would need other
+    memory."""
     kind, context = type(block), block.context
     sizes = {**context.dimensions, **kind.local_dimensions(params, context.robot)}
+    for misfit in find_misfits(kind, params, context):
+        place = f"{path}.{misfit.parameter}" if misfit.parameter else path
+        problems.add(
+            Code.MISFIT, f"{path}: {misfit.message}", where, at=place, expected=misfit.expected,
+            found=misfit.found, fix=misfit.fix,
+        )  # fmt: skip
+        return False
     for port in {**kind.inputs, **kind.outputs, **kind.states}.values():
         for name, field in port.signal.fields.items():
             if _shape(field, sizes) != _shape(field, context.dimensions):

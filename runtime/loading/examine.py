@@ -72,7 +72,7 @@ def _draft(flat: FlatBlock, graph: FlatGraph, settings: Settings, problems: Prob
     draft.dimensions = {**settings.dimensions, **local}
     draft.complete = _check_dimensions(draft, settings, problems)
     if settings.robot_known:
-        check_fit(draft, settings.robot, problems)
+        check_fit(draft, settings, problems)
     return draft
 
 

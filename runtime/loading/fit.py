@@ -1,73 +1,60 @@
-"""Checks that the graph's robot is one that every block can work with."""
+"""Reports every block that cannot work with the graph's robot, or with the graph itself."""
 
 from __future__ import annotations
 
-from ...robots.description import RobotDescription
-from ..language.block import Misfit, Need
+from ..language.block import Clock, Context, Misfit
+from ..language.fit import find_misfits
+from .nodes import ListNode, MapNode, Node
 from .problems import Code, Problems
+from .settings import Settings
 from .wire_check import Draft
 
 
-def has(robot: RobotDescription, need: Need) -> bool:
-    """Whether the robot has what a block needs."""
-    match need:
-        case "robot":
-            return True
-        case "floating base":
-            return robot.base_joint == "floating"
-        case "feet":
-            return len(robot.feet) > 0
-        case "imu":
-            return robot.sensors.imu
-        case "switches":
-            return robot.sensors.switches and len(robot.contacts) > 0
-
-
-def check_fit(draft: Draft, robot: RobotDescription | None, problems: Problems) -> None:
-    """Report every misfit of the robot and one block."""
+def check_fit(draft: Draft, settings: Settings, problems: Problems) -> None:
+    """Report every misfit of one block, whose parameters are known to be right."""
     assert draft.block_type is not None and draft.params is not None
-    flat, needs = draft.flat, draft.block_type.needs
-    if needs and robot is None:
-        problems.add(
-            Code.ROBOT,
-            f"{flat.path} ({flat.use}) needs a robot, and the graph names none",
-            flat.where,
-            at=flat.path,
-            fix="robot: bruce",
-        )
-        return
-    missing = [need for need in needs if robot is not None and not has(robot, need)]
-    for need in missing:
-        assert robot is not None
-        problems.add(
-            Code.ROBOT,
-            f"{flat.path} ({flat.use}) needs a robot with {_named(need)}; {robot.name} has none",
-            flat.where,
-            at=flat.path,
-        )
-    if missing:
-        return
-    for misfit in draft.block_type.requires(draft.params, robot):
-        _report(draft, misfit, problems)
-
-
-def _named(need: Need) -> str:
-    words = {"floating base": "a floating base", "imu": "an IMU", "switches": "contact switches"}
-    return words.get(need, need)
-
-
-def _report(draft: Draft, misfit: Misfit, problems: Problems) -> None:
     flat = draft.flat
+    context = Context(
+        path=flat.path,
+        clock=Clock(1.0 / (settings.base_rate or 1.0)),
+        period_ticks=draft.period_ticks,
+        offset_ticks=draft.offset_ticks,
+        dimensions=draft.dimensions,
+        robot=settings.robot,
+        wired=tuple(flat.wires),
+        folder=flat.folder,
+    )
+    for misfit in find_misfits(draft.block_type, draft.params, context):
+        report_misfit(draft, misfit, problems)
+
+
+def report_misfit(draft: Draft, misfit: Misfit, problems: Problems) -> None:
+    """Note a misfit at the parameter it is about, or at the block."""
+    flat = draft.flat
+    steps = misfit.parameter.split(".") if misfit.parameter else []
+    node: Node = flat.parameters
     where = flat.where
-    for entry in flat.parameters:
-        if entry.key == misfit.parameter:
-            where = entry.value.where
+    for step in steps:
+        found = _inside(node, step)
+        if found is None:
+            break
+        node, where = found, found.where
     problems.add(
-        Code.ROBOT,
+        Code.MISFIT,
         f"{flat.path} ({flat.use}): {misfit.message}",
         where,
-        at=f"{flat.path}.{misfit.parameter}" if misfit.parameter else flat.path,
+        at=".".join([flat.path, *steps]),
         expected=misfit.expected,
         found=misfit.found,
         fix=misfit.fix,
     )
+
+
+def _inside(node: Node, step: str) -> Node | None:
+    """The value under a key, or the element at an index."""
+    if isinstance(node, MapNode):
+        entry = node.get(step)
+        return entry.value if entry else None
+    if isinstance(node, ListNode) and step.isdigit() and int(step) < len(node.items):
+        return node.items[int(step)]
+    return None

@@ -82,6 +82,7 @@ class FlatGraph:
     duration: Entry | None = None
     robot: Entry | None = None
     robot_folder: Path = Path()
+    actuators: Entry | None = None
     dimensions: MapNode | None = None
     clock: MapNode | None = None
     overrides: Mapping[str, Any] = field(default_factory=dict)
@@ -104,6 +105,8 @@ class FlatGraph:
             if isinstance(robot, str) and robot.endswith((".yaml", ".yml")):
                 robot = Path(os.path.relpath(self.robot_folder / robot, self.folder)).as_posix()
             lines.append(f"robot: {text_of(robot)}")
+        if self.actuators is not None:
+            lines.append(f"actuators: {text_of(plain(self.actuators.value))}")
         for key, node in (("dimensions", self.dimensions), ("clock", self.clock)):
             if node is not None and node.entries:
                 lines.append(f"{key}: {text_of(plain(node))}")

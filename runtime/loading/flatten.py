@@ -101,6 +101,7 @@ class _Flattener:
             rate=written("rate"),
             duration=written("duration"),
             robot=written("robot"),
+            actuators=written("actuators"),
             robot_folder=graph["robot"][1] if "robot" in graph else path.parent,
             dimensions=self._mapping(written("dimensions")),
             clock=self._mapping(written("clock")),

@@ -11,8 +11,10 @@ from pydantic import ValidationError
 from ..language.block import Block
 from ..language.errors import UnitError
 from ..language.parameters import Parameters, unit_of
+from ..language.registry import block_name
 from ..language.stages import Position
 from ..language.units import parse_quantity
+from .earlier_versions import fix_of_profile
 from .flat import FlatBlock
 from .nodes import Entry, ListNode, MapNode, Node, ScalarNode, kind, plain, text_of
 from .problems import Code, Problems, instead, listing, nearest
@@ -46,7 +48,7 @@ def check_parameters(
     try:
         params = model.model_validate(plain(flat.parameters))
     except ValidationError as error:
-        _report(flat, model, error.errors(include_url=False), problems)
+        _report(flat, block_type, error.errors(include_url=False), problems)
         return None
     except Exception as error:  # noqa: BLE001  a check of the user's own failed
         problems.add(
@@ -94,8 +96,9 @@ class _Mistake:
 
 
 def _report(
-    flat: FlatBlock, model: type[Parameters], errors: Sequence[Any], problems: Problems
+    flat: FlatBlock, block_type: type[Block], errors: Sequence[Any], problems: Problems
 ) -> None:
+    model = block_type.Params
     mistakes: dict[tuple[Code, str], _Mistake] = {}
     for error in errors:
         kind_of = str(error["type"])
@@ -115,9 +118,10 @@ def _report(
         if kind_of == "extra_forbidden" and entry is not None:
             legal = _siblings(model, error["loc"])
             near = nearest(entry.key, legal)
+            fix = fix_of_profile(block_name(block_type), entry.key, entry.value)
             mistakes[Code.UNKNOWN_PARAMETER, place] = _Mistake(
                 Code.UNKNOWN_PARAMETER, place, entry.key_where, None, entry.key,
-                [listing(legal)], [], near, _right_name(entry, near),
+                [listing(legal)], [], () if fix else near, fix or _right_name(entry, near),
             )  # fmt: skip
             continue
         where = node.where if steps and node is not None else _end(node, flat)

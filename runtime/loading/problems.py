@@ -56,6 +56,7 @@ class Code(StrEnum):
     OFFSET = "offset"
     DIMENSION = "dimension"
     ROBOT = "robot"
+    MISFIT = "misfit"
     OVERRIDE = "override"
 
 

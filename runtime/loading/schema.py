@@ -75,6 +75,10 @@ def graph_schema(blocks: Mapping[str, type[Block]] | None = None) -> Schema:
                 "description": "how long the graph runs: 4 s",
             },
             "robot": {"type": "string", "description": "name of a robot, or its YAML file"},
+            "actuators": {
+                "type": "string",
+                "description": "the robot's actuator profile in use; by default its first",
+            },
             "dimensions": {
                 "type": "object",
                 "additionalProperties": {"type": "integer", "minimum": 1},

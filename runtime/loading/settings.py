@@ -11,6 +11,7 @@ import yaml
 from pydantic import ValidationError
 
 from ...robots.description import RobotDescription, find_robot
+from ...robots.shipped import robot_names
 from ..language.errors import UnitError
 from ..language.stages import ClockSpec, Position
 from ..language.units import parse_quantity
@@ -57,11 +58,14 @@ def read_settings(graph: FlatGraph, problems: Problems) -> Settings:
         if duration is not None and rate is not None:
             ticks = max(1, round(duration * rate))
     robot = _read_robot(graph, problems) if graph.robot is not None else None
+    known = robot is not None or graph.robot is None
+    if graph.actuators is not None and known:
+        robot = _with_actuators(robot, graph.actuators, problems)
     return Settings(
         rate,
         ticks,
         robot,
-        robot is not None or graph.robot is None,
+        known,
         _read_dimensions(graph, robot, problems),
         _read_clock(graph, problems),
     )
@@ -120,6 +124,40 @@ def _read_robot(graph: FlatGraph, problems: Problems) -> RobotDescription | None
         found=kind(node),
     )
     return None
+
+
+def _with_actuators(
+    robot: RobotDescription | None, entry: Entry, problems: Problems
+) -> RobotDescription | None:
+    """The robot with the actuator profile that the graph names in use."""
+    node = entry.value
+    name = node.value if isinstance(node, ScalarNode) else None
+    if robot is None:
+        problems.add(
+            Code.ROBOT,
+            "the graph chooses an actuator profile, and names no robot that has it",
+            entry.key_where,
+            at="actuators",
+            fix="remove 'actuators', or name the robot: "
+            + " or ".join(f"robot: {known}" for known in robot_names()),
+        )
+        return None
+    if isinstance(name, str) and name in robot.profiles:
+        return robot.with_profile(name)
+    similar = nearest(name, robot.profiles) if isinstance(name, str) else ()
+    problems.add(
+        Code.ROBOT,
+        f"{robot.name} has no actuator profile {name!r}"
+        if isinstance(name, str)
+        else f"actuators cannot be {kind(node)}",
+        node.where,
+        at="actuators",
+        expected=f"an actuator profile of {robot.name}: {listing(robot.profiles)}",
+        found=kind(node),
+        nearest=similar,
+        fix=f"actuators: {(*similar, *robot.profiles)[0]}",
+    )
+    return robot
 
 
 def _read_dimensions(

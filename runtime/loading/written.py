@@ -11,7 +11,7 @@ from ..language.stages import Position
 from .nodes import Entry, ListNode, MapNode, Node, ScalarNode, kind, plain, text_of
 from .problems import Code, Problems, instead, listing, nearest
 
-GRAPH_KEYS = ("rate", "duration", "robot", "dimensions", "clock")
+GRAPH_KEYS = ("rate", "duration", "robot", "actuators", "dimensions", "clock")
 """Keys that only a graph that is run, or a file it includes, may have."""
 SUBGRAPH_KEYS = ("inputs", "outputs", "parameters")
 """Keys that only a sub-graph's file may have."""

@@ -19,8 +19,8 @@ from .life_cycle import LifeCycle, LifeState, describe
 from .memory import BoundGraph
 from .notes import Note, TakesNotes
 from .pacing import TimeSource, WallTime
-from .run_result import RunResult, merge_metrics
-from .sinks import MemoryLog, RunHash, Sink, TakesResult
+from .run_result import RunResult, TakesResult, merge_metrics
+from .sinks import MemoryLog, RunHash, Sink
 from .ticker import Ticker
 from .timing import block_times
 

@@ -11,46 +11,15 @@ from __future__ import annotations
 import time
 from collections import deque
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from typing import Any
 
 from ..language.block import Block
 from ..language.errors import AloftError
-from ..language.parameters import Parameters
+from ..language.parameter_change import Adjustment, ParameterChange
 from .life_cycle import describe
 
 ANSWER_TIME = 2.0
 """Seconds that ``submit`` waits for the next tick."""
 _POLL = 1e-3
-
-
-@dataclass(frozen=True)
-class ParameterChange:
-    """One parameter, ``block.parameter``, that was ``old`` in all ticks before ``tick`` and is
-    ``new`` from it on. Values are plain data, as a graph file would have them."""
-
-    tick: int
-    path: str
-    old: Any
-    new: Any
-
-
-@dataclass
-class Adjustment:
-    """Checked new parameters by block, and what they change: path, old and new value of each.
-
-    When it has been ``answered``, it was taken over at ``tick``, or refused because of ``error``.
-    """
-
-    params: Mapping[str, Parameters]
-    values: tuple[tuple[str, Any, Any], ...]
-    tick: int = -1
-    error: str = ""
-    answered: bool = False
-
-    def changes(self) -> tuple[ParameterChange, ...]:
-        """What was changed."""
-        return tuple(ParameterChange(self.tick, *value) for value in self.values)
 
 
 class LiveParameters:

@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any, Protocol, runtime_checkable
 
-from .live_parameters import ParameterChange
+from ..language.parameter_change import ParameterChange
 
 
 @dataclass(frozen=True)

@@ -6,15 +6,15 @@ import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from difflib import get_close_matches
-from typing import Any
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..language.block import Metric
 from ..language.errors import ExitCode, RunError
+from ..language.parameter_change import ParameterChange
 from ..language.stages import CheckedGraph
-from .live_parameters import ParameterChange
 from .sinks import MemoryLog
 from .timing import BlockTimes
 
@@ -146,3 +146,11 @@ def merge_metrics(
             if name not in ("success", "reason"):
                 merged[name if len(owners[name]) == 1 else f"{path}.{name}"] = value
     return merged, failure, praise
+
+
+@runtime_checkable
+class TakesResult(Protocol):
+    """What a sink has beside that wants to know what came of the run."""
+
+    def finish(self, result: RunResult) -> list[str]:
+        """Take the result, last of all; gives warnings for the user."""

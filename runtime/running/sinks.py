@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from hashlib import blake2b
-from typing import TYPE_CHECKING, Protocol, runtime_checkable
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,9 +11,6 @@ from numpy.typing import NDArray
 from ..language.layout import Layout
 from .memory import BoundGraph
 from .notes import Note
-
-if TYPE_CHECKING:
-    from .run_result import RunResult
 
 
 class Sink(Protocol):
@@ -27,14 +24,6 @@ class Sink(Protocol):
 
     def close(self) -> None:
         """Finish, once, also after a failure."""
-
-
-@runtime_checkable
-class TakesResult(Protocol):
-    """What a sink has beside that wants to know what came of the run."""
-
-    def finish(self, result: RunResult) -> list[str]:
-        """Take the result, last of all; gives warnings for the user."""
 
 
 class RunHash:

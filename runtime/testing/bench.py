@@ -11,6 +11,8 @@ import numpy as np
 
 from ...robots.description import RobotDescription, find_robot
 from ..language.block import Block, Clock, Context
+from ..language.errors import BlockError
+from ..language.fit import find_misfits
 from ..language.parameters import Parameters
 from ..language.signals import Signal
 from ..language.stages import BlockSpec
@@ -32,6 +34,10 @@ class BlockBench(Generic[B]):
         dimensions: named sizes; they win over the robot's, and the block's own win over them.
         wired: which inputs the block is told are wired; all by default. The others read their
             defaults and cannot be set.
+
+    Raises:
+        BlockError: the block cannot work with the robot, or with the rate; as a load report has it.
+        KeyError: ``wired`` names an input that the block does not have.
 
     Example::
 
@@ -67,20 +73,22 @@ class BlockBench(Generic[B]):
                 raise KeyError(f"{block_type.__name__} has no input {name!r}")
         spec = BlockSpec("block", block_type, params, {}, sizes)
         self.clock = Clock(1.0 / rate)
-        self.memory = Memory([spec], description)
-        self.block: B = block_type(
-            params,
-            Context(
-                "block",
-                self.clock,
-                period_ticks,
-                0,
-                dimensions=sizes,
-                robot=description,
-                wired=names,
-                folder=folder or Path(),
-            ),
+        context = Context(
+            "block",
+            self.clock,
+            period_ticks,
+            0,
+            dimensions=sizes,
+            robot=description,
+            wired=names,
+            folder=folder or Path(),
         )
+        misfits = find_misfits(block_type, params, context)
+        if misfits:
+            reasons = "; ".join(misfit.message for misfit in misfits)
+            raise BlockError(f"{block_type.__name__}: {reasons}")
+        self.memory = Memory([spec], description)
+        self.block: B = block_type(params, context)
         self.memory.bind(self.block, spec)
         self._is_moore = block_type.is_moore()
         self._settable: dict[str, Signal] = {

@@ -21,8 +21,9 @@ import numpy as np
 
 from ...robots.description import RobotDescription
 from ..language.block import Block
+from ..language.parameter_change import Adjustment
 from ..running.finite import FiniteCheck
-from ..running.live_parameters import Adjustment, LiveParameters
+from ..running.live_parameters import LiveParameters
 from .allocations import count_array_allocations
 from .bench import BlockBench
 from .examples import live_changes, random_inputs

@@ -15,9 +15,10 @@ import pytest
 
 from aloft.blocks.signals import Phase
 from aloft.runtime.language.block import Block
+from aloft.runtime.language.parameter_change import Adjustment
 from aloft.runtime.language.parameters import Parameters, is_live
 from aloft.runtime.language.registry import find_block, known_names
-from aloft.runtime.running.live_parameters import Adjustment, LiveParameters
+from aloft.runtime.running.live_parameters import LiveParameters
 from aloft.runtime.testing import BlockBench
 from aloft.runtime.testing.examples import live_changes, random_inputs
 
@@ -128,6 +129,7 @@ SCENES: Mapping[str, list[Scene]] = {
     "blocks.LegInverseKinematics": [Scene({"speed_limit": 0.5})],
     "blocks.WholeBodyController": [
         Scene({"force_max": 20.0, "force_min": 1.0}),
+        Scene({"tasks": ["ContactPoints", {"task": "Posture", "gains": {"joints": ["*"]}}]}),
         # no force is both, so the solver fails and the last torque fades
         Scene(
             {"force_max": 20.0, "force_min": 50.0, "fallback_ticks": 50},

@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from aloft.planner.errors import PlanError
+from aloft.planner.library import nearest_feasible
 from aloft.planner.library.library import SHIPPED, PlanLibrary
-from aloft.planner.library.plan import JumpPlan
-from aloft.planner.solving import nearest_feasible
-from aloft.planner.solving.nearest_feasible import Axis
+from aloft.planner.library.nearest_feasible import Axis
+from aloft.planner.task.errors import PlanError
+from aloft.planner.task.plan import JumpPlan
 from aloft.planner.task.task import JumpTask, make_task, read_task
 from aloft.robots.description import find_robot
 

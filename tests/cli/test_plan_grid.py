@@ -13,7 +13,7 @@ from typing import Any
 
 import pytest
 
-from aloft.planner.library.plan import read_plan
+from aloft.planner.task.plan import read_plan
 
 CallJson = Callable[..., dict[str, Any]]
 Start = Callable[..., subprocess.Popen[str]]

@@ -24,10 +24,10 @@ blocks:
 """
 GAINS = """
 import math
-from aloft.runtime import primitives
+from aloft.blocks.general import gain
 
 
-class Gain(primitives.Gain):
+class Gain(gain.Gain):
     '''A gain.'''
 
 

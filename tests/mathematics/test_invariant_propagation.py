@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from aloft.mathematics import extended_pose, rotations
-from aloft.mathematics.inertial_filter import GRAVITY, propagate
+from aloft.mathematics.constants import GRAVITY
+from aloft.mathematics.inertial_filter import propagate
 from aloft.mathematics.invariant_propagation import deviation, drift, grow, spread
 
 PERIOD, N = 0.002, 2

@@ -9,8 +9,8 @@ import pytest
 from aloft.blocks.jumping.squat_jump import SquatJumpTask, plan_squat_jump
 from aloft.blocks.jumping.squat_jump_reference import SquatJumpReference
 from aloft.blocks.signals import Phase
-from aloft.planner.library.plan import JumpPlan
 from aloft.planner.models.exact_dynamics import ExactDynamics, joint_motion
+from aloft.planner.task.plan import JumpPlan
 from aloft.planner.task.task import make_task
 from aloft.robots.description import find_robot
 from aloft.robots.pinocchio_model import build_pinocchio_model

@@ -6,7 +6,7 @@ import pytest
 
 from aloft.planner.checking.validity import check_plan
 from aloft.planner.library.library import SHIPPED, PlanLibrary
-from aloft.planner.library.plan import read_plan
+from aloft.planner.task.plan import read_plan
 from aloft.planner.task.task import read_task
 from aloft.robots.description import find_robot
 

@@ -6,9 +6,8 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
-from pydantic import ValidationError
 
-from aloft.robots.description import RobotDescription, find_robot, read_description
+from aloft.robots.description import MotorRating, RobotDescription, find_robot, read_description
 
 
 def hopper() -> dict[str, Any]:
@@ -30,7 +29,13 @@ def hopper() -> dict[str, Any]:
             {"name": "toe", "foot": "foot", "position": [0, 0, -0.2], "radius": 0.005}
         ],
         "transmission": {"motors": ["a", "b"], "joint_to_motor": [[1, 0], [1, 1]]},
-        "profiles": {},
+        "profiles": {
+            "small": {
+                "peak_torque": 5.0, "corner_speed": 10.0, "no_load_speed": 20.0,
+                "continuous_torque": 2.0, "rotor_inertia": 0.001, "friction": 0.05,
+                "damping": 0.01,
+            }
+        },
         "standing": {"knee": 0.5},
     }  # fmt: skip
 
@@ -47,30 +52,6 @@ def test_derived_figures() -> None:
     assert motor_power == pytest.approx(torque @ velocity)
 
 
-@pytest.mark.parametrize(
-    ("path", "value", "message"),
-    [
-        (("base",), "torso", "base 'torso' is not one of body, thigh, shank"),
-        (("joints", 1, "parent"), "thig", "joint knee: parent 'thig' is not one of"),
-        (("joints", 1, "name"), "hip", "joint 'hip' is there twice"),
-        (("feet", 0, "link"), "toe", "foot foot: link 'toe' is not one of"),
-        (("contacts", 0, "foot"), "feet", "contact toe: foot 'feet' is not one of foot"),
-        (("standing",), {"nee": 1}, "standing 'nee' is not one of hip, knee"),
-        (("transmission", "joint_to_motor"), [[1, 0]], "joint_to_motor must be 2 x 2"),
-        (("links", 0, "weight"), 2, "Extra inputs are not permitted"),
-    ],
-)
-def test_wrong_names_are_named(path: tuple[Any, ...], value: object, message: str) -> None:
-    data = hopper()
-    place: Any = data
-    for key in path[:-1]:
-        place = place[key]
-    place[path[-1]] = value
-    with pytest.raises(ValidationError) as error:
-        RobotDescription.model_validate(data)
-    assert message in str(error.value)
-
-
 def test_a_robot_of_the_users_own_file(tmp_path: Path) -> None:
     (tmp_path / "hopper.yaml").write_text(yaml.safe_dump(hopper()))
     assert find_robot("hopper.yaml", tmp_path) == read_description(tmp_path / "hopper.yaml")
@@ -81,3 +62,32 @@ def test_a_robot_of_the_users_own_file(tmp_path: Path) -> None:
 def test_an_unknown_robot_names_those_there_are() -> None:
     with pytest.raises(LookupError, match=r"no robot called 'brus'; there is .*bruce"):
         find_robot("brus")
+
+
+def test_another_profile_in_use() -> None:
+    robot = find_robot("bruce")
+    assert robot.motors.profile == "koala"
+    relaxed = robot.with_profile("relaxed")
+    assert relaxed.motors.peak_torque.tolist() == [21.0] * 10
+    assert robot.motors.peak_torque.tolist() == [10.5] * 10
+    assert robot.with_profile("koala") is robot
+    with pytest.raises(LookupError, match="bruce has no actuator profile 'zebra'; there is koala,"):
+        robot.with_profile("zebra")
+
+
+def test_motors_that_differ() -> None:
+    robot = find_robot("bruce")
+    profile = robot.profiles["koala"].model_copy(
+        update={"motors": {"*_knee_motor": MotorRating(peak_torque=20.0)}}
+    )
+    motors = robot.changed(profiles={"koala": profile}).motors
+    assert motors.peak_torque.tolist() == [10.5, 10.5, 10.5, 20.0, 10.5] * 2
+    assert motors.rotor_inertia.tolist() == [0.00182] * 10
+
+
+def test_what_came_later_changes_no_content() -> None:
+    # plans are kept by the content of their robot
+    data = find_robot("bruce").model_dump(mode="json")
+    assert not {"base_joint", "profile", "sensors", "held"} & set(data)
+    assert "kind" not in data["joints"][0] and "motors" not in data["profiles"]["koala"]
+    assert RobotDescription.model_validate(data) == find_robot("bruce")

@@ -199,13 +199,24 @@ def test_orientation_need_not_be_exactly_of_unit_length(bench):
     assert np.abs(bench.get("terms").mass_matrix - terms["mass_matrix"]).max() < 1e-14
 
 
-def test_unknown_actuator_profile_names_the_known_ones():
-    with pytest.raises(
-        BlockError, match=r"bruce has no actuator profile 'squirrel'; there is koala"
-    ):
-        BlockBench(Dynamics, {"actuators": "squirrel"}, robot="bruce")
+def test_the_rotors_are_those_of_the_profile_in_use():
+    profiles = {
+        "koala": ROBOT.profiles["koala"],
+        "heavy": ROBOT.profiles["koala"].model_copy(update={"rotor_inertia": 0.1}),
+    }
+    robot = ROBOT.model_copy(update={"profiles": profiles})
+    light, heavy = (
+        BlockBench(Dynamics, robot=robot.with_profile(name)) for name in ("koala", "heavy")
+    )
+    for bench in (light, heavy):
+        bench.set("base", orientation=[0.0, 0.0, 0.0, 1.0])
+        bench.step()
+    more = heavy.get("terms").mass_matrix - light.get("terms").mass_matrix
+    matrix = ROBOT.joint_to_motor
+    added = (0.1 - ROBOT.profiles["koala"].rotor_inertia) * matrix.T @ matrix
+    np.testing.assert_allclose(more[6:, 6:], added, atol=1e-12)
 
 
 def test_needs_a_robot():
-    with pytest.raises(BlockError, match="name one in the graph"):
+    with pytest.raises(BlockError, match="it needs a robot, and the graph names none"):
         BlockBench(Dynamics, dimensions=dict(ROBOT.dimensions))

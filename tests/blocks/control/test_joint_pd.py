@@ -182,5 +182,7 @@ def test_a_soft_stop_adds_its_own_torque_to_any_feedback(angle, rate, gains, tar
 
 
 def test_gains_must_fit_the_leg():
-    with pytest.raises(BlockError, match=r"flight_damping has 2 gains; right_foot's leg has 5 "):
+    with pytest.raises(
+        BlockError, match=r"flight_damping has 2 gains, and the leg of \w+ has 5 joints"
+    ):
         make(flight_damping=[1.0, 2.0])

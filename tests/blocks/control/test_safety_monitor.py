@@ -175,5 +175,5 @@ def test_fault_survives_a_restore(bench):
 
 
 def test_needs_a_robot():
-    with pytest.raises(BlockError, match="name one in the graph"):
+    with pytest.raises(BlockError, match="it needs a robot, and the graph names none"):
         BlockBench(SafetyMonitor, dimensions=dict(ROBOT.dimensions))

@@ -315,5 +315,5 @@ def test_feet_that_press_harder_are_taken_to_slide():
 
 
 def test_needs_a_robot():
-    with pytest.raises(BlockError, match="name one in the graph"):
+    with pytest.raises(BlockError, match="it needs a robot, and the graph names none"):
         BlockBench(InvariantKalmanFilter, dimensions=dict(ROBOT.dimensions))

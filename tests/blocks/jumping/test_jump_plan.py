@@ -62,7 +62,7 @@ def test_what_cannot_be_asked_for_is_said(task: object, words: str) -> None:
 
 def test_it_needs_a_robot() -> None:
     dimensions = {"n_joints": 10, "n_feet": 2, "n_contacts": 4, "n_velocities": 16}
-    with pytest.raises(AloftError, match="JumpPlan needs a robot"):
+    with pytest.raises(AloftError, match="it needs a robot, and the graph names none"):
         BlockBench(JumpPlan, {}, dimensions=dimensions)
 
 

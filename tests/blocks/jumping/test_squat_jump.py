@@ -6,8 +6,9 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from aloft.blocks.jumping.squat_jump import GRAVITY, SquatJumpTask, plan_squat_jump
+from aloft.blocks.jumping.squat_jump import SquatJumpTask, plan_squat_jump
 from aloft.blocks.jumping.squat_jump_reference import SquatJumpReference
+from aloft.mathematics.constants import GRAVITY
 from aloft.robots.description import find_robot
 from aloft.robots.pinocchio_model import build_pinocchio_model
 from aloft.runtime.language.errors import BlockError

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from aloft.blocks.scoring.jump_score import JumpScore
+from aloft.runtime.language.errors import BlockError
 from aloft.runtime.testing.bench import BlockBench
 
 PERIOD = 0.002
@@ -295,5 +296,5 @@ def test_tolerances_are_parameters() -> None:
 
 def test_a_robot_is_needed() -> None:
     dimensions = {"n_joints": 10, "n_velocities": 16, "n_contacts": 4, "n_feet": 2}
-    with pytest.raises(ValueError, match="add `robot: bruce`"):
+    with pytest.raises(BlockError, match="it needs a robot, and the graph names none"):
         BlockBench(JumpScore, {}, dimensions=dimensions)

@@ -20,9 +20,9 @@ TORQUES = arrays(np.float64, 10, elements=st.floats(-100, 100))
 
 def limits(speed: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     lower, upper = np.empty_like(speed), np.empty_like(speed)
-    motor_torque_limits(
-        speed, KOALA.peak_torque, KOALA.corner_speed, KOALA.no_load_speed, lower, upper
-    )
+    peak, no_load = np.full_like(speed, KOALA.peak_torque), np.full_like(speed, KOALA.no_load_speed)
+    slope = peak / (no_load - KOALA.corner_speed)
+    motor_torque_limits(speed, peak, slope, no_load, lower, upper)
     return lower, upper
 
 
@@ -30,6 +30,14 @@ def test_curve_at_its_corners() -> None:
     lower, upper = limits(np.array([0.0, 18.0, 24.0, 30.0, 40.0, -18.0, -30.0, -40.0]))
     np.testing.assert_allclose(upper, [10.5, 10.5, 5.25, 0.0, 0.0, 10.5, 10.5, 10.5])
     np.testing.assert_allclose(lower, [-10.5, -10.5, -10.5, -10.5, -10.5, -10.5, 0.0, 0.0])
+
+
+def test_every_motor_has_its_own_curve_and_one_without_torque_does_nothing() -> None:
+    speed, lower, upper = np.array([0.0, 5.0, -5.0]), np.zeros(3), np.zeros(3)
+    peak, no_load = np.array([2.0, 4.0, 0.0]), np.array([10.0, 6.0, 10.0])
+    motor_torque_limits(speed, peak, peak / (no_load - 4.0), no_load, lower, upper)
+    np.testing.assert_allclose(upper, [2.0, 2.0, 0.0])
+    np.testing.assert_allclose(lower, [-2.0, -4.0, 0.0])
 
 
 @given(SPEEDS)

@@ -8,6 +8,7 @@ import pytest
 
 from aloft.hal.simulated.push import Push
 from aloft.robots.description import find_robot
+from aloft.runtime.language.errors import BlockError
 from aloft.runtime.testing.bench import BlockBench
 
 POINTS = list(find_robot("bruce").points)
@@ -68,7 +69,7 @@ def test_from_the_start() -> None:
 
 
 def test_unknown_point_and_missing_robot() -> None:
-    with pytest.raises(ValueError, match="bruce has no point 'head'; it has torso_com, "):
+    with pytest.raises(BlockError, match="bruce has no point 'head' to push at"):
         bench(point="head")
-    with pytest.raises(ValueError, match="add `robot: bruce`"):
+    with pytest.raises(BlockError, match="it needs a robot, and the graph names none"):
         BlockBench(Push, {}, dimensions=find_robot("bruce").dimensions)

@@ -8,10 +8,10 @@ import pytest
 from aloft.logs import RecordingError, read
 from aloft.logs.file.format import Header
 from aloft.logs.file.header import header_of
-from aloft.logs.file.writer import RecordingWriter
+from aloft.logs.recording.writer import RecordingWriter
 from aloft.runtime.language.block import Block, Input, Output, State
+from aloft.runtime.language.parameter_change import ParameterChange
 from aloft.runtime.language.signals import Field, Signal
-from aloft.runtime.running.live_parameters import ParameterChange
 from aloft.runtime.running.memory import BoundGraph, Snapshot
 from aloft.runtime.running.notes import Note, parameter_note
 from aloft.runtime.testing.graphs import Use, checked_graph

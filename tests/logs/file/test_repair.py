@@ -5,11 +5,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from aloft.blocks.general.primitives import Constant
+from aloft.blocks.general.constant import Constant
 from aloft.logs import RecordedRun, RecordingError, read
 from aloft.logs.file.header import make_header
 from aloft.logs.file.repair import RepairError, repair
-from aloft.logs.file.writer import RecordingWriter
+from aloft.logs.recording.writer import RecordingWriter
 from aloft.runtime.running.memory import BoundGraph
 from aloft.runtime.testing.graphs import Use, checked_graph
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from aloft.logs.file.header import make_header
-from aloft.logs.file.writer import RecordingWriter
+from aloft.logs.recording.writer import RecordingWriter
 from aloft.logs.replay.opened_run import OpenedRun
 from aloft.logs.replay.replay import replay
 from aloft.logs.replay.replayable import Keyframes
@@ -30,13 +30,13 @@ blocks:
 """
 PARTS = """
 from aloft import BlockError, parameter
-from aloft.runtime import primitives
+from aloft.blocks.general import gain
 
 
-class Fragile(primitives.Gain):
+class Fragile(gain.Gain):
     '''A gain that breaks at a tick.'''
 
-    class Params(primitives.Gain.Params):
+    class Params(gain.Gain.Params):
         breaks: int = parameter(-1, text="when")
 
     def step(self) -> None:

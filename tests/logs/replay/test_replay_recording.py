@@ -5,7 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from aloft.blocks.general.primitives import Gain, SineWave
+from aloft.blocks.general.gain import Gain
+from aloft.blocks.general.sine_wave import SineWave
 from aloft.logs.file.reader import _stream
 from aloft.logs.replay.replay import ReplayError, replay
 from aloft.logs.replay.replay_recording import write_replay

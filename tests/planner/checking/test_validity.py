@@ -14,7 +14,7 @@ from aloft.planner.checking.validity import (
     checked,
     require_valid,
 )
-from aloft.planner.library.plan import JumpPlan
+from aloft.planner.task.plan import JumpPlan
 from aloft.robots.description import find_robot
 
 ROBOT = find_robot("bruce")

@@ -8,7 +8,7 @@ import pytest
 
 from aloft.planner.drawing.line_chart import Chart, Line, page, pieces, ticks
 from aloft.planner.drawing.picture import write_picture
-from aloft.planner.library.plan import JumpPlan
+from aloft.planner.task.plan import JumpPlan
 from aloft.robots.description import find_robot
 
 SVG = "{http://www.w3.org/2000/svg}"

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from aloft.planner.checking.validity import InvalidPlanError
-from aloft.planner.errors import PlanError
 from aloft.planner.library.library import SHIPPED, PlanLibrary, kept_name, task_distance
-from aloft.planner.library.plan import JumpPlan
+from aloft.planner.task.errors import PlanError
+from aloft.planner.task.plan import JumpPlan
 from aloft.planner.task.task import JumpTask, make_task, read_task
 from aloft.robots.description import RobotDescription, find_robot
 

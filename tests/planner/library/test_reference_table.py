@@ -5,10 +5,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from aloft.blocks.jumping.jump_table import JumpTable
+from aloft.planner.library.jump_table import JumpTable
 from aloft.planner.library.library import SHIPPED, PlanLibrary
-from aloft.planner.library.plan import JumpPlan
 from aloft.planner.library.reference_table import reference_table
+from aloft.planner.task.plan import JumpPlan
 from aloft.planner.task.task import read_task
 from aloft.robots.description import find_robot
 

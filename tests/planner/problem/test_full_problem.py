@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 
 from aloft.planner.checking.validity import check_plan
-from aloft.planner.errors import PlanError
 from aloft.planner.library.library import SHIPPED
-from aloft.planner.library.plan import JumpPlan
 from aloft.planner.problem.guess import ballistic_guess
 from aloft.planner.solving.solve import make_problem, solve_jump
+from aloft.planner.task.errors import PlanError
+from aloft.planner.task.plan import JumpPlan
 from aloft.planner.task.task import Knots, make_task, read_task
 from aloft.robots.description import find_robot
 
@@ -47,7 +47,7 @@ def test_equations_are_independent_in_all_coordinates(task: dict[str, Any]) -> N
 
 PLAN_HASH = """
 import hashlib
-from aloft.planner.library.plan import ARRAYS
+from aloft.planner.task.plan import ARRAYS
 from aloft.planner.solving.solve import solve_jump
 from aloft.planner.task.task import make_task
 from aloft.robots.description import find_robot

@@ -8,9 +8,9 @@ import pytest
 
 from aloft.planner.checking.validity import InvalidPlanError, checked
 from aloft.planner.library.library import solve_and_check
-from aloft.planner.library.plan import JumpPlan
 from aloft.planner.solving.refinement import asks_for_finer, curable, finer_knots
 from aloft.planner.solving.solve import solve_jump
+from aloft.planner.task.plan import JumpPlan
 from aloft.planner.task.task import make_task
 from aloft.robots.description import find_robot
 

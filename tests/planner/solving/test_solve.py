@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from aloft.planner.checking.validity import check_plan
-from aloft.planner.errors import PlanError
-from aloft.planner.library.plan import ARRAYS
 from aloft.planner.problem.guess import ballistic_guess
 from aloft.planner.solving.solve import make_problem, solve_jump
+from aloft.planner.task.errors import PlanError
+from aloft.planner.task.plan import ARRAYS
 from aloft.planner.task.task import make_task
 from aloft.robots.description import find_robot
 

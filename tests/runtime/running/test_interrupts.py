@@ -18,7 +18,7 @@ PROGRAM = """
 import signal, sys, time
 from aloft.runtime.language.block import Block, Output
 from aloft.runtime.running.executor import run
-from aloft.blocks.general.primitives import Vector
+from aloft.blocks.general.vector import Vector
 from aloft.runtime.language.stages import ClockSpec
 from aloft.runtime.testing.graphs import Use, checked_graph
 

@@ -5,13 +5,16 @@ import threading
 import numpy as np
 import pytest
 
-from aloft.blocks.general.primitives import Gain, SineWave, Vector
+from aloft.blocks.general.gain import Gain
+from aloft.blocks.general.sine_wave import SineWave
+from aloft.blocks.general.vector import Vector
 from aloft.runtime.language.block import Block, Output
 from aloft.runtime.language.errors import AloftError, BlockError
+from aloft.runtime.language.parameter_change import ParameterChange
 from aloft.runtime.language.parameters import Parameters, live_parameter, parameter
 from aloft.runtime.loading.adjust import adjust
 from aloft.runtime.running.executor import Executor
-from aloft.runtime.running.live_parameters import LiveParameters, ParameterChange
+from aloft.runtime.running.live_parameters import LiveParameters
 from aloft.runtime.running.memory import BoundGraph
 from aloft.runtime.testing import Use, checked_graph
 

@@ -3,7 +3,10 @@
 import numpy as np
 import pytest
 
-from aloft.blocks.general.primitives import Constant, Gain, UnitDelay, Vector
+from aloft.blocks.general.constant import Constant
+from aloft.blocks.general.gain import Gain
+from aloft.blocks.general.unit_delay import UnitDelay
+from aloft.blocks.general.vector import Vector
 from aloft.runtime.language.block import Block, Input, Output, State
 from aloft.runtime.language.errors import DeclarationError, RunError
 from aloft.runtime.language.parameters import Parameters

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from aloft.blocks.general.primitives import Vector
+from aloft.blocks.general.vector import Vector
 from aloft.runtime.language.block import Block, Input, Output, State
 from aloft.runtime.language.parameters import Parameters, live_parameter, parameter
 from aloft.runtime.language.signals import Field, Signal

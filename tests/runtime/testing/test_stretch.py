@@ -5,7 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from aloft.blocks.general.primitives import Gain, UnitDelay
+from aloft.blocks.general.gain import Gain
+from aloft.blocks.general.unit_delay import UnitDelay
 from aloft.runtime.language.block import Block, Output
 from aloft.runtime.language.signals import Field, Signal
 from aloft.runtime.testing.stretch import Setting, Stretch, StretchError

@@ -7,10 +7,10 @@ from typing import Any
 
 import pytest
 
-from aloft.planner.errors import PlanError
 from aloft.planner.library import library
 from aloft.planner.library.library import SHIPPED, PlanLibrary
-from aloft.planner.library.plan import JumpPlan
+from aloft.planner.task.errors import PlanError
+from aloft.planner.task.plan import JumpPlan
 from aloft.planner.task.task import JumpTask, TaskError, make_task, read_task
 from aloft.robots.description import RobotDescription, find_robot
 from aloft.studies.batch import plan_grid as grid

@@ -1,0 +1,33 @@
+"""A vector times a constant."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...runtime.language.block import Block, Input, Output
+from ...runtime.language.parameters import Parameters, live_parameter, parameter
+from .vector import Vector
+
+
+class Gain(Block):
+    """The input times a constant: y = gain u."""
+
+    class Params(Parameters):
+        n: int = parameter(1, ge=1, text="elements")
+        gain: float = live_parameter(1.0, text="the factor")
+
+    params: Params
+    u = Input(Vector, text="what is scaled")
+    y = Output(Vector, text="gain times u")
+
+    def setup(self) -> None:
+        """Keep the factor at hand."""
+        self.on_parameters()
+
+    def on_parameters(self) -> None:
+        """As an array, so that no tick makes one."""
+        self._gain = np.array(self.params.gain)
+
+    def step(self) -> None:
+        """Multiply."""
+        np.multiply(self.u.value, self._gain, out=self.y.value)

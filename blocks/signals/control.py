@@ -1,0 +1,107 @@
+"""Signals between the blocks of a controller: the robot's state, its model, targets, torques.
+
+Units, frames and orders are those of the package ``signals``.
+"""
+
+from __future__ import annotations
+
+from ...runtime.language.signals import Field, Signal
+
+
+class ContactState(Signal):
+    """Which contact points carry load, after debouncing."""
+
+    active = Field("n_contacts", dtype="bool", text="whether each point is in contact")
+
+
+class BaseState(Signal):
+    """The floating base: its pose and velocity."""
+
+    position = Field(3, unit="m", frame="world", text="base origin")
+    orientation = Field(4, unit="", text="quaternion x, y, z, w from body to world")
+    linear_velocity = Field(3, unit="m/s", frame="world", text="velocity of the base origin")
+    angular_velocity = Field(3, unit="rad/s", frame="body", text="angular velocity of the base")
+
+
+class EstimatorHealth(Signal):
+    """How far an estimator believes itself, and what it has to live with.
+
+    A standard deviation here is that of the error's norm: the root of the covariance's trace.
+    """
+
+    position_std = Field(unit="m", text="standard deviation of the position's error")
+    velocity_std = Field(unit="m/s", text="of the velocity's error")
+    tilt_std = Field(unit="rad", text="of the orientation's error about the horizontal axes")
+    yaw_std = Field(unit="rad", text="of the orientation's error about the vertical axis")
+    trusted = Field("n_contacts", dtype="bool", text="points that the estimate leans on now")
+    gyro_saturated = Field(dtype="bool", text="an axis of the gyroscope is at the end of its range")
+    accelerometer_saturated = Field(dtype="bool", text="the same of the accelerometer")
+    saturated_ticks = Field(dtype="int64", text="ticks so far in which any of the two was")
+
+
+class DynamicsTerms(Signal):
+    """The whole-body model at the present state: everything the controllers need, once a tick."""
+
+    velocity = Field("n_velocities", text="generalised velocity")
+    mass_matrix = Field(("n_velocities", "n_velocities"), text="joint-space inertia with rotors")
+    nonlinear_effects = Field("n_velocities", text="Coriolis, centrifugal and gravity terms")
+    contact_position = Field(("n_contacts", 3), unit="m", frame="world", text="contact points")
+    contact_velocity = Field(("n_contacts", 3), unit="m/s", frame="world", text="their velocities")
+    contact_jacobian = Field(
+        ("n_contacts", 3, "n_velocities"), frame="world", text="linear velocity Jacobians"
+    )
+    contact_drift = Field(
+        ("n_contacts", 3), unit="m/s^2", frame="world", text="point acceleration at qdd = 0"
+    )
+    com = Field(3, unit="m", frame="world", text="centre of mass")
+    com_velocity = Field(3, unit="m/s", frame="world", text="velocity of the centre of mass")
+    linear_momentum = Field(3, unit="kg m/s", frame="world", text="l: mass times com velocity")
+    angular_momentum = Field(3, unit="N m s", frame="world", text="k: about the com")
+    centroidal_matrix = Field((6, "n_velocities"), frame="world", text="centroidal momentum matrix")
+    centroidal_drift = Field(6, frame="world", text="momentum rate at qdd = 0")
+    base_position = Field(3, unit="m", frame="world", text="base origin")
+    base_rotation = Field((3, 3), unit="", text="rotation matrix from body to world")
+    foot_position = Field(("n_feet", 3), unit="m", frame="world", text="sole centres")
+    foot_rotation = Field(("n_feet", 3, 3), unit="", text="rotations from foot to world")
+
+
+class WholeBodyTarget(Signal):
+    """What the whole-body controller is to achieve now."""
+
+    com = Field(3, unit="m", frame="world", text="centre of mass")
+    com_velocity = Field(3, unit="m/s", frame="world", text="its velocity")
+    com_acceleration = Field(3, unit="m/s^2", frame="world", text="its feedforward acceleration")
+    orientation = Field(4, unit="", text="base quaternion x, y, z, w")
+    angular_velocity = Field(3, unit="rad/s", frame="body", text="base angular velocity")
+    angular_momentum = Field(3, unit="N m s", frame="world", text="k about the com")
+    angular_momentum_rate = Field(3, unit="N m", frame="world", text="its feedforward rate")
+    joint_position = Field("n_joints", unit="rad", text="planned angles, for feet that roll")
+    joint_velocity = Field("n_joints", unit="rad/s", text="their velocities")
+    joint_acceleration = Field("n_joints", unit="rad/s^2", text="their accelerations")
+
+
+class WholeBodyCommand(Signal):
+    """The whole-body controller's answer."""
+
+    torque = Field("n_joints", unit="N m", text="feedforward joint torques")
+    acceleration = Field("n_velocities", text="generalised acceleration")
+    force = Field(("n_contacts", 3), unit="N", frame="world", text="contact forces on the robot")
+    solved = Field(dtype="bool", text="whether the quadratic program was solved")
+    failures = Field(dtype="int64", text="solver failures so far")
+
+
+class FootTarget(Signal):
+    """Where the feet should be, seen from the base: the landing controller's output."""
+
+    position = Field(("n_feet", 3), unit="m", frame="body", text="sole centres")
+    velocity = Field(("n_feet", 3), unit="m/s", frame="body", text="their velocities")
+    rotation = Field(("n_feet", 3, 3), unit="", text="rotations from foot to body")
+    landing = Field(("n_feet", 3), unit="m", frame="world", text="landing places, from the com")
+
+
+class JointTarget(Signal):
+    """Joint angles and velocities to track."""
+
+    position = Field("n_joints", unit="rad", text="joint angles")
+    velocity = Field("n_joints", unit="rad/s", text="joint velocities")
+    reachable = Field("n_feet", dtype="bool", text="whether the leg reaches the foot's target")

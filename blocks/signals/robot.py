@@ -1,0 +1,90 @@
+"""Signals between a robot, simulated or real, and its controller.
+
+Units, frames and orders are those of the package ``signals``.
+"""
+
+from __future__ import annotations
+
+from enum import IntEnum
+
+from ...runtime.language.signals import Field, Signal
+
+
+class CommandMode(IntEnum):
+    """What a drive does with a joint command."""
+
+    OFF = 0
+    """No torque."""
+    ACTIVE = 1
+    """Feedforward torque plus joint feedback at the drive's rate."""
+    DAMPING = 2
+    """Joint damping only: how every run ends."""
+
+
+class ImuReading(Signal):
+    """One sample of the inertial measurement unit, at the base's origin."""
+
+    angular_velocity = Field(3, unit="rad/s", frame="body", text="gyroscope")
+    specific_force = Field(3, unit="m/s^2", frame="body", text="accelerometer; at rest +g upwards")
+
+
+class JointState(Signal):
+    """What the joint encoders and drives report."""
+
+    position = Field("n_joints", unit="rad", text="joint angles")
+    velocity = Field("n_joints", unit="rad/s", text="joint velocities")
+    torque = Field("n_joints", unit="N m", text="joint torques from measured motor current")
+
+
+class ContactSwitches(Signal):
+    """The raw tactile switches under the feet."""
+
+    closed = Field("n_contacts", dtype="bool", text="whether each switch is pressed")
+
+
+class JointCommand(Signal):
+    """What the drives execute: mode, feedforward torque, joint targets and gains."""
+
+    mode = Field(dtype="int64", values=CommandMode, text="see CommandMode")
+    torque = Field("n_joints", unit="N m", text="feedforward joint torques")
+    position = Field("n_joints", unit="rad", text="joint angle targets")
+    velocity = Field("n_joints", unit="rad/s", text="joint velocity targets")
+    stiffness = Field("n_joints", unit="N m/rad", text="joint feedback gain on position")
+    damping = Field("n_joints", unit="N m s/rad", text="joint feedback gain on velocity")
+
+
+class ExternalForce(Signal):
+    """A force that something outside puts on the robot."""
+
+    force = Field(3, unit="N", frame="world", text="force")
+    point = Field(dtype="int64", text="index of the named point it acts at, in file order")
+
+
+class RobotTruth(Signal):
+    """What only a simulator knows. Peaks and minima are over the physics steps of the last tick."""
+
+    base_position = Field(3, unit="m", frame="world", text="base origin")
+    base_orientation = Field(4, unit="", text="quaternion x, y, z, w from body to world")
+    base_linear_velocity = Field(3, unit="m/s", frame="world", text="velocity of the base origin")
+    base_angular_velocity = Field(3, unit="rad/s", frame="body", text="angular velocity")
+    joint_position = Field("n_joints", unit="rad", text="joint angles")
+    joint_velocity = Field("n_joints", unit="rad/s", text="joint velocities")
+    com = Field(3, unit="m", frame="world", text="centre of mass")
+    com_velocity = Field(3, unit="m/s", frame="world", text="its velocity")
+    angular_momentum = Field(3, unit="N m s", frame="world", text="k about the com")
+    contact_position = Field(("n_contacts", 3), unit="m", frame="world", text="contact points")
+    contact_force = Field(
+        ("n_contacts", 3), unit="N", frame="world", text="mean force on each point over the tick"
+    )
+    contact_touched = Field("n_contacts", dtype="bool", text="loaded in any physics step")
+    ground_height = Field("n_contacts", unit="m", frame="world", text="ground under each point")
+    forbidden_contacts = Field(
+        dtype="int64", text="physics steps with any contact but toe or heel on the ground"
+    )
+    joint_limit_violation = Field(unit="rad", text="largest violation of a joint limit")
+    motor_torque = Field("n_joints", unit="N m", text="motor torque of largest magnitude")
+    motor_speed = Field("n_joints", unit="rad/s", text="motor speed of largest magnitude")
+    motor_overload = Field(
+        unit="N m", text="largest excess of a motor torque over what its speed allows"
+    )
+    saturated_share = Field(unit="", text="share of motor samples at the torque limit")

@@ -1,0 +1,154 @@
+"""How the base of a simulated robot is held: its coordinates in the simulator, by kind."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...blocks.signals import RobotTruth
+
+if TYPE_CHECKING:
+    from mujoco import MjData
+
+Array = NDArray[np.float64]
+
+
+class FixedBase:
+    """A base that is bolted to the world at its origin: it has no coordinates.
+
+    ``positions`` and ``velocities`` say how many elements of the simulator's ``qpos`` and ``qvel``
+    the base takes; those of the joints follow.
+    """
+
+    positions: ClassVar[int] = 0
+    velocities: ClassVar[int] = 0
+
+    def __init__(self, data: MjData) -> None:
+        self._data = data
+        self.angular_velocity = np.zeros(3)
+        """Of the base [rad/s, body], as of the last ``refresh``."""
+
+    @staticmethod
+    def add_joints(body: Any) -> None:
+        """Give the base's body in a model that is being built its joints."""
+
+    def place(self) -> None:
+        """Put the base upright at the world's origin."""
+
+    def turn(self, rotation: Array) -> None:
+        """Turn the upright base by a rotation vector [rad, world], as far as it can turn."""
+
+    def shift(self, offset: Array) -> None:
+        """Move the base by ``offset`` [m, world], as far as it can move."""
+
+    def refresh(self) -> None:
+        """Bring ``angular_velocity`` up to date."""
+
+    def publish(self, truth: RobotTruth) -> None:
+        """Write the base's pose and velocity."""
+        truth.base_position.fill(0.0)
+        truth.base_orientation[:3] = 0.0
+        truth.base_orientation[3] = 1.0
+        truth.base_linear_velocity.fill(0.0)
+        truth.base_angular_velocity.fill(0.0)
+
+
+class PlanarBase(FixedBase):
+    """A base that slides along the world's x and z axes and turns about y, in this order."""
+
+    positions = 3
+    velocities = 3
+
+    @staticmethod
+    def add_joints(body: Any) -> None:
+        """Two slides and a hinge."""
+        import mujoco
+
+        slide, hinge = mujoco.mjtJoint.mjJNT_SLIDE, mujoco.mjtJoint.mjJNT_HINGE
+        body.add_joint(name="base/x", type=slide, axis=[1, 0, 0])
+        body.add_joint(name="base/z", type=slide, axis=[0, 0, 1])
+        body.add_joint(name="base/pitch", type=hinge, axis=[0, 1, 0])
+
+    def place(self) -> None:
+        """Put the base upright at the world's origin."""
+        self._data.qpos[:3] = 0.0
+
+    def turn(self, rotation: Array) -> None:
+        """Pitch the base by the y component of ``rotation`` [rad]."""
+        self._data.qpos[2] = rotation[1]
+
+    def shift(self, offset: Array) -> None:
+        """Move the base by the x and z components of ``offset`` [m, world]."""
+        self._data.qpos[0] += offset[0]
+        self._data.qpos[1] += offset[2]
+
+    def refresh(self) -> None:
+        """Bring ``angular_velocity`` up to date."""
+        self.angular_velocity[1] = self._data.qvel[2]
+
+    def publish(self, truth: RobotTruth) -> None:
+        """Write the base's pose and velocity."""
+        position, velocity = self._data.qpos, self._data.qvel
+        half = 0.5 * position.item(2)
+        truth.base_position[0], truth.base_position[1] = position.item(0), 0.0
+        truth.base_position[2] = position.item(1)
+        truth.base_orientation.fill(0.0)
+        truth.base_orientation[1], truth.base_orientation[3] = math.sin(half), math.cos(half)
+        truth.base_linear_velocity[0], truth.base_linear_velocity[1] = velocity.item(0), 0.0
+        truth.base_linear_velocity[2] = velocity.item(1)
+        truth.base_angular_velocity.fill(0.0)
+        truth.base_angular_velocity[1] = velocity.item(2)
+
+
+class FloatingBase(FixedBase):
+    """A base that moves freely: position and quaternion w, x, y, z; linear velocity in the world,
+    angular velocity in the body."""
+
+    positions = 7
+    velocities = 6
+
+    def __init__(self, data: MjData) -> None:
+        super().__init__(data)
+        self.angular_velocity = data.qvel[3:6]
+
+    @staticmethod
+    def add_joints(body: Any) -> None:
+        """A free joint."""
+        body.add_freejoint(name="base")
+
+    def place(self) -> None:
+        """Put the base upright at the world's origin."""
+        self._data.qpos[:3] = 0.0
+        self._data.qpos[3:7] = [1.0, 0.0, 0.0, 0.0]
+
+    def turn(self, rotation: Array) -> None:
+        """Turn the upright base by a rotation vector [rad, world]."""
+        import mujoco
+
+        angle = math.sqrt(sum(float(x) ** 2 for x in rotation))
+        if angle > 0.0:
+            mujoco.mju_axisAngle2Quat(self._data.qpos[3:7], rotation / angle, angle)
+
+    def shift(self, offset: Array) -> None:
+        """Move the base by ``offset`` [m, world]."""
+        self._data.qpos[:3] += offset
+
+    def publish(self, truth: RobotTruth) -> None:
+        """Write the base's pose and velocity."""
+        data = self._data
+        truth.base_position[:] = data.qpos[:3]
+        truth.base_orientation[:3] = data.qpos[4:7]
+        truth.base_orientation[3] = data.qpos[3]
+        truth.base_linear_velocity[:] = data.qvel[:3]
+        truth.base_angular_velocity[:] = data.qvel[3:6]
+
+
+BASES: dict[Literal["floating", "planar", "fixed"], type[FixedBase]] = {
+    "floating": FloatingBase,
+    "planar": PlanarBase,
+    "fixed": FixedBase,
+}
+"""The kind of base by the description's ``base_joint``."""

@@ -1,0 +1,88 @@
+"""The rotors of a simulated robot: what their inertia adds to its joints.
+
+With ``A`` the transmission's ``joint_to_motor`` and ``I_m`` the motors' rotor inertias at the
+gearbox output, the rotors add ``A^T diag(I_m) A`` to the joint-space inertia. MuJoCo has two ways to
+say that: armature of a joint, a term on the diagonal, and armature of a fixed tendon whose length is
+a weighted sum of joint positions, a term of rank one. A motor's row of ``A`` is such a weighted sum,
+so one tendon for each motor that is geared to several joints is exact for any transmission, as long
+as these joints lie on one limb, one behind the other: the simulator's inertia has no entries for
+others.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...robots.description import RobotDescription
+from ...robots.link_poses import joints_above
+
+if TYPE_CHECKING:
+    from mujoco import MjSpec
+
+Array = NDArray[np.float64]
+
+
+def joint_armature(robot: RobotDescription) -> Array:
+    """The armature [kg m^2] (n_joints,) of the joints, by all motors without a tendon of their
+    own."""
+    armature, shared = np.zeros(len(robot.joints)), _shared_motors(robot)
+    for motor, inertia in enumerate(robot.motors.rotor_inertia.tolist()):
+        if motor not in shared:
+            armature += inertia * robot.joint_to_motor[motor] ** 2
+    return armature
+
+
+def add_rotors(spec: MjSpec, robot: RobotDescription) -> None:
+    """Add a fixed tendon for every motor whose rotor couples joints.
+
+    Raises:
+        ValueError: a motor couples joints that are not one behind the other.
+    """
+    complaint = unfit_motor(robot)
+    if complaint:
+        raise ValueError(f"{robot.name}: {complaint}")
+    for motor in _shared_motors(robot):
+        tendon = spec.add_tendon(
+            name=f"rotor/{robot.transmission.motors[motor]}",
+            armature=float(robot.motors.rotor_inertia[motor]),
+        )
+        for joint, weight in zip(robot.joints, robot.joint_to_motor[motor].tolist(), strict=True):
+            if weight:
+                tendon.wrap_joint(joint.name, weight)
+
+
+def unfit_motor(robot: RobotDescription) -> str:
+    """Which motor's rotor cannot be simulated, and why; empty where all can."""
+    names = [joint.name for joint in robot.joints]
+    above = [joints_above(robot, joint.child) for joint in robot.joints]
+    for motor in _shared_motors(robot):
+        geared = np.flatnonzero(robot.joint_to_motor[motor]).tolist()
+        for first in geared:
+            for second in geared:
+                if first < second and not (above[second][first] or above[first][second]):
+                    return (
+                        f"motor {robot.transmission.motors[motor]} is geared to {names[first]} and "
+                        f"{names[second]}, and neither joint carries the other; the simulator "
+                        "cannot express the inertia of such a rotor"
+                    )
+    return ""
+
+
+def _shared_motors(robot: RobotDescription) -> list[int]:
+    """The motors that need a tendon: those geared to several joints, unless the couplings of all
+    motors that have joints in common cancel, as in a differential of two equal motors."""
+    geared, inertia = robot.joint_to_motor != 0.0, robot.motors.rotor_inertia
+    coupling = np.abs(robot.rotor_matrix - np.diag(np.diag(robot.rotor_matrix)))
+    small = 1e-12 * float(np.abs(robot.rotor_matrix).max(initial=0.0))
+    found = []
+    for motor in range(len(inertia)):
+        joints = geared[motor]
+        for _ in range(len(inertia)):  # all joints that are geared to these over any motor
+            joints = geared[(geared & joints).any(axis=1)].any(axis=0)
+        joined = coupling[np.ix_(joints, joints)].max(initial=0.0) > small
+        if inertia[motor] and geared[motor].sum() > 1 and joined:
+            found.append(motor)
+    return found

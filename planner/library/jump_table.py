@@ -1,0 +1,142 @@
+"""A planned jump as a table over time, and how a reference is read from it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...blocks.signals import JumpReference, Phase
+from ...mathematics.kernel import kernel
+from ...mathematics.rotations import normalise
+
+Array = NDArray[np.float64]
+
+_FED_FORWARD = (
+    "com_acceleration", "angular_momentum_rate", "joint_acceleration", "joint_torque",
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class JumpTable:
+    """A planned jump, row by row in time.
+
+    Attributes:
+        time: increasing times since the plan began [s], (n,). Two rows may share an instant
+            where something jumps, such as the joint velocities at touchdown.
+        columns: by the name of a ``JumpReference`` field its values over time, (n, ...).
+        squat_time, thrust_time, lift_off_time, touchdown_time, recover_time: when the phases of
+            these names begin, flight beginning with lift-off and landing with touchdown [s]; of the
+            first jump, but for the last.
+        later_jumps: when thrust, flight and landing of the jumps after the first begin [s].
+        contact: by row which points carry load, (n, n_contacts); ``None``: all of them, but in
+            flight.
+    """
+
+    time: Array
+    columns: dict[str, Array]
+    squat_time: float
+    thrust_time: float
+    lift_off_time: float
+    touchdown_time: float
+    recover_time: float
+    later_jumps: tuple[tuple[float, float, float], ...] = ()
+    contact: NDArray[np.bool_] | None = None
+
+
+class JumpTableReader:
+    """Writes the reference of any instant of a table without allocating."""
+
+    def __init__(self, table: JumpTable) -> None:
+        self._table = table
+        self._time = table.time
+        self._columns = list(table.columns.items())
+        self._scratch = {name: np.zeros(rows.shape[1:]) for name, rows in self._columns}
+        first = (table.thrust_time, table.lift_off_time, table.touchdown_time)
+        self._jumps = [first, *table.later_jumps]
+        self._touchdowns = np.array([jump[2] for jump in self._jumps])
+
+    def read(self, time: float, reference: JumpReference, lead: float = 0.0) -> None:
+        """The reference at ``time``; before the table its first row, after it its last.
+
+        Lift-off and touchdown times are those of the next flight, and from its middle on those of
+        the one behind it: whoever lands, early or late, knows by them that it goes on.
+
+        What a controller feeds forward, the acceleration, the rate of angular momentum and the
+        torques, is that of ``lead`` seconds later.
+        """
+        table = self._table
+        here, there = locate(self._time, time), locate(self._time, time + lead)
+        for name, rows in self._columns:
+            out, scratch = getattr(reference, name), self._scratch[name]
+            row, share = there if name in _FED_FORWARD else here
+            np.subtract(rows[row + 1], rows[row], out=scratch)
+            np.multiply(scratch, share, out=scratch)
+            np.add(rows[row], scratch, out=out)
+        normalise(reference.orientation, reference.orientation)
+        jump = present_jump(time, self._touchdowns)
+        thrust, lift_off, touchdown = self._jumps[jump]
+        phase = planned_phase(
+            time, table.squat_time, thrust, lift_off, touchdown, table.recover_time
+        )
+        if jump and phase < Phase.THRUST:  # between two jumps it has landed, and does not squat
+            phase = int(Phase.LANDING)
+        reference.time[()] = time
+        reference.phase[()] = phase
+        if jump + 1 < len(self._jumps) and time >= 0.5 * (lift_off + touchdown):
+            _, lift_off, touchdown = self._jumps[jump + 1]
+        reference.lift_off_time[()] = lift_off
+        reference.touchdown_time[()] = touchdown
+        reference.contact[...] = phase != Phase.FLIGHT
+        if table.contact is not None and phase != Phase.FLIGHT:
+            reference.contact[...] = table.contact[here[0]]
+
+
+@kernel
+def locate(times: Array, time: float) -> tuple[int, float]:
+    """The row before ``time`` and the share of the way from it to the next, from 0 to 1."""
+    low, high = 0, times.shape[0] - 1
+    if time <= times[0]:
+        return 0, 0.0
+    if time >= times[high]:
+        return high - 1, 1.0
+    while high - low > 1:
+        middle = (low + high) // 2
+        if times[middle] <= time:
+            low = middle
+        else:
+            high = middle
+    return low, (time - float(times[low])) / (float(times[high]) - float(times[low]))
+
+
+@kernel
+def present_jump(time: float, touchdowns: Array) -> int:
+    """The jump that is under way or comes next, by when the jumps end; behind the last one that."""
+    number = 0
+    while number + 1 < touchdowns.shape[0] and time >= float(touchdowns[number]):
+        number += 1
+    return number
+
+
+@kernel
+def planned_phase(
+    time: float,
+    squat_time: float,
+    thrust_time: float,
+    lift_off_time: float,
+    touchdown_time: float,
+    recover_time: float,
+) -> int:
+    """The phase a plan is in at ``time``, from when its phases begin."""
+    if time < squat_time:
+        return 0
+    if time < thrust_time:
+        return 1
+    if time < lift_off_time:
+        return 2
+    if time < touchdown_time:
+        return 3
+    if time < recover_time:
+        return 4
+    return 5

@@ -1,0 +1,222 @@
+"""A planned jump as data, and the file it is kept in.
+
+The file is NumPy's ``.npz``: one array a quantity and ``header``, a JSON text with the task, the
+units, the names of joints, feet and contacts, what made the plan and whether it is valid. To read
+it without any of this code::
+
+    file = numpy.load("forward_10cm.npz")
+    header, com = json.loads(str(file["header"])), file["com"]
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import zipfile
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...runtime.language.errors import AloftError
+from .task import JumpTask, TaskError, make_task
+from .whole_file import write_whole
+
+Array = NDArray[np.float64]
+
+FILE_FORMAT = "aloft jump plan 1"
+
+
+class PlanFileError(AloftError, ValueError):
+    """A file is no plan, or one of another format."""
+
+
+@dataclass(frozen=True)
+class JumpPlan:
+    """A planned jump over N knots.
+
+    The world's origin is the ground midway between the soles at the start, x forward; joints, feet
+    and contacts are in the order of the robot's description. Velocities and accelerations are
+    Pinocchio's: the base's linear and angular part in the body frame, then the joints.
+
+    Rows of ``acceleration``, ``contact_force``, ``contact`` and ``joint_torque`` belong to the
+    interval that begins with their knot; the last repeats the one before it. An interval of no
+    length is an impact: velocities change, positions do not, and ``contact_force`` is an impulse
+    [N s] there.
+
+    Attributes:
+        task: what was asked for.
+        time: of the knots [s], from zero, never decreasing, (N,).
+        position: base position [m], base quaternion x, y, z, w, joint angles [rad], (N, 7 + n).
+        velocity: generalised velocity, (N, 6 + n).
+        acceleration: its derivative, (N, 6 + n).
+        contact_force: on the robot in the world [N], (N, n_contacts, 3).
+        contact: which points carry load, (N, n_contacts).
+        phase: ``Phase`` values of the intervals, (N,).
+        joint_torque: [N m], (N, n).
+        com, com_velocity: centre of mass in the world [m, m/s], (N, 3).
+        angular_momentum: about it, world axes [N m s], (N, 3).
+        lift_off_time, touchdown_time: of the first flight [s].
+        later_flights: lift-off and touchdown times of the flights after it [s].
+        statistics: how it was solved: solver, iterations, cpu_s, violation, cost and the like.
+        versions: of the packages that made it.
+        report: the validity report as plain data; empty until the plan is checked.
+    """
+
+    task: JumpTask
+    time: Array
+    position: Array
+    velocity: Array
+    acceleration: Array
+    contact_force: Array
+    contact: NDArray[np.bool_]
+    phase: NDArray[np.int64]
+    joint_torque: Array
+    com: Array
+    com_velocity: Array
+    angular_momentum: Array
+    lift_off_time: float
+    touchdown_time: float
+    later_flights: tuple[tuple[float, float], ...] = ()
+    statistics: Mapping[str, Any] = field(default_factory=dict)
+    versions: Mapping[str, str] = field(default_factory=dict)
+    report: Mapping[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        knots = len(self.time)
+        for name in ARRAYS:
+            if len(getattr(self, name)) != knots:
+                raise ValueError(
+                    f"{name} has {len(getattr(self, name))} rows, but the plan has {knots} knots"
+                )
+        if knots < 2 or np.any(np.diff(self.time) < 0.0):
+            raise ValueError("a plan needs two knots or more, with times that never decrease")
+
+    @property
+    def duration(self) -> float:
+        """From the first knot to the last [s]."""
+        return float(self.time[-1] - self.time[0])
+
+    @property
+    def flights(self) -> tuple[tuple[float, float], ...]:
+        """Lift-off and touchdown times of all flights [s]."""
+        return ((self.lift_off_time, self.touchdown_time), *self.later_flights)
+
+    @property
+    def lift_off_times(self) -> tuple[float, ...]:
+        """When the flights begin [s]."""
+        return tuple(start for start, _ in self.flights)
+
+    @property
+    def touchdown_times(self) -> tuple[float, ...]:
+        """When they end [s]."""
+        return tuple(end for _, end in self.flights)
+
+    @property
+    def flight_time(self) -> float:
+        """From lift-off to touchdown of the first flight [s]."""
+        return self.touchdown_time - self.lift_off_time
+
+    @property
+    def valid(self) -> bool:
+        """Whether the plan was checked and every test passed."""
+        return bool(self.report.get("valid", False))
+
+    def knot_at(self, time: float) -> int:
+        """The last knot at or before ``time``, but for rounding."""
+        return max(0, int(np.searchsorted(self.time, time + 1e-9, side="right")) - 1)
+
+    def with_report(self, report: Mapping[str, Any]) -> JumpPlan:
+        """The same plan with that validity report."""
+        return replace(self, report=dict(report))
+
+
+ARRAYS = {
+    "time": "s",
+    "position": "m, unit quaternion x y z w, rad",
+    "velocity": "m/s and rad/s in the body frame, rad/s",
+    "acceleration": "m/s^2 and rad/s^2 in the body frame, rad/s^2",
+    "contact_force": "N in the world frame",
+    "contact": "true where the point carries load",
+    "phase": "0 stand, 1 squat, 2 thrust, 3 flight, 4 landing, 5 recover",
+    "joint_torque": "N m",
+    "com": "m in the world frame",
+    "com_velocity": "m/s in the world frame",
+    "angular_momentum": "N m s about the centre of mass, world axes",
+}
+"""The arrays of a plan with their units, as they stand in the file."""
+
+_SCALARS = tuple(f.name for f in fields(JumpPlan) if f.name not in ARRAYS and f.name != "task")
+
+
+def plan_bytes(plan: JumpPlan, names: Mapping[str, list[str]] | None = None) -> bytes:
+    """The plan's file.
+
+    The same task gives the same bytes, also from another process: no time of day, no processor
+    time and no machine's name is in it.
+    """
+    statistics = {name: x for name, x in plan.statistics.items() if not name.endswith("cpu_s")}
+    header = {
+        "format": FILE_FORMAT,
+        "task": plan.task.model_dump(mode="json"),
+        **{name: getattr(plan, name) for name in _SCALARS},
+        "statistics": statistics,
+        "lift_off_times": list(plan.lift_off_times),
+        "touchdown_times": list(plan.touchdown_times),
+        "units": ARRAYS,
+        "names": dict(names or {}),
+    }
+    arrays: dict[str, Any] = {name: np.asarray(getattr(plan, name)) for name in ARRAYS}
+    memory = io.BytesIO()
+    np.savez_compressed(memory, header=np.array(json.dumps(header, default=_plain)), **arrays)
+    return memory.getvalue()
+
+
+def _plain(value: Any) -> Any:
+    """NumPy's numbers and arrays as JSON has them."""
+    if hasattr(value, "tolist"):
+        return value.tolist()
+    raise TypeError(f"{type(value).__name__} cannot be kept in a plan file")
+
+
+def write_plan(
+    path: str | Path, plan: JumpPlan, names: Mapping[str, list[str]] | None = None
+) -> Path:
+    """Write the plan's file as a whole or not at all, replacing what is there.
+
+    ``names`` may hold the names of ``joints``, ``feet`` and ``contacts``, for readers without the
+    robot's description.
+    """
+    return write_whole(Path(path), plan_bytes(plan, names))
+
+
+def read_plan(path: str | Path) -> JumpPlan:
+    """The plan in a file.
+
+    Raises:
+        PlanFileError: there is no file, it is broken, or it is of another format.
+    """
+    path = Path(path)
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            header = json.loads(str(file["header"]))
+            arrays = {name: file[name] for name in ARRAYS}
+    except OSError as error:
+        raise PlanFileError(f"cannot read {path}: {error.strerror or error}") from error
+    except (KeyError, ValueError, EOFError, zipfile.BadZipFile) as error:
+        raise PlanFileError(f"{path} is no plan file: {error}") from error
+    if header.get("format") != FILE_FORMAT:
+        raise PlanFileError(
+            f"{path} is of format {header.get('format')!r}, expected {FILE_FORMAT!r}; "
+            "plan it anew with 'aloft plan'"
+        )
+    try:
+        task = make_task(header["task"], where=f"{path}: task")
+        values = {name: header[name] for name in _SCALARS if name != "later_flights"}
+        times = [(float(start), float(end)) for start, end in header.get("later_flights", [])]
+        return JumpPlan(task=task, **arrays, **values, later_flights=tuple(times))
+    except (KeyError, ValueError, TaskError) as error:
+        raise PlanFileError(f"{path} is no plan file: {error}") from error

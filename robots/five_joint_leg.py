@@ -1,0 +1,400 @@
+"""The closed form of a leg of five joints: hip yaw, pitch and roll, knee and ankle, line foot.
+
+The three hip axes meet in the hip centre; knee and ankle turn about the axis the hip roll leaves
+horizontal, so thigh, calf and sole lie in one plane, the leg plane. With five joints a foot can
+reach a sole position and a direction of its line from heel to toe; its roll about that line
+follows. Canonical angles are yaw about +z, pitch about -y (thigh forward), roll about +x, knee and
+ankle about -y; a robot whose axes point the other way has a sign of -1 there.
+
+Inside the leg plane a vector is (x, z) of the thigh's frame at zero pose, and a positive knee or
+ankle angle turns it from x to z. Everything is in the base's frame, in m and rad. The functions
+are pure, allocate nothing and return finite numbers for all finite arguments.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..mathematics.kernel import kernel
+from ..mathematics.least_squares import solve_damped
+from ..mathematics.rotations import wrap
+from ..runtime.language.errors import BlockError
+from .description import RobotDescription
+from .limb import FootKind, chain_to, foot_shape
+
+Array = NDArray[np.float64]
+
+_AXES = ("yaw", 2), ("pitch", 1), ("roll", 0), ("knee", 1), ("ankle", 1)
+_CANONICAL = np.array([1.0, -1.0, 1.0, -1.0, -1.0])
+_FAR = 10.0
+"""Targets are brought within this distance [m], so that no square overflows."""
+_SLANT = 1e-3
+"""Below this sine of the angle between the foot's line and the line from hip to sole, the leg
+plane is undefined and blends into the upright one."""
+_GIMBAL = 1e-3
+"""Below this cosine of the hip pitch, yaw and roll turn about one axis and yaw is held."""
+
+
+@dataclass(frozen=True)
+class Leg:
+    """The geometry of one leg.
+
+    Attributes:
+        joints: the indices of yaw, pitch, roll, knee and ankle among the robot's joints.
+        hip: the hip centre [m, base frame], (3,).
+        plane: hip to knee, knee to ankle, ankle to sole centre [m], rows of (x, z).
+        signs: the robot's angle = sign times the canonical one, (5,).
+        limits: lower and upper limits of the robot's angles [rad], (5, 2).
+    """
+
+    joints: tuple[int, ...]
+    hip: Array
+    plane: Array
+    signs: Array
+    limits: Array
+
+
+def read_leg(robot: RobotDescription, foot: int) -> Leg:
+    """The leg that ends in foot number ``foot``.
+
+    Raises:
+        BlockError: the chain from base to foot is not a leg of the kind described above.
+    """
+    chain = chain_to(robot, robot.feet[foot].link)
+    mismatch = _mismatch(robot, foot, chain)
+    if mismatch:
+        raise BlockError(
+            f"foot {robot.feet[foot].name}: {mismatch}; this inverse kinematics is for legs of hip "
+            "yaw (z), pitch (y) and roll (x) with intersecting axes, then knee (y) and ankle (y) in "
+            "one plane, that end in a line foot"
+        )
+    joints = [robot.joints[i] for i in chain]
+    offsets = np.array([joints[3].origin, joints[4].origin, robot.feet[foot].sole])
+    signs = [joint.axis[k] * c for joint, (_, k), c in zip(joints, _AXES, _CANONICAL, strict=True)]
+    return Leg(
+        joints=chain,
+        hip=np.array(joints[0].origin),
+        plane=np.ascontiguousarray(offsets[:, ::2]),
+        signs=np.array(signs),
+        limits=robot.joint_limits[list(chain)].copy(),
+    )
+
+
+def find_leg(robot: RobotDescription, foot: int) -> Leg | None:
+    """The leg that ends in foot number ``foot``, or ``None`` where it is of another kind."""
+    if _mismatch(robot, foot, chain_to(robot, robot.feet[foot].link)):
+        return None
+    return read_leg(robot, foot)
+
+
+def _mismatch(robot: RobotDescription, foot: int, chain: tuple[int, ...]) -> str:
+    """What keeps a chain of joints from being a leg of this kind; empty if nothing does."""
+    joints = [robot.joints[i] for i in chain]
+    if len(joints) != len(_AXES):
+        return f"expected 5 joints from {robot.base}, found {len(joints)}"
+    for joint, (kind, axis) in zip(joints, _AXES, strict=True):
+        if joint.kind != "hinge" or abs(abs(joint.axis[axis]) - 1.0) > 1e-9:
+            return f"joint {joint.name} should turn about {'xyz'[axis]} ({kind})"
+        if joint.limits is None:
+            return f"joint {joint.name} has no limits"
+        if joint.name in robot.held:
+            return f"joint {joint.name} is held"
+    if any(joint.origin != (0.0, 0.0, 0.0) for joint in joints[1:3]):
+        return "the hip axes do not meet in one point"
+    if any(
+        place[1] != 0.0 for place in (joints[3].origin, joints[4].origin, robot.feet[foot].sole)
+    ):
+        return "knee, ankle or sole lies beside the leg plane"
+    shape, line = foot_shape(robot, foot)
+    if shape != FootKind.LINE or abs(float(line[0]) - 1.0) > 1e-9:
+        return "its contact points are not in a line along x"
+    return ""
+
+
+@kernel
+def forward(
+    hip: Array, plane: Array, signs: Array, angles: Array, position: Array, rotation: Array
+) -> None:
+    """The sole centre (3,) and the foot's rotation (3, 3) to the base, from the joint angles."""
+    a, b, c, k, n = _canonical(signs, angles)
+    _thigh_rotation(a, b, c, rotation)
+    cos_k, sin_k, cos_f, sin_f = math.cos(k), math.sin(k), math.cos(k + n), math.sin(k + n)
+    calf_x, calf_z = float(plane[1, 0]), float(plane[1, 1])
+    sole_x, sole_z = float(plane[2, 0]), float(plane[2, 1])
+    x = float(plane[0, 0]) + calf_x * cos_k - calf_z * sin_k + sole_x * cos_f - sole_z * sin_f
+    z = float(plane[0, 1]) + calf_x * sin_k + calf_z * cos_k + sole_x * sin_f + sole_z * cos_f
+    for i in range(3):
+        thigh_x, thigh_z = float(rotation[i, 0]), float(rotation[i, 2])
+        position[i] = hip[i] + x * thigh_x + z * thigh_z
+        rotation[i, 0] = cos_f * thigh_x + sin_f * thigh_z
+        rotation[i, 2] = cos_f * thigh_z - sin_f * thigh_x
+
+
+@kernel
+def jacobian(plane: Array, signs: Array, angles: Array, out: Array) -> None:
+    """The sole's linear (rows 0-2) and angular (rows 3-5) velocity per joint velocity, (6, 5)."""
+    a, b, c, k, n = _canonical(signs, angles)
+    cos_a, sin_a, cos_b, sin_b = math.cos(a), math.sin(a), math.cos(b), math.sin(b)
+    cos_c, sin_c = math.cos(c), math.sin(c)
+    cos_k, sin_k, cos_f, sin_f = math.cos(k), math.sin(k), math.cos(k + n), math.sin(k + n)
+    calf_x, calf_z = float(plane[1, 0]), float(plane[1, 1])
+    sole_x, sole_z = float(plane[2, 0]), float(plane[2, 1])
+    # From the ankle, from the knee and from the hip to the sole, in the leg plane.
+    ankle_x, ankle_z = sole_x * cos_f - sole_z * sin_f, sole_x * sin_f + sole_z * cos_f
+    knee_x = ankle_x + calf_x * cos_k - calf_z * sin_k
+    knee_z = ankle_z + calf_x * sin_k + calf_z * cos_k
+    x, z = knee_x + float(plane[0, 0]), knee_z + float(plane[0, 1])
+    # The thigh's x, y and z axes in the base's frame.
+    xx, xy, xz = cos_a * cos_b, sin_a * cos_b, sin_b
+    yx = -sin_a * cos_c - cos_a * sin_b * sin_c
+    yy = cos_a * cos_c - sin_a * sin_b * sin_c
+    yz = cos_b * sin_c
+    zx = sin_a * sin_c - cos_a * sin_b * cos_c
+    zy = -cos_a * sin_c - sin_a * sin_b * cos_c
+    zz = cos_b * cos_c
+    px, py, pz = x * xx + z * zx, x * xy + z * zy, x * xz + z * zz
+    # Each column: axis cross lever, then the axis.
+    out[0, 0], out[1, 0], out[2, 0] = -py, px, 0.0
+    out[3, 0], out[4, 0], out[5, 0] = 0.0, 0.0, 1.0
+    out[0, 1], out[1, 1], out[2, 1] = -cos_a * pz, -sin_a * pz, sin_a * py + cos_a * px
+    out[3, 1], out[4, 1], out[5, 1] = sin_a, -cos_a, 0.0
+    out[0, 2], out[1, 2], out[2, 2] = xy * pz - xz * py, xz * px - xx * pz, xx * py - xy * px
+    out[3, 2], out[4, 2], out[5, 2] = xx, xy, xz
+    out[0, 3], out[1, 3] = knee_x * zx - knee_z * xx, knee_x * zy - knee_z * xy
+    out[2, 3] = knee_x * zz - knee_z * xz
+    out[0, 4], out[1, 4] = ankle_x * zx - ankle_z * xx, ankle_x * zy - ankle_z * xy
+    out[2, 4] = ankle_x * zz - ankle_z * xz
+    out[3, 3], out[4, 3], out[5, 3] = -yx, -yy, -yz
+    out[3, 4], out[4, 4], out[5, 4] = -yx, -yy, -yz
+    for j in range(5):
+        sign = float(signs[j])
+        for i in range(6):
+            out[i, j] *= sign
+
+
+@kernel
+def inverse(
+    hip: Array,
+    plane: Array,
+    signs: Array,
+    limits: Array,
+    sole: Array,
+    line: Array,
+    softness: float,
+    present_yaw: float,
+    out: Array,
+) -> tuple[bool, float]:
+    """The joint angles (5,) that bring the sole centre to ``sole`` and its line along ``line``.
+
+    The leg plane contains the hip, the sole and the line; in it the knee follows from the law of
+    cosines and the ankle from the line's slope. What cannot be reached is given up in this order:
+    the line's slope (the ankle stays at its limit, the sole still exact), then the distance from
+    the hip (of the ankle, or of the sole; its direction still exact), then what the hip's limits
+    cut off. The knee of a leg
+    that stretches at a steady speed becomes ever faster; within ``softness`` of the full length d
+    the distance therefore approaches it as d - softness exp(-(x - d + softness) / softness).
+
+    Args:
+        hip, plane, signs, limits: of the ``Leg``; limits with any margin already taken off.
+        sole: where the sole centre should be [m, base frame].
+        line: the direction from heel to toe [base frame], of any length.
+        softness: of the full stretch [m]; zero: none.
+        present_yaw: the robot's angle to stay near where the hip is in gimbal lock [rad].
+        out: the robot's angles [rad].
+
+    Returns:
+        Whether the target is met without touching a limit, and how much the foot moves away from
+        the hip per movement of the target: one, or less where the leg is stretched.
+    """
+    px = min(max(float(sole[0]) - float(hip[0]), -_FAR), _FAR)
+    py = min(max(float(sole[1]) - float(hip[1]), -_FAR), _FAR)
+    pz = min(max(float(sole[2]) - float(hip[2]), -_FAR), _FAR)
+    fx, fy, fz = _direction(float(line[0]), float(line[1]), float(line[2]), 1.0, 0.0, 0.0)
+    # The plane's normal, which becomes the thigh's y axis.
+    nx, ny, nz = fy * pz - fz * py, fz * px - fx * pz, fx * py - fy * px
+    size = math.sqrt(nx * nx + ny * ny + nz * nz)
+    slant = _SLANT * math.sqrt(px * px + py * py + pz * pz)
+    exact = size >= slant and size > 0.0
+    if not exact:
+        fill = slant - size if size > 0.0 else 1.0
+        nx, ny, nz = nx - fill * fy * fx, ny + fill * (1.0 - fy * fy), nz - fill * fy * fz
+    nx, ny, nz = _direction(nx, ny, nz, 0.0, 1.0, 0.0)
+    # The line's direction and this one, at right angles to it, span the plane.
+    ux, uy, uz = fy * nz - fz * ny, fz * nx - fx * nz, fx * ny - fy * nx
+    x, z = px * fx + py * fy + pz * fz, px * ux + py * uy + pz * uz
+
+    # In the plane, with the ankle as the target: knee, thigh, then the ankle's own angle.
+    knee, thigh, share, near = _two_links(
+        float(plane[0, 0]), float(plane[0, 1]), float(plane[1, 0]), float(plane[1, 1]),
+        x - float(plane[2, 0]), z - float(plane[2, 1]), float(signs[3]),
+        float(limits[3, 0]), float(limits[3, 1]), softness,
+    )  # fmt: skip
+    ankle = wrap(-thigh - knee)
+    sign = float(signs[4])
+    held = min(max(ankle * sign, float(limits[4, 0])), float(limits[4, 1])) * sign
+    if held != ankle:
+        # The ankle keeps its angle, calf and foot become one link, the sole is the target.
+        ankle, exact = held, False
+        cos_n, sin_n = math.cos(ankle), math.sin(ankle)
+        sole_x, sole_z = float(plane[2, 0]), float(plane[2, 1])
+        knee, thigh, share, near = _two_links(
+            float(plane[0, 0]), float(plane[0, 1]),
+            float(plane[1, 0]) + cos_n * sole_x - sin_n * sole_z,
+            float(plane[1, 1]) + sin_n * sole_x + cos_n * sole_z,
+            x, z, float(signs[3]), float(limits[3, 0]), float(limits[3, 1]), softness,
+        )  # fmt: skip
+    cos_t, sin_t = math.cos(thigh), math.sin(thigh)
+    xx, xy, xz = cos_t * fx + sin_t * ux, cos_t * fy + sin_t * uy, cos_t * fz + sin_t * uz
+    zx, zy = cos_t * ux - sin_t * fx, cos_t * uy - sin_t * fy
+
+    # The thigh's axes are yaw, then pitch, then roll. Of the two answers for yaw the one with the
+    # roll below a right angle; in gimbal lock the present yaw, and roll takes up the rest.
+    flat = math.sqrt(xx * xx + xy * xy)
+    yaw = math.atan2(xy, xx)
+    if ny * math.cos(yaw) - nx * math.sin(yaw) < 0.0:
+        yaw = wrap(yaw + math.pi)
+    if flat < _GIMBAL:
+        present = wrap(present_yaw * float(signs[0]))
+        yaw = present + flat / _GIMBAL * wrap(yaw - present)
+    cos_y, sin_y = math.cos(yaw), math.sin(yaw)
+    out[0] = yaw
+    out[1] = math.atan2(xz, cos_y * xx + sin_y * xy)
+    out[2] = math.atan2(sin_y * zx - cos_y * zy, cos_y * ny - sin_y * nx)
+    out[3] = knee
+    out[4] = ankle
+    inside = exact and near
+    for i in range(5):
+        angle = float(out[i]) * float(signs[i])
+        lower, upper = float(limits[i, 0]), float(limits[i, 1])
+        inside = inside and lower <= angle <= upper
+        out[i] = min(max(angle, lower), upper)
+    return inside, share
+
+
+@kernel
+def inverse_velocity(
+    sole_jacobian: Array,
+    rotation: Array,
+    velocity: Array,
+    line_rate: Array,
+    length: float,
+    damping: float,
+    rows: Array,
+    turns: Array,
+    normal: Array,
+    out: Array,
+) -> None:
+    """Joint velocities (5,) for a sole velocity and a rate of the foot's line.
+
+    Least squares, damped: (A'A + damping^2) out = A'b. A's rows are the sole's velocity and, times
+    ``length``, the two turns of the line.
+
+    Args:
+        sole_jacobian: from ``jacobian``.
+        rotation: the foot's, from ``forward``.
+        velocity: of the sole [m/s, base frame].
+        line_rate: the time derivative of the line's unit direction [1/s, base frame].
+        length: how much distance a turn of 1 rad counts as [m].
+        damping: in m; 1e-4 changes nothing until a leg is stretched to within 1e-4 rad.
+        rows, turns, normal: scratch of shapes (5, 5), (3, 5) and (5, 5).
+    """
+    np.dot(rotation.T, sole_jacobian[3:6, :], turns)
+    turn, nod = 0.0, 0.0
+    for i in range(3):
+        turn += float(rotation[i, 1]) * float(line_rate[i])
+        nod -= float(rotation[i, 2]) * float(line_rate[i])
+    for j in range(5):
+        for i in range(3):
+            rows[i, j] = sole_jacobian[i, j]
+        rows[3, j] = length * float(turns[2, j])
+        rows[4, j] = length * float(turns[1, j])
+    # With the task (velocity, length * turn, length * nod), whose product with the rows is:
+    for j in range(5):
+        value = length * (float(rows[3, j]) * turn + float(rows[4, j]) * nod)
+        for i in range(3):
+            value += float(rows[i, j]) * float(velocity[i])
+        out[j] = value
+    solve_damped(rows, damping, normal, out)
+
+
+@kernel
+def _canonical(signs: Array, angles: Array) -> tuple[float, float, float, float, float]:
+    return (
+        float(signs[0]) * float(angles[0]),
+        float(signs[1]) * float(angles[1]),
+        float(signs[2]) * float(angles[2]),
+        float(signs[3]) * float(angles[3]),
+        float(signs[4]) * float(angles[4]),
+    )
+
+
+@kernel
+def _thigh_rotation(a: float, b: float, c: float, out: Array) -> None:
+    """Yaw ``a`` about z, then pitch ``b`` about -y, then roll ``c`` about x."""
+    cos_a, sin_a, cos_b, sin_b = math.cos(a), math.sin(a), math.cos(b), math.sin(b)
+    cos_c, sin_c = math.cos(c), math.sin(c)
+    out[0, 0], out[1, 0], out[2, 0] = cos_a * cos_b, sin_a * cos_b, sin_b
+    out[0, 1] = -sin_a * cos_c - cos_a * sin_b * sin_c
+    out[1, 1] = cos_a * cos_c - sin_a * sin_b * sin_c
+    out[2, 1] = cos_b * sin_c
+    out[0, 2] = sin_a * sin_c - cos_a * sin_b * cos_c
+    out[1, 2] = -cos_a * sin_c - sin_a * sin_b * cos_c
+    out[2, 2] = cos_b * cos_c
+
+
+@kernel
+def _direction(
+    x: float, y: float, z: float, default_x: float, default_y: float, default_z: float
+) -> tuple[float, float, float]:
+    """The unit vector along (x, y, z), or the default where there is no direction."""
+    largest = max(abs(x), abs(y), abs(z))
+    if largest < 1e-300:
+        return default_x, default_y, default_z
+    x, y, z = x / largest, y / largest, z / largest
+    size = math.sqrt(x * x + y * y + z * z)
+    return x / size, y / size, z / size
+
+
+@kernel
+def _two_links(
+    first_x: float,
+    first_z: float,
+    second_x: float,
+    second_z: float,
+    x: float,
+    z: float,
+    sign: float,
+    lower: float,
+    upper: float,
+    softness: float,
+) -> tuple[float, float, float, bool]:
+    """The knee's and the first link's angle that bring the end of two links to (x, z).
+
+    Of the two answers the one on the side of the middle of the robot's limits. Also returns how
+    much the distance follows the target's, and whether the target is met.
+    """
+    first = math.sqrt(first_x * first_x + first_z * first_z)
+    second = math.sqrt(second_x * second_x + second_z * second_z)
+    straight = wrap(math.atan2(first_z, first_x) - math.atan2(second_z, second_x))
+    straightest = min(max(straight * sign, lower), upper) * sign
+    bent = math.cos(straightest - straight)
+    farthest = math.sqrt(first * first + second * second + 2.0 * first * second * bent)
+    distance, share = math.sqrt(x * x + z * z), 1.0
+    if softness > 0.0 and distance > farthest - softness:
+        share = math.exp((farthest - softness - distance) / softness)
+        distance = farthest - softness * share
+    elif distance > farthest:
+        distance, share = farthest, 0.0
+    cosine = (distance * distance - first * first - second * second) / (2.0 * first * second)
+    bend = math.acos(min(max(cosine, -1.0), 1.0))
+    knee = straight + bend if 0.5 * (lower + upper) * sign > straight else straight - bend
+    held = min(max(knee * sign, lower), upper) * sign
+    near = share == 1.0 and abs(held - knee) < 1e-9 and cosine <= 1.0
+    cos_k, sin_k = math.cos(held), math.sin(held)
+    end_x = first_x + cos_k * second_x - sin_k * second_z
+    end_z = first_z + sin_k * second_x + cos_k * second_z
+    return held, math.atan2(z, x) - math.atan2(end_z, end_x), share, near

@@ -1,0 +1,82 @@
+"""What graphs of earlier versions say otherwise: errors that give the new form, and old graphs read.
+
+Since version 0.2 some blocks have other names, and the actuator profile is said once for the graph
+(``actuators: relaxed``) instead of at every block that uses it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from ..language.registry import MOVED
+from .document import read_value
+from .nodes import Node, plain, text_of
+from .problems import Problems
+
+PROFILE_PARAMETERS: Mapping[str, str] = {
+    "hal.MujocoRobot": "profile",
+    "blocks.WholeBodyController": "actuators",
+    "blocks.Dynamics": "actuators",
+    "blocks.SquatJumpReference": "actuators",
+}
+"""The parameter by which a block named its actuator profile before version 0.2, the most telling
+block first."""
+
+
+def fix_of_profile(use: str, parameter: str, value: Node) -> str:
+    """What to write for a parameter that named an actuator profile; empty for any other."""
+    if PROFILE_PARAMETERS.get(use) != parameter:
+        return ""
+    return f"said once for the graph since 0.2, beside 'robot': actuators: {text_of(plain(value))}"
+
+
+def in_present_form(text: str) -> str:
+    """The flattened graph that an earlier version has kept, as this version would have written it.
+
+    A graph that is of this version already, or that cannot be read, comes back as it is.
+    """
+    problems = Problems()
+    node = read_value(text, "a kept graph", problems)
+    data = plain(node) if node is not None else None
+    if len(problems) or not isinstance(data, dict) or not isinstance(data.get("blocks"), dict):
+        return text
+    blocks = [block for block in data["blocks"].values() if isinstance(block, dict)]
+    profiles = _take_profiles(blocks)
+    moved = [block for block in blocks if block.get("use") in MOVED]
+    if not moved and not profiles:
+        return text
+    for block in moved:
+        block["use"] = MOVED[block["use"]]
+    if profiles and "actuators" not in data:
+        data = _behind(data, "robot", "actuators", profiles[0])
+    return _text(data)
+
+
+def _take_profiles(blocks: list[Any]) -> list[str]:
+    """Remove the profiles that blocks name; those of the most telling block come first."""
+    found: list[str] = []
+    for use, parameter in PROFILE_PARAMETERS.items():
+        for block in blocks:
+            given = block.get("with")
+            if block.get("use") == use and isinstance(given, dict) and parameter in given:
+                found.append(str(given.pop(parameter)))
+    return found
+
+
+def _behind(data: Mapping[str, Any], key: str, new_key: str, value: Any) -> dict[str, Any]:
+    """The mapping with a new entry behind the one of that key, or at its start."""
+    result: dict[str, Any] = {} if key in data else {new_key: value}
+    for each, old in data.items():
+        result[each] = old
+        if each == key:
+            result[new_key] = value
+    return result
+
+
+def _text(data: Mapping[str, Any]) -> str:
+    """The graph as YAML, one line for each block."""
+    lines = [f"{key}: {text_of(value)}" for key, value in data.items() if key != "blocks"]
+    lines.append("blocks:")
+    lines += [f"  {path}: {text_of(block)}" for path, block in data["blocks"].items()]
+    return "\n".join(lines) + "\n"

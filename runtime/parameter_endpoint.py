@@ -1,0 +1,181 @@
+"""Where a running graph can be asked for its parameters, and told to change them.
+
+A Unix-domain socket, readable by its owner alone; nothing listens on a network. One request is one
+line of JSON and so is its answer::
+
+    {"verb": "list"}                                  {"graph": ..., "parameters": [...]}
+    {"verb": "set", "settings": ["landing.w_c=0.1"]}  {"changes": [{"tick": 812, "path": ...}]}
+
+and ``{"error": text}``, with the report of a ``LoadError`` as ``report``, where something is wrong.
+A thread of its own answers; the control thread only ever looks into the slot of
+``LiveParameters``, once a tick.
+"""
+
+from __future__ import annotations
+
+import json
+import socket
+import threading
+import time
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from .language.errors import AloftError
+from .loading.adjust import adjust, entries
+from .loading.problems import LoadError
+from .running.live_parameters import LiveParameters
+from .running.memory import BoundGraph
+
+LONGEST_REQUEST = 1 << 16
+"""Bytes of one request."""
+PATIENCE = 5.0
+"""Seconds either side waits for the other."""
+_LONGEST_PATH = 100  # bytes; the address of a Unix-domain socket has room for little more
+
+
+class EndpointError(AloftError):
+    """A running graph cannot be reached, or its endpoint cannot be opened."""
+
+
+class ParameterEndpoint:
+    """Answers requests about a graph's parameters while it runs; give it to a run as a sink.
+
+    Args:
+        path: of the socket; one that nobody answers any more is replaced.
+
+    Raises:
+        EndpointError: another run answers there, or the socket cannot be made.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        if len(str(path).encode()) > _LONGEST_PATH:
+            raise EndpointError(f"the name of the socket {path} is too long")
+        if path.exists():
+            if answers(path):
+                raise EndpointError(f"another run answers at {path}; give this one another name")
+            path.unlink(missing_ok=True)
+        self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+        try:
+            self._socket.bind(str(path))
+            path.chmod(0o600)
+            self._socket.listen(4)
+        except OSError as error:
+            self._socket.close()
+            raise EndpointError(f"no socket at {path}: {error.strerror or error}") from error
+        self._thread: threading.Thread | None = None
+        self._closing = False
+
+    def open(self, bound: BoundGraph) -> None:
+        """Begin to answer."""
+        self._thread = threading.Thread(
+            target=self._serve, args=(bound.parameters, bound.graph.name), daemon=True
+        )
+        self._thread.start()
+
+    def record(self, tick: int) -> None:
+        """Nothing: what is changed, others record."""
+
+    def close(self) -> None:
+        """Answer no more."""
+        self._closing = True
+        self.path.unlink(missing_ok=True)
+        with suppress(OSError):
+            self._socket.shutdown(socket.SHUT_RDWR)  # wakes the thread
+        self._socket.close()
+        if self._thread is not None:
+            self._thread.join(PATIENCE)
+
+    def _serve(self, parameters: LiveParameters, graph: str) -> None:
+        while not self._closing:
+            try:
+                connection, _ = self._socket.accept()
+            except OSError:
+                return
+            with connection, suppress(OSError):  # who asks may have left
+                connection.settimeout(PATIENCE)
+                answer = _answer(_read_line(connection), parameters, graph)
+                connection.sendall(json.dumps(answer).encode() + b"\n")
+
+
+def _answer(request: bytes, parameters: LiveParameters, graph: str) -> dict[str, Any]:
+    """What to say to one request, whatever it is."""
+    try:
+        message = json.loads(request)
+        verb = message["verb"]
+        if verb == "list":
+            listed = []
+            for path, block in parameters.blocks.items():
+                listed += [asdict(entry) for entry in entries({path: block})]
+                time.sleep(0)  # lets the control thread go first
+            return {"graph": graph, "parameters": listed}
+        if verb == "set":
+            adjustment = adjust(parameters.blocks, [str(text) for text in message["settings"]])
+            parameters.submit(adjustment)
+            return {"changes": [asdict(change) for change in adjustment.changes()]}
+        return {"error": f"there is no verb {verb!r}"}
+    except LoadError as error:
+        return {"error": str(error), "report": error.report.as_json()}
+    except AloftError as error:
+        return {"error": str(error)}
+    except (ValueError, KeyError, TypeError) as error:
+        return {"error": f"not a request: {error}"}
+
+
+def _read_line(connection: socket.socket) -> bytes:
+    """Bytes up to the end of a line or of the connection. Raises ``OSError``."""
+    parts: list[bytes] = []
+    size = 0
+    while size < LONGEST_REQUEST and not (parts and parts[-1].endswith(b"\n")):
+        part = connection.recv(4096)
+        if not part:
+            break
+        parts.append(part)
+        size += len(part)
+    return b"".join(parts)
+
+
+def ask(path: Path, request: Mapping[str, Any]) -> dict[str, Any]:
+    """The answer of the graph that listens at ``path``.
+
+    Raises:
+        EndpointError: nobody answers there, or the request was refused; the text says why.
+    """
+    try:
+        with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as connection:
+            connection.settimeout(PATIENCE)
+            connection.connect(str(path))
+            connection.sendall(json.dumps(request).encode() + b"\n")
+            with connection.makefile("rb") as file:
+                answer: dict[str, Any] = json.loads(file.readline())
+    except (OSError, ValueError) as error:
+        raise EndpointError(f"no running graph answers at {path} ({error})") from error
+    if "error" in answer:
+        raise EndpointError(str(answer["error"]))
+    return answer
+
+
+def answers(path: Path) -> bool:
+    """Whether some run listens at ``path``."""
+    try:
+        with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as connection:
+            connection.settimeout(PATIENCE)
+            connection.connect(str(path))
+    except OSError:
+        return False
+    return True
+
+
+def set_parameters(path: Path, settings: Sequence[str]) -> list[dict[str, Any]]:
+    """Change parameters of the graph at ``path``: ``["landing.w_c=0.1"]``; what was changed.
+
+    Raises:
+        EndpointError: as ``ask``.
+    """
+    changes: list[dict[str, Any]] = ask(path, {"verb": "set", "settings": list(settings)})[
+        "changes"
+    ]
+    return changes

@@ -1,0 +1,94 @@
+"""Reading a plan: rows, what lies between them, and the phase by time."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from aloft.blocks.signals import JumpReference, Phase
+from aloft.planner.library.jump_table import JumpTable, JumpTableReader, locate, planned_phase
+from aloft.robots.description import find_robot
+
+TIMES = np.array([0.0, 0.1, 0.1, 0.4])
+
+
+@pytest.mark.parametrize(
+    ("time", "row", "share"),
+    [(-1.0, 0, 0.0), (0.0, 0, 0.0), (0.05, 0, 0.5), (0.1, 2, 0.0), (0.25, 2, 0.5), (9.0, 2, 1.0)],
+)
+def test_locate(time, row, share):
+    assert locate(TIMES, time) == (row, pytest.approx(share))
+
+
+def test_an_instant_with_two_rows_takes_the_second():
+    rows = np.array([1.0, 2.0, 5.0, 6.0])
+    row, share = locate(TIMES, 0.1)
+    assert rows[row] + share * (rows[row + 1] - rows[row]) == 5.0
+
+
+def test_phases_begin_at_their_times():
+    marks = (1.0, 2.0, 3.0, 4.0, 5.0)
+    for phase in range(6):
+        assert planned_phase(phase, *marks) == phase
+        assert planned_phase(phase + 0.999, *marks) == phase
+
+
+def table():
+    robot = find_robot("bruce")
+    fields = JumpReference.allocate(robot.dimensions).views()
+    skip = {"time", "phase", "lift_off_time", "touchdown_time", "contact"}
+    columns = {
+        name: np.stack([np.full(view.shape, value) for value in (1.0, 3.0)])
+        for name, view in fields.items()
+        if name not in skip
+    }
+    columns["orientation"] = np.array([[0.0, 0.0, 0.0, 1.0], [1.0, 0.0, 0.0, 0.0]])
+    return JumpTable(np.array([0.0, 1.0]), columns, 0.1, 0.2, 0.3, 0.6, 0.8)
+
+
+def test_reading_interpolates_every_field_and_normalises_the_orientation():
+    reference = JumpReference.allocate(find_robot("bruce").dimensions)
+    JumpTableReader(table()).read(0.25, reference)
+    assert reference.com.tolist() == [1.5, 1.5, 1.5]
+    assert (reference.joint_velocity == 1.5).all()
+    assert reference.orientation == pytest.approx(np.array([0.25, 0.0, 0.0, 0.75]) / 0.625**0.5)
+    assert (float(reference.time), int(reference.phase)) == (0.25, Phase.THRUST)
+    assert (float(reference.lift_off_time), float(reference.touchdown_time)) == (0.3, 0.6)
+
+
+@pytest.mark.parametrize(
+    ("time", "contact"), [(0.29, True), (0.3, False), (0.59, False), (0.6, True)]
+)
+def test_points_are_planned_in_contact_outside_flight(time, contact):
+    reference = JumpReference.allocate(find_robot("bruce").dimensions)
+    JumpTableReader(table()).read(time, reference)
+    assert reference.contact.tolist() == [contact] * 4
+
+
+def test_several_jumps():
+    """Flights 0.3-0.6 and 0.8-1.0, thrust between them from 0.7 on."""
+    one = table()
+    reader = JumpTableReader(replace(one, recover_time=1.2, later_jumps=((0.7, 0.8, 1.0),)))
+    reference = JumpReference.allocate(find_robot("bruce").dimensions)
+    seen = {}
+    for k in range(130):
+        reader.read(k / 100 + 1e-6, reference)
+        seen[k] = int(reference.phase)
+        second = k >= 45
+        assert float(reference.lift_off_time) == (0.8 if second else 0.3), k
+        assert float(reference.touchdown_time) == (1.0 if second else 0.6), k
+        assert reference.contact.all() == (seen[k] != Phase.FLIGHT)
+    changes = [(k, seen[k]) for k in range(1, 130) if seen[k] != seen[k - 1]]
+    assert changes == [(10, 1), (20, 2), (30, 3), (60, 4), (70, 2), (80, 3), (100, 4), (120, 5)]
+
+
+def test_contacts_of_a_table_hold_on_the_ground():
+    contact = np.array([[True, False, True, False], [True] * 4])
+    reader = JumpTableReader(replace(table(), contact=contact))
+    reference = JumpReference.allocate(find_robot("bruce").dimensions)
+    reader.read(0.25, reference)
+    assert reference.contact.tolist() == [True, False, True, False]
+    reader.read(0.45, reference)
+    assert not reference.contact.any()

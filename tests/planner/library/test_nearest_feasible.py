@@ -1,0 +1,107 @@
+"""The search for the nearest task that can be planned: what it tries, finds, says and costs."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from aloft.planner.library import nearest_feasible as module
+from aloft.planner.library.library import SHIPPED, PlanLibrary
+from aloft.planner.library.nearest_feasible import candidates, nearest_feasible, values_towards
+from aloft.planner.task.errors import PlanError
+from aloft.planner.task.plan import JumpPlan
+from aloft.planner.task.task import JumpTask, make_task, read_task
+from aloft.robots.description import RobotDescription, find_robot
+
+ROBOT = find_robot("bruce")
+TASK = make_task({"name": "high", "rise": 0.4, "twist": 1.0})
+
+
+class Planner:
+    """Plans whatever a rule allows; keeps what it was asked and from where it started."""
+
+    def __init__(self, allows: Callable[[JumpTask], bool]) -> None:
+        self.allows = allows
+        self.asked: list[JumpTask] = []
+        self.warm: list[bool] = []
+        found = PlanLibrary(ROBOT, Path("nowhere")).find(
+            read_task(SHIPPED.parent / "tasks" / "in_situ.yaml")
+        )
+        assert found is not None
+        self.plan = found
+
+    def __call__(
+        self, task: JumpTask, robot: RobotDescription, warm_start: JumpPlan | None
+    ) -> JumpPlan:
+        self.asked.append(task)
+        self.warm.append(warm_start is not None)
+        if not self.allows(task):
+            raise PlanError("no plan", family="apex")
+        return replace(self.plan, task=task)
+
+
+@pytest.fixture(autouse=True)
+def _no_check(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What stands in for plans is valid."""
+
+    def solved(task: JumpTask, robot: Any, warm: Any, solve: Any) -> JumpPlan:
+        plan = solve(task, robot, warm)
+        assert isinstance(plan, JumpPlan)
+        return plan
+
+    monkeypatch.setattr(module, "solve_and_check", solved)
+
+
+def test_it_finds_the_last_round_value_that_can_be_planned() -> None:
+    solve = Planner(lambda task: (task.rise or 0.0) < 0.2431)
+    found = nearest_feasible(TASK, ROBOT, family="apex", solve=solve)
+    assert found is not None
+    assert (found.parameter, found.asked, found.value, found.beyond) == ("rise", 0.4, 0.24, 0.245)
+    assert found.solves == len(solve.asked) <= 8
+    assert found.plan.task.rise == 0.24
+    assert found.text.startswith(
+        f"the nearest that can be planned is rise: 24 cm; 24.5 cm cannot ({found.solves} solves, "
+    )
+    assert all(task.twist == 1.0 for task in solve.asked), "one parameter changes at a time"
+    assert solve.warm == [False, *[True] * (found.solves - 1)]
+
+
+def test_the_family_decides_what_is_tried_first() -> None:
+    assert candidates(TASK, "apex") == ["rise", "twist"]
+    assert candidates(TASK, "leg clearance") == ["twist", "rise"]
+    side = make_task({"name": "side", "rise": 0.15, "distance_y": 0.6})
+    assert candidates(side, "") == ["distance_y", "rise"], "the furthest first"
+    assert candidates(make_task({"name": "hop", "rise": 0.08}), "") == []
+
+
+def test_another_parameter_is_tried_where_the_first_does_not_help() -> None:
+    solve = Planner(lambda task: task.twist < 0.5)
+    found = nearest_feasible(TASK, ROBOT, family="apex", solve=solve)
+    assert found is not None
+    assert found.parameter == "twist"
+    assert "twist: 28 deg; 30 deg cannot" in found.text
+
+
+def test_values_come_from_both_sides_and_onto_a_step() -> None:
+    low = make_task({"name": "low", "rise": 0.06, "landing_height": 0.03, "distance_x": -0.025})
+    assert values_towards(low, "rise") == [0.11, 0.105, 0.1, 0.095, 0.09, 0.085, 0.08, 0.075, 0.07,
+                                           0.065, 0.06]  # fmt: skip
+    assert values_towards(low, "distance_x") == [0.0, -0.01, -0.02, -0.025]
+    assert values_towards(low, "take_off_speed") == []
+    assert values_towards(low, "friction") == []
+    slippery = make_task({"name": "ice", "rise": 0.1, "friction": 0.65})
+    assert values_towards(slippery, "friction") == [0.7, 0.675, 0.65]
+
+
+def test_the_search_is_bounded() -> None:
+    solve = Planner(lambda _: False)
+    odd = dict.fromkeys(("distance_x", "distance_y", "landing_height", "foot_clearance"), 0.3)
+    task = make_task({"name": "odd", "rise": 1.0, "friction": 0.1, "effort": 0.2, **odd})
+    assert nearest_feasible(task, ROBOT, solve=solve) is None
+    assert len(solve.asked) <= module.MOST_SOLVES
+    solve = Planner(lambda _: True)
+    found = nearest_feasible(TASK, ROBOT, solve=solve, seconds=0.0)
+    assert found is not None
+    assert (found.solves, found.value) == (1, 0.08)

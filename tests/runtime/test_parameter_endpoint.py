@@ -1,0 +1,82 @@
+"""The socket at which a running graph is asked for its parameters."""
+
+import json
+import socket
+import stat
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from aloft.blocks.general.gain import Gain
+from aloft.blocks.general.sine_wave import SineWave
+from aloft.runtime.parameter_endpoint import EndpointError, ParameterEndpoint, ask, set_parameters
+from aloft.runtime.running.executor import Executor
+from aloft.runtime.running.memory import BoundGraph
+from aloft.runtime.testing import Use, checked_graph
+
+
+@pytest.fixture
+def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("s") / "run.sock"
+
+
+@pytest.fixture
+def running(path: Path) -> Iterator[BoundGraph]:
+    """A graph that ticks as fast as it can until the test is over."""
+    bound = BoundGraph(
+        checked_graph({"wave": Use(SineWave), "gain": Use(Gain, wires={"u": "wave.y"})})
+    )
+    executor = Executor(bound, log=False, sinks=[ParameterEndpoint(path)])
+    thread = threading.Thread(target=executor.run)
+    thread.start()
+    yield bound
+    bound.clock.stop_reason = "the test is over"
+    thread.join(10)
+    assert not path.exists()
+
+
+def send(path: Path, data: bytes) -> dict[str, str]:
+    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as connection:
+        connection.connect(str(path))
+        connection.sendall(data)
+        connection.shutdown(socket.SHUT_WR)
+        answer: dict[str, str] = json.loads(connection.makefile().readline())
+    return answer
+
+
+def test_list_and_set(running: BoundGraph, path: Path) -> None:
+    assert stat.S_IMODE(path.stat().st_mode) == 0o600
+    before = {e["path"]: e["value"] for e in ask(path, {"verb": "list"})["parameters"]}
+    assert before["gain.gain"] == 1.0
+    (change,) = set_parameters(path, ["gain.gain=0.1"])
+    assert (change["path"], change["old"], change["new"]) == ("gain.gain", 1.0, 0.1)
+    after = {e["path"]: e["value"] for e in ask(path, {"verb": "list"})["parameters"]}
+    assert after == {**before, "gain.gain": 0.1}
+
+
+def test_nonsense_is_answered_and_the_next_request_still_is(
+    running: BoundGraph, path: Path
+) -> None:
+    assert send(path, b"hello\n")["error"].startswith("not a request")
+    assert send(path, b"[1]\n")["error"].startswith("not a request")
+    assert send(path, b'{"verb": "reboot"}\n')["error"] == "there is no verb 'reboot'"
+    assert send(path, b"")["error"].startswith("not a request")
+    with pytest.raises(EndpointError, match=r"gain\.gain cannot be high"):
+        set_parameters(path, ["gain.gain=high"])
+    assert set_parameters(path, ["gain.gain=3"])
+
+
+def test_a_name_that_is_taken_or_too_long(running: BoundGraph, path: Path) -> None:
+    with pytest.raises(EndpointError, match="another run answers at"):
+        ParameterEndpoint(path)
+    with pytest.raises(EndpointError, match="is too long"):
+        ParameterEndpoint(path.with_name("x" * 100))
+
+
+def test_nobody_answers(path: Path) -> None:
+    with pytest.raises(EndpointError, match="no running graph answers at"):
+        ask(path, {"verb": "list"})
+    with pytest.raises(EndpointError, match="no socket at"):
+        ParameterEndpoint(path.parent / "missing" / "run.sock")
