@@ -266,28 +266,11 @@ class JumpTask(FreeTimes):
             "format": PLAN_FORMAT,
             "task": self.scaled(robot).content()
             | {"profile": self.profile or robot.motors.profile},
-            "robot": robot_content(robot),
+            # The task says itself which actuators it is planned for.
+            "robot": robot.changed(profile="").model_dump(mode="json"),
         }
         text = json.dumps(whole, sort_keys=True, separators=(",", ":"))
         return hashlib.sha256(text.encode()).hexdigest()[:20]
-
-
-def robot_content(robot: RobotDescription) -> dict[str, Any]:
-    """The description as plain data, without the profile in use and without what was added to
-    descriptions later where it says nothing: plans keep their keys when descriptions can say more.
-    """
-    data = robot.model_dump(mode="json", exclude={"profile"})
-    for joint in data["joints"]:
-        if joint["kind"] == "hinge":
-            del joint["kind"]
-    for profile in data["profiles"].values():
-        if not profile["motors"]:
-            del profile["motors"]
-    for name in ("base_joint", "sensors", "held"):
-        field = type(robot).model_fields[name]
-        if getattr(robot, name) == field.default:
-            del data[name]
-    return data
 
 
 def _stance(robot: RobotDescription, given: Mapping[str, float], which: str) -> dict[str, float]:
