@@ -60,7 +60,7 @@ def solve_jump(
         PlanError: no motion was found; ``family`` names the constraints that could not be met.
         TaskError: the task names joints or a profile that the robot has not.
     """
-    robot, task = task.equipped(robot), task.scaled(robot)
+    robot, task = task.equipped(robot), task.resolved(robot)
     model_of(robot)  # raises what is wrong with the robot itself
     part = welded(robot)
     start = warm_start and for_moving_joints(warm_start, part)
@@ -136,7 +136,7 @@ def make_problem(
 
     Raises ``PlanError`` and ``TaskError`` as ``solve_jump`` does.
     """
-    robot, task = task.equipped(robot), task.scaled(robot)
+    robot, task = task.equipped(robot), task.resolved(robot)
     exact, finder = model_of(robot)
     model, stances = exact, stances_of(task, robot, finder)
     stretches = layout(task, robot)

@@ -8,15 +8,13 @@ shared by all contact points costs the same. What a task says is never changed.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from ...robots.description import RobotDescription
 from ...robots.kinematics import link_poses
-
-if TYPE_CHECKING:
-    from .task import JumpTask
+from ...runtime.language.parameters import Parameters
 
 MASS, POINTS, HEIGHT = 5.118, 4, 0.3287
 """The robot of the defaults: kg, contact points, m."""
@@ -43,8 +41,8 @@ def standing_height(robot: RobotDescription) -> float:
     return com - min(height(link_of[c.foot], c.position) for c in robot.contacts)
 
 
-def scaled_defaults(task: JumpTask, robot: RobotDescription) -> dict[str, Any]:
-    """The parameters of a task that follow from the robot, where the task does not say them."""
+def scaled_defaults(task: Parameters, robot: RobotDescription) -> dict[str, Any]:
+    """The parameters of a ``JumpTask`` that follow from the robot, where it does not say them."""
     if not robot.contacts:
         return {}
     slow = np.sqrt(standing_height(robot) / HEIGHT)
@@ -54,7 +52,7 @@ def scaled_defaults(task: JumpTask, robot: RobotDescription) -> dict[str, Any]:
         for name in TIMES
         if name not in task.model_fields_set
     }
-    weights = task.weights
+    weights: Parameters = getattr(task, "weights")  # noqa: B009 - any task's
     said = weights.model_fields_set if "weights" in task.model_fields_set else set()
     lighter = {
         name: rounded(type(weights).model_fields[name].default * light)

@@ -248,9 +248,12 @@ class JumpTask(FreeTimes):
         except LookupError as error:
             raise TaskError(f"profile: {error.args[0]}") from error
 
-    def scaled(self, robot: RobotDescription) -> JumpTask:
-        """The task with what it leaves unsaid as suits the robot; see ``scaling``."""
+    def resolved(self, robot: RobotDescription) -> JumpTask:
+        """The task with all that it leaves to the robot: the actuator profile in use, and times
+        and weights that suit its size; see ``scaling``."""
         changed = scaled_defaults(self, robot)
+        if not self.profile:
+            changed["profile"] = robot.motors.profile
         return self.model_copy(update=changed) if changed else self
 
     def content(self) -> dict[str, Any]:
@@ -264,8 +267,7 @@ class JumpTask(FreeTimes):
         """What a plan of this task is kept under: the same for the same task, robot and format."""
         whole = {
             "format": PLAN_FORMAT,
-            "task": self.scaled(robot).content()
-            | {"profile": self.profile or robot.motors.profile},
+            "task": self.resolved(robot).content(),
             # The task says itself which actuators it is planned for.
             "robot": robot.changed(profile="").model_dump(mode="json"),
         }

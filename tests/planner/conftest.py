@@ -30,7 +30,7 @@ def squat_jump_plan() -> JumpPlan:
     jump = SquatJumpTask(
         **defaults | {"rise": RISE, "touchdown_pitch": 0.0, "stand_time": 0.1, "pause_time": 0.05}
     )
-    table = plan_squat_jump(build_pinocchio_model(robot), robot, jump, "koala")
+    table = plan_squat_jump(build_pinocchio_model(robot), robot, jump)
     breaks = np.flatnonzero(np.diff(table.time) < 1e-9).tolist()
     ends = [0, *[k + 1 for k in breaks], len(table.time)]
     rows = []
