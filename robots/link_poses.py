@@ -12,8 +12,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from .ball_feet import ball_feet
-
 if TYPE_CHECKING:
     from .robot_description import RobotDescription
 
@@ -73,9 +71,6 @@ def standing_heights(robot: RobotDescription) -> Array:
     for k, contact in enumerate(robot.contacts):
         turn, place = poses[links[contact.foot]]
         heights[k] = (place + turn @ np.array(contact.position))[2]
-    for ball in ball_feet(robot):
-        turn, place = poses[robot.feet[ball.foot].link]
-        heights[ball.point] = (place + turn @ ball.centre)[2] - ball.radius
     return heights
 
 
