@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from ...mathematics.kernel import kernel
 from ...mathematics.rotations import normalise, rotate_back, to_matrix
+from ...robots.ball_feet import ball_feet
 from ...robots.pinocchio_model import build_pinocchio_model
 from ...runtime.language.block import Block, Input, Output
 from ..signals import BaseState, DynamicsTerms, JointState
@@ -88,13 +89,7 @@ class Dynamics(Block):
         self._soles = [np.array(foot.sole) for foot in robot.feet]
         self._points = [np.array(contact.position) for contact in robot.contacts]
         self._foot_of_point = robot.foot_of_contact()
-        self._balls = [
-            (point, foot, contact.radius, np.add(contact.position, (0.0, 0.0, contact.radius)))
-            for point, (foot, contact) in enumerate(
-                zip(self._foot_of_point, robot.contacts, strict=True)
-            )
-            if self._foot_of_point.count(foot) == 1
-        ]
+        self._balls = ball_feet(robot)
         n_feet = len(joints)
         self._foot_jacobian = np.zeros((n_feet, 6, n_velocities))
         self._local = np.zeros((2, 3))
@@ -128,9 +123,10 @@ class Dynamics(Block):
         terms.base_position[...] = base.position
         to_matrix(q[3:7], terms.base_rotation)
 
-        for point, foot, radius, centre in self._balls:
-            lowest_point(centre, radius, self._foot_turn[foot], self._points[point])
-            self._soles[foot][...] = self._points[point]
+        for ball in self._balls:
+            lowest = self._points[ball.point]
+            lowest_point(ball.centre, ball.radius, self._foot_turn[ball.foot], lowest)
+            self._soles[ball.foot][...] = lowest
         for foot, sole in enumerate(self._soles):
             turn = self._foot_turn[foot]
             terms.foot_rotation[foot] = turn
@@ -147,10 +143,10 @@ class Dynamics(Block):
             point_motion(*self._foot_motion[foot], self._points[point], self._local)
             np.dot(turn, self._local[0], terms.contact_velocity[point])
             np.dot(turn, self._local[1], terms.contact_drift[point])
-        for point, foot, _, centre in self._balls:
-            motion = self._foot_motion[foot]
-            rolling_drift(*motion, centre, self._points[point], self._local)
-            np.dot(self._foot_turn[foot], self._local[1], terms.contact_drift[point])
+        for ball in self._balls:
+            motion, turn = self._foot_motion[ball.foot], self._foot_turn[ball.foot]
+            rolling_drift(*motion, ball.centre, self._points[ball.point], self._local)
+            np.dot(turn, self._local[1], terms.contact_drift[ball.point])
 
 
 @kernel

@@ -9,6 +9,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from ...robots.ball_feet import ball_feet
 from ...robots.description import RobotDescription
 from ...robots.five_joint_leg import (
     Leg,
@@ -59,7 +60,8 @@ class LegInverseKinematics(Block):
     """Joint positions and velocities for foot targets seen from the base (paper, V).
 
     A leg is the chain of joints from the base to a foot, of any number and kind. How much of the
-    target's orientation counts follows from the foot's contact points: nothing for a point foot,
+    target's orientation counts follows from the foot's contact points: nothing for a point foot, whose
+    ball's lowest point goes to the target's place,
     the direction of its line for a line foot, all of it for a flat foot.
 
     A leg of hip yaw, pitch and roll with intersecting axes, a knee and an ankle that ends in a
@@ -241,6 +243,11 @@ class _LeastSquares:
     def __init__(self, block: LegInverseKinematics, foot: int, limb: Limb) -> None:
         self.block, self.foot, self.limb = block, foot, limb
         n = len(limb.joints)
+        self._radius, self._place = 0.0, np.zeros(3)
+        for ball in ball_feet(block.robot):
+            if ball.foot == foot:
+                self._radius = ball.radius
+                limb.tip[:3] = ball.centre
         self._standing = block.robot.standing_position[list(limb.joints)]
         self._starts, self._work = np.zeros((3, n + 1)), limb_scratch(n)
         self._angles, self._speeds = np.zeros(n), np.zeros(n)
@@ -255,7 +262,10 @@ class _LeastSquares:
         if block.params.follow == "pitch":
             pitched_line(self._rotation, float(block.reference.foot_pitch[foot]), self._line)
             self._rotation[:, 0] = self._line
-        aim(block.feet.position[foot], self._rotation, self._target)
+        # A ball's centre is its radius above the ground, whichever way the leg comes.
+        np.multiply(block.feet.rotation[foot, :, 2], self._radius, out=self._place)
+        self._place += block.feet.position[foot]
+        aim(self._place, self._rotation, self._target)
         self._twist[3:] = 0.0
         if block.memory.known[()]:
             last = block.memory.target[foot]

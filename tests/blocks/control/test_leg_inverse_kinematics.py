@@ -13,6 +13,7 @@ from hypothesis.extra.numpy import arrays
 from aloft.blocks.control.leg_inverse_kinematics import LegInverseKinematics
 from aloft.blocks.signals import Phase
 from aloft.robots import five_joint_leg
+from aloft.robots.ball_feet import ball_feet
 from aloft.robots.description import find_robot
 from aloft.robots.limb import place_limb, read_limb
 from aloft.runtime.language.errors import BlockError
@@ -259,6 +260,10 @@ def placed(robot, joints):
         place_limb(limb.links, limb.tip, angles, np.zeros((len(angles), 6)), pose)
         places.append(pose[0].copy())
         turns.append(pose[1:].copy())
+    for ball in ball_feet(robot):  # the lowest point of a ball, which has no orientation
+        places[ball.foot] += turns[ball.foot] @ (ball.centre - robot.feet[ball.foot].sole)
+        places[ball.foot][2] -= ball.radius
+        turns[ball.foot] = np.eye(3)
     return np.array(places), np.array(turns)
 
 
