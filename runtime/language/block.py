@@ -37,6 +37,7 @@ from ...robots.description import RobotDescription
 from .errors import BlockError, DeclarationError
 from .parameters import Parameters
 from .signals import Signal
+from .terrain import Terrain
 
 S = TypeVar("S", bound=Signal)
 Metric = float | int | bool | str
@@ -265,6 +266,11 @@ class Block:
     ) -> Mapping[str, int]:
         """Further dimensions that only state fields use; may build models, so it runs at bind."""
         return {}
+
+    @classmethod
+    def terrain(cls, params: Parameters) -> Terrain | None:
+        """The ground that the block knows of with these parameters; recordings draw it."""
+        return None
 
     @classmethod
     def example_parameters(cls) -> Mapping[str, Any]:
