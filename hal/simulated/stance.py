@@ -55,7 +55,9 @@ def place_standing(
     if not robot.contacts:
         _put_down(model, data, base, robot)
         return
-    check_level(robot)
+    uneven = uneven_contacts(robot)
+    if uneven:
+        raise StartError(uneven)
     names = [contact.name for contact in robot.contacts]
     places = np.array([data.site(name).xpos for name in names])
     down = -_sole_middle(data, robot)
@@ -88,21 +90,21 @@ def place_standing(
         )
 
 
-def check_level(robot: RobotDescription) -> None:
-    """Raise ``StartError`` unless all contact points are at one height in the standing pose."""
+def uneven_contacts(robot: RobotDescription) -> str:
+    """What keeps the robot from standing on level ground in its standing pose: contact points that
+    are above the lowest one, each with its height; empty where all are at one height."""
     heights = standing_heights(robot)
     above = heights - heights.min(initial=np.inf)
     if float(above.max(initial=0.0)) <= UNEVEN:
-        return
+        return ""
     found = [
         f"{contact.name} by {1e3 * height:.0f} mm"
         for contact, height in zip(robot.contacts, above.tolist(), strict=True)
         if height > UNEVEN
     ]
-    raise StartError(
+    return (
         f"{robot.name} cannot stand on level ground: in its standing pose these contact points are "
-        f"above the lowest one: {', '.join(found)}; correct `standing` or the positions under "
-        "`contacts` in its description"
+        f"above the lowest one: {', '.join(found)}"
     )
 
 

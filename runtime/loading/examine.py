@@ -21,6 +21,9 @@ from .rates import check_hyperperiod, read_offset, read_period
 from .settings import Settings, read_settings
 from .wire_check import Draft, WireCheck
 
+MAY_BE_ZERO = ("n_contacts", "n_feet")
+"""Dimensions that are zero for some robots; their fields are empty then."""
+
 
 def examine(graph: FlatGraph, problems: Problems) -> CheckedGraph | None:
     """Check everything; the checked graph if nothing is wrong, now or before."""
@@ -72,7 +75,7 @@ def _draft(flat: FlatBlock, graph: FlatGraph, settings: Settings, problems: Prob
     draft.dimensions = {**settings.dimensions, **local}
     draft.complete = _check_dimensions(draft, settings, problems)
     if settings.robot_known:
-        check_fit(draft, settings, problems)
+        draft.absent = check_fit(draft, settings, problems)
     return draft
 
 
@@ -109,14 +112,18 @@ def _find(flat: FlatBlock, graph: FlatGraph, problems: Problems) -> type[Block] 
 
 
 def _check_dimensions(draft: Draft, settings: Settings, problems: Problems) -> bool:
-    """Whether every named dimension of the block's ports is known and at least 1."""
+    """Whether every named dimension of the block's ports is known and at least 1, or 0 where a
+    robot may have none of it."""
     assert draft.block_type is not None
     missing: dict[str, str] = {}
     for ports in (draft.inputs, draft.outputs):
         for port_name, port in ports.items():
             for field_name, field in port.signal.fields.items():
                 for size in field.shape:
-                    if isinstance(size, str) and draft.dimensions.get(size, 0) < 1:
+                    if not isinstance(size, str):
+                        continue
+                    least = 0 if size in MAY_BE_ZERO else 1
+                    if draft.dimensions.get(size, -1) < least:
                         missing.setdefault(size, f"{port_name}.{field_name}")
     flat = draft.flat
     for name, field_path in missing.items():
