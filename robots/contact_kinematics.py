@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..mathematics.rotations import cross, rotate_back, skew
+from .ball_feet import ball_feet
 from .description import RobotDescription
-from .link_poses import contact_centres, joints_above
+from .link_poses import contact_centres, joints_above, link_poses
 from .pinocchio_model import build_pinocchio_model
 
 Array = NDArray[np.float64]
@@ -27,7 +28,8 @@ class ContactKinematics:
         points: the lowest point of each contact [m, body], (n_contacts, 3).
         rates: their velocities with the joints' and the base's turning [m/s, body].
         soles: the sole centres [m, body], (n_feet, 3).
-        forward: the sum of the feet's forward directions [body], (3,).
+        forward: the sum of the feet's forward directions [body], (3,); of feet that are balls
+            the direction in which their pattern points, x where they stand as in the standing pose.
         com_velocity: of the centre of mass relative to the base's origin [m/s, body], (3,).
         centres: of the contacts' round rubber [m, body], (n_contacts, 3).
         jacobians: of the centres by the joints [m, body], (n_contacts, 3, n_joints).
@@ -57,6 +59,8 @@ class ContactKinematics:
         self._foot_of_point = robot.foot_of_contact()
         self._radii = [contact.radius for contact in robot.contacts]
         self._centres = list(contact_centres(robot))
+        self._balls = ball_feet(robot)
+        self._pattern = _pattern(robot) if len(self._balls) == len(robot.feet) > 1 else None
         self._sole_offsets = [np.array(foot.sole) for foot in robot.feet]
         self._down, self._arm, self._spare = np.zeros(3), np.zeros(3), np.zeros(3)
         self.points, self.rates = np.zeros((len(self._radii), 3)), np.zeros((len(self._radii), 3))
@@ -102,6 +106,13 @@ class ContactKinematics:
             self.forward += turn[:, 0]
             np.dot(turn, self._sole_offsets[foot], self.soles[foot])
             self.soles[foot] += place
+        for ball in self._balls:
+            self.soles[ball.foot] = self.points[ball.point]
+        if self._pattern is not None:
+            np.dot(self._pattern[0], self.points, out=self.forward)
+            np.dot(self._pattern[1], self.points, out=self._spare)
+            cross(self._down, self._spare, self._arm)
+            self.forward += self._arm
         np.divide(self._momentum, self._mass, out=self.com_velocity)
 
     def differentiate(self) -> None:
@@ -122,3 +133,18 @@ class ContactKinematics:
             np.dot(self._lever, self._angular, jacobian)
             np.subtract(self._linear, jacobian, out=jacobian)
             jacobian *= self._of_leg[foot]
+
+
+def _pattern(robot: RobotDescription) -> Array:
+    """How far every contact point is ahead and to the left of their middle in the standing pose
+    [m], (2, n_contacts).
+
+    Where the points p_i stand so, turned by a heading, the sum over x_i p_i + y_i (p_i x up)
+    points ahead, as far as the pattern is symmetric.
+    """
+    poses = link_poses(robot, robot.standing_position)
+    places = np.zeros((len(robot.contacts), 3))
+    for ball in ball_feet(robot):
+        turn, place = poses[robot.feet[ball.foot].link]
+        places[ball.point] = place + turn @ ball.centre
+    return np.ascontiguousarray((places - places.mean(axis=0))[:, :2].T)

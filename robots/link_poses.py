@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from .ball_feet import ball_feet
+
 if TYPE_CHECKING:
     from .description import RobotDescription
 
@@ -80,6 +82,9 @@ def standing_heights(robot: RobotDescription) -> Array:
     for k, contact in enumerate(robot.contacts):
         turn, place = poses[links[contact.foot]]
         heights[k] = (place + turn @ np.array(contact.position))[2]
+    for ball in ball_feet(robot):
+        turn, place = poses[robot.feet[ball.foot].link]
+        heights[ball.point] = (place + turn @ ball.centre)[2] - ball.radius
     return heights
 
 

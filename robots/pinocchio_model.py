@@ -31,11 +31,12 @@ class PinocchioModel:
     sole_frames: tuple[int, ...]
 
 
-def build_pinocchio_model(robot: RobotDescription, profile: str = "koala") -> PinocchioModel:
-    """The model of the robot on a free-flyer, with the rotors of that actuator profile.
+def build_pinocchio_model(robot: RobotDescription, profile: str | None = None) -> PinocchioModel:
+    """The model of the robot on a free-flyer, with the rotors of its actuator profile in use, or of
+    the one named.
 
     Raises:
-        KeyError: the robot has no actuator profile of that name.
+        LookupError: the robot has no actuator profile of that name.
         ValueError: a joint is listed before the one that carries it.
     """
     import pinocchio as pin
@@ -71,8 +72,7 @@ def build_pinocchio_model(robot: RobotDescription, profile: str = "koala") -> Pi
 
     contacts = tuple(add_frame(c.name, link_of_foot[c.foot], c.position) for c in robot.contacts)
     soles = tuple(add_frame(f"{f.name}_sole", f.link, f.sole) for f in robot.feet)
-    matrix = robot.joint_to_motor
-    rotors = robot.profiles[profile].rotor_inertia * matrix.T @ matrix
+    rotors = (robot if profile is None else robot.with_profile(profile)).rotor_matrix
     coupling = np.zeros((model.nv, model.nv))
     coupling[6:, 6:] = rotors - np.diag(np.diag(rotors))
     armature = np.zeros(model.nv)

@@ -20,6 +20,7 @@ BY = {
     "pydantic_core": "pydantic",
     "pydrake": "drake",
     "rerun": "rerun-sdk",
+    "serial": "pyserial",
     "yaml": "pyyaml",
 }
 """Who brings a module, where that is not a distribution of its name."""

@@ -20,7 +20,9 @@ import pytest
 import aloft
 from aloft.mathematics.kernel import kernel, kernels
 from aloft.robots.description import find_robot
-from aloft.robots.leg_kinematics import read_leg
+from aloft.robots.five_joint_leg import read_leg
+from aloft.robots.limb import read_limb
+from aloft.robots.limb_inverse import limb_scratch
 
 ROOT = Path(__file__).parent.parent
 ROOMS = ("mathematics", "blocks", "hal")
@@ -40,23 +42,57 @@ INEXACT = {"sin", "cos", "atan2", "acos", "exp", "hypot", "dot"}
 """What another library, or another order of sums, may round differently."""
 
 LEG = read_leg(find_robot("bruce"), 0)
+LIMB = read_limb(find_robot("bruce"), 0)
+MIDDLE = LIMB.limits.mean(axis=1)
+TARGET = np.array([[0.05, -0.08, -0.3], [0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+POSE = np.array([[0.02, -0.06, -0.3], [1.0, 0.0, 0.0], [0.0, 0.8, -0.6], [0.0, 0.6, 0.8]])
+CHAIN = (LIMB.links, LIMB.tip, LIMB.limits, TARGET, np.array([1.0, 0.9, 0.3]))
 UNUSED = {
-    "aloft.blocks.control.leg_inverse_kinematics.slide": (
+    "aloft.robots.limb.place_limb": (
+        LIMB.links, LIMB.tip, MIDDLE, np.zeros((5, 6)), np.zeros((4, 3)),
+    ),
+    "aloft.robots.limb.limb_jacobian": (LIMB.links, np.ones((5, 6)), POSE, np.zeros((6, 5))),
+    "aloft.robots.limb_inverse.aim": (POSE[0], POSE[1:], np.zeros((4, 3))),
+    "aloft.robots.limb_inverse.foot_error": (
+        LIMB.tip, POSE, TARGET, np.array([1.0, 0.9, 0.3]), np.zeros(6),
+    ),
+    "aloft.robots.limb_inverse.weigh_rows": (
+        LIMB.tip, POSE, TARGET, np.array([1.0, 0.9, 0.3]), np.ones((6, 5)),
+    ),
+    "aloft.robots.limb_inverse.approach": (*CHAIN, 3, limb_scratch(5), MIDDLE),
+    "aloft.robots.limb_inverse.reach": (
+        *CHAIN, np.tile([*MIDDLE, 0.0], (3, 1)), 3, 3, limb_scratch(5), np.zeros(5),
+    ),
+    "aloft.robots.limb_inverse.limb_velocity": (
+        *CHAIN, MIDDLE, np.ones(6), 3e-4, limb_scratch(5), np.zeros(5),
+    ),
+    "aloft.robots.limb_inverse.turning": (LIMB.tip, POSE, TARGET, 0.002, 10.0, np.zeros(3)),
+    "aloft.robots.limb_inverse._stuck": (LIMB.limits, 1, 0.3, 1.0),
+    "aloft.robots.limb_inverse._along": (POSE, LIMB.tip),
+    "aloft.robots.limb_inverse._product": (POSE, TARGET, 1, 2),
+    "aloft.robots.limb_inverse._unit": (0.1, 0.2, 0.3, 1.0, 0.0, 0.0),
+    "aloft.robots.five_joint_reach.slide": (
         LEG.hip, LEG.plane, LEG.signs, LEG.limits, np.add(LEG.hip, [0.25, 0.02, -0.3]), np.eye(3), 0.005,
         0.1, np.zeros(3), np.zeros(5),
     ),
     "aloft.mathematics.rotations.skew": (np.ones(3), np.zeros((3, 3))),
-    "aloft.blocks.control.leg_inverse_kinematics.pitched_line": (np.eye(3), 0.4, np.zeros(3)),
+    "aloft.robots.five_joint_reach.pitched_line": (np.eye(3), 0.4, np.zeros(3)),
     "aloft.mathematics.rotations.yaw": (np.array([0.1, 0.2, 0.3, 0.9]),),
     "aloft.blocks.control.balance_target.lengthen": (
         np.array([0.01, -0.04, 0.0]), 0.7, 0.02, 0.25, 0.2, 0.6, *(np.ones(3) for _ in range(3)),
+    ),
+    "aloft.blocks.control.dynamics.lowest_point": (
+        np.array([0.01, 0.0, -0.2]), 0.022, np.eye(3), np.zeros(3),
+    ),
+    "aloft.blocks.control.dynamics.rolling_drift": (
+        *(np.linspace(-1.0, 2.0, 3) * k for k in range(1, 7)), np.zeros((2, 3)),
     ),
     "aloft.blocks.control.joint_pd.follow": (0.002, 0.02, *(np.ones(10) for _ in range(5))),
     "aloft.blocks.control.joint_pd.stop": (
         np.linspace(-1.0, 1.0, 5), np.tile([-0.8, 0.7], (5, 1)), 0.1, 2.0,
         *(np.full(5, x) for x in (60.0, 1.5, 40.0, 0.2, 1.0, 0.3)),
     ),
-    "aloft.blocks.control.leg_inverse_kinematics.keep_along": (
+    "aloft.robots.five_joint_reach.keep_along": (
         np.array([0.0, 0.6, 0.8]), np.array([0.1, 0.2, 0.3]),
     ),
     "aloft.mathematics.inertial_filter.right_up": (
@@ -94,10 +130,21 @@ PYTHON = {bool, int, float}
 
 def copy(arguments):
     """The same arguments in arrays of the same memory order; named numbers as plain ones."""
-    return tuple(
-        a.copy(order="K") if isinstance(a, np.ndarray) else int(a) if type(a) not in PYTHON else a
-        for a in arguments
-    )
+
+    def one(a):
+        if isinstance(a, tuple):  # a record of arrays and numbers
+            return type(a)(*(one(part) for part in a))
+        if isinstance(a, np.ndarray):
+            return a.copy(order="K")
+        return a if type(a) in PYTHON else int(a)
+
+    return tuple(one(a) for a in arguments)
+
+
+def leaves(arguments):
+    """The arrays and numbers of arguments, also those in records."""
+    for a in arguments:
+        yield from leaves(a) if isinstance(a, tuple) else (a,)
 
 
 def load_all():
@@ -169,7 +216,7 @@ def is_exact(function):
 def replaced(arguments, random):
     """The arguments with other numbers of about the same size in every array of floats."""
     new = copy(arguments)
-    for a in new:
+    for a in leaves(new):
         if isinstance(a, np.ndarray) and a.dtype == np.float64:
             a += (0.1 * np.abs(a) + 1e-3) * random.standard_normal(a.shape)
         elif isinstance(a, np.ndarray) and a.dtype == np.bool_:
@@ -180,7 +227,7 @@ def replaced(arguments, random):
 def flat(arguments, result):
     """All that a call has written and returned, as arrays."""
     returned = result if isinstance(result, tuple) else () if result is None else (result,)
-    return [np.asarray(a) for a in (*arguments, *returned)]
+    return [np.asarray(a) for a in (*leaves(arguments), *returned)]
 
 
 @pytest.mark.filterwarnings("ignore::numba.core.errors.NumbaPerformanceWarning")

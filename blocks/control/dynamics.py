@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from ...mathematics.kernel import kernel
 from ...mathematics.rotations import normalise, rotate_back, to_matrix
+from ...robots.ball_feet import ball_feet
 from ...robots.pinocchio_model import build_pinocchio_model
 from ...runtime.language.block import Block, Input, Output
 from ..signals import BaseState, DynamicsTerms, JointState
@@ -31,6 +32,11 @@ class Dynamics(Block):
     rotor's inertia with the square of its ratio in M, but only once in the momentum, so A leaves
     the rotors out. Friction is in none of the terms.
 
+    A foot with one contact point is a ball that rolls: its contact point, and its sole, are the
+    ball's lowest point however the foot is turned. What rests when it rolls is the ball's material
+    there, whose velocity changes by that of the centre and the ball's turning alone. Contact points
+    of other feet are fixed to the foot.
+
     Does not filter or estimate anything, and knows no ground: contact points are points of the
     feet, loaded or not.
     """
@@ -45,7 +51,7 @@ class Dynamics(Block):
         import pinocchio
 
         robot = self.robot
-        built = build_pinocchio_model(robot, robot.motors.profile)
+        built = build_pinocchio_model(robot)
         self._pinocchio: Any = pinocchio
         self._model: Any = built.model
         self._data: Any = built.model.createData()
@@ -83,6 +89,7 @@ class Dynamics(Block):
         self._soles = [np.array(foot.sole) for foot in robot.feet]
         self._points = [np.array(contact.position) for contact in robot.contacts]
         self._foot_of_point = robot.foot_of_contact()
+        self._balls = ball_feet(robot)
         n_feet = len(joints)
         self._foot_jacobian = np.zeros((n_feet, 6, n_velocities))
         self._local = np.zeros((2, 3))
@@ -116,6 +123,10 @@ class Dynamics(Block):
         terms.base_position[...] = base.position
         to_matrix(q[3:7], terms.base_rotation)
 
+        for ball in self._balls:
+            point = self._points[ball.point]
+            lowest_point(ball.centre, ball.radius, self._foot_turn[ball.foot], point)
+            self._soles[ball.foot][...] = point
         for foot, sole in enumerate(self._soles):
             turn = self._foot_turn[foot]
             terms.foot_rotation[foot] = turn
@@ -132,6 +143,10 @@ class Dynamics(Block):
             point_motion(*self._foot_motion[foot], self._points[point], self._local)
             np.dot(turn, self._local[0], terms.contact_velocity[point])
             np.dot(turn, self._local[1], terms.contact_drift[point])
+        for ball in self._balls:
+            motion, turn = self._foot_motion[ball.foot], self._foot_turn[ball.foot]
+            rolling_drift(*motion, ball.centre, self._points[ball.point], self._local)
+            np.dot(turn, self._local[1], terms.contact_drift[ball.point])
 
 
 @kernel
@@ -180,3 +195,47 @@ def point_motion(
     out[1, 0] = float(linear_rate[0]) + ay * z - az * y + wy * vz - wz * vy
     out[1, 1] = float(linear_rate[1]) + az * x - ax * z + wz * vx - wx * vz
     out[1, 2] = float(linear_rate[2]) + ax * y - ay * x + wx * vy - wy * vx
+
+
+@kernel
+def lowest_point(centre: Array, radius: float, rotation: Array, out: Array) -> None:
+    """The lowest point (3,) of a ball, in the frame of the body it belongs to.
+
+    Args:
+        centre: of the ball [m, body].
+        radius: of the ball [m].
+        rotation: from the body to the world, (3, 3).
+    """
+    for k in range(3):
+        out[k] = float(centre[k]) - radius * float(rotation[2, k])
+
+
+@kernel
+def rolling_drift(
+    linear: Array,
+    angular: Array,
+    linear_rate: Array,
+    angular_rate: Array,
+    centre: Array,
+    lowest: Array,
+    out: Array,
+) -> None:
+    """How the velocity of a ball's lowest point changes (row 1), in the body's frame.
+
+    The lowest point is always another one of the ball's material, so its velocity
+    v_c + w x (lowest - centre) changes by a_c + w' x (lowest - centre): the acceleration of one
+    point of the material would count the turning about the centre too.
+
+    Args:
+        linear, angular, linear_rate, angular_rate: as for ``point_motion``.
+        centre, lowest: the ball's centre and its lowest point in the body's frame [m].
+        out: (2, 3); row 0 is the centre's velocity.
+    """
+    point_motion(linear, angular, linear_rate, angular_rate, centre, out)
+    x = float(lowest[0]) - float(centre[0])
+    y = float(lowest[1]) - float(centre[1])
+    z = float(lowest[2]) - float(centre[2])
+    ax, ay, az = float(angular_rate[0]), float(angular_rate[1]), float(angular_rate[2])
+    out[1, 0] += ay * z - az * y
+    out[1, 1] += az * x - ax * z
+    out[1, 2] += ax * y - ay * x

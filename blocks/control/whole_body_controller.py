@@ -3,32 +3,30 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...mathematics.constants import GRAVITY
 from ...mathematics.quadratic_program import QuadraticProgramSolver
-from ...mathematics.rotations import from_matrix
 from ...mathematics.whole_body_qp import (
-    PYRAMID_ROWS,
-    angular_task,
+    Bounds,
+    CostScratch,
+    FrictionCone,
+    RigidBodyTerms,
+    TaskRows,
+    TorqueSpeedCurves,
     assemble_cost,
     base_dynamics,
-    contact_tasks,
     friction_pyramids,
     joint_torque,
-    lifting_tasks,
-    linear_task,
     motor_limits,
     share_weight,
     torque_limits,
-    torso_task,
 )
 from ...robots.description import RobotDescription
-from ...runtime.language.block import Block, Input, Misfit, Output, State
+from ...runtime.language.block import Block, Context, Input, Misfit, Output, State
 from ...runtime.language.parameters import Parameters, live_parameter, parameter
 from ...runtime.language.signals import Field, Signal
 from ..signals import (
@@ -39,7 +37,10 @@ from ..signals import (
     WholeBodyCommand,
     WholeBodyTarget,
 )
-from .task_gains import GainArrays, TaskGains
+from .task_gains import TaskGains
+from .tasks.choose import OWN_TASKS, PHASE_KINDS, ChosenTask, TaskChoiceError, choose_tasks
+from .tasks.task import Situation, Task, TaskChoice
+from .whole_body_program import WholeBodyProgram
 
 Array = NDArray[np.float64]
 
@@ -57,48 +58,49 @@ class WholeBodyController(Block):
 
     Over the generalised acceleration a and the forces f_j of the points in stance::
 
-        minimise    sum_i |J_i a + J_i' v - x_i|^2_{W_i} + sum_j |f_j|^2_{W_f} + |a|^2_{W_a}
+        minimise    sum_i |J_i a - d_i|^2_{W_i} + sum_j |f_j|^2_{W_f} + |a|^2_{W_a}
         subject to  H_b a + C_b v + G_b - sum_j J_{c_j,b}' f_j = 0            (base_dyn)
                     |f_x| <= mu f_z, |f_y| <= mu f_z, f_min <= f_z <= f_max   (cone)
                     torque limits, if any
 
-    then the torque is tau = H_j a + C_j v + G_j - sum_j J_{c_j,j}' f_j (opt_torque). The tasks:
+    then the torque is tau = H_j a + C_j v + G_j - sum_j J_{c_j,j}' f_j (opt_torque).
 
-    1. Stance: contact points do not accelerate, softly. Points that are not in stance while
-       others are go to the ground at their height: a task of zero acceleration never closes a
-       gap, and a program that believes in a hovering heel pushes with nothing. In THRUST they
-       are free to rise instead, as the heels do while the toes still push, and damped across
-       their foot; the foot's last joint then follows the plan, feedforward and feedback.
-    2. Linear momentum: x = a_ref + K_p (p_ref - p) + K_d (v_ref - v), per kg       (linear).
-    3. Torso: x = K_p Log(R' R_ref) + K_d (w_ref - w), body frame.
-    4. Angular momentum: x = -K_d k, or with ``track_angular_momentum`` k_ref' + K_d (k_ref - k).
-       Its error is in N m and the torso's in rad/s^2; for equal say its weight must be larger
-       by 1/I^2, about 160 for BRUCE.
+    **Tasks.** What is wanted of the acceleration is a list of tasks, each a small class in
+    ``blocks/control/tasks`` with its error, its Jacobian and its gains: ``ContactPoints``,
+    ``LinearMomentum``, ``TorsoOrientation``, ``AngularMomentum`` (the paper's tasks 1 to 4) and
+    ``Posture``, which keeps joints that belong to no leg where they should be. A graph chooses others with
+    ``tasks``; an entry is the name of a task, or ``{task: module:Class, gains: {...}}`` for a
+    class of the user's own and for gains of one entry alone. See ``docs/whole_body.md``.
 
-    Limits: ``none`` is the paper's; ``joint`` bounds each joint's torque by the motor's peak;
-    ``motor`` bounds the torque of every motor through the transmission by what it can give at
-    its present speed, which is the truth of a robot with differential joints.
+    ``stand`` gains hold in STAND and SQUAT, ``thrust`` in THRUST, ``landing`` after. The default
+    thrust gains put lateral motion above roll and yaw momentum: where a thigh is level the hip's
+    yaw and roll axes are in line, both cannot be had, and a jump should go straight up.
 
-    The default thrust gains put lateral motion above roll and yaw momentum: where a thigh is level
-    the hip's yaw and roll axes are in line, both cannot be had, and a jump should go straight up.
+    **Limits.** ``none`` is the paper's; ``joint`` bounds each joint's torque by the peak of the
+    motor at its place; ``motor`` bounds the torque of every motor through the transmission by
+    what it can give at its present speed, which is the truth of a robot with differential joints.
+    They are those of the robot's actuator profile in use.
 
-    ``stand`` gains hold in STAND and SQUAT, ``thrust`` in THRUST, ``landing`` after. Without a
-    point in stance there is nothing to solve: torque, force and acceleration are zero, and the
-    command counts as solved.
+    Without a point in stance there is nothing to solve: torque, force and acceleration are zero,
+    and the command counts as solved.
 
     Should the solver fail, the last solved torque is given times ``fallback_decay`` to the number
     of ticks since, for ``fallback_ticks`` ticks; after those the torque that carries the weight,
     shared equally by the points in stance, with no acceleration. Failures are counted.
 
-    Does no feedback on joints (``JointPD`` does) and keeps no solver state: a cold start makes
-    the answer a function of the inputs alone. The load report has a problem where
-    the solver is not installed, or a foot is part of the base.
+    Works for any robot with a floating base and feet. It does no feedback on joints (``JointPD``
+    does) and keeps no solver state: a cold start makes the answer a function of the inputs alone.
+    The load report has a problem where the solver is not installed, where a task is unknown or
+    has no such gain, and where the feet can carry nothing.
     """
 
     array_allocations = 12
     allocation_reason = "qpsolvers and the solver behind it return new arrays for every problem"
 
     class Params(Parameters):
+        tasks: list[str | TaskChoice] = parameter(
+            list(OWN_TASKS), min_length=1, text="what is wanted of the acceleration"
+        )
         solver: str = parameter("daqp", text="any dense solver that qpsolvers finds installed")
         limits: Literal["none", "joint", "motor"] = parameter("motor", text="torque limits")
         torque_margin: float = live_parameter(
@@ -108,7 +110,9 @@ class WholeBodyController(Block):
         force_min: float = live_parameter(
             0.0, unit="N", ge=0.0, text="least normal force of a point"
         )
-        force_max: float = live_parameter(400.0, unit="N", gt=0.0, text="largest one")
+        force_max: float | None = live_parameter(
+            None, unit="N", gt=0.0, text="largest one; none: eight times the robot's weight"
+        )
         force_weight: float = live_parameter(1e-4, gt=0.0, text="W_f")
         acceleration_weight: float = live_parameter(1e-4, gt=0.0, text="W_a")
         stand: TaskGains = live_parameter(TaskGains(), text="gains while standing and squatting")
@@ -145,14 +149,16 @@ class WholeBodyController(Block):
     terms = Input(DynamicsTerms, text="the whole-body model at the present state")
     target = Input(WholeBodyTarget, text="what to achieve")
     phase = Input(PhaseState, text="the phase and the points in stance")
-    joints = Input(JointState, text="joint velocities, for the motors' limits")
+    joints = Input(JointState, text="joint angles and velocities")
     command = Output(WholeBodyCommand, text="torque, acceleration and contact forces")
     memory = State(SolverMemory, text="for when the solver fails")
 
     @classmethod
     def requires(cls, params: Parameters, robot: RobotDescription | None) -> Iterable[Misfit]:
-        """A solver that is installed, and feet that joints carry."""
+        """A solver that is installed, and feet with contact points that joints carry."""
         assert isinstance(params, cls.Params) and robot is not None
+        if not robot.contacts:
+            yield Misfit(f"{robot.name} has no contact points, so its feet can carry no load")
         try:
             QuadraticProgramSolver.check_name(params.solver)
         except LookupError as error:
@@ -161,39 +167,77 @@ class WholeBodyController(Block):
             if foot.link == robot.base:
                 yield Misfit(f"foot {foot.name} of {robot.name} is part of the base, not of a leg")
 
+    @classmethod
+    def requires_of_graph(cls, params: Parameters, context: Context) -> Iterable[Misfit]:
+        """Tasks that can be found, each with gains that it has."""
+        assert isinstance(params, cls.Params)
+        try:
+            for chosen in choose_tasks(params.tasks, context.folder):
+                for kind in PHASE_KINDS:
+                    chosen.gains(kind, getattr(params, kind))
+        except TaskChoiceError as error:
+            yield Misfit(str(error), parameter="tasks")
+
     def setup(self) -> None:
         robot, p = self.robot, self.params
         self._solver = QuadraticProgramSolver(p.solver)
-        self._profile = robot.profiles[robot.motors.profile]
-        self._mass = robot.total_mass
-        n_joints, n_contacts = len(robot.joints), len(robot.contacts)
-        self._to_motor = robot.joint_to_motor
+        self._weight = robot.total_mass * GRAVITY
+        n_joints, n_contacts, n = len(robot.joints), len(robot.contacts), 6 + len(robot.joints)
+        self._motors, self._to_motor = robot.motors, robot.joint_to_motor
         motor = p.limits == "motor"
         self._transmission = robot.torque_to_motor if motor else np.eye(n_joints)
         limit_rows = 0 if p.limits == "none" else 2 * n_joints
-        n = 6 + n_joints
+        self._bounds = Bounds(np.zeros(n_joints), np.zeros(n_joints))
+        self._curves = TorqueSpeedCurves(
+            np.zeros(n_joints), self._motors.corner_speed, self._motors.no_load_speed
+        )
+        self._speed, self._product, self._still = (
+            np.zeros(n_joints),
+            np.zeros(n_joints),
+            np.zeros(n),
+        )
+        terms = self.terms
+        self._model = RigidBodyTerms(
+            terms.mass_matrix, terms.nonlinear_effects, terms.contact_jacobian
+        )
+        self._build_tasks(robot, n)
         self.on_parameters()
-        self._rows = np.zeros((3 * n_contacts + 9, n))
-        self._desired, self._weights = np.zeros(len(self._rows)), np.zeros(len(self._rows))
-        self._weighted, self._block = np.zeros_like(self._rows), np.zeros((n, n))
-        self._vector, self._quaternion = np.zeros(n), np.zeros(4)
-        self._error, self._product = np.zeros(3), np.zeros(n_joints)
-        self._speed, self._offset = np.zeros(n_joints), np.zeros(n_joints)
-        self._lower, self._upper = np.zeros(n_joints), np.zeros(n_joints)
-        self._still = np.zeros(n)
-        self._foot_of_point = np.array(robot.foot_of_contact(), dtype=np.int64)
-        last = [[joint.child for joint in robot.joints].index(foot.link) for foot in robot.feet]
-        self._ankles = 6 + np.array(last, dtype=np.int64)
-        self._ankle_acceleration = np.zeros(len(last))
         self._active = np.zeros(n_contacts, dtype=np.int64)
         # A program of its own size for every number of points in stance: forces fixed to zero by
         # bounds would leave it without an interior.
-        self._programs = [_Program.of(n, k, limit_rows) for k in range(n_contacts + 1)]
+        self._programs = [
+            WholeBodyProgram.of_size(n, count, limit_rows) for count in range(n_contacts + 1)
+        ]
+
+    def _build_tasks(self, robot: RobotDescription, n: int) -> None:
+        """The chosen tasks, each with its part of the rows."""
+        situation = Situation(robot, self.terms, self.target, self.phase, self.joints)
+        self._chosen: tuple[ChosenTask, ...] = choose_tasks(self.params.tasks, self.context.folder)
+        counts = [
+            chosen.kind.row_count(robot, chosen.gains("stand", self.params.stand))
+            for chosen in self._chosen
+        ]
+        total = sum(counts)
+        self._rows = TaskRows(np.zeros((total, n)), np.zeros(total), np.zeros(total))
+        self._scratch = CostScratch(np.zeros((total, n)), np.zeros((n, n)), np.zeros(n))
+        self._tasks: list[Task[Any]] = []
+        first = 0
+        for chosen, count in zip(self._chosen, counts, strict=True):
+            own = TaskRows(*(array[first : first + count] for array in self._rows))
+            self._tasks.append(chosen.kind(situation, own))
+            first += count
 
     def on_parameters(self) -> None:
+        p = self.params
+        most = 8.0 * self._weight if p.force_max is None else p.force_max
+        self._cone = FrictionCone(p.friction, p.force_min, most)
+        np.multiply(p.torque_margin, self._motors.peak_torque, out=self._curves.peak)
         self._gains = {
-            kind: GainArrays.of(getattr(self.params, kind))
-            for kind in ("stand", "thrust", "landing")
+            kind: [
+                task.prepare(chosen.gains(kind, getattr(p, kind)))
+                for chosen, task in zip(self._chosen, self._tasks, strict=True)
+            ]
+            for kind in PHASE_KINDS
         }
 
     def step(self) -> None:
@@ -209,11 +253,16 @@ class WholeBodyController(Block):
             command.failures[()] = memory.failures
             return
         program = self._programs[count]
-        self._set_tasks()
+        phase = int(self.phase.phase)
+        kind = "thrust" if phase == Phase.THRUST else "landing" if phase > Phase.THRUST else "stand"
+        gains = self._gains[kind]
+        for i in range(len(gains)):
+            self._tasks[i].update(gains[i])
         self._assemble(program, count)
         answer = self._solver.solve(
-            program.hessian, program.gradient, program.inequality, program.bound,
-            program.equality, program.right,
+            program.cost.hessian, program.cost.gradient,
+            program.inequality.matrix, program.inequality.bound,
+            program.equality.matrix, program.equality.bound,
         )  # fmt: skip
         if answer is None:
             self._fall_back()
@@ -232,136 +281,42 @@ class WholeBodyController(Block):
                 count += 1
         return count
 
-    def _set_tasks(self) -> None:
-        terms, target = self.terms, self.target
-        rows, desired, weights = self._rows, self._desired, self._weights
-        phase = int(self.phase.phase)
-        kind = "thrust" if phase == Phase.THRUST else "landing" if phase > Phase.THRUST else "stand"
-        gains, first = self._gains[kind], rows.shape[0] - 9
-        p = gains.source
-        contact_tasks(
-            terms.contact_jacobian, terms.contact_drift, terms.contact_position,
-            terms.contact_velocity, self.phase.stance, p.stance_weight, p.stance_damping,
-            p.swing_weight, p.swing_stiffness, p.swing_damping,
-            rows[:first], desired[:first], weights[:first],
-        )  # fmt: skip
-        if phase == Phase.THRUST:
-            self._follow_ankles(p)
-            lifting_tasks(
-                terms.contact_jacobian, terms.contact_drift, terms.contact_velocity,
-                self.phase.stance, self._foot_of_point, terms.foot_rotation, p.swing_weight,
-                p.swing_damping, self._ankles, self._ankle_acceleration, p.rolling_weight,
-                rows[:first], desired[:first], weights[:first],
-            )  # fmt: skip
-        linear_task(
-            terms.centroidal_matrix, terms.centroidal_drift, self._mass, terms.com,
-            terms.com_velocity, target.com, target.com_velocity, target.com_acceleration,
-            gains.linear_stiffness, gains.linear_damping,
-            rows[first : first + 3], desired[first : first + 3],
-        )  # fmt: skip
-        from_matrix(terms.base_rotation, self._quaternion)
-        torso_task(
-            self._quaternion, terms.velocity[3:6], target.orientation, target.angular_velocity,
-            gains.torso_stiffness, gains.torso_damping, self._error, self._quaternion,
-            rows[first + 3 : first + 6], desired[first + 3 : first + 6],
-        )  # fmt: skip
-        angular_task(
-            terms.centroidal_matrix, terms.centroidal_drift, terms.angular_momentum,
-            target.angular_momentum, target.angular_momentum_rate, gains.angular_damping,
-            p.track_angular_momentum, rows[first + 6 :], desired[first + 6 :],
-        )  # fmt: skip
-        weights[first:] = gains.weights
-
-    def _follow_ankles(self, gains: TaskGains) -> None:
-        """The acceleration that keeps every foot's last joint on the plan."""
-        terms, target = self.terms, self.target
-        for foot in range(self._ankles.shape[0]):
-            velocity = int(self._ankles[foot])
-            joint = velocity - 6
-            self._ankle_acceleration[foot] = (
-                float(target.joint_acceleration[joint])
-                + gains.rolling_stiffness
-                * (float(target.joint_position[joint]) - float(self.joints.position[joint]))
-                + gains.rolling_damping
-                * (float(target.joint_velocity[joint]) - float(terms.velocity[velocity]))
-            )
-
-    def _assemble(self, program: _Program, count: int) -> None:
-        p, terms, profile = self.params, self.terms, self._profile
-        active, n = self._active[:count], self._rows.shape[1]
+    def _assemble(self, program: WholeBodyProgram, count: int) -> None:
+        p = self.params
+        active, n = self._active[:count], self._still.shape[0]
         assemble_cost(
-            self._rows, self._desired, self._weights, p.acceleration_weight, p.force_weight,
-            self._weighted, self._block, self._vector, program.hessian, program.gradient,
-        )  # fmt: skip
-        base_dynamics(
-            terms.mass_matrix, terms.nonlinear_effects, terms.contact_jacobian, active,
-            program.equality, program.right,
-        )  # fmt: skip
-        cone = PYRAMID_ROWS * count
-        friction_pyramids(
-            count, n, p.friction, p.force_min, p.force_max,
-            program.inequality[:cone], program.bound[:cone],
-        )  # fmt: skip
+            self._rows, p.acceleration_weight, p.force_weight, self._scratch, program.cost
+        )
+        base_dynamics(self._model, active, program.equality)
+        friction_pyramids(count, n, self._cone, program.cones)
         if p.limits == "none":
             return
-        peak = p.torque_margin * profile.peak_torque
         if p.limits == "motor":
             np.dot(self._to_motor, self.joints.velocity, self._speed)
-            motor_limits(
-                self._speed, peak, profile.corner_speed, profile.no_load_speed,
-                self._lower, self._upper,
-            )  # fmt: skip
+            motor_limits(self._speed, self._curves, self._bounds)
         else:
-            self._lower[:], self._upper[:] = -peak, peak
+            self._bounds.upper[:] = self._curves.peak
+            np.negative(self._curves.peak, self._bounds.lower)
         torque_limits(
-            terms.mass_matrix, terms.nonlinear_effects, terms.contact_jacobian, active,
-            self._transmission, self._lower, self._upper, program.torque_rows, self._offset,
-            program.product, program.inequality[cone:], program.bound[cone:],
-        )  # fmt: skip
+            self._model, active, self._transmission, self._bounds, program.scratch, program.limits
+        )
 
     def _take(self, answer: Array, count: int) -> None:
-        command, terms, n = self.command, self.terms, self._rows.shape[1]
+        command, n = self.command, self._still.shape[0]
         command.acceleration[...] = answer[:n]
         for j in range(count):
             command.force[self._active[j]] = answer[n + 3 * j : n + 3 * j + 3]
         joint_torque(
-            terms.mass_matrix, terms.nonlinear_effects, terms.contact_jacobian,
-            command.acceleration, command.force, self._product, command.torque,
-        )  # fmt: skip
+            self._model, command.acceleration, command.force, self._product, command.torque
+        )
 
     def _fall_back(self) -> None:
-        p, memory, command, terms = self.params, self.memory, self.command, self.terms
+        p, memory, command = self.params, self.memory, self.command
         memory.failed[()] += 1
         memory.failures[()] += 1
         failed = int(memory.failed)
         if failed <= p.fallback_ticks:
             np.multiply(memory.torque, p.fallback_decay**failed, out=command.torque)
             return
-        share_weight(self.phase.stance, self._mass * GRAVITY, command.force)
-        joint_torque(
-            terms.mass_matrix, terms.nonlinear_effects, terms.contact_jacobian, self._still,
-            command.force, self._product, command.torque,
-        )  # fmt: skip
-
-
-@dataclass(frozen=True)
-class _Program:
-    """The memory of the quadratic program with a certain number of points in stance."""
-
-    hessian: Array
-    gradient: Array
-    equality: Array
-    right: Array
-    inequality: Array
-    bound: Array
-    torque_rows: Array
-    product: Array
-
-    @classmethod
-    def of(cls, n: int, count: int, limit_rows: int) -> _Program:
-        size, rows = n + 3 * count, PYRAMID_ROWS * count + limit_rows
-        return cls(
-            np.zeros((size, size)), np.zeros(size), np.zeros((6, size)), np.zeros(6),
-            np.zeros((rows, size)), np.zeros(rows),
-            np.zeros((n - 6, size)), np.zeros((n - 6, size)),
-        )  # fmt: skip
+        share_weight(self.phase.stance, self._weight, command.force)
+        joint_torque(self._model, self._still, command.force, self._product, command.torque)

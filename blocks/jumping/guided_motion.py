@@ -1,13 +1,18 @@
 """Motions of the whole body that follow from what its feet, centre and rotation are to do.
 
-Two line feet leave a body with five-joint legs exactly six freedoms in stance: where its centre
-of mass is, and how it turns. So the velocity of all joints follows from ten rows that say what
-the feet do and six that say how the centre of mass moves and, axis by axis, either how the torso
-turns or what angular momentum there is::
+In stance the feet stand still, as far as their contact points can hold them: a point foot its
+place, a line foot its place and the direction of its line, a flat foot its whole pose. What is
+left is how the centre of mass moves and, axis by axis, either how the base turns or what angular
+momentum there is. So the velocities v of all joints and the base follow from::
 
-    [ A_l / m          ]       [ com velocity                ]
-    [ A_k  or  base    ]  v  = [ k  or  torso rate           ]
-    [ J of every sole  ]       [ its velocity; no pitch, yaw ]
+    [ A_l / m          ]       [ velocity of the centre of mass              ]
+    [ A_k  or  base    ]  v  = [ angular momentum  or  turning rate          ]
+    [ J of every foot  ]       [ its velocity; nothing it holds of its pose turns ]
+    [ held joints      ]       [ 0                                           ]
+
+For a biped with two line feet and five joints a leg, two flat feet and six joints, or four point
+feet and three joints these are exactly as many rows as velocities. A body with more joints has a
+choice; it takes the velocities nearest to those that lead back to its standing joints.
 """
 
 from __future__ import annotations
@@ -21,6 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...robots.description import RobotDescription
+from ...robots.limb import FootKind, foot_shape
 from ...robots.pinocchio_model import PinocchioModel
 from ...runtime.language.errors import BlockError
 
@@ -28,6 +34,10 @@ Array = NDArray[np.float64]
 
 _STEP = 0.002
 """Longest step of the integration [s]."""
+_RETURN_RATE = 2.0
+"""How fast joints that have a choice go back to where they stand [1/s]."""
+ROWS_OF_FOOT = {FootKind.POINT: 3, FootKind.LINE: 5, FootKind.FLAT: 6}
+"""How many velocities a foot on the ground fixes."""
 
 
 @dataclass
@@ -47,30 +57,50 @@ class Motion:
     foot_velocity: Array
 
 
+def missing_joints(robot: RobotDescription) -> int:
+    """How many joints a robot lacks to move its centre of mass and its base as it is told."""
+    rows = sum(ROWS_OF_FOOT[foot_shape(robot, foot)[0]] for foot in range(len(robot.feet)))
+    return max(0, rows - (len(robot.joints) - len(robot.held)))
+
+
 class GuidedBody:
     """The robot's model, asked for the velocity that a motion needs."""
 
     def __init__(self, built: PinocchioModel, robot: RobotDescription) -> None:
         import pinocchio
 
+        missing = missing_joints(robot)
+        if missing:
+            raise BlockError(
+                f"{robot.name}: its feet on the ground fix {missing} velocities more than its "
+                f"joints have, so its centre of mass and base cannot be guided"
+            )
         self.pinocchio: Any = pinocchio
         self.model = built.model
         self.data = built.model.createData()
         self.soles = built.sole_frames
         self.mass = robot.total_mass
-        n = built.model.nv
-        if n != 6 + 5 * len(self.soles):
-            raise BlockError(
-                f"{robot.name}: a squat jump is planned for legs of five joints each; expected "
-                f"{5 * len(self.soles)} joints for {len(self.soles)} feet, found {n - 6}"
-            )
-        self._matrix = np.zeros((n, n))
-        self._right = np.zeros(n)
+        self._shapes = [foot_shape(robot, foot) for foot in range(len(robot.feet))]
+        self._first = np.cumsum([6, *(ROWS_OF_FOOT[kind] for kind, _ in self._shapes)]).tolist()
+        joints = [joint.name for joint in robot.joints]
+        self._held = {joints.index(name): angle for name, angle in robot.held.items()}
+        rows, n = self._first[-1] + len(self._held), built.model.nv
+        self._matrix, self._wanted = np.zeros((rows, n)), np.zeros(rows)
+        for row, joint in enumerate(self._held):
+            self._matrix[self._first[-1] + row, 6 + joint] = 1.0
+        self._stance = robot.standing_position.copy()
+        self._stance[list(self._held)] = list(self._held.values())
+        self._choice = np.zeros(n)
 
     def standing(self, joints: Array) -> Array:
-        """The configuration with these joint angles, upright, the soles' middle at the origin."""
+        """The configuration with these joint angles, upright, the soles' middle at the origin.
+
+        Joints that the description holds have their held angle.
+        """
         q = np.array(self.pinocchio.neutral(self.model))
         q[7:] = joints
+        for joint, angle in self._held.items():
+            q[7 + joint] = angle
         q[0:3] -= self.feet(q).mean(axis=0)
         return q
 
@@ -94,29 +124,49 @@ class GuidedBody:
 
     def velocity(self, q: Array, motion: Motion) -> Array:
         """The generalised velocity of the motion."""
-        pin, matrix, right = self.pinocchio, self._matrix, self._right
+        pin, matrix, wanted = self.pinocchio, self._matrix, self._wanted
         pin.computeJointJacobians(self.model, self.data, q)
         pin.updateFramePlacements(self.model, self.data)
         centroidal = pin.computeCentroidalMap(self.model, self.data, q)
-        matrix[:] = 0.0
+        matrix[: self._first[-1]] = 0.0
         matrix[0:3] = centroidal[0:3] / self.mass
-        right[0:3] = motion.com_velocity
+        wanted[0:3] = motion.com_velocity
         for axis in range(3):
             if motion.by_momentum[axis]:
                 matrix[3 + axis] = centroidal[3 + axis]
             else:
                 matrix[3 + axis, 3 + axis] = 1.0
-        right[3:6] = motion.rotation
+        wanted[3:6] = motion.rotation
         for foot, frame in enumerate(self.soles):
-            row = 6 + 5 * foot
+            row, end = self._first[foot], self._first[foot + 1]
             jacobian = pin.getFrameJacobian(
                 self.model, self.data, frame, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
             )
             matrix[row : row + 3] = jacobian[0:3]
-            matrix[row + 3 : row + 5] = jacobian[4:6]
-            right[row : row + 3] = motion.foot_velocity[foot]
-            right[row + 3 : row + 5] = 0.0
-        return np.linalg.solve(matrix, right)
+            matrix[row + 3 : end] = self._turning_rows(foot, jacobian[3:6])
+            wanted[row : row + 3] = motion.foot_velocity[foot]
+            wanted[row + 3 : end] = 0.0
+        if matrix.shape[0] == matrix.shape[1]:
+            return np.linalg.solve(matrix, wanted)
+        choice = self._choice
+        choice[6:] = _RETURN_RATE * (self._stance - q[7:])
+        found = np.linalg.lstsq(matrix, wanted - matrix @ choice)[0]
+        return np.asarray(choice + found)
+
+    def _turning_rows(self, foot: int, turning: Array) -> Array:
+        """Of the rows (3, n) of a foot's turning in the world those that it holds."""
+        kind, line = self._shapes[foot]
+        if kind == FootKind.POINT:
+            return turning[:0]
+        if kind == FootKind.FLAT:
+            return turning
+        ahead: Array = self.data.oMf[self.soles[foot]].rotation @ line
+        if abs(float(ahead[0])) > 1.0 - 1e-9:
+            return turning[1:]
+        # Two directions at right angles to the line, which the foot cannot turn about.
+        first = np.cross(ahead, np.eye(3)[int(np.abs(ahead).argmin())])
+        first /= np.linalg.norm(first)
+        return np.asarray(np.stack([first, np.cross(ahead, first)]) @ turning)
 
     def integrate(self, q: Array, v: Array) -> Array:
         """The configuration after moving by ``v``."""
@@ -170,3 +220,32 @@ class MotionRecorder:
         self.time.append(time)
         for name, value in values.items():
             self.rows.setdefault(name, []).append(np.array(value))
+
+
+def check_limits(robot: RobotDescription, columns: dict[str, Array]) -> None:
+    """Refuse a motion that no such robot can make.
+
+    Args:
+        robot: whose joint limits and motor speeds count.
+        columns: from ``MotionRecorder.rows``, as arrays.
+
+    Raises:
+        BlockError: a joint passes its limit or a motor its speed.
+    """
+    hint = "ask for less: a smaller rise, distance, lean or squat_depth"
+    angles, limits = columns["joint_position"], robot.joint_limits
+    excess = np.maximum(angles - limits[:, 1], limits[:, 0] - angles).max(axis=0)
+    worst = int(excess.argmax())
+    if excess[worst] > 0.0:
+        raise BlockError(
+            f"this motion takes {robot.joints[worst].name} {excess[worst]:.3f} rad past its limit; "
+            + hint
+        )
+    speeds = np.abs(columns["joint_velocity"] @ robot.joint_to_motor.T).max(axis=0)
+    most = robot.motors.no_load_speed
+    worst = int((speeds - most).argmax())
+    if speeds[worst] > most[worst]:
+        raise BlockError(
+            f"this motion turns {robot.transmission.motors[worst]} at {speeds[worst]:.1f} rad/s, "
+            f"but {robot.motors.profile} reaches {most[worst]:.1f} rad/s; {hint}"
+        )

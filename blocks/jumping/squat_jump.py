@@ -19,8 +19,7 @@ from ...mathematics.polynomials import minimum_jerk, quintic
 from ...planner.library.jump_table import JumpTable
 from ...robots.description import RobotDescription
 from ...robots.pinocchio_model import PinocchioModel
-from ...runtime.language.errors import BlockError
-from .guided_motion import GuidedBody, Motion, MotionRecorder
+from .guided_motion import GuidedBody, Motion, MotionRecorder, check_limits
 
 Array = NDArray[np.float64]
 
@@ -59,7 +58,7 @@ class SquatJumpTask:
 
 
 def plan_squat_jump(
-    built: PinocchioModel, robot: RobotDescription, task: SquatJumpTask, profile: str
+    built: PinocchioModel, robot: RobotDescription, task: SquatJumpTask
 ) -> JumpTable:
     """The whole jump, from standing to standing.
 
@@ -84,7 +83,7 @@ def plan_squat_jump(
     recover = table.now
     table.run(task.recover_time, jump.recover)
     columns = {name: np.array(rows) for name, rows in table.rows.items()}
-    _check(robot, columns, profile)
+    check_limits(robot, columns)
     return JumpTable(
         np.array(table.time), columns, task.stand_time, start, lift_off, touchdown, recover
     )
@@ -269,23 +268,3 @@ class _Jump:
         motion.com_velocity = rate / duration * (end - start)
         motion.com_acceleration = bend / duration**2 * (end - start)
         return motion
-
-
-def _check(robot: RobotDescription, columns: dict[str, Array], profile: str) -> None:
-    """Raise where the plan passes a joint's limit or a motor's speed."""
-    hint = "ask for less: a smaller rise, distance, lean or squat_depth"
-    angles, limits = columns["joint_position"], robot.joint_limits
-    excess = np.maximum(angles - limits[:, 1], limits[:, 0] - angles).max(axis=0)
-    worst = int(excess.argmax())
-    if excess[worst] > 0.0:
-        raise BlockError(
-            f"this jump moves {robot.joints[worst].name} {excess[worst]:.3f} rad past its limit; "
-            + hint
-        )
-    speeds = np.abs(columns["joint_velocity"] @ robot.joint_to_motor.T).max(axis=0)
-    worst, most = int(speeds.argmax()), robot.profiles[profile].no_load_speed
-    if speeds[worst] > most:
-        raise BlockError(
-            f"this jump turns {robot.transmission.motors[worst]} at {speeds[worst]:.1f} rad/s, but "
-            f"{profile} reaches {most:.1f} rad/s; {hint}"
-        )

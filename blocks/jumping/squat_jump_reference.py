@@ -11,6 +11,7 @@ from ...robots.pinocchio_model import build_pinocchio_model
 from ...runtime.language.block import Block, Misfit, Output
 from ...runtime.language.parameters import Parameters, parameter
 from ..signals import JumpReference
+from .guided_motion import missing_joints
 from .squat_jump import SquatJumpTask, plan_squat_jump
 
 
@@ -39,10 +40,10 @@ class SquatJumpReference(Block):
 
     class Params(Parameters):
         rise: float = parameter(
-            0.09, unit="m", gt=0.0, le=0.5, text="apex of the centre of mass above standing"
+            0.09, unit="m", gt=0.0, le=1.0, text="apex of the centre of mass above standing"
         )
         distance: float = parameter(
-            0.0, unit="m", ge=-0.3, le=0.4, text="how far ahead of the start the feet land"
+            0.0, unit="m", ge=-1.0, le=1.0, text="how far ahead of the start the feet land"
         )
         lean: float = parameter(
             0.8, unit="rad", ge=0.0, le=1.3, text="forward pitch of the torso in the squat"
@@ -51,16 +52,16 @@ class SquatJumpReference(Block):
             -0.06, unit="rad", ge=-0.5, le=0.5, text="forward pitch of the torso at touchdown"
         )
         squat_depth: float = parameter(
-            0.094, unit="m", gt=0.0, le=0.15, text="bottom of the squat below standing"
+            0.094, unit="m", gt=0.0, le=0.5, text="bottom of the squat below standing"
         )
         lift_off_drop: float = parameter(
-            0.029, unit="m", ge=0.0, le=0.1, text="height at lift-off below standing"
+            0.029, unit="m", ge=-0.1, le=0.3, text="height at lift-off below standing"
         )
         touchdown_drop: float = parameter(
-            0.009, unit="m", ge=-0.02, le=0.1, text="height at touchdown below standing"
+            0.009, unit="m", ge=-0.1, le=0.3, text="height at touchdown below standing"
         )
         landing_depth: float = parameter(
-            0.06, unit="m", ge=0.0, le=0.15, text="where the landing comes to rest below standing"
+            0.06, unit="m", ge=0.0, le=0.5, text="where the landing comes to rest below standing"
         )
         unloading: float = parameter(
             0.7, ge=0.0, le=1.0, text="share of the weight taken off the feet at lift-off"
@@ -89,15 +90,15 @@ class SquatJumpReference(Block):
 
     @classmethod
     def requires(cls, params: Parameters, robot: RobotDescription | None) -> Iterable[Misfit]:
-        """Legs of five joints, and no joint besides."""
+        """Joints enough to move the centre of mass and the base with all feet on the ground."""
         assert robot is not None
-        joints, feet = len(robot.joints), len(robot.feet)
-        if joints != 5 * feet:
+        missing = missing_joints(robot)
+        if missing:
             yield Misfit(
-                f"a squat jump is planned for legs of five joints each, and {robot.name} has "
-                f"{joints} joints for {feet} feet",
-                expected=f"{5 * feet} joints",
-                found=f"{joints} joints",
+                f"a squat jump needs {missing} more joints than {robot.name} has to move its "
+                "centre of mass and base with all feet on the ground",
+                expected=f"{len(robot.joints) + missing} joints that are not held",
+                found=f"{len(robot.joints) - len(robot.held)}",
             )
 
     def setup(self) -> None:
@@ -114,6 +115,4 @@ class SquatJumpReference(Block):
 def _plan(robot: str, task: SquatJumpTask) -> JumpTable:
     """The plan for a robot given as JSON: the same for all runs of a process."""
     description = RobotDescription.model_validate_json(robot)
-    profile = description.motors.profile
-    model = build_pinocchio_model(description, profile)
-    return plan_squat_jump(model, description, task, profile)
+    return plan_squat_jump(build_pinocchio_model(description), description, task)

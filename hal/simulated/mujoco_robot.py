@@ -117,7 +117,7 @@ class MujocoRobot(Robot):
                 parameter="timestep",
                 expected=f"a whole fraction of {context.period} s",
                 found=f"{params.timestep} s",
-                fix=f"timestep: {context.period / max(1, math.ceil(steps)):.10g} s",
+                fix=f"timestep: {_nearest_step(context.period, params.timestep):.10g} s",
             )
 
     @classmethod
@@ -351,3 +351,11 @@ class MujocoRobot(Robot):
             high.fill(-np.inf)
         for low in (record.torque_low, record.speed_low):
             low.fill(np.inf)
+
+
+def _nearest_step(period: float, timestep: float) -> float:
+    """The largest step [s] up to ``timestep`` that divides the period, of few digits if one is
+    near."""
+    count = max(1, math.ceil(period / timestep))
+    steps = [period / k for k in range(count, 2 * count + 1)]
+    return next((step for step in steps if abs(step * 1e5 - round(step * 1e5)) < 1e-9), steps[0])

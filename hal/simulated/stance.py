@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from ...robots.ball_feet import ball_feet
 from ...robots.description import RobotDescription
 from ...robots.link_poses import joints_above, standing_heights
 from ...runtime.language.errors import BlockError
@@ -195,8 +196,11 @@ def _sole_middle(data: MjData, robot: RobotDescription) -> Array:
     import mujoco
 
     middle, offset = np.zeros(3), np.zeros(3)
-    for foot in robot.feet:
+    soles = [np.array(foot.sole) for foot in robot.feet]
+    for ball in ball_feet(robot):  # the lowest point is straight below the centre
+        soles[ball.foot] = ball.centre
+    for foot, sole in zip(robot.feet, soles, strict=True):
         body = data.body(body_name(foot.link))
-        mujoco.mju_mulMatVec(offset, body.xmat.reshape(3, 3), np.array(foot.sole))
+        mujoco.mju_mulMatVec(offset, body.xmat.reshape(3, 3), sole)
         middle += (body.xpos + offset) / len(robot.feet)
     return middle

@@ -55,8 +55,8 @@ class TruthReport:
             force = truth.contact_force[k]
             truth.contact_touched[k] = any(force.item(axis) != 0.0 for axis in range(3))
         truth.forbidden_contacts[()] = record.forbidden
-        truth.joint_limit_violation[()] = max(record.violation.tolist())
-        truth.motor_overload[()] = max(record.overload.tolist())
+        truth.joint_limit_violation[()] = max(record.violation.tolist(), default=0.0)
+        truth.motor_overload[()] = max(record.overload.tolist(), default=0.0)
         truth.saturated_share[()] = sum(record.saturated.tolist()) / (steps * len(self._is_low))
         for high, low, out in (
             (record.torque_high, record.torque_low, truth.motor_torque),

@@ -120,14 +120,16 @@ class State(Port[S]):
 class Misfit:
     """Something about the graph's robot or a parameter that a block cannot work with.
 
-    ``message`` says what is wrong, ``parameter`` names the parameter that it is about, if any, and
-    ``fix`` is what to write instead.
+    ``message`` says what is wrong. ``parameter`` is the parameter that it is about, if any, as
+    ``name`` or ``name.key``; ``nearest`` holds legal names like the one found; ``fix`` is what to
+    write instead.
     """
 
     message: str
     parameter: str = ""
     expected: str = ""
     found: str = ""
+    nearest: tuple[str, ...] = ()
     fix: str = ""
 
 

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from difflib import get_close_matches
+
+from pydantic import BaseModel
 
 from ...robots.description import RobotDescription
 from ...robots.shipped import robot_names
 from .block import Block, Context, Misfit, Need
 from .parameters import Parameters
+from .per_joint import PerJoint
 
 _NAMED: Mapping[Need, str] = {
     "robot": "a robot",
@@ -33,38 +37,88 @@ def has(robot: RobotDescription, need: Need) -> bool:
             return robot.sensors.switches and len(robot.contacts) > 0
 
 
-def find_misfits(
-    block_type: type[Block], params: Parameters, context: Context
-) -> tuple[Misfit, ...]:
-    """Everything about the robot and the graph that the block cannot work with.
+def fix_without_robot() -> str:
+    """What to write in a graph that needs a robot and names none."""
+    return " or ".join(f"robot: {name}" for name in robot_names())
 
-    First what ``needs`` names and the robot lacks; only if it lacks nothing, what ``requires`` and
-    ``requires_of_graph`` say. What the block's own code raises is a misfit too.
-    """
-    robot = context.robot
-    if block_type.needs and robot is None:
+
+def unmet_needs(block_type: type[Block], robot: RobotDescription | None) -> tuple[Misfit, ...]:
+    """What the block needs of a robot and this one does not have."""
+    if not block_type.needs:
+        return ()
+    if robot is None:
         return (
             Misfit(
                 "it needs a robot, and the graph names none",
                 expected="a robot under the graph's key 'robot'",
                 found="nothing",
-                fix=" or ".join(f"robot: {name}" for name in robot_names()),
+                fix=fix_without_robot(),
             ),
         )
-    missing = [need for need in block_type.needs if robot is not None and not has(robot, need)]
-    if missing:
-        assert robot is not None
-        return tuple(
-            Misfit(f"it needs a robot with {_NAMED[need]}; {robot.name} {_lack(robot, need)}")
-            for need in missing
-        )
+    return tuple(
+        Misfit(f"it needs a robot with {_NAMED[need]}; {robot.name} {_lack(robot, need)}")
+        for need in block_type.needs
+        if not has(robot, need)
+    )
+
+
+def find_misfits(
+    block_type: type[Block], params: Parameters, context: Context
+) -> tuple[Misfit, ...]:
+    """Everything about the robot and the graph that the block cannot work with.
+
+    First what ``needs`` names and the robot lacks; only if it lacks nothing, values per joint that
+    do not fit the joints, and what ``requires`` and ``requires_of_graph`` say. What the block's own
+    code raises is a misfit too.
+    """
+    robot = context.robot
+    unmet = unmet_needs(block_type, robot)
+    if unmet:
+        return unmet
     try:
         return (
+            *(_per_joint_misfits(params, robot) if robot is not None else ()),
             *block_type.requires(params, robot),
             *block_type.requires_of_graph(params, context),
         )
     except Exception as error:  # noqa: BLE001  the block's own code must not hide other problems
         return (Misfit(f"asking what it requires failed: {type(error).__name__}: {error}"),)
+
+
+def _per_joint_misfits(
+    params: BaseModel, robot: RobotDescription, prefix: str = ""
+) -> Iterator[Misfit]:
+    """Patterns of ``PerJoint`` parameters that match no joint, and joints they give no value."""
+    names = [joint.name for joint in robot.joints]
+    for field in type(params).model_fields:
+        value = getattr(params, field)
+        if isinstance(value, PerJoint):
+            for pattern in value.unmatched_patterns(robot):
+                near = get_close_matches(pattern, [*names, *_ends(names)], 3)
+                yield Misfit(
+                    f"{prefix}{field}: {robot.name} has no joint {pattern!r}",
+                    parameter=f"{prefix}{field}.{pattern}",
+                    expected=f"names or patterns of its joints: {', '.join(names)}",
+                    found=pattern,
+                    nearest=tuple(near),
+                    fix=near[0] if near else f"remove {pattern!r}",
+                )
+            missing = value.joints_without_value(robot)
+            if missing:
+                yield Misfit(
+                    f"{prefix}{field} gives no value for {', '.join(missing)}",
+                    parameter=f"{prefix}{field}",
+                    expected="a value for every joint; '*' stands for all, and later entries win",
+                    fix=f'"{missing[0]}": ...' if len(missing) == 1 else '"*": ..., first',
+                )
+        elif isinstance(value, BaseModel):
+            yield from _per_joint_misfits(value, robot, f"{prefix}{field}.")
+
+
+def _ends(names: Iterable[str]) -> tuple[str, ...]:
+    """Patterns for the words that names end with: ``left_hip_yaw`` -> ``*_hip_yaw``, ``*_yaw``."""
+    ends = (f"*{name[k:]}" for name in names for k, letter in enumerate(name) if letter == "_")
+    return tuple(dict.fromkeys(ends))
 
 
 def _lack(robot: RobotDescription, need: Need) -> str:

@@ -146,6 +146,21 @@ def find_block(name: str, folder: Path | None = None) -> type[Block]:
     raise UnknownBlockError(f"there is no block called {name!r}")
 
 
+def find_class(name: str, folder: Path | None = None) -> object:
+    """What ``module:Class`` names; files in ``folder`` can be imported as modules.
+
+    Raises:
+        UnknownBlockError: there is no such module, or it has no such name.
+        BlockImportError: the module fails when imported.
+    """
+    module_name, _, class_name = name.partition(":")
+    module = _user_module(module_name, folder, name)
+    found = getattr(module, class_name, None)
+    if found is None:
+        raise UnknownBlockError(f"module {module_name!r} has no class {class_name!r}")
+    return found
+
+
 def _own_module(package: str, class_name: str) -> ModuleType | None:
     """The module of ours that has the class: the one by convention, or any other."""
     file = f"{snake_case(class_name)}.py"

@@ -76,7 +76,9 @@ def adjust(blocks: Mapping[str, Block], settings: Overrides) -> Adjustment:
         assert isinstance(node, MapNode)
         for override in overrides:
             node = node.assign(override.path, override.value, override.where)
-        checked = check_parameters(_flat(path, block, node), type(block), problems)
+        checked = check_parameters(
+            _flat(path, block, node), type(block), problems, block.context.robot
+        )
         if checked is None or not _fits(path, block, checked, overrides[0].where, problems):
             continue
         params[path] = checked
@@ -137,7 +139,7 @@ def _fits(path: str, block: Block, params: Parameters, where: Position, problems
         place = f"{path}.{misfit.parameter}" if misfit.parameter else path
         problems.add(
             Code.MISFIT, f"{path}: {misfit.message}", where, at=place, expected=misfit.expected,
-            found=misfit.found, fix=misfit.fix,
+            found=misfit.found, nearest=misfit.nearest, fix=misfit.fix,
         )  # fmt: skip
         return False
     for port in {**kind.inputs, **kind.outputs, **kind.states}.values():

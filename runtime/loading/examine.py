@@ -6,13 +6,16 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
+from ...robots.description import find_robot
+from ...robots.shipped import robot_names
 from ..language.block import Block
 from ..language.errors import UnknownBlockError
+from ..language.fit import fix_without_robot
 from ..language.registry import BlockImportError, find_block, nearest_names
 from ..language.schedule import ScheduleBlock, find_loops, order_blocks
 from ..language.signals import Signal
 from ..language.stages import BlockSpec, CheckedGraph, Position, Wire
-from .fit import check_fit
+from .fit import check_fit, lacks_robot
 from .flat import FlatBlock, FlatGraph
 from .inserted import insert_constant, insert_delay, read_values
 from .parameter_check import check_parameters
@@ -20,9 +23,6 @@ from .problems import Code, Problems, nearest
 from .rates import check_hyperperiod, read_offset, read_period
 from .settings import Settings, read_settings
 from .wire_check import Draft, WireCheck
-
-MAY_BE_ZERO = ("n_contacts", "n_feet")
-"""Dimensions that are zero for some robots; their fields are empty then."""
 
 
 def examine(graph: FlatGraph, problems: Problems) -> CheckedGraph | None:
@@ -56,7 +56,7 @@ def _draft(flat: FlatBlock, graph: FlatGraph, settings: Settings, problems: Prob
     draft.block_type = _find(flat, graph, problems) if flat.use else None
     if draft.block_type is None:
         return draft
-    draft.params = check_parameters(flat, draft.block_type, problems)
+    draft.params = check_parameters(flat, draft.block_type, problems, settings.robot)
     draft.dimensions = settings.dimensions
     if draft.params is None:
         return draft
@@ -69,10 +69,13 @@ def _draft(flat: FlatBlock, graph: FlatGraph, settings: Settings, problems: Prob
                 f"the dimensions of {flat.path} cannot be told: {type(error).__name__}: {error}",
                 flat.where,
                 at=flat.path,
-                fix="robot: bruce" if settings.robot is None else "",
+                fix=fix_without_robot() if settings.robot is None else "",
             )
         return draft
     draft.dimensions = {**settings.dimensions, **local}
+    if settings.robot_known and lacks_robot(draft, settings):
+        check_fit(draft, settings, problems)  # this explains missing dimensions, too
+        return draft
     draft.complete = _check_dimensions(draft, settings, problems)
     if settings.robot_known:
         draft.absent = check_fit(draft, settings, problems)
@@ -112,18 +115,22 @@ def _find(flat: FlatBlock, graph: FlatGraph, problems: Problems) -> type[Block] 
 
 
 def _check_dimensions(draft: Draft, settings: Settings, problems: Problems) -> bool:
-    """Whether every named dimension of the block's ports is known and at least 1, or 0 where a
-    robot may have none of it."""
+    """Whether every named dimension of the block's ports is known and at least 1.
+
+    A dimension of the robot may be zero: one without feet has empty arrays for its contacts.
+    """
     assert draft.block_type is not None
     missing: dict[str, str] = {}
+    of_robot = settings.robot.dimensions if settings.robot else {}
+
+    def least(size: str) -> int:
+        return 0 if size in of_robot and size in draft.dimensions else 1
+
     for ports in (draft.inputs, draft.outputs):
         for port_name, port in ports.items():
             for field_name, field in port.signal.fields.items():
                 for size in field.shape:
-                    if not isinstance(size, str):
-                        continue
-                    least = 0 if size in MAY_BE_ZERO else 1
-                    if draft.dimensions.get(size, -1) < least:
+                    if isinstance(size, str) and draft.dimensions.get(size, 0) < least(size):
                         missing.setdefault(size, f"{port_name}.{field_name}")
     flat = draft.flat
     for name, field_path in missing.items():
@@ -131,10 +138,9 @@ def _check_dimensions(draft: Draft, settings: Settings, problems: Problems) -> b
             continue  # the robot would have had it
         value = draft.dimensions.get(name)
         near = nearest(name, draft.dimensions)
-        of_robots = name in ("n_joints", "n_velocities", "n_contacts", "n_feet")
         fix = f"dimensions: {{{name}: 3}}"
-        if of_robots:
-            fix = "robot: bruce"
+        if settings.robot is None and name in find_robot(robot_names()[0]).dimensions:
+            fix = fix_without_robot()
         elif near:
             fix = f"dimensions: {{{name}: {draft.dimensions[near[0]]}}}"
         problems.add(

@@ -5,11 +5,17 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from ..language.block import Clock, Context, Misfit
-from ..language.fit import find_misfits
+from ..language.fit import find_misfits, unmet_needs
 from .nodes import ListNode, MapNode, Node
 from .problems import Code, Problems
 from .settings import Settings
 from .wire_check import Draft
+
+
+def lacks_robot(draft: Draft, settings: Settings) -> bool:
+    """Whether the block needs something of a robot that the graph's does not have."""
+    assert draft.block_type is not None
+    return bool(unmet_needs(draft.block_type, settings.robot))
 
 
 def check_fit(draft: Draft, settings: Settings, problems: Problems) -> Mapping[str, str]:
@@ -54,6 +60,7 @@ def report_misfit(draft: Draft, misfit: Misfit, problems: Problems) -> None:
         at=".".join([flat.path, *steps]),
         expected=misfit.expected,
         found=misfit.found,
+        nearest=misfit.nearest,
         fix=misfit.fix,
     )
 

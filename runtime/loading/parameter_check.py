@@ -8,9 +8,11 @@ from typing import Any
 
 from pydantic import ValidationError
 
+from ...robots.description import RobotDescription
 from ..language.block import Block
 from ..language.errors import UnitError
 from ..language.parameters import Parameters, unit_of
+from ..language.per_joint import BY_POSITION, by_name
 from ..language.registry import block_name
 from ..language.stages import Position
 from ..language.units import parse_quantity
@@ -40,15 +42,18 @@ _BOUNDS = {
 
 
 def check_parameters(
-    flat: FlatBlock, block_type: type[Block], problems: Problems
+    flat: FlatBlock,
+    block_type: type[Block],
+    problems: Problems,
+    robot: RobotDescription | None = None,
 ) -> Parameters | None:
-    """The block's parameters; ``None`` after a problem."""
+    """The block's parameters; ``None`` after a problem. The robot's joints are named in fixes."""
     model = block_type.Params
     ok = _refuse_truth_values(flat, model, problems)
     try:
         params = model.model_validate(plain(flat.parameters))
     except ValidationError as error:
-        _report(flat, block_type, error.errors(include_url=False), problems)
+        _report(flat, block_type, error.errors(include_url=False), robot, problems)
         return None
     except Exception as error:  # noqa: BLE001  a check of the user's own failed
         problems.add(
@@ -96,7 +101,11 @@ class _Mistake:
 
 
 def _report(
-    flat: FlatBlock, block_type: type[Block], errors: Sequence[Any], problems: Problems
+    flat: FlatBlock,
+    block_type: type[Block],
+    errors: Sequence[Any],
+    robot: RobotDescription | None,
+    problems: Problems,
 ) -> None:
     model = block_type.Params
     mistakes: dict[tuple[Code, str], _Mistake] = {}
@@ -134,10 +143,14 @@ def _report(
             found.expected.append(expected)
         if reason and reason not in found.reasons:
             found.reasons.append(reason)
+        if kind_of == BY_POSITION:
+            found.fix = f"{name}: {_by_name(node, robot)}"
         if isinstance(node, ScalarNode) and isinstance(node.value, str):
             legal = tuple(w.strip("' ") for w in expected.replace(" or ", ",").split(","))
             found.near = found.near or nearest(node.value, [w for w in legal if w])
     for mistake in mistakes.values():
+        if _is_explained(mistake, mistakes.values()):
+            continue
         if mistake.code is Code.BAD_PARAMETER and mistake.near:
             mistake.fix = f"{mistake.name}: {mistake.near[0]}"
         if mistake.code is Code.MISSING_PARAMETER and _is_meant(mistake, mistakes.values()):
@@ -145,10 +158,28 @@ def _report(
         _add(flat, model, mistake, problems)
 
 
+def _by_name(node: Node, robot: RobotDescription | None) -> str:
+    """What a list of values by position may have meant, as a mapping with joint names."""
+    values = plain(node)
+    named = by_name(values, robot) if robot is not None and isinstance(values, list) else {}
+    if named:
+        return text_of(named)
+    names = [text_of(joint.name) for joint in robot.joints] if robot is not None else ["<joint>"]
+    return "{" + ", ".join(f"{name}: ..." for name in names) + "}"
+
+
 def _right_name(entry: Entry, near: Sequence[str]) -> str:
     if not near:
         return f"remove {entry.key!r}"
     return instead(entry.key, text_of(plain(entry.value)), entry.key_where, near[0])
+
+
+def _is_explained(mistake: _Mistake, others: Iterable[_Mistake]) -> bool:
+    """Whether a collection was refused for what others say of its elements: where a number or a
+    mapping may stand, pydantic reports a wrong element and that the mapping is no number."""
+    return isinstance(mistake.node, (MapNode, ListNode)) and any(
+        other.place.startswith((f"{mistake.place}.", f"{mistake.place}[")) for other in others
+    )
 
 
 def _is_meant(missing: _Mistake, mistakes: Iterable[_Mistake]) -> bool:
@@ -247,6 +278,8 @@ def _explain(error: Mapping[str, Any], node: Node, unit: str) -> tuple[str, str]
         return f"{'at least' if few else 'at most'} {limit} values", ""
     if kind_of in ("literal_error", "enum"):
         return str(context["expected"]), ""
+    if kind_of == BY_POSITION:
+        return "a number for all joints, or numbers by joint name or pattern", str(error["msg"])
     if kind_of in ("value_error", "assertion_error"):
         return "", str(context.get("error", error["msg"]))
     if kind_of == "int_from_float":

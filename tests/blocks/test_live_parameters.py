@@ -129,6 +129,7 @@ SCENES: Mapping[str, list[Scene]] = {
     "blocks.LegInverseKinematics": [Scene({"speed_limit": 0.5})],
     "blocks.WholeBodyController": [
         Scene({"force_max": 20.0, "force_min": 1.0}),
+        Scene({"tasks": ["ContactPoints", {"task": "Posture", "gains": {"joints": ["*"]}}]}),
         # no force is both, so the solver fails and the last torque fades
         Scene(
             {"force_max": 20.0, "force_min": 50.0, "fallback_ticks": 50},

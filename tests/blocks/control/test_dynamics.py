@@ -220,3 +220,43 @@ def test_the_rotors_are_those_of_the_profile_in_use():
 def test_needs_a_robot():
     with pytest.raises(BlockError, match="it needs a robot, and the graph names none"):
         BlockBench(Dynamics, dimensions=dict(ROBOT.dimensions))
+
+
+BALL = ROBOT.model_copy(
+    update={
+        "contacts": tuple(
+            contact.model_copy(update={"radius": 0.05})
+            for contact in ROBOT.contacts
+            if contact.name.endswith("toe")
+        )
+    }
+)
+"""BRUCE on balls: one round contact point a foot."""
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_foot_with_one_contact_point_rolls(seed):
+    """The lowest point of the ball is below its centre, and what rests there is its material."""
+    bench, state, step = BlockBench(Dynamics, robot=BALL), State(seed), 1e-5
+    terms = evaluate(bench, state)
+    after, before = evaluate(bench, state.moved(step)), evaluate(bench, state.moved(-step))
+    for point, contact in enumerate(BALL.contacts):
+        centre = link_frame(state, contact.foot, np.add(contact.position, [0, 0, 0.05]))
+        data = state.model.createData()
+        pin.forwardKinematics(state.model, data, state.q, state.v)
+        pin.updateFramePlacements(state.model, data)
+        below = np.array([0.0, 0.0, -0.05])
+        motion = pin.getFrameVelocity(state.model, data, centre, pin.LOCAL_WORLD_ALIGNED)
+        assert terms["contact_position"][point] == pytest.approx(
+            data.oMf[centre].translation + below, abs=1e-12
+        )
+        assert terms["contact_velocity"][point] == pytest.approx(
+            motion.linear + np.cross(motion.angular, below), abs=1e-10
+        )
+        assert terms["foot_position"][point] == pytest.approx(terms["contact_position"][point])
+    assert terms["contact_jacobian"] @ state.v == pytest.approx(
+        terms["contact_velocity"], abs=1e-11
+    )
+    rate = (after["contact_velocity"] - before["contact_velocity"]) / (2.0 * step)
+    acceleration = terms["contact_jacobian"] @ state.acceleration + terms["contact_drift"]
+    assert rate == pytest.approx(acceleration, abs=2e-4)

@@ -6,19 +6,23 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from aloft.blocks.control.leg_inverse_kinematics import LegInverseKinematics
 from aloft.blocks.signals import Phase
-from aloft.robots import leg_kinematics
+from aloft.robots import five_joint_leg
+from aloft.robots.ball_feet import ball_feet
 from aloft.robots.description import find_robot
+from aloft.robots.limb import place_limb, read_limb
 from aloft.runtime.language.errors import BlockError
 from aloft.runtime.testing import BlockBench
 
+from ...robots.limbed_robots import humanoid, quadruped
+
 ROBOT = find_robot("bruce")
-LEGS = [leg_kinematics.read_leg(ROBOT, foot) for foot in range(2)]
+LEGS = [five_joint_leg.read_leg(ROBOT, foot) for foot in range(2)]
 any_number = st.floats(allow_nan=False, allow_infinity=False)
 
 
@@ -26,7 +30,7 @@ def feet_of(joints):
     positions, rotations = np.empty((2, 3)), np.empty((2, 3, 3))
     for leg, position, rotation in zip(LEGS, positions, rotations, strict=True):
         angles = joints[list(leg.joints)]
-        leg_kinematics.forward(leg.hip, leg.plane, leg.signs, angles, position, rotation)
+        five_joint_leg.forward(leg.hip, leg.plane, leg.signs, angles, position, rotation)
     return positions, rotations
 
 
@@ -224,3 +228,135 @@ def test_the_plans_joints_are_followed_as_long_as_the_plan_flies():
     bench.set("reference", phase=int(Phase.LANDING), **planned)
     bench.step()
     assert not np.array_equal(bench.get("target").position, np.linspace(-0.5, 0.5, 10))
+
+
+@given(arrays(np.float64, 10, elements=st.floats(0.05, 0.95)))
+def test_least_squares_agree_with_the_closed_form(fraction):
+    limits = ROBOT.joint_limits
+    joints = limits[:, 0] + fraction * (limits[:, 1] - limits[:, 0])
+    position, rotation = feet_of(joints)
+    found = {}
+    for method in ("auto", "least_squares"):
+        bench = BlockBench(LegInverseKinematics, {"method": method, "softness": 0.0}, robot="bruce")
+        bench.set("feet", position=position, rotation=rotation)
+        bench.set("joints", position=joints + 0.01)
+        bench.step()
+        target = bench.get("target")
+        found[method] = target.position.copy(), target.reachable.copy()
+    for foot, leg in enumerate(LEGS):
+        if found["auto"][1][foot] and abs(joints[leg.joints[1]]) < 1.3:
+            mine = list(leg.joints)
+            assert np.abs(found["auto"][0][mine] - joints[mine]).max() < 1e-9
+            assert found["least_squares"][1][foot]
+            assert np.abs(found["least_squares"][0][mine] - joints[mine]).max() < 1e-9
+
+
+def placed(robot, joints):
+    """Places and rotations of all feet of any robot."""
+    places, turns = [], []
+    for foot in range(len(robot.feet)):
+        limb, pose = read_limb(robot, foot), np.zeros((4, 3))
+        angles = np.asarray(joints)[list(limb.joints)]
+        place_limb(limb.links, limb.tip, angles, np.zeros((len(angles), 6)), pose)
+        places.append(pose[0].copy())
+        turns.append(pose[1:].copy())
+    for ball in ball_feet(robot):  # the lowest point of a ball, which has no orientation
+        places[ball.foot] += turns[ball.foot] @ (ball.centre - robot.feet[ball.foot].sole)
+        places[ball.foot][2] -= ball.radius
+        turns[ball.foot] = np.eye(3)
+    return np.array(places), np.array(turns)
+
+
+@pytest.mark.parametrize("robot", [quadruped(), humanoid()], ids=lambda robot: robot.name)
+def test_legs_of_any_kind_follow_their_feet(robot):
+    rate = 500.0
+    bench = BlockBench(LegInverseKinematics, robot=robot, rate=rate)
+    n = len(robot.joints)
+    legs = [j for foot in range(len(robot.feet)) for j in read_limb(robot, foot).joints]
+    for tick in range(100):
+        shift = np.arange(n)
+        joints = robot.standing_position + 0.15 * np.sin(9.0 * tick / rate + shift)
+        speeds = 0.15 * 9.0 * np.cos(9.0 * tick / rate + shift)
+        position, rotation = placed(robot, joints)
+        velocity = (placed(robot, joints + 1e-6 * speeds)[0] - position) / 1e-6
+        bench.set("feet", position=position, rotation=rotation, velocity=velocity)
+        bench.set("joints", position=joints + 0.02)
+        bench.step()
+        target = bench.get("target")
+        assert target.reachable.all()
+        assert np.abs(target.position - joints)[legs].max() < 1e-7
+        if tick:
+            assert np.abs(target.velocity - speeds)[legs].max() < 0.05
+
+
+def test_joints_of_no_leg_keep_their_held_or_their_measured_position():
+    robot = humanoid()
+    bench = BlockBench(LegInverseKinematics, robot=robot)
+    position, rotation = placed(robot, robot.standing_position)
+    bench.set("feet", position=position, rotation=rotation)
+    bench.set("joints", position=np.full(len(robot.joints), 0.3))
+    bench.step()
+    names = [joint.name for joint in robot.joints]
+    target = bench.get("target")
+    assert target.position[names.index("waist")] == 0.1
+    assert target.position[names.index("shoulder")] == 0.3
+    assert target.velocity[-2:].tolist() == [0.0, 0.0]
+
+
+def test_a_point_foot_out_of_reach_keeps_its_height_where_it_slides():
+    robot = quadruped()
+    position, _ = placed(robot, robot.standing_position)
+    level = np.tile(np.eye(3), (4, 1, 1))
+    away = position + np.array([0.5, 0.0, 0.0])
+    heights = {}
+    for beyond in ("slide", "turn"):
+        bench = BlockBench(LegInverseKinematics, {"beyond": beyond}, robot=robot)
+        bench.set("feet", position=away, rotation=level)
+        bench.set("joints", position=robot.standing_position)
+        for _ in range(5):
+            bench.step()
+        target = bench.get("target")
+        assert not target.reachable.any()
+        heights[beyond] = placed(robot, target.position)[0][:, 2] - position[:, 2]
+    assert np.abs(heights["slide"]).max() < 0.3 * np.abs(heights["turn"]).max()
+
+
+@given(
+    arrays(np.float64, (2, 3), elements=any_number),
+    arrays(np.float64, (2, 3), elements=any_number),
+    arrays(np.float64, (2, 3, 3), elements=any_number),
+    arrays(np.float64, 14, elements=st.floats(-10.0, 10.0)),
+)
+@settings(deadline=None, max_examples=30)
+def test_any_leg_gives_finite_targets_within_limits(position, velocity, rotation, joints):
+    robot = humanoid()
+    bench = BlockBench(LegInverseKinematics, robot=robot)
+    bench.set("feet", position=position, velocity=velocity, rotation=rotation)
+    bench.set("joints", position=joints)
+    for _ in range(2):
+        bench.step()
+    target = bench.get("target")
+    legs, limits = slice(0, 12), robot.joint_limits
+    assert (target.position[legs] >= limits[legs, 0] + 0.049).all()
+    assert (target.position[legs] <= limits[legs, 1] - 0.049).all()
+    assert (np.abs(target.velocity) <= 30.0).all()
+
+
+def test_a_joint_that_carries_two_feet_must_be_held():
+    robot = humanoid()
+    moved = tuple(
+        joint.model_copy(update={"parent": "waist_link"}) if "hip_pitch" in joint.name else joint
+        for joint in robot.joints
+    )
+    params = LegInverseKinematics.Params()
+    both = robot.model_copy(update={"joints": moved, "held": {}})
+    misfits = list(LegInverseKinematics.requires(params, both))
+    assert len(misfits) == 1
+    assert misfits[0].message == (
+        "joint waist of humanoid carries 2 feet; the inverse kinematics solves every leg by "
+        "itself, so it can only hold such a joint"
+    )
+    assert misfits[0].fix == "in the robot's description: held: {waist: 0.0}"
+    assert not list(
+        LegInverseKinematics.requires(params, both.model_copy(update={"held": {"waist": 0.1}}))
+    )

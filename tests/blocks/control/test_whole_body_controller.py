@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from itertools import product
 
 import numpy as np
@@ -77,7 +78,7 @@ def cost(bench, command, active):
     block = bench.block
     program = block._programs[len(active)]
     x = np.concatenate([command["acceleration"], command["force"][active].ravel()])
-    return 0.5 * x @ program.hessian @ x + program.gradient @ x, program, x
+    return 0.5 * x @ program.cost.hessian @ x + program.cost.gradient @ x, program, x
 
 
 @pytest.mark.parametrize("stance", SUBSETS)
@@ -115,15 +116,15 @@ def test_two_solvers_find_the_same_optimum(dynamics, seed, stance, phase):
     assert other == pytest.approx(best, rel=1e-9, abs=1e-6)
     assert second["torque"] == pytest.approx(first["torque"], abs=1e-4)
     # Optimality: minus the gradient is a combination of the active rows, pushing outwards.
-    slack = program.bound - program.inequality @ x
+    slack = program.inequality.bound - program.inequality.matrix @ x
     assert slack.min() > -1e-6
-    tight = program.inequality[slack < 1e-6]
-    basis = np.vstack([program.equality, tight])
-    gradient = program.hessian @ x + program.gradient
+    tight = program.inequality.matrix[slack < 1e-6]
+    basis = np.vstack([program.equality.matrix, tight])
+    gradient = program.cost.hessian @ x + program.cost.gradient
     multipliers = np.linalg.lstsq(basis.T, -gradient, rcond=None)[0]
-    size = 1.0 + np.abs(program.gradient).max()
+    size = 1.0 + np.abs(program.cost.gradient).max()
     assert np.abs(basis.T @ multipliers + gradient).max() < 1e-7 * size
-    assert np.abs(program.equality @ x - program.right).max() < 1e-7
+    assert np.abs(program.equality.matrix @ x - program.equality.bound).max() < 1e-7
 
 
 def test_motor_limits_follow_the_speed(dynamics):
@@ -314,3 +315,41 @@ def test_the_fallback_survives_a_snapshot(dynamics):
 def test_errors_name_the_fix(dynamics):
     with pytest.raises(BlockError, match=r"no quadratic-program solver 'magic'.*daqp"):
         BlockBench(WholeBodyController, {"solver": "magic"}, robot=ROBOT)
+    for task, message in {
+        "Torso": "no task called 'Torso'; did you mean TorsoOrientation?",
+        "nowhere:Task": "task nowhere:Task: there is no module 'nowhere'",
+        "math:pi": "task math:pi: pi does not derive from Task",
+        "aloft.blocks.control.tasks:Task": "does not define row_count, update",
+    }.items():
+        with pytest.raises(BlockError, match=re.escape(message)):
+            BlockBench(WholeBodyController, {"tasks": [task]}, robot=ROBOT)
+    entry = {"task": "LinearMomentum", "gains": {"weight": 3.0}}
+    with pytest.raises(
+        BlockError, match=r"LinearMomentum: gain 'weight':.*linear_weight, linear_st"
+    ):
+        BlockBench(WholeBodyController, {"tasks": [entry]}, robot=ROBOT)
+
+
+def test_a_graph_chooses_the_tasks_and_their_gains(dynamics):
+    """Without the torso's task its orientation does not matter; an entry has gains of its own."""
+    terms = model(dynamics)
+    turned = {"orientation": [0.0, np.sin(0.1), 0.0, np.cos(0.1)]}
+    few = ["ContactPoints", "LinearMomentum", "AngularMomentum"]
+    without, _ = solve(terms, target=turned, tasks=few)
+    level, _ = solve(terms, tasks=few)
+    assert (without["torque"] == level["torque"]).all()
+    stiff = {"task": "TorsoOrientation", "gains": {"torso_stiffness": [50.0] * 3}}
+    entry = {**stiff, "thrust": {"torso_stiffness": [400.0] * 3}}
+    heavy = {"torso_weight": [1e6] * 3}
+    for phase, stiffness in ((Phase.STAND, 50.0), (Phase.THRUST, 400.0)):
+        command, _ = solve(
+            terms, target=turned, tasks=["ContactPoints", entry], phase=phase, limits="none",
+            stand=heavy, thrust=heavy,
+        )  # fmt: skip
+        assert command["acceleration"][4] == pytest.approx(stiffness * 0.2, rel=0.02)
+
+
+def test_the_default_force_limit_follows_the_robots_weight(dynamics):
+    bench = make(model(dynamics))
+    bench.step()
+    assert bench.block._cone.force_max == pytest.approx(8.0 * WEIGHT)

@@ -8,13 +8,13 @@ import pytest
 from aloft.blocks.estimation.state_estimator import StateEstimator
 from aloft.hal.simulated.mujoco_robot import MujocoRobot
 from aloft.mathematics import rotations
-from aloft.robots import leg_kinematics
+from aloft.robots import five_joint_leg
 from aloft.robots.description import find_robot
 from aloft.runtime.language.errors import BlockError
 from aloft.runtime.testing import BlockBench
 
 ROBOT = find_robot("bruce")
-LEGS = [leg_kinematics.read_leg(ROBOT, foot) for foot in range(2)]
+LEGS = [five_joint_leg.read_leg(ROBOT, foot) for foot in range(2)]
 PERIOD = 0.002
 STANDING_HEIGHT = 0.3796
 
@@ -50,7 +50,7 @@ class Motion:
         for leg, foot in zip(LEGS, self.feet(time), strict=True):
             out = np.empty(5)
             sole = matrix.T @ (foot - self.position(time))
-            inside, _ = leg_kinematics.inverse(
+            inside, _ = five_joint_leg.inverse(
                 leg.hip, leg.plane, leg.signs, leg.limits, sole, line, 0.0, 0.0, out
             )
             assert inside

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
-
 import numpy as np
 import pinocchio as pin
 import pytest
 
-from aloft.blocks.jumping.guided_motion import GuidedBody, Motion, MotionRecorder
+from aloft.blocks.jumping.guided_motion import GuidedBody, Motion, MotionRecorder, check_limits
 from aloft.robots.description import find_robot
 from aloft.robots.pinocchio_model import build_pinocchio_model
 from aloft.runtime.language.errors import BlockError
+
+from ...robots.limbed_robots import SEVEN_JOINTS, humanoid, quadruped
 
 ROBOT = find_robot("bruce")
 BUILT = build_pinocchio_model(ROBOT)
@@ -77,8 +77,79 @@ def test_a_motion_is_followed_to_its_end(body):
     assert len(recorder.rows["joint_position"]) == len(recorder.time)
 
 
-def test_a_robot_with_other_legs_is_refused():
-    robot = SimpleNamespace(name="tripod", total_mass=1.0)
-    built = SimpleNamespace(model=BUILT.model, sole_frames=BUILT.sole_frames[:1])
-    with pytest.raises(BlockError, match="tripod: a squat jump is planned for legs of five joints"):
-        GuidedBody(built, robot)
+def test_a_robot_with_too_few_joints_is_refused():
+    robot = quadruped()
+    held = robot.model_copy(update={"held": {"front_left_knee": -1.5, "back_right_knee": -1.5}})
+    with pytest.raises(
+        BlockError, match="feet on the ground fix 2 velocities more than its joints"
+    ):
+        GuidedBody(build_pinocchio_model(held), held)
+
+
+@pytest.mark.parametrize(
+    "robot", [quadruped(), humanoid(), humanoid(SEVEN_JOINTS)], ids=["four", "two", "redundant"]
+)
+@pytest.mark.parametrize("by_momentum", [(False, False, False), (False, True, False)])
+def test_any_body_moves_as_asked(robot, by_momentum):
+    built = build_pinocchio_model(robot)
+    body = GuidedBody(built, robot)
+    q = body.standing(robot.standing_position)
+    feet = np.tile([0.1, -0.05, 0.2], (len(robot.feet), 1))
+    wanted = motion(
+        com_velocity=np.array([0.1, -0.05, 0.4]),
+        rotation=np.array([0.01, 0.02, -0.01]),
+        by_momentum=by_momentum,
+        foot_velocity=feet,
+    )
+    v = body.velocity(q, wanted)
+    data = built.model.createData()
+    pin.computeCentroidalMomentum(built.model, data, q, v)
+    pin.centerOfMass(built.model, data, q, v)
+    assert data.vcom[0] == pytest.approx(wanted.com_velocity, abs=1e-9)
+    for axis in range(3):
+        found = data.hg.angular[axis] if by_momentum[axis] else v[3 + axis]
+        assert found == pytest.approx(wanted.rotation[axis], abs=1e-9)
+    for foot, frame in enumerate(built.sole_frames):
+        turn = pin.computeFrameJacobian(
+            built.model, data, q, frame, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+        )
+        assert turn[:3] @ v == pytest.approx(feet[foot], abs=1e-9)
+        if robot.name == "humanoid":
+            assert turn[3:] @ v == pytest.approx(np.zeros(3), abs=1e-9)
+    names = [joint.name for joint in robot.joints]
+    for name, angle in robot.held.items():
+        assert v[6 + names.index(name)] == pytest.approx(0.0, abs=1e-12)
+        assert q[7 + names.index(name)] == angle
+
+
+def test_a_line_foot_that_points_aside_may_only_roll():
+    """A biped whose line feet point 0.4 rad to the left."""
+    turned = [c.model_copy(update={"position": (
+        c.position[0] * np.cos(0.4), c.position[0] * np.sin(0.4), c.position[2]
+    )}) for c in ROBOT.contacts]  # fmt: skip
+    robot = ROBOT.model_copy(update={"contacts": tuple(turned)})
+    built = build_pinocchio_model(robot)
+    body = GuidedBody(built, robot)
+    q = body.standing(robot.standing_position)
+    v = body.velocity(q, motion(com_velocity=np.array([0.05, 0.1, 0.2])))
+    line = np.array([np.cos(0.4), np.sin(0.4), 0.0])
+    data = built.model.createData()
+    for frame in built.sole_frames:
+        turn = pin.computeFrameJacobian(
+            built.model, data, q, frame, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+        )
+        assert np.cross(turn[3:] @ v, line) == pytest.approx(np.zeros(3), abs=1e-9)
+
+
+def test_a_motion_beyond_limits_or_speeds_is_refused_by_name():
+    columns = {"joint_position": np.zeros((2, 10)), "joint_velocity": np.zeros((2, 10))}
+    columns["joint_position"][:] = ROBOT.standing_position
+    check_limits(ROBOT, columns)
+    columns["joint_velocity"][1, 5] = 40.0
+    with pytest.raises(BlockError, match=r"turns .* at 40.0 rad/s, but koala reaches 30.0 rad/s"):
+        check_limits(ROBOT, columns)
+    columns["joint_position"][1, 3] = 0.2
+    with pytest.raises(
+        BlockError, match=r"takes right_knee 0.220 rad past its limit; ask for less"
+    ):
+        check_limits(ROBOT, columns)

@@ -21,7 +21,7 @@ DEFAULTS = SquatJumpReference.Params()
 def plan(**changes):
     names = SquatJumpTask.__dataclass_fields__
     task = {k: v for k, v in DEFAULTS.model_dump().items() if k in names}
-    return plan_squat_jump(BUILT, ROBOT, SquatJumpTask(**{**task, **changes}), "koala")
+    return plan_squat_jump(BUILT, ROBOT, SquatJumpTask(**{**task, **changes}))
 
 
 @pytest.fixture(scope="module")

@@ -1,11 +1,14 @@
 """Small blocks for the wrong graphs, so that these depend on no block of ours."""
 
+from collections.abc import Iterable
 from typing import Literal
 
 from pydantic import model_validator
 
-from aloft.runtime.language.block import Block, Input, Output
-from aloft.runtime.language.parameters import Parameters, parameter
+from aloft.robots.description import RobotDescription
+from aloft.runtime.language.block import Block, Input, Misfit, Output
+from aloft.runtime.language.parameters import Parameters, live_parameter, parameter
+from aloft.runtime.language.per_joint import PerJoint
 from aloft.runtime.language.signals import Field, Signal
 
 
@@ -144,3 +147,76 @@ class Motionless(Block):
 
 class NotABlock:
     """No block at all."""
+
+
+class Picky(Block):
+    """Works with a robot of so many legs."""
+
+    class Params(Parameters):
+        legs: int = parameter(2, text="how many legs it wants")
+
+    needs = ("robot",)
+    params: Params
+    height = Output(Height)
+
+    @classmethod
+    def requires(cls, params: Parameters, robot: RobotDescription | None) -> Iterable[Misfit]:
+        assert isinstance(params, cls.Params) and robot is not None
+        legs = len(robot.feet)
+        if legs != params.legs:
+            yield Misfit(
+                f"{robot.name} has {legs} legs",
+                parameter="legs",
+                expected=f"{legs} legs",
+                found=f"{params.legs} legs",
+                fix=f"legs: {legs}",
+            )
+
+    def step(self) -> None: ...
+
+
+class Clumsy(Block):
+    """Fails when it is asked what it requires."""
+
+    height = Output(Height)
+
+    @classmethod
+    def requires(cls, params: Parameters, robot: RobotDescription | None) -> Iterable[Misfit]:
+        raise ZeroDivisionError("division by zero")
+
+    def step(self) -> None: ...
+
+
+class Walker(Block):
+    """Needs all that a robot can have."""
+
+    needs = ("robot", "floating base", "feet", "imu", "switches")
+    joints = Output(Joints)
+
+    def step(self) -> None: ...
+
+
+class Springs(Block):
+    """A stiffness for every joint."""
+
+    class Params(Parameters):
+        stiffness: PerJoint = parameter(40.0, unit="N m/rad", ge=0.0, text="of every joint")
+
+    needs = ("robot",)
+    params: Params
+    joints = Output(Joints)
+
+    def step(self) -> None: ...
+
+
+class LiveSprings(Block):
+    """A stiffness for every joint, which may change."""
+
+    class Params(Parameters):
+        stiffness: PerJoint = live_parameter({"*": 40.0}, unit="N m/rad", text="of every joint")
+
+    needs = ("robot",)
+    params: Params
+    joints = Output(Joints)
+
+    def step(self) -> None: ...

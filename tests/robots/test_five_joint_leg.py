@@ -10,7 +10,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from aloft.robots import leg_kinematics as legs
+from aloft.robots import five_joint_leg as legs
 from aloft.robots.description import find_robot
 from aloft.robots.kinematics import link_poses
 from aloft.runtime.language.errors import BlockError
@@ -214,7 +214,7 @@ def test_inverse_velocity_undoes_the_jacobian(side, fraction, rate):
     assume(np.linalg.svd(rows)[1][-1] > 0.02)
     out = np.empty(5)
     legs.inverse_velocity(
-        sole_jacobian, rotation, twist[:3], np.cross(twist[3:], rotation[:, 0]), 1e-5,
+        sole_jacobian, rotation, twist[:3], np.cross(twist[3:], rotation[:, 0]), 0.3, 1e-5,
         np.empty((5, 5)), np.empty((3, 5)), np.empty((5, 5)), out,
     )  # fmt: skip
     assert np.abs(out - rate).max() < 1e-5

@@ -1,4 +1,4 @@
-"""The kinematics of a five-joint leg in closed form: hip yaw, pitch and roll, knee, ankle.
+"""The closed form of a leg of five joints: hip yaw, pitch and roll, knee and ankle, line foot.
 
 The three hip axes meet in the hip centre; knee and ankle turn about the axis the hip roll leaves
 horizontal, so thigh, calf and sole lie in one plane, the leg plane. With five joints a foot can
@@ -24,6 +24,7 @@ from ..mathematics.least_squares import solve_damped
 from ..mathematics.rotations import wrap
 from ..runtime.language.errors import BlockError
 from .description import RobotDescription
+from .limb import FootKind, chain_to, foot_shape
 
 Array = NDArray[np.float64]
 
@@ -63,41 +64,55 @@ def read_leg(robot: RobotDescription, foot: int) -> Leg:
     Raises:
         BlockError: the chain from base to foot is not a leg of the kind described above.
     """
-    name, link = robot.feet[foot].name, robot.feet[foot].link
-    chain: list[int] = []
-    while link != robot.base:
-        index = next((i for i, j in enumerate(robot.joints) if j.child == link), None)
-        if index is None:
-            raise BlockError(f"foot {name}: no joint carries link {link!r}")
-        chain.insert(0, index)
-        link = robot.joints[index].parent
-
-    def refuse(what: str) -> BlockError:
-        return BlockError(
-            f"foot {name}: {what}; this inverse kinematics is for legs of hip yaw (z), pitch (y) "
-            "and roll (x) with intersecting axes, then knee (y) and ankle (y) in one plane"
+    chain = chain_to(robot, robot.feet[foot].link)
+    mismatch = _mismatch(robot, foot, chain)
+    if mismatch:
+        raise BlockError(
+            f"foot {robot.feet[foot].name}: {mismatch}; this inverse kinematics is for legs of hip "
+            "yaw (z), pitch (y) and roll (x) with intersecting axes, then knee (y) and ankle (y) in "
+            "one plane, that end in a line foot"
         )
-
     joints = [robot.joints[i] for i in chain]
-    if len(joints) != len(_AXES):
-        raise refuse(f"expected 5 joints from {robot.base}, found {len(joints)}")
-    signs = np.ones(5)
-    for i, (joint, (kind, axis)) in enumerate(zip(joints, _AXES, strict=True)):
-        if abs(abs(joint.axis[axis]) - 1.0) > 1e-9:
-            raise refuse(f"joint {joint.name} should turn about {'xyz'[axis]} ({kind})")
-        signs[i] = joint.axis[axis] * _CANONICAL[i]
-    if any(joint.origin != (0.0, 0.0, 0.0) for joint in joints[1:3]):
-        raise refuse("the hip axes do not meet in one point")
     offsets = np.array([joints[3].origin, joints[4].origin, robot.feet[foot].sole])
-    if np.abs(offsets[:, 1]).max() > 0.0:
-        raise refuse("knee, ankle or sole lies beside the leg plane")
+    signs = [joint.axis[k] * c for joint, (_, k), c in zip(joints, _AXES, _CANONICAL, strict=True)]
     return Leg(
-        joints=tuple(chain),
+        joints=chain,
         hip=np.array(joints[0].origin),
         plane=np.ascontiguousarray(offsets[:, ::2]),
-        signs=signs,
-        limits=np.array([joint.limits for joint in joints]),
+        signs=np.array(signs),
+        limits=robot.joint_limits[list(chain)].copy(),
     )
+
+
+def find_leg(robot: RobotDescription, foot: int) -> Leg | None:
+    """The leg that ends in foot number ``foot``, or ``None`` where it is of another kind."""
+    if _mismatch(robot, foot, chain_to(robot, robot.feet[foot].link)):
+        return None
+    return read_leg(robot, foot)
+
+
+def _mismatch(robot: RobotDescription, foot: int, chain: tuple[int, ...]) -> str:
+    """What keeps a chain of joints from being a leg of this kind; empty if nothing does."""
+    joints = [robot.joints[i] for i in chain]
+    if len(joints) != len(_AXES):
+        return f"expected 5 joints from {robot.base}, found {len(joints)}"
+    for joint, (kind, axis) in zip(joints, _AXES, strict=True):
+        if joint.kind != "hinge" or abs(abs(joint.axis[axis]) - 1.0) > 1e-9:
+            return f"joint {joint.name} should turn about {'xyz'[axis]} ({kind})"
+        if joint.limits is None:
+            return f"joint {joint.name} has no limits"
+        if joint.name in robot.held:
+            return f"joint {joint.name} is held"
+    if any(joint.origin != (0.0, 0.0, 0.0) for joint in joints[1:3]):
+        return "the hip axes do not meet in one point"
+    if any(
+        place[1] != 0.0 for place in (joints[3].origin, joints[4].origin, robot.feet[foot].sole)
+    ):
+        return "knee, ankle or sole lies beside the leg plane"
+    shape, line = foot_shape(robot, foot)
+    if shape != FootKind.LINE or abs(float(line[0]) - 1.0) > 1e-9:
+        return "its contact points are not in a line along x"
+    return ""
 
 
 @kernel
@@ -266,6 +281,7 @@ def inverse_velocity(
     rotation: Array,
     velocity: Array,
     line_rate: Array,
+    length: float,
     damping: float,
     rows: Array,
     turns: Array,
@@ -275,17 +291,17 @@ def inverse_velocity(
     """Joint velocities (5,) for a sole velocity and a rate of the foot's line.
 
     Least squares, damped: (A'A + damping^2) out = A'b. A's rows are the sole's velocity and, times
-    a leg's length, the two turns of the line.
+    ``length``, the two turns of the line.
 
     Args:
         sole_jacobian: from ``jacobian``.
         rotation: the foot's, from ``forward``.
         velocity: of the sole [m/s, base frame].
         line_rate: the time derivative of the line's unit direction [1/s, base frame].
+        length: how much distance a turn of 1 rad counts as [m].
         damping: in m; 1e-4 changes nothing until a leg is stretched to within 1e-4 rad.
         rows, turns, normal: scratch of shapes (5, 5), (3, 5) and (5, 5).
     """
-    length = 0.3
     np.dot(rotation.T, sole_jacobian[3:6, :], turns)
     turn, nod = 0.0, 0.0
     for i in range(3):

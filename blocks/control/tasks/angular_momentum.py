@@ -1,0 +1,98 @@
+"""Angular momentum about the centre of mass: damped, or as planned."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ....mathematics.kernel import kernel
+from ....mathematics.whole_body_qp import TaskRows
+from ....robots.description import RobotDescription
+from ....runtime.language.parameters import Parameters, parameter
+from .task import Situation, Task
+
+Array = NDArray[np.float64]
+Vector = tuple[float, float, float]
+
+
+class AngularGains(Parameters):
+    """Weights and gains of the angular momentum; vectors are x, y, z of the world."""
+
+    angular_weight: Vector = parameter(
+        (1.0, 1.0, 1.0), text="weight of the angular momentum, per N m"
+    )
+    angular_damping: Vector = parameter(
+        (5.0, 5.0, 5.0), unit="1/s", text="gain on the error of the angular momentum"
+    )
+    track_angular_momentum: bool = parameter(
+        False, text="track the target's angular momentum instead of damping all of it"
+    )
+
+
+class Feedback(NamedTuple):
+    """Weights and gains as arrays, (3,) each, and whether the target is tracked."""
+
+    weight: Array
+    damping: Array
+    track: bool
+
+
+class Momentum(NamedTuple):
+    """An angular momentum [N m s] and its rate [N m] about the centre of mass, (3,) each, world."""
+
+    value: Array
+    rate: Array
+
+
+class AngularMomentum(Task[Feedback]):
+    """The rate of the angular momentum k is -K_d k, the paper's damping (V, task 4), or, with
+    ``track_angular_momentum``, k_ref' + K_d (k_ref - k).
+
+    The rows are the angular rows of the centroidal momentum matrix, in N m. The torso's error is in
+    rad/s^2; for equal say the weight here must be larger by 1/I^2, with I the inertia of the whole
+    robot: about 160 for a robot of 5 kg, and below one for a robot of 30 kg.
+    """
+
+    Gains = AngularGains
+
+    def __init__(self, situation: Situation, rows: TaskRows) -> None:
+        super().__init__(situation, rows)
+        terms, target = situation.terms, situation.target
+        self._measured = Momentum(terms.angular_momentum, terms.centroidal_drift[3:6])
+        self._target = Momentum(target.angular_momentum, target.angular_momentum_rate)
+
+    @classmethod
+    def row_count(cls, robot: RobotDescription, gains: AngularGains) -> int:
+        return 3
+
+    def prepare(self, gains: AngularGains) -> Feedback:
+        return Feedback(
+            np.array(gains.angular_weight), np.array(gains.angular_damping),
+            gains.track_angular_momentum,
+        )  # fmt: skip
+
+    def update(self, gains: Feedback) -> None:
+        angular_rows(
+            self.situation.terms.centroidal_matrix, self._measured, self._target, gains, self.rows
+        )
+
+
+@kernel
+def angular_rows(
+    matrix: Array, measured: Momentum, target: Momentum, gains: Feedback, rows: TaskRows
+) -> None:
+    """Three rows for the rate of the angular momentum.
+
+    Args:
+        matrix: centroidal momentum matrix (6, n_velocities).
+        measured: its ``rate`` is the drift, the rate at zero acceleration.
+    """
+    rows.jacobian[:, :] = matrix[3:6]
+    for i in range(3):
+        wanted = -float(gains.damping[i]) * float(measured.value[i])
+        if gains.track:
+            wanted += float(target.rate[i]) + float(gains.damping[i]) * float(target.value[i])
+        rows.desired[i] = wanted - float(measured.rate[i])
+        rows.weights[i] = gains.weight[i]

@@ -1,0 +1,99 @@
+"""From the list of tasks in a graph to task classes with their gains."""
+
+from __future__ import annotations
+
+import difflib
+import inspect
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from ....runtime.language.errors import AloftError
+from ....runtime.language.parameters import Parameters
+from ....runtime.language.registry import find_class
+from .angular_momentum import AngularMomentum
+from .contact_points import ContactPoints
+from .linear_momentum import LinearMomentum
+from .posture import Posture
+from .task import Task, TaskChoice
+from .torso_orientation import TorsoOrientation
+
+OWN_TASKS: Mapping[str, type[Task[Any]]] = {
+    kind.__name__: kind
+    for kind in (ContactPoints, LinearMomentum, TorsoOrientation, AngularMomentum, Posture)
+}
+"""The tasks that a graph may choose by name, in the order of the default list."""
+
+PHASE_KINDS = ("stand", "thrust", "landing")
+"""The kinds of phases that have gains of their own."""
+
+
+class TaskChoiceError(AloftError):
+    """An entry of the list of tasks cannot be used; the message is one line."""
+
+
+@dataclass(frozen=True)
+class ChosenTask:
+    """A task class, and the entry that chose it."""
+
+    kind: type[Task[Any]]
+    entry: TaskChoice
+
+    def gains(self, phase: str, shared: Parameters) -> Parameters:
+        """The task's gains in the phases called ``phase``, of which ``shared`` are the controller's.
+
+        Raises:
+            TaskChoiceError: the entry sets a gain that the task does not have, or a wrong value.
+        """
+        try:
+            return self.entry.gains_of(self.kind, phase, shared)
+        except ValidationError as error:
+            first = error.errors()[0]
+            gain = ".".join(map(str, first["loc"]))
+            known = ", ".join(self.kind.Gains.model_fields) or "none"
+            raise TaskChoiceError(
+                f"task {self.entry.task}: gain {gain!r}: {first['msg']}; its gains are {known}"
+            ) from error
+
+
+def choose_tasks(
+    entries: Sequence[str | TaskChoice], folder: Path | None = None
+) -> tuple[ChosenTask, ...]:
+    """The tasks of a list, in its order.
+
+    Args:
+        folder: where the graph lies; files in it can be imported as modules.
+
+    Raises:
+        TaskChoiceError: there is no such task, or it is not a task.
+    """
+    chosen = []
+    for item in entries:
+        entry = item if isinstance(item, TaskChoice) else TaskChoice(task=item)
+        chosen.append(ChosenTask(_find_task(entry.task, folder), entry))
+    return tuple(chosen)
+
+
+def _find_task(name: str, folder: Path | None) -> type[Task[Any]]:
+    if name in OWN_TASKS:
+        return OWN_TASKS[name]
+    if ":" not in name:
+        nearest = difflib.get_close_matches(name, OWN_TASKS, n=1, cutoff=0.4)
+        hint = f"did you mean {nearest[0]}? " if nearest else ""
+        raise TaskChoiceError(
+            f"there is no task called {name!r}; {hint}There are {', '.join(OWN_TASKS)}, and a task "
+            "of your own is named module:Class"
+        )
+    try:
+        found = find_class(name, folder)
+    except AloftError as error:
+        raise TaskChoiceError(f"task {name}: {error}") from error
+    if not (isinstance(found, type) and issubclass(found, Task)):
+        raise TaskChoiceError(f"task {name}: {name.partition(':')[2]} does not derive from Task")
+    if inspect.isabstract(found):
+        missing = ", ".join(sorted(found.__abstractmethods__))
+        raise TaskChoiceError(f"task {name}: the class does not define {missing}")
+    return found

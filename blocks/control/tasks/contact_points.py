@@ -1,0 +1,237 @@
+"""The contact points: at rest where they carry load, else on their way down or up."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ....mathematics.kernel import kernel
+from ....mathematics.whole_body_qp import TaskRows
+from ....robots.description import RobotDescription
+from ....runtime.language.parameters import Parameters, parameter
+from ...signals import Phase
+from .foot_joints import rolling_joint
+from .task import Situation, Task
+
+Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+Indices = NDArray[np.int64]
+
+
+class ContactGains(Parameters):
+    """Weights and gains of the contact points."""
+
+    stance_weight: float = parameter(
+        1e3, ge=0.0, text="weight of the rest of points in stance, per m/s^2"
+    )
+    stance_damping: float = parameter(
+        0.0, unit="1/s", ge=0.0, text="damping of the velocity of points in stance"
+    )
+    swing_weight: float = parameter(
+        10.0,
+        ge=0.0,
+        text="weight of points without load, per m/s^2: they go to the ground; in the thrust they "
+        "are damped across the foot",
+    )
+    swing_stiffness: float = parameter(
+        3000.0, unit="1/s^2", ge=0.0, text="stiffness that pulls points without load to the ground"
+    )
+    swing_damping: float = parameter(
+        110.0, unit="1/s", ge=0.0, text="damping of the velocity of points without load"
+    )
+    rolling_weight: float = parameter(
+        0.1, ge=0.0, text="weight of the ankle of a foot that rolls over its toes, per rad/s^2"
+    )
+    rolling_stiffness: float = parameter(
+        1000.0, unit="1/s^2", ge=0.0, text="position gain of that ankle towards the plan"
+    )
+    rolling_damping: float = parameter(
+        60.0, unit="1/s", ge=0.0, text="velocity gain of that ankle towards the plan"
+    )
+
+
+class Points(NamedTuple):
+    """The contact points: (n, 3, n_velocities), then (n, 3) each [m, m/s, m/s^2, world]."""
+
+    jacobian: Array
+    drift: Array
+    position: Array
+    velocity: Array
+
+
+class Ankles(NamedTuple):
+    """The joint each foot rolls with: its place in the generalised velocity, -1 for none, and the
+    acceleration it should have [rad/s^2], (n_feet,) each."""
+
+    place: Indices
+    acceleration: Array
+
+
+class JointMotion(NamedTuple):
+    """Joint angles [rad], velocities and accelerations, (n_joints,) each."""
+
+    position: Array
+    velocity: Array
+    acceleration: Array
+
+
+class ContactPoints(Task[ContactGains]):
+    """Points in stance do not accelerate (paper, V, task 1): J a + drift = -damping velocity.
+
+    Points that are not in stance while others are go to the ground, at the mean height of the
+    others: a task of zero acceleration never closes a gap, and a program that believes in a
+    hovering heel pushes with nothing. In THRUST such points are leaving the ground: those of a foot
+    with an ankle are free to rise, as the heels do while the toes still push, and damped across
+    their foot, while the ankle follows the plan with feedforward and feedback. A foot without
+    an ankle (see ``foot_joints.rolling_joint``) only has its velocity damped.
+    """
+
+    Gains = ContactGains
+
+    def __init__(self, situation: Situation, rows: TaskRows) -> None:
+        super().__init__(situation, rows)
+        robot, terms, target = situation.robot, situation.terms, situation.target
+        self._points = Points(
+            terms.contact_jacobian, terms.contact_drift, terms.contact_position,
+            terms.contact_velocity,
+        )  # fmt: skip
+        self._foot = np.array(robot.foot_of_contact(), dtype=np.int64)
+        joints = [rolling_joint(robot, foot) for foot in range(len(robot.feet))]
+        first = robot.base_velocities
+        places = [-1 if joint is None else first + joint for joint in joints]
+        self._ankles = Ankles(np.array(places, dtype=np.int64), np.zeros(len(joints)))
+        self._planned = JointMotion(
+            target.joint_position, target.joint_velocity, target.joint_acceleration
+        )
+
+    @classmethod
+    def row_count(cls, robot: RobotDescription, gains: ContactGains) -> int:
+        return 3 * len(robot.contacts)
+
+    def update(self, gains: ContactGains) -> None:
+        now, g = self.situation, gains
+        contact_rows(
+            self._points, now.phase.stance, g.stance_weight, g.stance_damping,
+            g.swing_weight, g.swing_stiffness, g.swing_damping, self.rows,
+        )  # fmt: skip
+        if int(now.phase.phase) == Phase.THRUST:
+            follow_plan(
+                self._planned, now.joints.position, now.terms.velocity,
+                g.rolling_stiffness, g.rolling_damping, self._ankles,
+            )  # fmt: skip
+            lifting_rows(
+                self._points, now.phase.stance, self._foot, now.terms.foot_rotation, self._ankles,
+                g.swing_weight, g.swing_damping, g.rolling_weight, self.rows,
+            )  # fmt: skip
+
+
+@kernel
+def contact_rows(
+    points: Points,
+    stance: Flags,
+    stance_weight: float,
+    stance_damping: float,
+    swing_weight: float,
+    swing_stiffness: float,
+    swing_damping: float,
+    rows: TaskRows,
+) -> None:
+    """Three rows a contact point: rest in stance, else a fall to the ground under the others.
+
+    Elsewhere the height falls to the mean height of the points in stance as a spring and damper
+    would bring it there, and the velocity along the ground is damped.
+    """
+    count = stance.shape[0]
+    ground, loaded = 0.0, 0
+    for i in range(count):
+        if stance[i]:
+            ground += float(points.position[i, 2])
+            loaded += 1
+    ground = ground / loaded if loaded else 0.0
+    for i in range(count):
+        for k in range(3):
+            row = 3 * i + k
+            rows.jacobian[row, :] = points.jacobian[i, k, :]
+            speed, drift = float(points.velocity[i, k]), float(points.drift[i, k])
+            if stance[i]:
+                rows.weights[row] = stance_weight
+                rows.desired[row] = -stance_damping * speed - drift
+            else:
+                rows.weights[row] = swing_weight
+                wanted = -swing_damping * speed
+                if k == 2:
+                    wanted += swing_stiffness * (ground - float(points.position[i, 2]))
+                rows.desired[row] = wanted - drift
+
+
+@kernel
+def follow_plan(
+    planned: JointMotion,
+    position: Array,
+    velocity: Array,
+    stiffness: float,
+    damping: float,
+    ankles: Ankles,
+) -> None:
+    """The acceleration that keeps every ankle on the plan: feedforward and feedback.
+
+    Args:
+        position: measured joint angles, (n_joints,).
+        velocity: generalised velocity, (n_velocities,).
+    """
+    first = velocity.shape[0] - position.shape[0]
+    for foot in range(ankles.place.shape[0]):
+        place = int(ankles.place[foot])
+        if place >= 0:
+            joint = place - first
+            ankles.acceleration[foot] = (
+                float(planned.acceleration[joint])
+                + stiffness * (float(planned.position[joint]) - float(position[joint]))
+                + damping * (float(planned.velocity[joint]) - float(velocity[place]))
+            )
+
+
+@kernel
+def lifting_rows(
+    points: Points,
+    stance: Flags,
+    foot: Indices,
+    foot_rotation: Array,
+    ankles: Ankles,
+    weight: float,
+    damping: float,
+    ankle_weight: float,
+    rows: TaskRows,
+) -> None:
+    """Points that leave the ground before lift-off, over what ``contact_rows`` wrote for them.
+
+    They are free to rise; their velocity across the foot is damped, so that the foot rolls over its
+    other points and does not turn about them. How fast it rolls is the ankle's task, since the
+    motion of centre of mass and torso leaves it open. Points of a foot without an ankle have all
+    of their velocity damped.
+
+    Args:
+        foot: the foot of every point; foot_rotation: from foot to world, (n_feet, 3, 3).
+    """
+    for i in range(stance.shape[0]):
+        if stance[i]:
+            continue
+        row, wanted, ankle = 3 * i, 0.0, int(ankles.place[foot[i]])
+        if ankle < 0:
+            rows.desired[row + 2] = -damping * float(points.velocity[i, 2]) - float(
+                points.drift[i, 2]
+            )
+            continue
+        rows.jacobian[row, :] = 0.0
+        for k in range(3):
+            across = float(foot_rotation[foot[i], k, 1])
+            wanted -= across * (damping * float(points.velocity[i, k]) + float(points.drift[i, k]))
+            for j in range(rows.jacobian.shape[1]):
+                rows.jacobian[row, j] += across * float(points.jacobian[i, k, j])
+        rows.desired[row] = wanted
+        rows.jacobian[row + 1, :] = 0.0
+        rows.jacobian[row + 1, ankle] = 1.0
+        rows.desired[row + 1] = ankles.acceleration[foot[i]]
+        rows.weights[row], rows.weights[row + 1], rows.weights[row + 2] = weight, ankle_weight, 0.0

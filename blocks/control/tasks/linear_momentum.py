@@ -1,0 +1,103 @@
+"""The centre of mass: linear momentum by feedforward and feedback."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ....mathematics.kernel import kernel
+from ....mathematics.whole_body_qp import TaskRows
+from ....robots.description import RobotDescription
+from ....runtime.language.parameters import Parameters, parameter
+from .task import Situation, Task
+
+Array = NDArray[np.float64]
+Vector = tuple[float, float, float]
+
+
+class LinearGains(Parameters):
+    """Weights and gains of the centre of mass; vectors are x, y, z of the world."""
+
+    linear_weight: Vector = parameter(
+        (100.0, 100.0, 100.0), text="weight of the centre of mass, per m/s^2"
+    )
+    linear_stiffness: Vector = parameter(
+        (100.0, 100.0, 100.0), unit="1/s^2", text="position gain of the centre of mass"
+    )
+    linear_damping: Vector = parameter(
+        (20.0, 20.0, 20.0), unit="1/s", text="velocity gain of the centre of mass"
+    )
+
+
+class Feedback(NamedTuple):
+    """Weights and gains as arrays, (3,) each."""
+
+    weight: Array
+    stiffness: Array
+    damping: Array
+
+
+class Centre(NamedTuple):
+    """A centre of mass: position, velocity and acceleration [m, m/s, m/s^2, world], (3,) each."""
+
+    position: Array
+    velocity: Array
+    acceleration: Array
+
+
+class LinearMomentum(Task[Feedback]):
+    """The centre of mass accelerates by a_ref + K_p (p_ref - p) + K_d (v_ref - v) (paper, V, task 2).
+
+    With the linear rows A_l of the centroidal momentum matrix and their drift, the rows are
+    A_l / m a = that - drift / m, in m/s^2.
+    """
+
+    Gains = LinearGains
+
+    def __init__(self, situation: Situation, rows: TaskRows) -> None:
+        super().__init__(situation, rows)
+        terms, target = situation.terms, situation.target
+        self._mass = situation.robot.total_mass
+        self._target = Centre(target.com, target.com_velocity, target.com_acceleration)
+        self._measured = Centre(terms.com, terms.com_velocity, terms.centroidal_drift)
+
+    @classmethod
+    def row_count(cls, robot: RobotDescription, gains: LinearGains) -> int:
+        return 3
+
+    def prepare(self, gains: LinearGains) -> Feedback:
+        return Feedback(
+            np.array(gains.linear_weight), np.array(gains.linear_stiffness),
+            np.array(gains.linear_damping),
+        )  # fmt: skip
+
+    def update(self, gains: Feedback) -> None:
+        linear_rows(
+            self.situation.terms.centroidal_matrix, self._mass, self._measured, self._target, gains,
+            self.rows,
+        )  # fmt: skip
+
+
+@kernel
+def linear_rows(
+    matrix: Array, mass: float, measured: Centre, target: Centre, gains: Feedback, rows: TaskRows
+) -> None:
+    """Three rows for the acceleration of the centre of mass.
+
+    Args:
+        matrix: centroidal momentum matrix (6, n_velocities).
+        mass: of the robot [kg].
+        measured: its ``acceleration`` is the drift of the momentum [N], of which the first three
+            elements count.
+    """
+    np.divide(matrix[0:3], mass, rows.jacobian)
+    for i in range(3):
+        rows.desired[i] = (
+            float(target.acceleration[i])
+            + float(gains.stiffness[i]) * (float(target.position[i]) - float(measured.position[i]))
+            + float(gains.damping[i]) * (float(target.velocity[i]) - float(measured.velocity[i]))
+            - float(measured.acceleration[i]) / mass
+        )
+        rows.weights[i] = gains.weight[i]

@@ -1,0 +1,147 @@
+"""Joint angles: arms, waist and other joints that no other task says enough about."""
+
+from __future__ import annotations
+
+from fnmatch import fnmatchcase
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ....mathematics.kernel import kernel
+from ....mathematics.whole_body_qp import TaskRows
+from ....robots.description import RobotDescription
+from ....runtime.language.parameters import Parameters, parameter
+from .foot_joints import leg_joints
+from .task import Situation, Task
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+
+class PostureGains(Parameters):
+    """Weights and gains of joints towards their angles."""
+
+    posture_weight: float | dict[str, float] = parameter(
+        1.0, text="weight of a joint's angle, per rad/s^2; one number, or by joint name or pattern"
+    )
+    posture_stiffness: float = parameter(
+        100.0, unit="1/s^2", ge=0.0, text="position gain of the joints"
+    )
+    posture_damping: float = parameter(20.0, unit="1/s", ge=0.0, text="velocity gain of the joints")
+
+
+class PostureChoice(PostureGains):
+    """The gains, and which joints they are for."""
+
+    joints: list[str] = parameter(
+        [], text="names or patterns of the joints; none: all that belong to no leg"
+    )
+
+
+class Feedback(NamedTuple):
+    """Weights by row (n,), and the two gains."""
+
+    weight: Array
+    stiffness: float
+    damping: float
+
+
+class JointTargets(NamedTuple):
+    """Joint angles [rad], velocities and accelerations by row, (n,) each."""
+
+    position: Array
+    velocity: Array
+    acceleration: Array
+
+
+class Posture(Task[Feedback]):
+    """Joints accelerate by q_ref'' + K_p (q_ref - q) + K_d (q_ref' - q'), one row a joint.
+
+    Joints that the robot's description holds stand still at their angle; others follow the
+    target's joint angles. By default the joints are those of no leg, so that the program does not
+    swing arms to balance; with ``joints: ["*"]`` and a small weight it says which of many solutions
+    a redundant robot takes.
+    """
+
+    Gains = PostureChoice
+
+    def __init__(self, situation: Situation, rows: TaskRows) -> None:
+        super().__init__(situation, rows)
+        self._joints: Indices = np.zeros(rows.desired.shape[0], dtype=np.int64)
+        n = len(self._joints)
+        self._reference = JointTargets(np.zeros(n), np.zeros(n), np.zeros(n))
+        robot = situation.robot
+        self._is_held = [joint.name in robot.held for joint in robot.joints]
+        self._held = np.array([robot.held.get(joint.name, 0.0) for joint in robot.joints])
+
+    @classmethod
+    def row_count(cls, robot: RobotDescription, gains: PostureChoice) -> int:
+        return len(chosen_joints(robot, gains))
+
+    def prepare(self, gains: PostureChoice) -> Feedback:
+        robot = self.situation.robot
+        chosen = chosen_joints(robot, gains)
+        self._joints[:] = chosen
+        weights = gains.posture_weight
+        patterns = weights if isinstance(weights, dict) else {"*": weights}
+        by_row = np.zeros(len(chosen))
+        for row, joint in enumerate(chosen):
+            for pattern, weight in patterns.items():
+                if fnmatchcase(robot.joints[joint].name, pattern):
+                    by_row[row] = weight
+        return Feedback(by_row, gains.posture_stiffness, gains.posture_damping)
+
+    def update(self, gains: Feedback) -> None:
+        terms, target = self.situation.terms, self.situation.target
+        reference = self._reference
+        for row in range(self._joints.shape[0]):
+            joint = int(self._joints[row])
+            if self._is_held[joint]:
+                reference.position[row] = self._held[joint]
+                reference.velocity[row] = reference.acceleration[row] = 0.0
+            else:
+                reference.position[row] = target.joint_position[joint]
+                reference.velocity[row] = target.joint_velocity[joint]
+                reference.acceleration[row] = target.joint_acceleration[joint]
+        posture_rows(
+            self._joints, self.situation.joints.position, terms.velocity, reference, gains,
+            self.rows,
+        )  # fmt: skip
+
+
+def chosen_joints(robot: RobotDescription, gains: PostureChoice) -> list[int]:
+    """The joints of the task, in the order of the description."""
+    names = [joint.name for joint in robot.joints]
+    if gains.joints:
+        return [k for k, n in enumerate(names) if any(fnmatchcase(n, p) for p in gains.joints)]
+    legs = {joint for foot in range(len(robot.feet)) for joint in leg_joints(robot, foot)}
+    return [k for k, name in enumerate(names) if k not in legs or name in robot.held]
+
+
+@kernel
+def posture_rows(
+    joints: Indices,
+    position: Array,
+    velocity: Array,
+    reference: JointTargets,
+    gains: Feedback,
+    rows: TaskRows,
+) -> None:
+    """One row for each of the ``joints``: its own acceleration [rad/s^2].
+
+    Args:
+        position: measured joint angles, (n_joints,).
+        velocity: generalised velocity, (n_velocities,).
+    """
+    first = velocity.shape[0] - position.shape[0]
+    rows.jacobian[:, :] = 0.0
+    for row in range(joints.shape[0]):
+        joint = int(joints[row])
+        rows.jacobian[row, first + joint] = 1.0
+        rows.desired[row] = (
+            float(reference.acceleration[row])
+            + gains.stiffness * (float(reference.position[row]) - float(position[joint]))
+            + gains.damping * (float(reference.velocity[row]) - float(velocity[first + joint]))
+        )
+        rows.weights[row] = gains.weight[row]

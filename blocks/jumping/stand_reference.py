@@ -1,0 +1,136 @@
+"""Standing still, and if asked for a squat: what any robot with feet can follow without a plan."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...mathematics.polynomials import minimum_jerk
+from ...planner.library.jump_table import JumpTable, JumpTableReader
+from ...robots.description import RobotDescription
+from ...robots.pinocchio_model import build_pinocchio_model
+from ...runtime.language.block import Block, Misfit, Output
+from ...runtime.language.parameters import Parameters, parameter
+from ..signals import JumpReference
+from .guided_motion import GuidedBody, Motion, MotionRecorder, check_limits, missing_joints
+
+Array = NDArray[np.float64]
+
+NEVER = 1e6
+"""The time [s] of a lift-off that is not planned."""
+
+
+class StandReference(Block):
+    """The whole body standing as its description says; if asked for, it squats and rises again.
+
+    The feet stand still and the base stays level. For ``stand_time`` the robot stands in its
+    standing pose. With a ``squat_depth`` above zero its centre of mass then goes down by that much
+    with least jerk within ``squat_time``, and over the middle of the feet; it waits there for
+    ``pause_time`` and rises within ``rise_time`` to the height it stood at. Then it stands for
+    ever. All joints follow from the feet, the centre of mass and the base (see ``guided_motion``);
+    joints that the description holds stay at their held angle.
+
+    The phase is STAND, and SQUAT from the squat on; no lift-off is ever planned. The reference is
+    made at load and follows time alone: it does not know what the robot really does. The load
+    report has a problem for a robot with too few joints; a squat that takes a joint past its limit
+    or a motor past its speed raises ``BlockError`` at load.
+    """
+
+    class Params(Parameters):
+        squat_depth: float = parameter(
+            0.0, unit="m", ge=0.0, le=0.5, text="how far the centre of mass goes down; 0: not"
+        )
+        stand_time: float = parameter(
+            0.5, unit="s", gt=0.0, text="standing before the squat, for the estimator to settle"
+        )
+        squat_time: float = parameter(0.5, unit="s", gt=0.1, text="going down")
+        pause_time: float = parameter(0.3, unit="s", gt=0.0, text="waiting at the bottom")
+        rise_time: float = parameter(0.6, unit="s", gt=0.1, text="rising to standing height")
+        lead: float = parameter(
+            0.002,
+            unit="s",
+            ge=0.0,
+            le=0.02,
+            text="delay from sensing to torque that is made up for",
+        )
+
+    needs = ("floating base", "feet")
+    params: Params
+    reference = Output(JumpReference, text="the stance or squat at the present instant")
+
+    @classmethod
+    def requires(cls, params: Parameters, robot: RobotDescription | None) -> Iterable[Misfit]:
+        """Joints enough to move the centre of mass and the base with all feet on the ground."""
+        assert robot is not None
+        missing = missing_joints(robot)
+        if missing:
+            yield Misfit(
+                f"{robot.name} lacks {missing} joints to move its centre of mass and its base with "
+                "all feet on the ground",
+                expected=f"{len(robot.joints) + missing} joints that are not held",
+                found=f"{len(robot.joints) - len(robot.held)}",
+            )
+
+    def setup(self) -> None:
+        p = self.params
+        times = (p.stand_time, p.squat_time, p.pause_time, p.rise_time)
+        self._reader = JumpTableReader(
+            _plan(self.robot.model_dump_json(), float(p.squat_depth), times)
+        )
+
+    def step(self) -> None:
+        self._reader.read(self.time, self.reference, self.params.lead)
+
+
+@lru_cache(maxsize=8)
+def _plan(robot: str, depth: float, times: tuple[float, float, float, float]) -> JumpTable:
+    """The motion for a robot given as JSON: the same for all runs of a process."""
+    description = RobotDescription.model_validate_json(robot)
+    return plan_stand(description, depth, times)
+
+
+def plan_stand(
+    robot: RobotDescription, depth: float, times: tuple[float, float, float, float]
+) -> JumpTable:
+    """The stance, and with a ``depth`` above zero [m] the squat, as a table.
+
+    Args:
+        robot: who stands.
+        depth: how far the centre of mass goes down [m].
+        times: standing, going down, waiting and rising [s].
+
+    Raises:
+        BlockError: the squat takes a joint past its limit or a motor past its speed.
+    """
+    stand_time, squat_time, pause_time, rise_time = times
+    body = GuidedBody(build_pinocchio_model(robot), robot)
+    table = MotionRecorder(body, body.standing(robot.standing_position))
+    still = np.zeros((len(robot.feet), 3))
+    home = body.com(table.q)
+    low = np.array([0.0, 0.0, float(home[2]) - depth])
+    high = np.array([0.0, 0.0, float(home[2])])
+
+    def between(start: Array, end: Array, duration: float, t: float) -> Motion:
+        share, rate, bend = minimum_jerk(t / duration)
+        return Motion(
+            com=start + share * (end - start),
+            com_velocity=rate / duration * (end - start),
+            com_acceleration=bend / duration**2 * (end - start),
+            rotation=np.zeros(3),
+            rotation_rate=np.zeros(3),
+            by_momentum=(False, False, False),
+            foot_velocity=still,
+        )
+
+    table.run(stand_time, lambda t: between(home, home, stand_time, t))
+    if depth > 0.0:
+        table.run(squat_time, lambda t: between(home, low, squat_time, t))
+        table.run(pause_time, lambda t: between(low, low, pause_time, t))
+        table.run(rise_time, lambda t: between(low, high, rise_time, t))
+    columns = {name: np.array(rows) for name, rows in table.rows.items()}
+    check_limits(robot, columns)
+    squat = stand_time if depth > 0.0 else NEVER
+    return JumpTable(np.array(table.time), columns, squat, NEVER, NEVER, NEVER, NEVER)

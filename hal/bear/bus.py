@@ -1,0 +1,263 @@
+"""The bus of BEAR actuators: one master, and actuators that answer when they are asked."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+from ...runtime.language.errors import AloftError
+from .conditions import describe, is_critical
+from .frames import Frame, FrameReader, Instruction, frame_bytes
+from .registers import CONFIG, STATUS, Register
+
+BAUDRATE = 8_000_000
+"""The rate of a new actuator [bit/s]."""
+REPLY_TIME = 3e-3
+"""Seconds that an actuator has for its reply: the transfer, the adapter's delay of 1 ms, a reserve."""
+TRIES = 3
+"""How often a question is asked before the actuator counts as silent."""
+
+
+class BusError(AloftError):
+    """The bus or an actuator on it does not do what it should; the message names which."""
+
+
+class NoReplyError(BusError):
+    """An actuator stays silent."""
+
+
+class SerialPort(Protocol):
+    """What the bus needs of a serial port; ``serial.Serial`` has it all."""
+
+    timeout: float | None
+
+    def write(self, data: bytes | bytearray, /) -> int | None:
+        """Send all bytes."""
+
+    def read(self, size: int = 1, /) -> bytes:
+        """Up to ``size`` bytes, and what has come when ``timeout`` seconds are over."""
+
+    def reset_input_buffer(self) -> None:
+        """Forget what was received and not read."""
+
+    def close(self) -> None:
+        """Give the port back."""
+
+
+@dataclass(frozen=True)
+class Reply:
+    """What an actuator answered: its error byte and its data."""
+
+    device: int
+    error_byte: int
+    data: bytes
+
+    @property
+    def trouble(self) -> str:
+        """What the error byte reports, in words."""
+        return describe(self.error_byte)
+
+    @property
+    def failed(self) -> bool:
+        """Whether the actuator has switched its torque off."""
+        return is_critical(self.error_byte)
+
+
+@dataclass
+class BusCounts:
+    """What went wrong on the bus since it was opened."""
+
+    silent: int = 0
+    """Questions without an answer in time."""
+    damaged: int = 0
+    """Frames with a wrong checksum."""
+    stray: int = 0
+    """Frames of somebody else, or with the wrong number of bytes."""
+
+
+def open_port(path: str, baudrate: int = BAUDRATE) -> SerialPort:
+    """The serial port at ``path``, for this process alone.
+
+    Raises:
+        BusError: there is no such port, or another process has it.
+    """
+    import serial
+
+    try:
+        port: SerialPort = serial.Serial(path, baudrate, timeout=REPLY_TIME, exclusive=True)
+    except (serial.SerialException, OSError, ValueError) as error:
+        raise BusError(
+            f"the serial port {path} cannot be opened: {error}; look for its name with "
+            "`ls /dev/serial/by-id`, and for another program that uses it"
+        ) from error
+    return port
+
+
+class BearBus:
+    """Questions to single actuators and their answers, in order, one at a time.
+
+    A question that only reads is asked again where the answer is missing or damaged; a write has
+    no answer and is sent once. Values that an actuator would ignore because they are out of its
+    range are refused here.
+
+    Args:
+        port: the serial port.
+        reply_time: seconds that an actuator has for its reply.
+        tries: how often a question is asked.
+    """
+
+    def __init__(
+        self, port: SerialPort, *, reply_time: float = REPLY_TIME, tries: int = TRIES
+    ) -> None:
+        self.port = port
+        self.reply_time = reply_time
+        self.tries = tries
+        self.counts = BusCounts()
+        self._reader = FrameReader()
+
+    def close(self) -> None:
+        """Give the port back."""
+        self.port.close()
+
+    def ping(self, device: int) -> Reply:
+        """Ask whether an actuator is there; its reply holds 4 bytes of versions.
+
+        Raises:
+            NoReplyError: it is not.
+        """
+        return self._ask(device, Instruction.PING, b"", 4)
+
+    def scan(self, devices: Sequence[int]) -> dict[int, Reply]:
+        """The actuators of those addresses that answer, asked once each."""
+        found = {}
+        for device in devices:
+            reply = self._try(frame_bytes(device, Instruction.PING), device, 4)
+            if reply is not None:
+                found[device] = reply
+        return found
+
+    def read(self, device: int, *names: str) -> dict[str, float]:
+        """The values of status or configuration registers, by name.
+
+        Raises:
+            BusError: there is no such register.
+            NoReplyError: the actuator does not answer.
+        """
+        registers = [register_of(name) for name in names]
+        values: dict[str, float] = {}
+        for area, code in (
+            ("status", Instruction.READ_STATUS),
+            ("config", Instruction.READ_CONFIG),
+        ):
+            wanted = [register for register in registers if register.area == area]
+            if not wanted:
+                continue
+            addresses = bytes(register.address for register in wanted)
+            data = self._ask(device, code, addresses, 4 * len(wanted)).data
+            for k, register in enumerate(wanted):
+                values[register.name] = register.unpack(data[4 * k : 4 * k + 4])
+        return {register.name: values[register.name] for register in registers}
+
+    def write(self, device: int, values: Mapping[str, float]) -> None:
+        """Set registers, by name. The actuator sends no answer; ``verify`` reads them back.
+
+        Raises:
+            BusError: there is no such register, it cannot be written, or the value is out of its
+                range: nothing is sent then.
+        """
+        parts: dict[str, bytes] = {}
+        for name, value in values.items():
+            register = register_of(name)
+            _check_value(register, value)
+            part = bytes((register.address,)) + register.pack(value)
+            parts[register.area] = parts.get(register.area, b"") + part
+        for area, code in (
+            ("status", Instruction.WRITE_STATUS),
+            ("config", Instruction.WRITE_CONFIG),
+        ):
+            if area in parts:
+                self.port.write(frame_bytes(device, code, parts[area]))
+
+    def verify(self, device: int, values: Mapping[str, float]) -> None:
+        """Set registers and read them back.
+
+        Raises:
+            BusError: a register has another value afterwards; or as ``write`` and ``read``.
+        """
+        self.write(device, values)
+        found = self.read(device, *values)
+        for name, value in values.items():
+            register = register_of(name)
+            if found[name] != register.unpack(register.pack(value)):
+                raise BusError(
+                    f"actuator {device}: {name} was set to {value:g} {register.unit} and is "
+                    f"{found[name]:g}; configuration can only be set while the torque is off"
+                )
+
+    def save(self, device: int) -> None:
+        """Keep the configuration in flash memory, which bears some 10,000 writes."""
+        self.port.write(frame_bytes(device, Instruction.SAVE_CONFIG))
+
+    def _ask(self, device: int, code: Instruction, data: bytes, length: int) -> Reply:
+        """The answer to a question, asked up to ``tries`` times."""
+        question = frame_bytes(device, code, data)
+        for _ in range(self.tries):
+            reply = self._try(question, device, length)
+            if reply is not None:
+                return reply
+        raise NoReplyError(
+            f"actuator {device} does not answer {code.name} after {self.tries} tries of "
+            f"{1e3 * self.reply_time:g} ms; check its power, its address and the cable"
+        )
+
+    def _try(self, question: bytes, device: int, length: int) -> Reply | None:
+        """The answer with ``length`` bytes of data, or none in time."""
+        self.port.reset_input_buffer()
+        self._reader.clear()
+        self.port.write(question)
+        end = time.monotonic() + self.reply_time
+        missing = length + 6
+        while True:
+            left = end - time.monotonic()
+            if left <= 0.0:
+                self.counts.silent += 1
+                return None
+            self.port.timeout = left
+            for frame in self._read_frames(missing):
+                if frame.device == device and len(frame.data) == length:
+                    return Reply(device, frame.code, frame.data)
+                self.counts.stray += 1
+
+    def _read_frames(self, size: int) -> list[Frame]:
+        before = self._reader.damaged
+        frames = self._reader.feed(self.port.read(size))
+        self.counts.damaged += self._reader.damaged - before
+        return frames
+
+
+def register_of(name: str) -> Register:
+    """The register of that name.
+
+    Raises:
+        BusError: there is none; the message names the nearest.
+    """
+    register = STATUS.get(name) or CONFIG.get(name)
+    if register is None:
+        from difflib import get_close_matches
+
+        near = get_close_matches(name, [*STATUS, *CONFIG], 3)
+        hint = f"; the nearest are {', '.join(near)}" if near else ""
+        raise BusError(f"BEAR actuators have no register {name!r}{hint}")
+    return register
+
+
+def _check_value(register: Register, value: float) -> None:
+    if not register.writable:
+        raise BusError(f"{register.name} can only be read")
+    if not register.least <= value <= register.most:  # also refuses what is not a number
+        raise BusError(
+            f"{register.name} takes {register.least:g} to {register.most:g} {register.unit}, and "
+            f"{value:g} would be ignored by the actuator"
+        )

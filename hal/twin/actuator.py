@@ -1,0 +1,179 @@
+"""A BEAR actuator as its bus sees it: registers, limits, errors, and what it ignores."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from ..bear.conditions import HEALTHY
+from ..bear.frames import Frame, Instruction
+from ..bear.registers import CONFIG, STATUS, Mode, Register, Torque
+
+CORRUPT, HOT, ENCODER, WATCHDOG, LIMIT, HARDWARE, FLASH = range(7)
+"""The bits of the error byte."""
+VERSION = b"\x01\x00\x02\x00"
+"""What a ping answers; how the four bytes are to be read is not published."""
+
+_STATUS = {register.address: register for register in STATUS.values()}
+_CONFIG = {register.address: register for register in CONFIG.values()}
+
+
+@dataclass
+class EmulatedActuator:
+    """One actuator, without its mechanics: whoever owns it sets what the sensors measure, and reads
+    what the drive is to do.
+
+    It has the quirks that are known of the real ones: it ignores a goal beyond a limit instead of
+    clamping it, sends no answer to a write, ignores configuration while its torque is on, sets its
+    watchdog's error when nothing was written for ``watchdog_timeout``, switches off for good on an
+    error, and warns of damaged packets in its next answer only.
+
+    Attributes:
+        device: its address.
+        status, config: the registers' values, by name.
+        stopped: whether the emergency stop's line is pressed.
+        saves: how often the configuration was saved to flash.
+    """
+
+    device: int
+    status: dict[str, float] = field(
+        default_factory=lambda: {name: register.default for name, register in STATUS.items()}
+    )
+    config: dict[str, float] = field(
+        default_factory=lambda: {name: register.default for name, register in CONFIG.items()}
+    )
+    stopped: bool = False
+    saves: int = 0
+    _errors: int = 0
+    _corrupt: bool = False
+    _silent_time: float = 0.0
+
+    def __post_init__(self) -> None:
+        self.config["id"] = self.device
+        self.status.setdefault("input_voltage", 14.8)
+        self.status["input_voltage"] = self.status["input_voltage"] or 14.8
+        for sensor in ("winding", "powerstage", "ic"):
+            self.status[f"{sensor}_temperature"] = 25.0
+
+    @property
+    def error_byte(self) -> int:
+        """What the next answer reports."""
+        hot = self.status["winding_temperature"] > self.config["temp_limit_low"]
+        return HEALTHY | self._errors | hot << HOT | self._corrupt << CORRUPT
+
+    @property
+    def driving(self) -> bool:
+        """Whether the drive follows its goals."""
+        return self.status["torque_enable"] == Torque.ON and not self._errors
+
+    @property
+    def damping(self) -> bool:
+        """Whether the windings are shorted, which brakes."""
+        return self.status["torque_enable"] == Torque.DAMPING
+
+    def fail(self, bit: int) -> None:
+        """Set an error's bit: the torque goes off until the error is cleared."""
+        self._errors |= 1 << bit
+        if self.status["torque_enable"] == Torque.ON:
+            self.status["torque_enable"] = Torque.ERROR
+
+    def garble(self) -> None:
+        """A packet arrived damaged; the next answer says so."""
+        self._corrupt = True
+
+    def advance(self, seconds: float) -> None:
+        """Let time pass: the watchdog, voltage and temperature are looked at."""
+        self._silent_time += seconds
+        timeout = 1e-6 * self.config["watchdog_timeout"]
+        in_mode = self.config["mode"] in (Mode.TORQUE, Mode.DIRECT_FORCE)
+        if timeout and in_mode and self.driving and self._silent_time > timeout:
+            self.fail(WATCHDOG)
+        if self.stopped:
+            self.fail(WATCHDOG)
+        voltage = self.status["input_voltage"]
+        if not self.config["min_voltage"] <= voltage <= self.config["max_voltage"]:
+            self.fail(HARDWARE)
+        if self.status["winding_temperature"] > self.config["temp_limit_high"]:
+            self.fail(HARDWARE)
+        position = self.status["present_position"]
+        low, high = self.config["limit_position_min"], self.config["limit_position_max"]
+        if self.driving and not low <= position <= high and self.config["mode"] == Mode.POSITION:
+            self.fail(LIMIT)
+
+    def answer(self, frame: Frame) -> bytes | None:
+        """The data of the answer to an instruction for this actuator; ``None`` where it is silent."""
+        data = frame.data
+        match frame.code:
+            case Instruction.PING:
+                return VERSION
+            case Instruction.READ_STATUS:
+                return self._read(data, _STATUS, self.status)
+            case Instruction.READ_CONFIG:
+                return self._read(data, _CONFIG, self.config)
+            case Instruction.WRITE_STATUS:
+                self._write(data, _STATUS, self.status)
+            case Instruction.WRITE_CONFIG:
+                if not self.driving:
+                    self._write(data, _CONFIG, self.config)
+            case Instruction.SAVE_CONFIG:
+                self.saves += 1
+                self.status["torque_enable"] = Torque.OFF
+        return None
+
+    def bulk_read(self, addresses: bytes) -> bytes:
+        """The status registers of a bulk exchange's answer."""
+        return self._read(addresses, _STATUS, self.status)
+
+    def bulk_write(self, addresses: bytes, values: bytes) -> None:
+        """Take over the goals of a bulk exchange."""
+        pairs = b"".join(
+            bytes((address,)) + values[4 * k : 4 * k + 4] for k, address in enumerate(addresses)
+        )
+        self._write(pairs, _STATUS, self.status)
+
+    def answered(self) -> None:
+        """An answer with the error byte has gone out."""
+        self._corrupt = False
+
+    def _read(
+        self, addresses: bytes, known: dict[int, Register], values: dict[str, float]
+    ) -> bytes:
+        found = b""
+        for address in addresses:
+            register = known.get(address)
+            found += register.pack(values[register.name]) if register else bytes(4)
+        return found
+
+    def _write(self, data: bytes, known: dict[int, Register], values: dict[str, float]) -> None:
+        self._silent_time = 0.0
+        for start in range(0, len(data) - 4, 5):
+            register = known.get(data[start])
+            if register is None or not register.writable:
+                continue
+            value = register.unpack(data[start + 1 : start + 5])
+            if not register.least <= value <= register.most or self._beyond(register.name, value):
+                continue
+            if register.name == "torque_enable":
+                self._enable(int(value))
+            else:
+                values[register.name] = value
+
+    def _beyond(self, name: str, value: float) -> bool:
+        """Whether a goal is beyond its limit; the actuator then keeps the last one."""
+        if name == "goal_iq":
+            return abs(value) > self.config["limit_i_max"]
+        if name == "goal_velocity" and self.config["mode"] != Mode.DIRECT_FORCE:
+            return abs(value) > self.config["limit_velocity_max"]
+        if name == "goal_position" and self.config["mode"] == Mode.POSITION:
+            low, high = self.config["limit_position_min"], self.config["limit_position_max"]
+            return not low <= value <= high
+        return False
+
+    def _enable(self, wanted: int) -> None:
+        if wanted == Torque.OFF and not self.stopped:
+            self._errors = 0  # errors are cleared by switching off
+        if wanted == Torque.ON and self._errors:
+            return
+        if wanted == Torque.DAMPING:
+            self._errors |= 1 << WATCHDOG
+        if wanted != Torque.ERROR:
+            self.status["torque_enable"] = wanted

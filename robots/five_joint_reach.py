@@ -1,0 +1,156 @@
+"""What a five-joint leg does for a target beyond its reach, and how fast its target moves.
+
+These kernels complete ``five_joint_leg``: they draw a foot's target back into reach in the plane
+of its sole, slow a leg down that stretches, and differentiate the foot's line. Everything is in
+the base's frame, in m and rad.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..mathematics.kernel import kernel
+from .five_joint_leg import inverse
+
+Array = NDArray[np.float64]
+
+_LEVEL = 0.3
+"""A sole whose normal has less than this along the base's z axis does not slide."""
+_HALVINGS = 8
+"""The place in reach is found to within a 256th of the way."""
+_FARTHEST = 10.0
+"""Places [m] are brought within this distance before they slide."""
+_JUMP = 0.1
+"""A line that turns by more than this [rad] in a tick has been given anew."""
+
+
+@kernel
+def pitched_line(rotation: Array, pitch: float, out: Array) -> None:
+    """The x axis of ``rotation`` (3, 3), turned by ``pitch`` [rad] about its y axis."""
+    cosine, sine = math.cos(pitch), math.sin(pitch)
+    for i in range(3):
+        out[i] = cosine * float(rotation[i, 0]) - sine * float(rotation[i, 2])
+
+
+@kernel
+def slide(
+    hip: Array,
+    plane: Array,
+    signs: Array,
+    limits: Array,
+    sole: Array,
+    rotation: Array,
+    softness: float,
+    present_yaw: float,
+    place: Array,
+    angles: Array,
+) -> tuple[bool, float]:
+    """Draw a ``sole`` out of reach, in its own plane, towards a place that is in reach.
+
+    That is the one straight below the hip, seen from the sole, or where even that is out of reach
+    the one on the base's z axis through the hip, where every angle of the hip is small. The place
+    in reach that is nearest to the target on this way is found by bisection, to within a 256th
+    of the way.
+
+    Args:
+        hip, plane, signs, limits, softness, present_yaw: as for ``five_joint_leg.inverse``.
+        sole, rotation: the target's place and axes, of which the third is normal to the sole.
+        place: scratch (3,).
+        angles: out, the joint angles (5,) for that place; as they were where there is none.
+
+    Returns:
+        Whether there is such a place, and the second result of ``inverse`` for it.
+    """
+    nx, ny, nz = float(rotation[0, 2]), float(rotation[1, 2]), float(rotation[2, 2])
+    if nz < _LEVEL or not abs(nx * nx + ny * ny + nz * nz - 1.0) < 0.1:
+        return False, 1.0
+    hx, hy, hz = float(hip[0]), float(hip[1]), float(hip[2])
+    sx = min(max(float(sole[0]), -_FARTHEST), _FARTHEST)
+    sy = min(max(float(sole[1]), -_FARTHEST), _FARTHEST)
+    sz = min(max(float(sole[2]), -_FARTHEST), _FARTHEST)
+    depth = nx * (hx - sx) + ny * (hy - sy) + nz * (hz - sz)
+    line = rotation[:, 0]
+    for axis in range(2):
+        ax, ay, az = hx - depth * nx, hy - depth * ny, hz - depth * nz
+        if axis == 1:
+            ax, ay, az = hx, hy, hz - depth / nz
+        near, far, share = 0.0, 1.0, 1.0
+        for step in range(_HALVINGS + 2):
+            # First the end of the way, whether it is in reach; halves of it; the answer again.
+            last = step == _HALVINGS + 1
+            part = near if step == 0 or last else 0.5 * (near + far)
+            place[0] = ax + part * (sx - ax)
+            place[1] = ay + part * (sy - ay)
+            place[2] = az + part * (sz - az)
+            inside, kept = inverse(
+                hip, plane, signs, limits, place, line, softness, present_yaw, angles
+            )
+            if inside:
+                near, share = part, kept
+            elif step == 0:
+                break
+            else:
+                far = part
+            if last:
+                return True, share
+    inverse(hip, plane, signs, limits, sole, line, softness, present_yaw, angles)
+    return False, 1.0
+
+
+@kernel
+def keep_along(axis: Array, vector: Array) -> None:
+    """Keep of ``vector`` (3,) only its part along ``axis`` (3,), of unit length."""
+    part = 0.0
+    for i in range(3):
+        part += float(axis[i]) * float(vector[i])
+    for i in range(3):
+        vector[i] = part * float(axis[i])
+
+
+@kernel
+def slow_stretch(
+    hip: Array, plane: Array, sole: Array, rotation: Array, share: float, velocity: Array
+) -> None:
+    """Keep only a ``share`` of the velocity [m/s] that leads the ankle away from the hip.
+
+    Args:
+        hip, plane: of the ``Leg``.
+        sole, rotation: of the foot, from ``five_joint_leg.forward``.
+    """
+    if share == 1.0:
+        return
+    square, along = 1e-9, 0.0
+    for i in range(3):
+        lever = float(plane[2, 0]) * float(rotation[i, 0]) + float(plane[2, 1]) * float(
+            rotation[i, 2]
+        )
+        reach = float(sole[i]) - lever - float(hip[i])
+        square += reach * reach
+        along += reach * float(velocity[i])
+    scale = (1.0 - share) * along / square
+    for i in range(3):
+        lever = float(plane[2, 0]) * float(rotation[i, 0]) + float(plane[2, 1]) * float(
+            rotation[i, 2]
+        )
+        velocity[i] -= scale * (float(sole[i]) - lever - float(hip[i]))
+
+
+@kernel
+def line_rate(line: Array, last: Array, period: float, known: bool, out: Array) -> None:
+    """How fast the direction of ``line`` turns [1/s]; ``last`` becomes its direction now."""
+    x, y, z = float(line[0]), float(line[1]), float(line[2])
+    largest = max(abs(x), abs(y), abs(z))
+    if largest < 1e-300:
+        x, y, z = 1.0, 0.0, 0.0
+    else:
+        x, y, z = x / largest, y / largest, z / largest
+    size = math.sqrt(x * x + y * y + z * z)
+    x, y, z = x / size, y / size, z / size
+    dx, dy, dz = x - float(last[0]), y - float(last[1]), z - float(last[2])
+    jumped = dx * dx + dy * dy + dz * dz > _JUMP * _JUMP
+    scale = 0.0 if jumped or not known else 1.0 / period
+    out[0], out[1], out[2] = scale * dx, scale * dy, scale * dz
+    last[0], last[1], last[2] = x, y, z

@@ -1,0 +1,449 @@
+"""The inverse kinematics of a limb of any number of joints, by damped least squares within limits.
+
+A foot's target is a place and an orientation. How much of the orientation counts follows from the
+foot's kind: nothing for a point foot, the direction of its line for a line foot, all of it for a
+flat one. With the error e(q) between target and foot, weighted, and J its negative derivative, the
+joint angles solve
+
+    min |e(q)|^2   within the limits,
+
+by Levenberg and Marquardt's method: from the present angles, with L = mu |e|^2,
+
+    dq = (J'J + L I)^-1 J'e,
+
+the step is cut off at the limits and taken if it makes the error smaller; mu shrinks or grows with
+how much of the promised gain came true (Nielsen's rule), and grows where there was none. A joint that stands at its limit and would have to go beyond it is left out. Damping
+by the squared error makes the last steps Newton's, so the error's digits double with each of them.
+
+Vectors are in the base's frame, in m and rad. The kernels allocate nothing, take a bounded number
+of steps and return finite numbers for all finite arguments. They share one scratch array
+``work``, see ``limb_scratch``.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..mathematics.kernel import kernel
+from ..mathematics.least_squares import solve_positive
+from .limb import limb_jacobian, place_limb
+
+Array = NDArray[np.float64]
+
+FOUND = 1e-24
+"""A squared error [m^2] below which no further step is taken."""
+REACHED = 1e-18
+"""A squared error [m^2] below which the target counts as reached: a nanometre."""
+_FAR = 10.0
+"""Targets are brought within this distance [m], so that no square overflows."""
+_FLOOR = 1e-13
+"""Damping [m^2] that is always there; it keeps the steps finite where a limb is singular."""
+_STILL = 1e-18
+"""A squared gradient by the squared error [m^2] below which the error no longer gets smaller."""
+
+
+def limb_scratch(joints: int) -> Array:
+    """The scratch array that the kernels of this file need for a limb of so many joints."""
+    return np.zeros((2 * joints + 16, max(joints, 6)))
+
+
+@kernel
+def aim(position: Array, rotation: Array, target: Array) -> None:
+    """Make a target of any finite numbers: within 10 m, and with a true rotation matrix.
+
+    Args:
+        position: of the sole centre (3,).
+        rotation: from foot to base (3, 3); its first and then its second axis are kept.
+        target: out, the place and then the rows of the rotation matrix, (4, 3).
+    """
+    for k in range(3):
+        target[0, k] = min(max(float(position[k]), -_FAR), _FAR)
+    x0, x1, x2 = _unit(
+        float(rotation[0, 0]), float(rotation[1, 0]), float(rotation[2, 0]), 1.0, 0.0, 0.0
+    )
+    y0, y1, y2 = _unit(
+        float(rotation[0, 1]), float(rotation[1, 1]), float(rotation[2, 1]), 0.0, 1.0, 0.0
+    )
+    part = x0 * y0 + x1 * y1 + x2 * y2
+    if abs(part) > 0.999999:
+        # The second axis is of no use: take the base's axis that is farthest from the first.
+        y0, y1, y2 = 0.0, 0.0, 0.0
+        if abs(x1) <= abs(x0) and abs(x1) <= abs(x2):
+            y1 = 1.0
+        elif abs(x2) <= abs(x0):
+            y2 = 1.0
+        else:
+            y0 = 1.0
+        part = x0 * y0 + x1 * y1 + x2 * y2
+    y0, y1, y2 = _unit(y0 - part * x0, y1 - part * x1, y2 - part * x2, 0.0, 1.0, 0.0)
+    target[1, 0], target[2, 0], target[3, 0] = x0, x1, x2
+    target[1, 1], target[2, 1], target[3, 1] = y0, y1, y2
+    target[1, 2] = x1 * y2 - x2 * y1
+    target[2, 2] = x2 * y0 - x0 * y2
+    target[3, 2] = x0 * y1 - x1 * y0
+
+
+@kernel
+def foot_error(tip: Array, pose: Array, target: Array, weights: Array, error: Array) -> float:
+    """The weighted error of a foot's pose, and its square [m^2].
+
+    Args:
+        tip: of the ``Limb``.
+        pose, target: a place and the rows of a rotation matrix, (4, 3).
+        weights: of the place in the plane of the target's sole, of the place along its normal,
+            and how many metres a turn of 1 rad counts as, (3,).
+        error: out, (6,); the last three are zero for a point foot.
+    """
+    plane, normal, length = float(weights[0]), float(weights[1]), float(weights[2])
+    ex = float(target[0, 0]) - float(pose[0, 0])
+    ey = float(target[0, 1]) - float(pose[0, 1])
+    ez = float(target[0, 2]) - float(pose[0, 2])
+    nx, ny, nz = float(target[1, 2]), float(target[2, 2]), float(target[3, 2])
+    along = (normal - plane) * (nx * ex + ny * ey + nz * ez)
+    ex, ey, ez = plane * ex + along * nx, plane * ey + along * ny, plane * ez + along * nz
+    tx, ty, tz, sine, cosine = 0.0, 0.0, 0.0, 0.0, 1.0
+    if tip[6] == 1.0:
+        lx, ly, lz = _along(pose, tip)
+        wx, wy, wz = _along(target, tip)
+        tx, ty, tz = ly * wz - lz * wy, lz * wx - lx * wz, lx * wy - ly * wx
+        sine, cosine = math.sqrt(tx * tx + ty * ty + tz * tz), lx * wx + ly * wy + lz * wz
+        if sine < 1e-7 and cosine < 0.0:
+            # The line points the opposite way: turn about an axis at right angles to it.
+            tx, ty, tz = _unit(-ly * lx, 1.0 - ly * ly, -ly * lz, 0.0, 0.0, 1.0)
+            sine = 1.0
+            cosine = -1e9
+    elif tip[6] == 2.0:
+        # The axis of target times the foot's inverse, times the sine of the angle.
+        tx = 0.5 * (_product(target, pose, 3, 2) - _product(target, pose, 2, 3))
+        ty = 0.5 * (_product(target, pose, 1, 3) - _product(target, pose, 3, 1))
+        tz = 0.5 * (_product(target, pose, 2, 1) - _product(target, pose, 1, 2))
+        a, b, c = (
+            _product(target, pose, 1, 1),
+            _product(target, pose, 2, 2),
+            _product(target, pose, 3, 3),
+        )
+        sine, cosine = math.sqrt(tx * tx + ty * ty + tz * tz), 0.5 * (a + b + c - 1.0)
+        if sine < 1e-7 and cosine < 0.0:
+            # Half a turn: its axis is that of the largest element of the diagonal.
+            k = 1 if a >= b and a >= c else (2 if b >= c else 3)
+            tx = 0.5 * (_product(target, pose, 1, k) + _product(target, pose, k, 1))
+            ty = 0.5 * (_product(target, pose, 2, k) + _product(target, pose, k, 2))
+            tz = 0.5 * (_product(target, pose, 3, k) + _product(target, pose, k, 3))
+            if k == 1:
+                tx += 1.0
+            elif k == 2:
+                ty += 1.0
+            else:
+                tz += 1.0
+            tx, ty, tz = _unit(tx, ty, tz, 1.0, 0.0, 0.0)
+            sine = 1.0
+            cosine = -1e9
+    scale = length if sine < 1e-7 else length * math.atan2(sine, cosine) / sine
+    tx, ty, tz = scale * tx, scale * ty, scale * tz
+    error[0], error[1], error[2], error[3], error[4], error[5] = ex, ey, ez, tx, ty, tz
+    return ex * ex + ey * ey + ez * ez + tx * tx + ty * ty + tz * tz
+
+
+@kernel
+def weigh_rows(tip: Array, pose: Array, target: Array, weights: Array, rows: Array) -> None:
+    """Make of the foot's Jacobian (6, n) the negative derivative of ``foot_error``, in place."""
+    plane, normal, length = float(weights[0]), float(weights[1]), float(weights[2])
+    n = rows.shape[1]
+    if plane != normal or plane != 1.0:
+        nx, ny, nz = float(target[1, 2]), float(target[2, 2]), float(target[3, 2])
+        for j in range(n):
+            x, y, z = float(rows[0, j]), float(rows[1, j]), float(rows[2, j])
+            along = (normal - plane) * (nx * x + ny * y + nz * z)
+            rows[0, j] = plane * x + along * nx
+            rows[1, j] = plane * y + along * ny
+            rows[2, j] = plane * z + along * nz
+    lx, ly, lz = 0.0, 0.0, 0.0
+    if tip[6] == 0.0:
+        length = 0.0
+    elif tip[6] == 1.0:
+        lx, ly, lz = _along(pose, tip)
+    for j in range(n):
+        x, y, z = float(rows[3, j]), float(rows[4, j]), float(rows[5, j])
+        along = lx * x + ly * y + lz * z
+        rows[3, j] = length * (x - along * lx)
+        rows[4, j] = length * (y - along * ly)
+        rows[5, j] = length * (z - along * lz)
+
+
+@kernel
+def approach(
+    links: Array,
+    tip: Array,
+    limits: Array,
+    target: Array,
+    weights: Array,
+    steps: int,
+    work: Array,
+    angles: Array,
+) -> float:
+    """Bring the foot as near to its target as it goes from the present joint angles.
+
+    Args:
+        links, tip, limits: of the ``Limb``.
+        target: from ``aim``, (4, 3).
+        weights: see ``foot_error``.
+        steps: how many steps are tried at most.
+        work: scratch, see ``limb_scratch``.
+        angles: in, where to start, brought within the limits; out, the answer, (n,).
+
+    Returns:
+        The squared error that is left [m^2].
+    """
+    n = links.shape[0]
+    anchors, pose = work[:n, :6], work[n : n + 4, :3]
+    rows, normal = work[n + 4 : n + 10, :n], work[n + 10 : 2 * n + 10, :n]
+    error, gradient = work[2 * n + 10, :6], work[2 * n + 11, :n]
+    step, trial = work[2 * n + 12, :n], work[2 * n + 13, :n]
+    points = 3 if tip[6] == 0.0 else 6
+    for j in range(n):
+        angles[j] = min(max(float(angles[j]), float(limits[j, 0])), float(limits[j, 1]))
+    place_limb(links, tip, angles, anchors, pose)
+    square = foot_error(tip, pose, target, weights, error)
+    ease, fresh = 0.1, True
+    for _ in range(steps):
+        if square <= FOUND:
+            break
+        if fresh:
+            limb_jacobian(links, anchors, pose, rows)
+            weigh_rows(tip, pose, target, weights, rows)
+            slope = 0.0
+            for j in range(n):
+                value = 0.0
+                for i in range(points):
+                    value += float(rows[i, j]) * float(error[i])
+                gradient[j] = value
+                if not _stuck(limits, j, float(angles[j]), value):
+                    slope += value * value
+            if slope <= _STILL * square:
+                break
+        damping = ease * square + _FLOOR
+        for j in range(n):
+            free = not _stuck(limits, j, float(angles[j]), float(gradient[j]))
+            step[j] = gradient[j] if free else 0.0
+            for k in range(j + 1):
+                value = 0.0
+                if free and not _stuck(limits, k, float(angles[k]), float(gradient[k])):
+                    for i in range(points):
+                        value += float(rows[i, j]) * float(rows[i, k])
+                normal[j, k] = value
+            normal[j, j] += damping if free else 1.0
+        solve_positive(normal, step)
+        promised = 0.0
+        for j in range(n):
+            angle = float(angles[j]) + min(max(float(step[j]), -1.0), 1.0)
+            trial[j] = min(max(angle, float(limits[j, 0])), float(limits[j, 1]))
+            moved = float(trial[j]) - float(angles[j])
+            promised += moved * (damping * moved + float(gradient[j]))
+        place_limb(links, tip, trial, anchors, pose)
+        found = foot_error(tip, pose, target, weights, error)
+        fresh = found < square
+        if fresh:
+            # What the linear model promised came true, or less of it (Nielsen's rule).
+            ratio = 2.0 * min((square - found) / max(promised, 1e-300), 1.0) - 1.0
+            ease, square = ease * max(0.1, 1.0 - ratio * ratio * ratio), found
+            for j in range(n):
+                angles[j] = trial[j]
+        else:
+            ease = 4.0 * max(ease, 1e-3)
+    return square
+
+
+@kernel
+def reach(
+    links: Array,
+    tip: Array,
+    limits: Array,
+    target: Array,
+    weights: Array,
+    starts: Array,
+    tries: int,
+    steps: int,
+    work: Array,
+    angles: Array,
+) -> float:
+    """Reach a target from the first of several starts that leads there.
+
+    The first start is tried first, then the others in the order of how near they are to the
+    target. Where none leads there, the answer is the nearest that was found; a later one has to be
+    nearer by a tenth, so that the answer does not jump to and fro between two that are equally
+    good.
+
+    Args:
+        starts: joint angles to start from, one start a row; the last column is scratch, (k, n + 1).
+        tries: how many of the starts are tried at most.
+        steps: how many steps are tried from each of them at most.
+        angles: out, the answer, (n,). The other arguments are as for ``approach``.
+
+    Returns:
+        The squared error that is left [m^2].
+    """
+    n = links.shape[0]
+    anchors, pose, error = work[:n, :6], work[n : n + 4, :3], work[2 * n + 10, :6]
+    attempt = work[2 * n + 14, :n]
+    least, start = math.inf, 0
+    for number in range(min(tries, starts.shape[0])):
+        if number == 1:
+            for k in range(1, starts.shape[0]):
+                place_limb(links, tip, starts[k], anchors, pose)
+                starts[k, n] = foot_error(tip, pose, target, weights, error)
+        if number > 0:
+            start = 0
+            for k in range(1, starts.shape[0]):
+                fresh = float(starts[k, n]) >= 0.0
+                if fresh and (start == 0 or float(starts[k, n]) < float(starts[start, n])):
+                    start = k
+            starts[start, n] = -1.0
+        for j in range(n):
+            attempt[j] = starts[start, j]
+        square = approach(links, tip, limits, target, weights, steps, work, attempt)
+        if square < 0.81 * least:
+            least = square
+            for j in range(n):
+                angles[j] = attempt[j]
+        if least <= REACHED:
+            break
+    return least
+
+
+@kernel
+def limb_velocity(
+    links: Array,
+    tip: Array,
+    limits: Array,
+    target: Array,
+    weights: Array,
+    angles: Array,
+    twist: Array,
+    damping: float,
+    work: Array,
+    speeds: Array,
+) -> None:
+    """Joint velocities that move the foot as its target moves, by damped least squares.
+
+    With J as for ``approach``, speeds = (J'J + damping^2)^-1 J'(twist, weighted). A joint at its
+    limit that would have to go beyond it stands still, and the others do what they can.
+
+    Args:
+        twist: the target's linear velocity [m/s] and its angular velocity [rad/s], (6,).
+        damping: in m.
+        speeds: out, (n,). The other arguments are as for ``approach``.
+    """
+    n = links.shape[0]
+    anchors, pose = work[:n, :6], work[n : n + 4, :3]
+    rows, normal = work[n + 4 : n + 10, :n], work[n + 10 : 2 * n + 10, :n]
+    task = work[2 * n + 10, :6]
+    free = work[2 * n + 11, :n]
+    place_limb(links, tip, angles, anchors, pose)
+    limb_jacobian(links, anchors, pose, rows)
+    # The twist is weighted as the rows are: as if it were one more column of the Jacobian.
+    column = work[2 * n + 10 : 2 * n + 16, 0:1]
+    for i in range(6):
+        column[i, 0] = twist[i]
+    weigh_rows(tip, pose, target, weights, column)
+    tx, ty, tz = float(column[3, 0]), float(column[4, 0]), float(column[5, 0])
+    x, y, z = float(column[0, 0]), float(column[1, 0]), float(column[2, 0])
+    task[0], task[1], task[2], task[3], task[4], task[5] = x, y, z, tx, ty, tz
+    weigh_rows(tip, pose, target, weights, rows)
+    for j in range(n):
+        free[j] = 1.0
+    for _ in range(n + 1):
+        for j in range(n):
+            value = 0.0
+            for i in range(6):
+                value += float(rows[i, j]) * float(task[i])
+            speeds[j] = float(free[j]) * value
+            for k in range(j + 1):
+                value = 0.0
+                if free[j] > 0.0 and free[k] > 0.0:
+                    for i in range(6):
+                        value += float(rows[i, j]) * float(rows[i, k])
+                normal[j, k] = value
+            normal[j, j] += damping * damping if free[j] > 0.0 else 1.0
+        solve_positive(normal, speeds)
+        again = False
+        for j in range(n):
+            if free[j] > 0.0 and _stuck(limits, j, float(angles[j]), float(speeds[j])):
+                free[j], again = 0.0, True
+        if not again:
+            break
+
+
+@kernel
+def turning(
+    tip: Array, last: Array, target: Array, period: float, limit: float, out: Array
+) -> None:
+    """The angular velocity (3,) [rad/s] of a target, from its orientation one period before.
+
+    It is that of a line's direction for a line foot and zero for a point foot. A target that has
+    turned by more than ``limit`` [rad] has been given anew and does not turn.
+
+    Args:
+        last, target: places and rows of rotation matrices, (4, 3).
+    """
+    ax, ay, az, sine, cosine = 0.0, 0.0, 0.0, 0.0, 1.0
+    if tip[6] == 1.0:
+        lx, ly, lz = _along(last, tip)
+        wx, wy, wz = _along(target, tip)
+        ax, ay, az = ly * wz - lz * wy, lz * wx - lx * wz, lx * wy - ly * wx
+        cosine = lx * wx + ly * wy + lz * wz
+    elif tip[6] == 2.0:
+        ax = 0.5 * (_product(target, last, 3, 2) - _product(target, last, 2, 3))
+        ay = 0.5 * (_product(target, last, 1, 3) - _product(target, last, 3, 1))
+        az = 0.5 * (_product(target, last, 2, 1) - _product(target, last, 1, 2))
+        trace = _product(target, last, 1, 1) + _product(target, last, 2, 2)
+        cosine = 0.5 * (trace + _product(target, last, 3, 3) - 1.0)
+    sine = math.sqrt(ax * ax + ay * ay + az * az)
+    angle = math.atan2(sine, cosine)
+    scale = 0.0
+    if angle <= limit:
+        scale = 1.0 / period if sine < 1e-7 else angle / (sine * period)
+    out[0], out[1], out[2] = scale * ax, scale * ay, scale * az
+
+
+@kernel
+def _stuck(limits: Array, joint: int, angle: float, direction: float) -> bool:
+    """Whether a joint stands at a limit and ``direction`` points beyond it."""
+    lower, upper = float(limits[joint, 0]), float(limits[joint, 1])
+    return (angle <= lower and direction <= 0.0) or (angle >= upper and direction >= 0.0)
+
+
+@kernel
+def _along(pose: Array, tip: Array) -> tuple[float, float, float]:
+    """The direction of a foot's line in the base's frame."""
+    x, y, z = float(tip[3]), float(tip[4]), float(tip[5])
+    return (
+        float(pose[1, 0]) * x + float(pose[1, 1]) * y + float(pose[1, 2]) * z,
+        float(pose[2, 0]) * x + float(pose[2, 1]) * y + float(pose[2, 2]) * z,
+        float(pose[3, 0]) * x + float(pose[3, 1]) * y + float(pose[3, 2]) * z,
+    )
+
+
+@kernel
+def _product(first: Array, second: Array, row: int, column: int) -> float:
+    """An element of a rotation matrix times another's transpose; rows count from 1."""
+    return (
+        float(first[row, 0]) * float(second[column, 0])
+        + float(first[row, 1]) * float(second[column, 1])
+        + float(first[row, 2]) * float(second[column, 2])
+    )
+
+
+@kernel
+def _unit(
+    x: float, y: float, z: float, default_x: float, default_y: float, default_z: float
+) -> tuple[float, float, float]:
+    """The unit vector along (x, y, z), or the default where there is no direction."""
+    largest = max(abs(x), abs(y), abs(z))
+    if largest < 1e-300:
+        return default_x, default_y, default_z
+    x, y, z = x / largest, y / largest, z / largest
+    size = math.sqrt(x * x + y * y + z * z)
+    return x / size, y / size, z / size

@@ -1,0 +1,67 @@
+"""Graphs that earlier versions kept are read as this version would have written them."""
+
+from pathlib import Path
+
+import pytest
+
+from aloft.runtime.language.registry import block_name
+from aloft.runtime.loading import LoadError, load_text
+from aloft.runtime.loading.earlier_versions import in_present_form
+
+OLD = """\
+rate: 500
+duration: 3
+robot: bruce
+blocks:
+  robot:
+    use: hal.MujocoRobot
+    with: {seed: 3, profile: relaxed, scene: flat}
+    in: {command: safety.command}
+  dynamics:
+    use: blocks.Dynamics
+    with: {actuators: koala}
+    in: {base: {value: {orientation: [0, 0, 0, 1]}}, joints: robot.joints}
+  wave:
+    use: runtime.SineWave
+    with:
+      amplitude: 0.001
+      n: 10
+  safety:
+    use: blocks.SafetyMonitor
+    in: {desired: {value: {}}, base: {value: {}}, joints: robot.joints, wbc: {value: {}}}
+    rate: 250
+"""
+
+
+def test_an_old_graph_loads() -> None:
+    graph = load_text(in_present_form(OLD), Path("old.yaml"))
+    assert graph.robot is not None and graph.robot.motors.profile == "relaxed"
+    assert block_name(graph.block("wave").block_type) == "blocks.SineWave"
+    assert graph.block("robot").params.model_dump()["seed"] == 3
+    assert graph.block("wave").params.model_dump()["amplitude"] == 0.001
+    assert graph.block("safety").period_ticks == 2
+    assert [spec.path for spec in graph.blocks if "~" not in spec.path] == [
+        "robot", "dynamics", "wave", "safety",
+    ]  # fmt: skip
+
+
+def test_without_translation_the_report_says_what_to_write() -> None:
+    with pytest.raises(LoadError) as caught:
+        load_text(OLD, Path("old.yaml"))
+    text = str(caught.value)
+    assert "said once for the graph since 0.2, beside 'robot': actuators: relaxed" in text
+    assert "runtime.SineWave has been called blocks.SineWave since version 0.2" in text
+
+
+def test_a_text_of_the_present_stays_as_it_is() -> None:
+    text = in_present_form(OLD)
+    assert in_present_form(text) is text
+    assert in_present_form("rate: [") == "rate: ["
+    assert in_present_form("blocks: {a: {use: blocks.Constant}}  # as written").endswith("written")
+
+
+def test_texts_that_look_like_references_survive() -> None:
+    text = "blocks:\n  a: {use: runtime.Gain, with: {name: $$cost, other: 'on'}}\n"
+    assert in_present_form(text) == (
+        'blocks:\n  a: {use: blocks.Gain, with: {name: $$cost, other: "on"}}\n'
+    )
