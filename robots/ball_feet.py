@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
-    from .description import RobotDescription
+    from .robot_description import RobotDescription
 
 Array = NDArray[np.float64]
 

@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from ..mathematics.rotations import cross, rotate_back, skew
 from .ball_feet import ball_feet
-from .description import RobotDescription
 from .link_poses import contact_centres, joints_above, link_poses
 from .pinocchio_model import build_pinocchio_model
+from .robot_description import RobotDescription
 
 Array = NDArray[np.float64]
 

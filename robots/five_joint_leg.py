@@ -23,8 +23,8 @@ from ..mathematics.kernel import kernel
 from ..mathematics.least_squares import solve_damped
 from ..mathematics.rotations import wrap
 from ..runtime.language.errors import BlockError
-from .description import RobotDescription
 from .limb import FootKind, chain_to, foot_shape
+from .robot_description import RobotDescription
 
 Array = NDArray[np.float64]
 

@@ -11,7 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .description import Joint, RobotDescription
+from .parts import Joint
+from .robot_description import RobotDescription
 
 Array = NDArray[np.float64]
 
@@ -82,7 +83,8 @@ def link_poses(
         robot: the description; all its frames are parallel to the base's at the zero pose.
         base_position: base origin in the world [m], (n, 3).
         base_orientation: unit quaternions x, y, z, w from base to world, (n, 4).
-        joint_position: joint angles [rad], (n, n_joints), in the order of the description.
+        joint_position: joint angles [rad], of slides positions [m], (n, n_joints), in the order of
+            the description.
     """
     names = tuple(link.name for link in robot.links)
     index = {name: k for k, name in enumerate(names)}
@@ -94,6 +96,12 @@ def link_poses(
     for k, joint in from_base_outwards(robot):
         parent, child = index[joint.parent], index[joint.child]
         offset = np.array(joint.origin)
+        if joint.kind == "slide":
+            offset = offset + joint_position[:, k, None] * np.array(joint.axis)
+            position[:, child] = position[:, parent]
+            position[:, child] += (rotation[:, parent] @ offset[:, :, None])[:, :, 0]
+            rotation[:, child] = rotation[:, parent]
+            continue
         position[:, child] = position[:, parent] + rotation[:, parent] @ offset
         turn = rotations_about(joint.axis, joint_position[:, k])
         rotation[:, child] = rotation[:, parent] @ turn

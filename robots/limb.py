@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..mathematics.kernel import kernel
-from .description import RobotDescription
+from .robot_description import RobotDescription
 
 Array = NDArray[np.float64]
 

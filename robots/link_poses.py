@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from .ball_feet import ball_feet
 
 if TYPE_CHECKING:
-    from .description import RobotDescription
+    from .robot_description import RobotDescription
 
 Array = NDArray[np.float64]
 

@@ -1,8 +1,9 @@
 """The controller's model, built from the robot's description with Pinocchio.
 
 The same links, joints and rotors as the simulator's model, so that the two agree to rounding.
-Joints and velocities are in the description's order after the free-flyer. Frames: every contact
-point under its own name, every sole centre as ``<foot>_sole``.
+Joints and velocities are in the description's order after those of the base: none for a fixed base,
+a planar joint in the x-z plane for a planar one, a free-flyer for a floating one. Frames: every
+contact point under its own name, every sole centre as ``<foot>_sole``.
 """
 
 from __future__ import annotations
@@ -13,7 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .description import RobotDescription
+from .parts import Joint
+from .robot_description import RobotDescription
 
 
 @dataclass(frozen=True)
@@ -32,30 +34,29 @@ class PinocchioModel:
 
 
 def build_pinocchio_model(robot: RobotDescription, profile: str | None = None) -> PinocchioModel:
-    """The model of the robot on a free-flyer, with the rotors of its actuator profile in use, or of
-    the one named.
+    """The model of the robot on its base, with the rotors of the actuator profile in use.
+
+    The velocity of a floating base is that of its origin in the base's own frame, first linear,
+    then angular (6). A planar base has the positions x, z and the turn about y that takes z to x,
+    and the velocities of the same, in the world (3).
+
+    Args:
+        robot: the description.
+        profile: another actuator profile than the one in use.
 
     Raises:
         LookupError: the robot has no actuator profile of that name.
-        ValueError: a joint is listed before the one that carries it.
     """
     import pinocchio as pin
 
+    robot = robot if profile is None else robot.with_profile(profile)
     model = pin.Model()
     model.name = robot.name
-    carrier = {robot.base: model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), "base")}
-    kinds = {
-        (1.0, 0.0, 0.0): pin.JointModelRX,
-        (0.0, 1.0, 0.0): pin.JointModelRY,
-        (0.0, 0.0, 1.0): pin.JointModelRZ,
-    }
+    carrier = {robot.base: _add_base(model, robot.base_joint)}
     for joint in robot.joints:
-        if joint.parent not in carrier:
-            raise ValueError(f"{robot.name}: joint {joint.name} is listed before its parent link")
-        kind = kinds.get(joint.axis)
-        revolute = pin.JointModelRevoluteUnaligned(np.array(joint.axis)) if kind is None else kind()
         place = pin.SE3(np.eye(3), np.array(joint.origin))
-        carrier[joint.child] = model.addJoint(carrier[joint.parent], revolute, place, joint.name)
+        parent = carrier[joint.parent]
+        carrier[joint.child] = model.addJoint(parent, _joint_model(joint), place, joint.name)
         lower, upper = joint.limits or (-np.inf, np.inf)
         model.lowerPositionLimit[-1], model.upperPositionLimit[-1] = lower, upper
     for link in robot.links:
@@ -72,10 +73,37 @@ def build_pinocchio_model(robot: RobotDescription, profile: str | None = None) -
 
     contacts = tuple(add_frame(c.name, link_of_foot[c.foot], c.position) for c in robot.contacts)
     soles = tuple(add_frame(f"{f.name}_sole", f.link, f.sole) for f in robot.feet)
-    rotors = (robot if profile is None else robot.with_profile(profile)).rotor_matrix
+    rotors, first = robot.rotor_matrix, robot.base_velocities
     coupling = np.zeros((model.nv, model.nv))
-    coupling[6:, 6:] = rotors - np.diag(np.diag(rotors))
+    coupling[first:, first:] = rotors - np.diag(np.diag(rotors))
     armature = np.zeros(model.nv)
-    armature[6:] = np.diag(rotors)
+    armature[first:] = np.diag(rotors)
     model.armature = armature
     return PinocchioModel(model, coupling, contacts, soles)
+
+
+def _add_base(model: Any, base_joint: str) -> int:
+    """Add what holds the base; the index of the joint that carries it."""
+    import pinocchio as pin
+
+    if base_joint == "fixed":
+        return 0
+    nothing = pin.SE3.Identity()
+    if base_joint == "floating":
+        return int(model.addJoint(0, pin.JointModelFreeFlyer(), nothing, "base"))
+    # Three joints after one another, so that positions and velocities are plain numbers.
+    along_x = model.addJoint(0, pin.JointModelPX(), nothing, "base_x")
+    along_z = model.addJoint(along_x, pin.JointModelPZ(), nothing, "base_z")
+    return int(model.addJoint(along_z, pin.JointModelRY(), nothing, "base_pitch"))
+
+
+def _joint_model(joint: Joint) -> Any:
+    """Pinocchio's joint, its special one where the axis is a coordinate axis."""
+    import pinocchio as pin
+
+    straight = {(1.0, 0.0, 0.0): "X", (0.0, 1.0, 0.0): "Y", (0.0, 0.0, 1.0): "Z"}.get(joint.axis)
+    letter = "P" if joint.kind == "slide" else "R"
+    if straight:
+        return getattr(pin, f"JointModel{letter}{straight}")()
+    name = "PrismaticUnaligned" if joint.kind == "slide" else "RevoluteUnaligned"
+    return getattr(pin, f"JointModel{name}")(np.array(joint.axis))

@@ -65,6 +65,16 @@ class PlacedYaml:
             mark = node.start_mark
         return (mark.line + 1, mark.column + 1) if mark else (0, 0)
 
+    def holds(self, path: tuple[str | int, ...]) -> bool:
+        """Whether the file has something at that path."""
+        found = self.data
+        for key in path:
+            try:
+                found = found[key]
+            except (KeyError, IndexError, TypeError):
+                return False
+        return True
+
     def placed(self, fault: RobotFault) -> RobotFault:
         """The same fault with its line and column."""
         if fault.line:

@@ -2,62 +2,166 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
+from typing import Any
 
-from .description import RobotDescription
+from .importing.packages import SCHEME, find_file, package_of
 from .placed_yaml import PlacedYaml
+from .robot_description import RobotDescription
+from .shipped import robot_names
 from .validation import RobotError, RobotFault, find_faults
 
 SHIPPED = Path(__file__).parent
+MODEL_FILES = (".urdf", ".xml", ".mjcf")
+YAML_FILES = (".yaml", ".yml")
+DISTRIBUTIONS = {"example-robot-data": "example-robot-data"}
+"""What to install for a package of files, where it is not called as the package."""
 
 
-def shipped_robots() -> list[str]:
-    """The names of the robots that ship with aloft."""
-    return sorted(path.stem for path in SHIPPED.glob("*/*.yaml") if path.stem == path.parent.name)
+@dataclass(frozen=True)
+class ReadRobot:
+    """A robot that was read: its ``description``, the file it is from, the URDF or MJCF behind it
+    if there is one, and what that lacks or what was approximated in ``notes``."""
+
+    description: RobotDescription
+    path: Path
+    model_file: Path | None = None
+    notes: tuple[str, ...] = ()
 
 
-def find(name: str, folder: Path | None = None) -> RobotDescription:
-    """See ``description.find_robot``."""
-    if name.endswith((".yaml", ".yml")):
+def path_of(name: str, folder: Path | None = None) -> Path:
+    """The file that describes the robot called ``name``, ours or relative to ``folder``.
+
+    Raises:
+        LookupError: there is none; the message names the robots that there are.
+    """
+    if name.endswith((*YAML_FILES, *MODEL_FILES)):
         path = (folder or Path()) / name
         if not path.is_file():
             raise LookupError(f"no robot description at {path}")
-        return read_robot(path)
+        return path
     path = SHIPPED / name / f"{name}.yaml"
     if not path.is_file():
-        raise LookupError(f"no robot called {name!r}; there is {', '.join(shipped_robots())}")
-    return _read_shipped(path)
+        raise LookupError(f"no robot called {name!r}; there is {', '.join(robot_names())}")
+    return path
+
+
+def find(name: str, folder: Path | None = None) -> RobotDescription:
+    """The robot called ``name``; see ``description.find_robot``."""
+    path = path_of(name, folder)
+    return (_read_shipped(path) if path.is_relative_to(SHIPPED) else read(path)).description
 
 
 @lru_cache(maxsize=16)
-def _read_shipped(path: Path) -> RobotDescription:
-    return read_robot(path)
+def _read_shipped(path: Path) -> ReadRobot:
+    return read(path)
 
 
-def read_robot(path: Path) -> RobotDescription:
-    """See ``description.read_description``."""
+def read(path: Path) -> ReadRobot:
+    """The robot that a YAML, URDF or MJCF file describes.
+
+    A YAML of the same name beside a URDF or MJCF file adds what that lacks; a YAML with a key
+    ``file`` adds to the file that it names.
+
+    Raises:
+        RobotError: the file cannot be read, or describes no robot; it carries every fault.
+    """
+    if path.suffix in MODEL_FILES:
+        beside = next((p for s in YAML_FILES if (p := path.with_suffix(s)).is_file()), None)
+        return _read_model(path, beside, PlacedYaml.read(beside) if beside else None)
     text = PlacedYaml.read(path)
+    if isinstance(text.data, dict) and "file" in text.data:
+        return _read_model(_named_file(path, text), path, text)
     data = text.data
     _complete(data)
     faults = [*text.faults, *find_faults(data)]
     if faults:
         raise RobotError(str(path), [text.placed(fault) for fault in faults])
-    return RobotDescription.model_validate(data)
+    return ReadRobot(RobotDescription.model_validate(data), path)
+
+
+def _named_file(path: Path, text: PlacedYaml) -> Path:
+    """The URDF or MJCF file that a YAML names. Raises ``RobotError`` where it is not there."""
+    name = text.data["file"]
+    if isinstance(name, str) and name.endswith(MODEL_FILES):
+        found = find_file(name, path.parent)
+        if found is not None:
+            return found
+    expected = "the path of a URDF or MJCF file, from this file's folder or as package://NAME/PATH"
+    message, fix = f"there is no file {name}", ""
+    if not isinstance(name, str) or not name.endswith(MODEL_FILES):
+        message = f"file cannot be {name!r}"
+    elif name.startswith(SCHEME):
+        package = package_of(name)
+        message = (
+            f"there is no file {name}: no folder {package} is above this file, and no installed "
+            "Python package brings it"
+        )
+        fix = f"pip install {DISTRIBUTIONS.get(package, package)}"
+    fault = RobotFault(("file",), message, expected, str(name), fix)
+    raise RobotError(str(path), [text.placed(fault)])
+
+
+def _read_model(path: Path, added: Path | None, text: PlacedYaml | None) -> ReadRobot:
+    from .importing.description_data import import_robot
+    from .importing.fit_to_ground import fit_to_ground
+
+    content = text.data if text is not None and text.data is not None else {}
+    if not isinstance(content, Mapping):
+        raise RobotError(str(added), [RobotFault((), "this adds nothing to a robot", "a mapping")])
+    imported = import_robot(path, content)
+    faults = [*(text.faults if text else ()), *imported.faults]
+    # A fault of the YAML's own keys also shows in what is made of them: once is enough.
+    own = {fault.path[:2] for fault in faults}
+    faults += [f for f in find_faults(imported.data) if _written(f, imported.data)[:2] not in own]
+    if faults:
+        placed = [_placed(f, imported.data, imported.model, added, text) for f in faults]
+        raise RobotError(str(added or path), placed)
+    robot = RobotDescription.model_validate(imported.data)
+    robot, more = fit_to_ground(robot, "standing" in content, imported.model.pose)
+    return ReadRobot(robot, added or path, path, (*imported.notes, *more))
+
+
+def _written(fault: RobotFault, data: Mapping[str, Any]) -> tuple[str | int, ...]:
+    """The path of a fault as a short YAML has it: links and joints by name."""
+    path = fault.path
+    if len(path) > 1 and path[0] in ("links", "joints") and isinstance(path[1], int):
+        return (path[0], str(data[path[0]][path[1]]["name"]), *path[2:])
+    return path
+
+
+def _placed(
+    fault: RobotFault, data: Mapping[str, Any], model: Any, added: Path | None, text: Any
+) -> RobotFault:
+    """The fault with its place: in the YAML where that says it, else in the URDF or MJCF file."""
+    from .importing.urdf_text import XmlFile
+
+    path = _written(fault, data)
+    if text is not None and text.holds(path):
+        return text.placed(replace(fault, path=path))  # type: ignore[no-any-return]
+    tags = {"links": ("link", "body"), "joints": ("joint", "joint")}
+    line = column = 0
+    if len(path) > 1 and path[0] in tags:
+        line, column = XmlFile(model.path).place(
+            tags[str(path[0])][not model.is_urdf], str(path[1])
+        )
+    if not line and text is not None:
+        return text.placed(replace(fault, path=path))  # type: ignore[no-any-return]
+    return replace(fault, path=path, file=str(model.path), line=line, column=column)
 
 
 def _complete(data: object) -> None:
-    """Fill in what a short description may leave out: one motor a joint, called as the joint."""
+    """Fill in what a description may leave out: one motor a joint, called as the joint."""
     if not isinstance(data, dict) or "transmission" in data:
         return
     joints = data.get("joints")
     if not isinstance(joints, list):
         return
-    names = [j.get("name") if isinstance(j, dict) else None for j in joints]
-    data["transmission"] = {
-        "motors": [name for name in names if isinstance(name, str)],
-        "joint_to_motor": [[float(i == k) for k in range(len(names))] for i in range(len(names))],
-    }
+    from .importing.description_data import own_motors
 
-
-__all__ = ["RobotError", "RobotFault", "find", "read_robot", "shipped_robots"]
+    names = [joint.get("name") if isinstance(joint, dict) else None for joint in joints]
+    if all(isinstance(name, str) for name in names):
+        data["transmission"] = own_motors([str(name) for name in names])

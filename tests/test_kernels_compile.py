@@ -18,6 +18,7 @@ import numpy as np
 import pytest
 
 import aloft
+from aloft.mathematics.joint_feedback import Feedback, Motion, SoftStops
 from aloft.mathematics.kernel import kernel, kernels
 from aloft.robots.description import find_robot
 from aloft.robots.five_joint_leg import read_leg
@@ -38,7 +39,7 @@ NOT_HOT = {
 }
 """Functions of numbers and arrays only that need not compile, and why."""
 
-INEXACT = {"sin", "cos", "atan2", "acos", "exp", "hypot", "dot"}
+INEXACT = {"sin", "cos", "atan2", "acos", "exp", "hypot", "dot", "tanh"}
 """What another library, or another order of sums, may round differently."""
 
 LEG = read_leg(find_robot("bruce"), 0)
@@ -87,10 +88,16 @@ UNUSED = {
     "aloft.blocks.control.dynamics.rolling_drift": (
         *(np.linspace(-1.0, 2.0, 3) * k for k in range(1, 7)), np.zeros((2, 3)),
     ),
-    "aloft.blocks.control.joint_pd.follow": (0.002, 0.02, *(np.ones(10) for _ in range(5))),
-    "aloft.blocks.control.joint_pd.stop": (
-        np.linspace(-1.0, 1.0, 5), np.tile([-0.8, 0.7], (5, 1)), 0.1, 2.0,
-        *(np.full(5, x) for x in (60.0, 1.5, 40.0, 0.2, 1.0, 0.3)),
+    "aloft.mathematics.joint_feedback.integrate_accelerations": (
+        0.002, 0.02, np.ones(10), Motion(np.ones(10), np.ones(10)), Motion(np.ones(10), np.ones(10)),
+    ),
+    "aloft.mathematics.joint_feedback.add_friction": (
+        np.linspace(-1.0, 1.0, 10), np.full(10, 0.07), 0.3, np.zeros(10), np.ones(10),
+    ),
+    "aloft.mathematics.joint_feedback.add_soft_stops": (
+        np.linspace(-1.0, 1.0, 5),
+        SoftStops(np.tile([-0.8, 0.7], (5, 1)), 0.1, 2.0, np.full(5, 60.0), np.full(5, 1.5)),
+        Feedback(*(np.full(5, x) for x in (40.0, 0.2, 1.0, 0.3))),
     ),
     "aloft.robots.five_joint_reach.keep_along": (
         np.array([0.0, 0.6, 0.8]), np.array([0.1, 0.2, 0.3]),

@@ -22,6 +22,7 @@ class RobotFault:
         found: what does.
         fix: text to paste instead; empty where nothing can be proposed.
         line, column: the place in the file, counted from 1; zero where it is not known.
+        file: the file of that place; empty where it is the error's.
     """
 
     path: Path
@@ -31,6 +32,7 @@ class RobotFault:
     fix: str = ""
     line: int = 0
     column: int = 0
+    file: str = ""
 
     def lines(self) -> list[tuple[str, str]]:
         """The details under the message, as (label, text)."""
@@ -39,6 +41,7 @@ class RobotFault:
 
     def text(self, file: str) -> str:
         """The fault as plain text of several lines, beginning with its place in the file."""
+        file = self.file or file
         place = f"{file}:{self.line}:{self.column}" if self.line else file
         head = f"{place}: {self.message}"
         return "\n".join([head, *(f"    {label:<9}  {text}" for label, text in self.lines())])
@@ -54,7 +57,9 @@ class RobotError(ValueError):
 
     def __init__(self, file: str, faults: Iterable[RobotFault]) -> None:
         self.file = file
-        self.faults = tuple(sorted(faults, key=lambda fault: (fault.line, fault.column)))
+        self.faults = tuple(
+            sorted(faults, key=lambda fault: (fault.file, fault.line, fault.column))
+        )
         count = len(self.faults)
         headline = f"{file}: {count} fault{'s' if count != 1 else ''} in the robot's description"
         super().__init__("\n".join([*(fault.text(file) for fault in self.faults), headline]))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from ..robot_description import RobotDescription
 from .actuation import check_actuation
 from .bodies import check_bodies
 from .draft import Draft
@@ -21,8 +22,6 @@ def find_faults(data: Any) -> tuple[RobotFault, ...]:
     A value of a wrong type is reported and otherwise passed over, so that it hides nothing else.
     Data without a fault can be read by ``RobotDescription.model_validate``.
     """
-    from ..description import RobotDescription
-
     if not isinstance(data, dict):
         found = "nothing" if data is None else f"a {type(data).__name__}"
         expected = "keys such as name, base, links and joints"

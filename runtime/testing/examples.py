@@ -7,7 +7,7 @@ from typing import Any, Literal, get_args, get_origin
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ValidationError
+from pydantic import BaseModel, RootModel, ValidationError
 
 from ..language.block import Block
 from ..language.parameters import Parameters, is_live
@@ -86,7 +86,11 @@ def _with(params: Any, name: str, value: Any) -> Any:
 
 def _others(value: Any, annotation: Any) -> Iterator[tuple[str, Any]]:
     """Other values than this one, the first of which is usually legal, with the path inside it."""
-    if isinstance(value, BaseModel):
+    if isinstance(value, RootModel):
+        yield from _others(value.root, None)
+    elif isinstance(value, dict):
+        yield "", {name: 0.75 * item + 0.01 for name, item in value.items()}
+    elif isinstance(value, BaseModel):
         for name, info in type(value).model_fields.items():
             for path, other in _others(getattr(value, name), info.annotation):
                 changed = _with(value, name, other)

@@ -115,7 +115,8 @@ def pushed(tick: int) -> Inputs:
 
 SCENES: Mapping[str, list[Scene]] = {
     "blocks.JointPD": [
-        Scene({"stance_targets": "acceleration", "friction": 0.1, "stance_stiffness": [1.0] * 5}),
+        Scene({"flight_stiffness": {"*": 40.0}, "flight_damping": 1.0}, hopping),
+        Scene({"stance_targets": "acceleration", "friction": 0.1, "stance_stiffness": 1.0}),
         Scene({"stop_gain": 1.0}, lambda tick: {"joints": {"position": 0.9, "velocity": 1.0}}),
         Scene({}, hopping),
     ],

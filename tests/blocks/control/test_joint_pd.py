@@ -4,13 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
-from aloft.blocks.control.joint_pd import JointPD, stop
+from aloft.blocks.control.joint_pd import JointPD
 from aloft.blocks.signals import CommandMode, Phase
 from aloft.robots.description import find_robot
-from aloft.runtime.language.errors import BlockError
 from aloft.runtime.testing import BlockBench
 
 ROBOT = find_robot("bruce")
@@ -18,8 +15,14 @@ FLIGHT_KP = np.tile([40.0, 60.0, 60.0, 60.0, 15.0], 2)
 FLIGHT_KD = np.tile([1.0, 1.5, 1.5, 1.2, 0.3], 2)
 
 
-def make(**params):
-    bench = BlockBench(JointPD, params, robot="bruce")
+GAINS = {
+    "flight_stiffness": {"*": 60.0, "*_hip_yaw": 40.0, "*_ankle": 15.0},
+    "flight_damping": {"*": 1.5, "*_hip_yaw": 1.0, "*_knee": 1.2, "*_ankle": 0.3},
+}
+
+
+def make(robot=ROBOT, **params):
+    bench = BlockBench(JointPD, {**GAINS, **params}, robot=robot)
     bench.set("wbc", torque=np.arange(1.0, 11.0))
     bench.set("legs", position=0.1, velocity=0.2)
     bench.set("joints", position=np.linspace(-1, 1, 10), velocity=0.5)
@@ -88,7 +91,7 @@ def test_no_blend_switches_at_once():
 
 
 def test_half_way_the_torque_is_the_mean_of_both_controllers():
-    bench = make(blend=0.004, stance_stiffness=[20.0] * 5, stance_damping=[1.0] * 5)
+    bench = make(blend=0.004, stance_stiffness=20.0, stance_damping=1.0)
     settle(bench, Phase.STAND, True)
     bench.set("phase", phase=int(Phase.FLIGHT), stance=False)
     bench.step()
@@ -106,7 +109,7 @@ def test_half_way_the_torque_is_the_mean_of_both_controllers():
 
 def test_acceleration_targets_lead_the_joints_by_the_commanded_acceleration():
     """A steady acceleration a leads a joint at rest by a times leak, and leak squared."""
-    bench = make(stance_targets="acceleration", leak=0.02, stance_stiffness=[20.0] * 5)
+    bench = make(stance_targets="acceleration", leak=0.02, stance_stiffness=20.0)
     bench.set("joints", velocity=0.0)
     acceleration = np.zeros(16)
     acceleration[6 + 3] = 10.0
@@ -120,7 +123,7 @@ def test_acceleration_targets_lead_the_joints_by_the_commanded_acceleration():
 
 
 def test_the_legs_kinematics_can_be_what_the_stance_gains_act_towards():
-    gains = {"stance_stiffness": [20.0] * 5, "stance_damping": [1.0] * 5}
+    gains = {"stance_stiffness": 20.0, "stance_damping": 1.0}
     command = settle(make(stance_targets="legs", **gains), Phase.THRUST, True)
     assert np.array_equal(command.torque, np.arange(1.0, 11.0))
     assert (command.stiffness == 20.0).all() and (command.damping == 1.0).all()
@@ -158,31 +161,44 @@ def test_a_soft_stop_pushes_back_from_a_limit_and_brakes():
     assert np.delete(added, knee) == pytest.approx(0.0, abs=1e-12)
 
 
-@given(
-    angle=st.floats(-2.5, 2.5),
-    rate=st.floats(-20, 20),
-    gains=st.tuples(*[st.floats(0, 100)] * 4),
-    targets=st.tuples(st.floats(-3, 3), st.floats(-3, 3)),
-)
-def test_a_soft_stop_adds_its_own_torque_to_any_feedback(angle, rate, gains, targets):
-    stiffness, damping = np.array([gains[0]]), np.array([gains[1]])
-    position, velocity = np.array([targets[0]]), np.array([targets[1]])
-    before = gains[0] * (targets[0] - angle) + gains[1] * (targets[1] - rate)
-    limits, springs, dampers = np.array([[-1.0, 0.5]]), np.array([gains[2]]), np.array([gains[3]])
-    stop(
-        np.array([angle]), limits, 0.1, 2.0, springs, dampers, stiffness, position, damping,
-        velocity,
-    )  # fmt: skip
-    after = stiffness[0] * (position[0] - angle) + damping[0] * (velocity[0] - rate)
-    edge = min(max(angle, -0.9), 0.4)
-    depth = abs(angle - edge) / 0.1
-    added = 2.0 * gains[2] * (edge - angle) - 2.0 * min(depth, 1.0) * gains[3] * rate
-    if stiffness[0] > 1e-9 and damping[0] > 1e-9:
-        assert after - before == pytest.approx(added, abs=1e-6, rel=1e-9)
+def test_without_gains_every_joint_gets_some_by_its_inertia_and_its_motor():
+    bench = BlockBench(JointPD, {}, robot="bruce")
+    command = settle(bench, Phase.FLIGHT, False)
+    stiffness, damping = command.stiffness, command.damping
+    assert stiffness[:5] == pytest.approx(stiffness[5:], rel=1e-6)  # left as right
+    peak = np.abs(ROBOT.joint_to_motor).T @ ROBOT.motors.peak_torque
+    assert (stiffness <= peak / 0.2 + 1e-9).all() and (stiffness > 1.0).all()
+    inertia = (damping / 1.6) ** 2 / stiffness
+    assert (inertia > np.diag(ROBOT.rotor_matrix)).all()  # and what the links add
+    limited = np.isclose(stiffness, peak / 0.2)
+    assert stiffness[~limited] == pytest.approx(3600.0 * inertia[~limited])
+    assert limited.any() and not limited.all()
 
 
-def test_gains_must_fit_the_leg():
-    with pytest.raises(
-        BlockError, match=r"flight_damping has 2 gains, and the leg of \w+ has 5 joints"
-    ):
-        make(flight_damping=[1.0, 2.0])
+def test_held_joints_are_held_on_the_ground_and_in_the_air():
+    held = ROBOT.changed(held={"left_hip_yaw": 0.3})
+    bench = make(robot=held)
+    for phase, stance in ((Phase.STAND, True), (Phase.FLIGHT, False)):
+        command = settle(bench, phase, stance)
+        assert command.stiffness[5] == 40.0 and command.damping[5] == 1.0
+        assert command.position[5] == 0.3 and command.velocity[5] == 0.0
+    assert settle(bench, Phase.STAND, True).torque[5] == 6.0
+
+
+def test_joints_of_no_leg_follow_the_plan_while_all_legs_swing():
+    """The right leg's foot is gone, so its five joints belong to no leg."""
+    one_leg = ROBOT.changed(
+        feet=ROBOT.feet[1:], contacts=tuple(c for c in ROBOT.contacts if c.foot == "left_foot")
+    )
+    assert len(one_leg.contacts) == 2
+    bench = make(robot=one_leg)
+    bench.set("reference", joint_position=np.full(10, 0.7), joint_velocity=np.full(10, -0.2))
+    command = settle(bench, Phase.FLIGHT, False)
+    assert (command.position[:5] == 0.7).all() and (command.velocity[:5] == -0.2).all()
+    assert (command.position[5:] == 0.1).all()
+    assert np.array_equal(command.stiffness, FLIGHT_KP)
+    command = settle(bench, Phase.LANDING, True)
+    assert not command.stiffness.any() and (command.torque == np.arange(1.0, 11.0)).all()
+    alone = BlockBench(JointPD, GAINS, robot=one_leg, wired=["wbc", "legs", "phase", "joints"])
+    command = settle(alone, Phase.FLIGHT, False)
+    assert np.array_equal(command.position[:5], ROBOT.standing_position[:5])

@@ -1,0 +1,36 @@
+"""Joint gains for robots for which nobody has given any."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...robots.description import RobotDescription
+from ...robots.pinocchio_model import build_pinocchio_model
+
+Array = NDArray[np.float64]
+
+NATURAL_FREQUENCY = 60.0
+"""Of a joint under the default gains by itself [rad/s], where its motor is strong enough."""
+DAMPING_RATIO = 0.8
+SATURATION_ERROR = 0.2
+"""Error of a joint [rad] at which the default stiffness asks for the motor's peak torque."""
+
+
+def default_gains(robot: RobotDescription) -> tuple[Array, Array]:
+    """Stiffness [N m/rad] and damping [N m s/rad] of every joint, (n_joints,) each.
+
+    A joint with the inertia I that it has in the standing pose, rotors included and the base held,
+    gets K = I w^2 with ``NATURAL_FREQUENCY`` w, but no more than asks for its peak torque at
+    ``SATURATION_ERROR``, and D = 2 ``DAMPING_RATIO`` sqrt(K I).
+    """
+    import pinocchio
+
+    built = build_pinocchio_model(robot)
+    position = np.array(pinocchio.neutral(built.model))
+    position[-len(robot.joints) :] = robot.standing_position
+    matrix = pinocchio.crba(built.model, built.model.createData(), position)
+    inertia = np.diag(matrix + built.rotor_coupling)[-len(robot.joints) :]
+    peak = np.abs(robot.joint_to_motor).T @ robot.motors.peak_torque
+    stiffness = np.minimum(inertia * NATURAL_FREQUENCY**2, peak / SATURATION_ERROR)
+    return stiffness, 2.0 * DAMPING_RATIO * np.sqrt(stiffness * inertia)

@@ -1,0 +1,144 @@
+"""Joint feedback as pure functions: blending two of them, soft stops, friction, stance targets.
+
+A feedback is a stiffness [N m/rad] towards an angle [rad] and a damping [N m s/rad] towards a
+velocity [rad/s], one element a joint (n,). Nothing here allocates.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .kernel import kernel
+
+Array = NDArray[np.float64]
+
+
+class Feedback(NamedTuple):
+    """Stiffness towards an angle and damping towards a velocity, (n,) each."""
+
+    stiffness: Array
+    position: Array
+    damping: Array
+    velocity: Array
+
+
+class SoftStops(NamedTuple):
+    """Springs and dampers that begin ``margin`` [rad] inside joint limits (n, 2).
+
+    The springs are ``gain`` times ``stiffness``; the dampers grow from none there to ``gain``
+    times ``damping`` at the limit.
+    """
+
+    limits: Array
+    margin: float
+    gain: float
+    stiffness: Array
+    damping: Array
+
+
+class Motion(NamedTuple):
+    """Joint angles [rad] and velocities [rad/s], (n,) each."""
+
+    position: Array
+    velocity: Array
+
+
+@kernel
+def blend_feedback(
+    weight: Array, first: Feedback, second: Feedback, measured: Motion, out: Feedback
+) -> None:
+    """One feedback that equals ``weight`` (n,) of the first plus the rest of the second.
+
+    K = w K1 + (1 - w) K2 towards (w K1 x1 + (1 - w) K2 x2) / K; the measured value where K = 0.
+    """
+    blend_gain(
+        weight, first.stiffness, first.position, second.stiffness, second.position,
+        measured.position, out.stiffness, out.position,
+    )  # fmt: skip
+    blend_gain(
+        weight, first.damping, first.velocity, second.damping, second.velocity,
+        measured.velocity, out.damping, out.velocity,
+    )  # fmt: skip
+
+
+@kernel
+def blend_gain(
+    weight: Array,
+    first_gain: Array,
+    first_target: Array,
+    second_gain: Array,
+    second_target: Array,
+    measured: Array,
+    gain: Array,
+    target: Array,
+) -> None:
+    """One gain and target of ``blend_feedback``."""
+    for i in range(gain.shape[0]):
+        first = float(weight[i]) * float(first_gain[i])
+        second = (1.0 - float(weight[i])) * float(second_gain[i])
+        total = first + second
+        gain[i] = total
+        if total > 0.0:
+            share = first / total
+            target[i] = share * float(first_target[i]) + (1.0 - share) * float(second_target[i])
+        else:
+            target[i] = measured[i]
+
+
+@kernel
+def add_soft_stops(measured: Array, stops: SoftStops, out: Feedback) -> None:
+    """Add soft stops to a feedback where a measured angle (n,) is near its joint's limit."""
+    for i in range(measured.shape[0]):
+        angle, margin = float(measured[i]), stops.margin
+        edge = min(
+            max(angle, float(stops.limits[i, 0]) + margin), float(stops.limits[i, 1]) - margin
+        )
+        depth = abs(angle - edge) / margin
+        if depth > 0.0:
+            spring = stops.gain * float(stops.stiffness[i])
+            total = spring + float(out.stiffness[i])
+            if total > 0.0:
+                pulled = spring * edge + float(out.stiffness[i]) * float(out.position[i])
+                out.position[i] = pulled / total
+            out.stiffness[i] = total
+            damper = stops.gain * min(depth, 1.0) * float(stops.damping[i])
+            total = damper + float(out.damping[i])
+            if total > 0.0:
+                out.velocity[i] = float(out.damping[i]) * float(out.velocity[i]) / total
+            out.damping[i] = total
+
+
+@kernel
+def add_friction(
+    velocity: Array, friction: Array, speed: float, scratch: Array, torque: Array
+) -> None:
+    """Add the ``friction`` [N m] (n,) of joints that move, in the direction of their velocity.
+
+    friction tanh(velocity / speed): most of it from ``speed`` [rad/s] on, none at rest.
+    """
+    np.divide(velocity, speed, scratch)
+    np.tanh(scratch, scratch)
+    np.multiply(scratch, friction, scratch)
+    np.add(torque, scratch, torque)
+
+
+@kernel
+def integrate_accelerations(
+    period: float, leak: float, acceleration: Array, measured: Motion, targets: Motion
+) -> None:
+    """Integrate accelerations [rad/s^2] (n,) to ``targets``, drawn to the measured joints.
+
+    x' = v + (q - x) / leak, v' = a + (q' - v) / leak: below the corner frequency 1/leak the
+    targets are the measurements and the feedback vanishes; above it they are the intention.
+    """
+    share = min(period / leak, 1.0)
+    for i in range(acceleration.shape[0]):
+        speed = float(targets.velocity[i])
+        x = float(targets.position[i]) + period * speed
+        targets.velocity[i] = (
+            speed + period * float(acceleration[i]) + share * (float(measured.velocity[i]) - speed)
+        )
+        targets.position[i] = x + share * (float(measured.position[i]) - x)

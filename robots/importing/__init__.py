@@ -1,0 +1,1 @@
+"""Reads robots from URDF and MJCF files, with what a short YAML beside them adds."""

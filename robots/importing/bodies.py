@@ -1,0 +1,55 @@
+"""Rigid bodies as they are joined: masses, centres and inertias about different frames."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Inertial:
+    """``mass`` [kg], ``com`` [m] (3,) and ``inertia`` about the CoM [kg m^2] (3, 3) in a frame."""
+
+    mass: float
+    com: Array
+    inertia: Array
+
+    def moved(self, rotation: Array, position: Array) -> Inertial:
+        """The same body seen from a frame in which its own is turned and displaced so."""
+        if np.array_equal(rotation, np.eye(3)):
+            return Inertial(self.mass, self.com + position, self.inertia)
+        inertia = rotation @ self.inertia @ rotation.T
+        return Inertial(self.mass, rotation @ self.com + position, 0.5 * (inertia + inertia.T))
+
+    def scaled(self, share: float) -> Inertial:
+        """A share of the body, spread as the body is."""
+        return Inertial(self.mass * share, self.com, self.inertia * share)
+
+
+NOTHING = Inertial(0.0, np.zeros(3), np.zeros((3, 3)))
+
+
+def joined(bodies: list[Inertial]) -> Inertial:
+    """Several bodies in one frame as one."""
+    bodies = [body for body in bodies if body.mass > 0.0 or np.any(body.inertia)]
+    if len(bodies) <= 1:
+        return bodies[0] if bodies else NOTHING
+    mass = sum(body.mass for body in bodies)
+    if mass <= 0.0:
+        return Inertial(mass, bodies[0].com, np.sum([body.inertia for body in bodies], axis=0))
+    com = np.sum([body.mass * body.com for body in bodies], axis=0) / mass
+    inertia = np.zeros((3, 3))
+    for body in bodies:
+        arm = body.com - com
+        inertia += body.inertia + body.mass * (arm @ arm * np.eye(3) - np.outer(arm, arm))
+    return Inertial(mass, com, inertia)
+
+
+def full_tensor(values: Array) -> Array:
+    """The tensor (3, 3) of xx, yy, zz, xy, xz, yz."""
+    xx, yy, zz, xy, xz, yz = values
+    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])

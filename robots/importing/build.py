@@ -1,0 +1,197 @@
+"""From the bodies of a file to the links and joints of a description.
+
+Bodies that no joint moves become part of the body they are fixed to, and every link's frame is put
+at its joint and turned parallel to the base's at the zero of all joints, so that joint axes may
+point anywhere. A body with several joints becomes several links: each but the last is given a
+thousandth of the body, because a link has a mass; together they are the body at the zero pose.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..validation import RobotError, RobotFault
+from ..validation.faults import listing
+from .bodies import Inertial, joined
+from .capsules import Capsule
+from .raw_model import RawBody, RawJoint, RawModel
+
+Array = NDArray[np.float64]
+
+GROUND = "ground"
+"""The base link of a robot that is bolted to the world by a file's own world body."""
+SHARE = 1e-3
+
+
+@dataclass(frozen=True)
+class Frame:
+    """Where a body of the file is: on ``link``, turned and displaced [m] in the link's frame."""
+
+    link: str
+    rotation: Array
+    position: Array
+
+    def point(self, place: Any) -> list[float]:
+        """A point [m] given in the body's frame, in the link's."""
+        return tidy(self.rotation @ np.asarray(place, dtype=float) + self.position)
+
+
+@dataclass
+class BuiltLink:
+    """A link that is being put together: its origin [m] in the base's frame and its content."""
+
+    name: str
+    origin: Array
+    bodies: list[Inertial] = field(default_factory=list)
+    capsules: list[Capsule] = field(default_factory=list)
+
+
+@dataclass(frozen=True)
+class Built:
+    """The tree of a description: plain data for ``base``, ``base_joint``, ``links``, ``joints``,
+    the file's joints by name, and where every body of the file went."""
+
+    base: str
+    base_joint: str
+    links: list[dict[str, Any]]
+    joints: list[dict[str, Any]]
+    raw_joints: Mapping[str, RawJoint]
+    frames: Mapping[str, Frame]
+
+
+def tidy(values: Any) -> list[float]:
+    """Plain numbers without the rounding errors of a rotation."""
+    numbers = np.round(np.asarray(values, dtype=float), 13)
+    return [float(value) for value in np.where(np.abs(numbers) < 1e-11, 0.0, numbers)]
+
+
+def build(model: RawModel, welded: Collection[str] = (), base_joint: str = "") -> Built:
+    """The tree of links and joints.
+
+    Args:
+        model: what the file holds.
+        welded: names of joints that are taken for fixed at zero.
+        base_joint: ``floating``, ``planar`` or ``fixed`` where the file does not decide it or the
+            user decides otherwise; empty to go by the file.
+
+    Raises:
+        RobotError: the file holds several robots, or joints that a description has not.
+    """
+    root, found_joint, dropped = _base_of(model, base_joint)
+    still = {*welded, *dropped}
+    start = model.bodies.get(root) or RawBody(
+        GROUND, "", np.eye(3), np.zeros(3), Inertial(0.0, np.zeros(3), np.zeros((3, 3)))
+    )
+    turn, place = start.rotation, start.position
+    links = {start.name: BuiltLink(start.name, np.zeros(3), [start.inertial], [*start.capsules])}
+    frames = {start.name: Frame(start.name, np.eye(3), np.zeros(3))}
+    joints: list[dict[str, Any]] = []
+    raw: dict[str, RawJoint] = {}
+    for body in model.bodies.values():
+        if body.name == start.name:
+            continue
+        parent = start.name if body.parent == model.world and root == GROUND else body.parent
+        if parent not in frames:
+            continue  # A thing beside the robot.
+        moving = [joint for joint in body.joints if joint.name not in still]
+        rotation, position = turn.T @ body.rotation, turn.T @ (body.position - place)
+        carrier = links[frames[parent].link]
+        for k, joint in enumerate(moving):
+            last = k == len(moving) - 1
+            name = body.name if last else f"{body.name}_{k + 1}"
+            anchor = turn.T @ (joint.anchor - place)
+            link = links[name] = BuiltLink(name, anchor)
+            if not last:
+                piece = body.inertial.scaled(SHARE)
+                link.bodies.append(piece.moved(rotation, position - anchor))
+            limits = None if joint.limits is None else list(joint.limits)
+            joints.append({
+                "name": joint.name, "kind": joint.kind, "parent": carrier.name, "child": name,
+                "origin": tidy(anchor - carrier.origin), "axis": _axis(turn.T @ joint.axis),
+                "limits": limits,
+            })  # fmt: skip
+            raw[joint.name] = joint
+            carrier = link
+        pieces = max(len(moving) - 1, 0)
+        inertial = body.inertial.scaled(1.0 - SHARE * pieces) if pieces else body.inertial
+        frame = Frame(carrier.name, rotation, position - carrier.origin)
+        frames[body.name] = frame
+        carrier.bodies.append(inertial.moved(frame.rotation, frame.position))
+        carrier.capsules += [each.moved(frame.rotation, frame.position) for each in body.capsules]
+    return Built(
+        start.name, found_joint, [_link_data(link) for link in links.values()], joints, raw, frames
+    )
+
+
+def _base_of(model: RawModel, wanted: str) -> tuple[str, str, list[str]]:
+    """The base's name (``GROUND`` for the world), how it is held, and joints that say just that."""
+    roots = [body for body in model.bodies.values() if body.parent == model.world]
+    free = [body for body in roots if any(joint.kind == "free" for joint in body.joints)]
+    others = [
+        joint.name
+        for body in model.bodies.values()
+        for joint in body.joints
+        if joint.kind == "ball" or (joint.kind == "free" and body not in free)
+    ]
+    if others:
+        raise _error(model, f"joints {listing(others)} are no hinges or slides, which a robot's are",
+                     "one axis each")  # fmt: skip
+    if len(free) > 1:
+        names = listing([body.name for body in free])
+        raise _error(
+            model, f"bodies {names} move freely: that is more than one robot", "one", names
+        )
+    if free:
+        released = [joint.name for joint in free[0].joints]
+        return free[0].name, wanted or "floating", released
+    if not roots:
+        raise _error(model, "the file holds no body besides the world", "at least one", "none")
+    if len(roots) == 1 and _is_planar(roots[0]):
+        released = [joint.name for joint in roots[0].joints]
+        return roots[0].name, wanted or "planar", released
+    if len(roots) == 1 and not roots[0].joints and model.is_urdf:
+        return roots[0].name, wanted or "floating", []
+    return GROUND, wanted or "fixed", []
+
+
+def _is_planar(body: RawBody) -> bool:
+    """Whether a body is carried by slides along x and z and a hinge about y, without motors."""
+    kinds = sorted(
+        (joint.kind, tuple(tidy(joint.axis)))
+        for joint in body.joints
+        if joint.effort == 0.0 and joint.limits is None
+    )
+    wanted = [("hinge", (0.0, 1.0, 0.0)), ("slide", (0.0, 0.0, 1.0)), ("slide", (1.0, 0.0, 0.0))]
+    return len(body.joints) == 3 and kinds == wanted
+
+
+def _error(model: RawModel, message: str, expected: str = "", found: str = "") -> RobotError:
+    return RobotError(str(model.path), [RobotFault((), message, expected, found)])
+
+
+def _axis(axis: Array) -> list[float]:
+    """A unit vector to the last digit, without the rounding errors of a rotation."""
+    straight = np.where(np.abs(axis - np.round(axis)) < 1e-10, np.round(axis), axis) + 0.0
+    return [float(value) for value in straight / np.linalg.norm(straight)]
+
+
+def _link_data(link: BuiltLink) -> dict[str, Any]:
+    whole = joined(link.bodies)
+    tensor = whole.inertia
+    pairs = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
+    shapes = [
+        {"start": tidy(c.start), "end": tidy(c.end), "radius": round(c.radius, 9)}
+        for c in link.capsules
+    ]
+    return {
+        "name": link.name,
+        "mass": float(whole.mass),
+        "com": [float(value) for value in whole.com],
+        "inertia": [float(tensor[pair]) for pair in pairs],
+        "shapes": shapes,
+    }

@@ -1,0 +1,93 @@
+"""Collision shapes of other kinds as capsules, the one shape that a description has.
+
+A capsule stands for each shape, lying inside it where the shape is round or slender: a sphere is
+a very short capsule, a cylinder loses its edges, a box is filled by up to three capsules side by
+side, as thick as its thinnest side, and a mesh is taken for the box along its principal directions.
+What a capsule leaves out is at most the corners, so a robot touches things slightly later with
+capsules than with its own shapes, never earlier.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+SHORTEST = 0.002
+"""The least length of a capsule between the centres of its ends, relative to its radius."""
+
+
+@dataclass(frozen=True)
+class Capsule:
+    """From ``start`` to ``end`` [m], each (3,), of ``radius`` [m]."""
+
+    start: Array
+    end: Array
+    radius: float
+
+    def moved(self, rotation: Array, position: Array) -> Capsule:
+        """The same capsule seen from a frame in which its own is turned and displaced so."""
+        return Capsule(
+            rotation @ self.start + position, rotation @ self.end + position, self.radius
+        )
+
+    def lowest(self, rotation: Array) -> float:
+        """How low it reaches [m] in a frame in which its own is turned so."""
+        return float(min((rotation @ self.start)[2], (rotation @ self.end)[2]) - self.radius)
+
+
+def along(axis: int, half_length: float, radius: float) -> Capsule:
+    """A capsule about the origin along the coordinate axis of that number."""
+    end = np.zeros(3)
+    end[axis] = max(half_length, 0.5 * SHORTEST * radius)
+    return Capsule(-end, end, radius)
+
+
+def of_sphere(radius: float) -> list[Capsule]:
+    """The capsule for a sphere."""
+    return [along(2, 0.0, radius)]
+
+
+def of_cylinder(radius: float, half_length: float) -> list[Capsule]:
+    """The capsule for a cylinder about z; a disc's lies across it."""
+    if half_length >= radius:
+        return [along(2, half_length - radius, radius)]
+    return of_box(np.array([radius, radius, half_length]))
+
+
+def of_ellipsoid(sizes: Array) -> list[Capsule]:
+    """The capsule for an ellipsoid of these half axes (3,)."""
+    long, middle, short = np.argsort(-sizes, kind="stable")
+    radius = float(np.sqrt(sizes[middle] * sizes[short]))
+    return [along(int(long), float(sizes[long]) - radius, radius)]
+
+
+def of_box(sizes: Array) -> list[Capsule]:
+    """Up to three capsules that fill a box of these half lengths (3,)."""
+    long, middle, short = (int(k) for k in np.argsort(-sizes, kind="stable"))
+    radius = float(sizes[short])
+    room = float(sizes[middle]) - radius
+    count = 1 if room < 0.5 * radius else 2 if room < 1.5 * radius else 3
+    capsule, found = along(long, float(sizes[long]) - radius, radius), []
+    for place in np.linspace(-1.0, 1.0, count) if count > 1 else (0.0,):
+        offset = np.zeros(3)
+        offset[middle] = place * room
+        found.append(capsule.moved(np.eye(3), offset))
+    return found
+
+
+def of_points(points: Array) -> list[Capsule]:
+    """One capsule for a mesh with these corners (n, 3), along its longest principal direction."""
+    corners = np.unique(points, axis=0)
+    _, directions = np.linalg.eigh(np.cov((corners - corners.mean(axis=0)).T))
+    turn = directions * np.sign(directions[np.abs(directions).argmax(axis=0), range(3)])
+    places = corners @ turn
+    low, high = places.min(axis=0), places.max(axis=0)
+    sizes = np.maximum(0.5 * (high - low), 1e-4)
+    long, middle, short = (int(k) for k in np.argsort(-sizes, kind="stable"))
+    radius = float(min(np.sqrt(sizes[middle] * sizes[short]), sizes[long]))
+    capsule = along(long, float(sizes[long]) - radius, radius)
+    return [capsule.moved(turn, turn @ (0.5 * (low + high)))]

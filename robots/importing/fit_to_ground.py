@@ -1,0 +1,107 @@
+"""What follows from the pose in which an imported robot stands."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from ..link_poses import contact_centres, link_poses, standing_heights
+from ..parts import Array, Shape
+from ..robot_description import RobotDescription
+from ..standing_pose import find_standing_pose
+
+CLEARANCE = 0.002
+"""How far above the ground a shape that is no contact point has to end [m]."""
+FOOT_CLEARANCE = 0.01
+"""The same for shapes of a link with a foot, which tilts while the robot moves."""
+
+
+def fit_to_ground(
+    robot: RobotDescription, standing_given: bool, start: Mapping[str, float]
+) -> tuple[RobotDescription, list[str]]:
+    """The robot with a standing pose and without shapes that reach the ground in it, and notes.
+
+    A file's own shapes of the feet are where the contact points are: what touches the ground there
+    is the contact point, and any other shape that touches it counts as a fall.
+    """
+    if not robot.feet:
+        return robot, []
+    notes = []
+    # The file's contacts are where they are at the zero of all joints, whatever the robot does.
+    loose = robot.changed(standing={})
+    angles, centres = robot.standing, contact_centres(loose)
+    if not standing_given:
+        pose = find_standing_pose(loose, start)
+        if pose.holds:
+            angles = pose.angles
+            notes.append("standing is not given: the pose was found")
+        else:
+            notes.append(
+                f"no standing pose was found: contacts differ in height by {pose.level:.1g} m, soles "
+                f"tilt by {pose.flatness:.1g} rad, the centre of mass is off by {pose.balance:.1g} m"
+            )
+    robot = _standing(robot.changed(standing=angles), centres)
+    return _without_low_shapes(robot, notes), notes
+
+
+def _standing(robot: RobotDescription, centres: Array) -> RobotDescription:
+    """The robot with its contact points at the lowest points of their rubber as it stands.
+
+    Args:
+        robot: in its standing pose, with the contact points of the zero pose.
+        centres: of the contacts' rubber [m, link frame], (n_contacts, 3).
+    """
+    poses = link_poses(robot, robot.standing_position)
+    links = {foot.name: foot.link for foot in robot.feet}
+    moved: dict[str, list[Array]] = {foot.name: [] for foot in robot.feet}
+    contacts = []
+    for contact, centre in zip(robot.contacts, centres, strict=True):
+        up = poses[links[contact.foot]][0][2]
+        place = np.round(centre - contact.radius * up, 12) + 0.0
+        moved[contact.foot].append(place - contact.position)
+        contacts.append(contact.model_copy(update={"position": tuple(place.tolist())}))
+    feet = []
+    for foot in robot.feet:
+        sole = np.round(np.array(foot.sole) + np.mean(moved[foot.name], axis=0), 12) + 0.0
+        feet.append(foot.model_copy(update={"sole": tuple(sole.tolist())}))
+    return robot.changed(contacts=tuple(contacts), feet=tuple(feet))
+
+
+def _without_low_shapes(robot: RobotDescription, notes: list[str]) -> RobotDescription:
+    poses = link_poses(robot, robot.standing_position)
+    ground = float(np.min(standing_heights(robot)))
+    links, changed = [], []
+    feet = {foot.link for foot in robot.feet}
+    for link in robot.links:
+        rotation, position = poses[link.name]
+        room = ground + (FOOT_CLEARANCE if link.name in feet else CLEARANCE) - position[2]
+        kept = [_above(shape, rotation, room) for shape in link.shapes]
+        if kept != [*link.shapes]:
+            changed.append(link.name)
+            shapes = tuple(shape for shape in kept if shape is not None)
+            link = link.model_copy(update={"shapes": shapes})
+        links.append(link)
+    if not changed:
+        return robot
+    notes.append(
+        f"shapes of {', '.join(changed)} reach the ground in the standing pose and end above it: "
+        "contact points stand for what touches it"
+    )
+    return robot.changed(links=tuple(links))
+
+
+def _above(shape: Shape, rotation: Array, room: float) -> Shape | None:
+    """The shape, shortened where its lower end is not above ``room`` [m] when the link is turned
+    so; None where that leaves nothing."""
+    ends = np.array([shape.start, shape.end])
+    heights = ends @ rotation[2] - shape.radius
+    low, high = int(np.argmin(heights)), int(np.argmax(heights))
+    if heights[low] > room:
+        return shape
+    if heights[high] <= room:
+        return None
+    share = (room - heights[low]) / (heights[high] - heights[low])
+    ends[low] += share * (ends[high] - ends[low])
+    start, end = (tuple(float(v) for v in np.round(end, 9)) for end in ends)
+    return Shape.model_validate({"start": start, "end": end, "radius": shape.radius})

@@ -1,0 +1,295 @@
+"""Reads a URDF or MJCF file with MuJoCo.
+
+MuJoCo compiles the file, so that defaults, alternative orientations, included files and degrees
+are its business. Two things are kept from it: inertias, which it would refuse or change where a
+link that does not move by itself has an impossible one (published files have such), and meshes,
+of which it reads few formats and needs none here.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import capsules as fit
+from .bodies import NOTHING, Inertial, full_tensor
+from .mesh_files import READABLE, mesh_corners
+from .packages import find_file
+from .raw_model import RawBody, RawJoint, RawModel
+from .urdf_text import UrdfJoint, XmlFile, check_urdf, urdf_joints
+
+Array = NDArray[np.float64]
+
+
+def read_model(path: Path) -> RawModel:
+    """What the file holds.
+
+    Raises:
+        RobotError: it is no URDF and no MJCF, or MuJoCo cannot make sense of it.
+    """
+    import mujoco
+
+    file = XmlFile(path)
+    if file.is_urdf:
+        check_urdf(file)
+    try:
+        spec = mujoco.MjSpec.from_file(str(path))
+    except (ValueError, RuntimeError) as error:
+        raise file.error(f"MuJoCo cannot read this: {_one_line(error)}") from error
+    notes: list[str] = []
+    _name_everything(spec)
+    inertials = _take_inertials(spec, file.is_urdf)
+    meshes = _take_meshes(spec, path.parent, inertials, notes)
+    try:
+        model = spec.compile()
+    except (ValueError, RuntimeError) as error:
+        raise file.error(f"MuJoCo cannot compile this: {_one_line(error)}") from error
+    data = mujoco.MjData(model)
+    data.qpos[:] = 0.0
+    for k in range(model.njnt):
+        kind, start = int(model.jnt_type[k]), int(model.jnt_qposadr[k])
+        if kind == mujoco.mjtJoint.mjJNT_FREE:
+            data.qpos[start + 3] = 1.0
+        elif kind == mujoco.mjtJoint.mjJNT_BALL:
+            data.qpos[start] = 1.0
+    mujoco.mj_kinematics(model, data)
+    limits = urdf_joints(file) if file.is_urdf else {}
+    mimics = tuple(name for name, joint in limits.items() if joint.mimics)
+    for name in mimics:
+        notes.append(f"joint {name} mimics {limits[name].mimics} in the URDF and is fixed here")
+    names = [model.body(k).name for k in range(model.nbody)]
+    bodies = {}
+    for k in range(1, model.nbody):
+        bodies[names[k]] = RawBody(
+            names[k],
+            names[model.body_parentid[k]],
+            _tidy(data.xmat[k].reshape(3, 3)),
+            np.array(data.xpos[k]),
+            _inertial(model, k, inertials.get(names[k])),
+            tuple(
+                _joint(model, data, j, limits)
+                for j in range(model.njnt)
+                if model.jnt_bodyid[j] == k
+            ),
+            tuple(_capsules(model, k, meshes, notes)),
+        )
+    name = spec.modelname or path.stem
+    pose = _key_frame(model)
+    return RawModel(
+        name, path, file.is_urdf, bodies, names[0], pose, mimics, tuple(dict.fromkeys(notes))
+    )
+
+
+def _one_line(error: Exception) -> str:
+    return " ".join(str(error).split())
+
+
+def _tidy(values: Array) -> Array:
+    """Directions without the rounding of angles such as 1.5707963: what is nearly straight is."""
+    values = np.array(values, dtype=float)
+    nearest = np.round(values)
+    return np.where(np.abs(values - nearest) < 1e-10, nearest, values) + 0.0
+
+
+def _name_everything(spec: Any) -> None:
+    for k, body in enumerate(spec.bodies):
+        body.name = body.name or f"body_{k}"
+        for i, joint in enumerate(body.joints):
+            joint.name = joint.name or f"{body.name}_joint" + (f"_{i + 1}" if i else "")
+    for k, geom in enumerate(spec.geoms):
+        geom.name = f"geom/{k}"
+
+
+def _take_inertials(spec: Any, is_urdf: bool) -> dict[str, tuple[float, Array]]:
+    """Take the inertials that the file gives out of the model: mass, tensor in the inertial frame.
+
+    Every one is replaced by a unit body at its place, which any compiler accepts.
+    """
+    import mujoco
+
+    spec.compiler.fusestatic = False
+    if (
+        not is_urdf
+        and spec.compiler.inertiafromgeom == mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE
+    ):
+        return {}
+    found = {}
+    for body in spec.bodies[1:]:
+        if not body.explicitinertial and not is_urdf and len(body.geoms):
+            continue  # An MJCF body without an inertial has that of its shapes.
+        if not body.explicitinertial:
+            found[body.name] = (0.0, np.zeros((3, 3)))
+            body.ipos = [0.0, 0.0, 0.0]
+        elif math.isnan(body.fullinertia[0]):
+            found[body.name] = (float(body.mass), np.diag(body.inertia))
+        else:
+            found[body.name] = (float(body.mass), full_tensor(np.array(body.fullinertia)))
+        body.fullinertia = [math.nan, 0.0, 0.0, 0.0, 0.0, 0.0]
+        body.mass, body.inertia, body.explicitinertial = 1.0, [1.0, 1.0, 1.0], True
+    return found
+
+
+def _take_meshes(
+    spec: Any, folder: Path, inertials: dict[str, Any], notes: list[str]
+) -> dict[str, tuple[str, Path | None, Array]]:
+    """Take the meshes of bodies with an inertial out of the model: name, file and scale by geom."""
+    import mujoco
+
+    kinds = mujoco.mjtGeom
+    found: dict[str, tuple[str, Path | None, Array]] = {}
+    files = {mesh.name: mesh for mesh in spec.meshes}
+    base = folder / (spec.compiler.meshdir or "")
+    needed: list[str] = []
+    for geom in list(spec.geoms):
+        geom.material = ""
+        if geom.type not in (kinds.mjGEOM_MESH, kinds.mjGEOM_SDF):
+            continue
+        mesh = files.get(geom.meshname)
+        if geom.parent.name not in inertials and geom.parent.name != "world":
+            needed.append(geom.meshname)
+        elif mesh is not None:
+            path = find_file(mesh.file, base)
+            found[geom.name] = (mesh.file, path, np.array(mesh.scale))
+            geom.meshname, geom.type, geom.size = "", kinds.mjGEOM_SPHERE, [0.01, 0.0, 0.0]
+    for mesh in list(spec.meshes):
+        if mesh.name not in needed:
+            spec.delete(mesh)
+    for group in (spec.textures, spec.materials, spec.skins):
+        for each in list(group):
+            spec.delete(each)
+    return found
+
+
+def _inertial(model: Any, k: int, taken: tuple[float, Array] | None) -> Inertial:
+    import mujoco
+
+    turn = np.zeros(9)
+    mujoco.mju_quat2Mat(turn, model.body_iquat[k])
+    rotation, position = _tidy(turn.reshape(3, 3)), np.array(model.body_ipos[k])
+    mass, tensor = taken or (float(model.body_mass[k]), np.diag(model.body_inertia[k]))
+    if mass == 0.0 and not np.any(tensor):
+        return NOTHING
+    return Inertial(mass, np.zeros(3), tensor).moved(rotation, position)
+
+
+def _joint(model: Any, data: Any, j: int, urdf: dict[str, UrdfJoint]) -> RawJoint:
+    import mujoco
+
+    kinds = {
+        mujoco.mjtJoint.mjJNT_HINGE: "hinge",
+        mujoco.mjtJoint.mjJNT_SLIDE: "slide",
+        mujoco.mjtJoint.mjJNT_FREE: "free",
+        mujoco.mjtJoint.mjJNT_BALL: "ball",
+    }
+    name, dof = model.joint(j).name, int(model.jnt_dofadr[j])
+    lower, upper = (float(value) for value in model.jnt_range[j])
+    effort = _motor_torque(model, j)
+    speed = math.nan
+    if name in urdf:
+        effort, speed = urdf[name].effort, urdf[name].speed
+    return RawJoint(
+        name,
+        kinds[mujoco.mjtJoint(int(model.jnt_type[j]))],
+        _tidy(data.xaxis[j]),
+        np.array(data.xanchor[j]),
+        (lower, upper) if model.jnt_limited[j] else None,
+        effort,
+        speed,
+        float(model.dof_armature[dof]),
+        float(np.max(model.dof_damping[dof])),
+        float(model.dof_frictionloss[dof]),
+    )
+
+
+def _motor_torque(model: Any, j: int) -> float:
+    """The largest torque [N m] of the MJCF actuators on a joint; 0 without one, NaN if unlimited."""
+    import mujoco
+
+    found = 0.0
+    for k in range(model.nu):
+        on_joint = model.actuator_trntype[k] in (
+            mujoco.mjtTrn.mjTRN_JOINT, mujoco.mjtTrn.mjTRN_JOINTINPARENT,
+        )  # fmt: skip
+        if not on_joint or model.actuator_trnid[k][0] != j:
+            continue
+        gear, gain = abs(float(model.actuator_gear[k][0])), abs(float(model.actuator_gainprm[k][0]))
+        is_motor = model.actuator_biastype[k] == mujoco.mjtBias.mjBIAS_NONE
+        if model.actuator_forcelimited[k]:
+            torque = gear * float(np.max(np.abs(model.actuator_forcerange[k])))
+        elif is_motor and model.actuator_ctrllimited[k]:
+            torque = gear * gain * float(np.max(np.abs(model.actuator_ctrlrange[k])))
+        else:
+            torque = math.nan
+        found += torque
+    if model.jnt_actfrclimited[j] and found != 0.0:
+        return float(np.fmin(found, np.max(np.abs(model.jnt_actfrcrange[j]))))
+    return found
+
+
+def _capsules(
+    model: Any, k: int, meshes: dict[str, tuple[str, Path | None, Array]], notes: list[str]
+) -> list[fit.Capsule]:
+    """The capsules of a body, in its own frame; shapes that touch nothing are left out."""
+    import mujoco
+
+    kinds = mujoco.mjtGeom
+    of_kind: dict[int, Callable[[Array], list[fit.Capsule]]] = {
+        int(kinds.mjGEOM_SPHERE): lambda size: fit.of_sphere(float(size[0])),
+        int(kinds.mjGEOM_CAPSULE): lambda size: [fit.along(2, float(size[1]), float(size[0]))],
+        int(kinds.mjGEOM_CYLINDER): lambda size: fit.of_cylinder(float(size[0]), float(size[1])),
+        int(kinds.mjGEOM_BOX): fit.of_box,
+        int(kinds.mjGEOM_ELLIPSOID): fit.of_ellipsoid,
+    }
+    found: list[fit.Capsule] = []
+    for g in range(model.ngeom):
+        if model.geom_bodyid[g] != k or not (model.geom_contype[g] or model.geom_conaffinity[g]):
+            continue
+        name, body = model.geom(g).name, model.body(k).name
+        kind, size = int(model.geom_type[g]), np.array(model.geom_size[g])
+        shapes: list[fit.Capsule] = []
+        if name in meshes:
+            written, path, scale = meshes[name]
+            if path is None:
+                notes.append(f"link {body}: the mesh {written} is not there, so it has no shape")
+            elif path.suffix.lower() not in READABLE:
+                notes.append(
+                    f"link {body}: the mesh {written} is of a format that is not read "
+                    f"({', '.join(READABLE)} are), so it has no shape"
+                )
+            else:
+                try:
+                    shapes = fit.of_points(mesh_corners(path) * scale)
+                except (ValueError, OSError) as error:
+                    notes.append(f"link {body}: {_one_line(error)}, so it has no shape")
+        elif kind == int(kinds.mjGEOM_MESH):
+            mesh = int(model.geom_dataid[g])
+            start, count = int(model.mesh_vertadr[mesh]), int(model.mesh_vertnum[mesh])
+            shapes = fit.of_points(np.array(model.mesh_vert[start : start + count], dtype=float))
+        elif kind in of_kind:
+            shapes = of_kind[kind](size)
+        turn = np.zeros(9)
+        mujoco.mju_quat2Mat(turn, model.geom_quat[g])
+        rotation, position = turn.reshape(3, 3), np.array(model.geom_pos[g])
+        found += [shape.moved(rotation, position) for shape in shapes]
+    return found
+
+
+def _key_frame(model: Any) -> dict[str, float]:
+    """Joint angles of the key frame called home or stand, else of the first."""
+    import mujoco
+
+    names = [model.key(k).name for k in range(model.nkey)]
+    if not names:
+        return {}
+    key = next((names.index(name) for name in ("home", "stand", "standing") if name in names), 0)
+    simple = (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE)
+    return {
+        model.joint(j).name: float(model.key_qpos[key][model.jnt_qposadr[j]])
+        for j in range(model.njnt)
+        if model.jnt_type[j] in simple
+    }

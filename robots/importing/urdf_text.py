@@ -1,0 +1,154 @@
+"""What MuJoCo does not keep of a URDF: speed limits, mimic joints, and the lines of everything."""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from xml.etree import ElementTree
+
+from ..validation import RobotError, RobotFault
+from ..validation.faults import listing, number
+
+HINGES = ("revolute", "continuous")
+KINDS = (*HINGES, "prismatic", "fixed", "floating", "planar")
+
+
+@dataclass(frozen=True)
+class UrdfJoint:
+    """A joint's ``effort`` and ``speed`` (NaN where not given) and the joint it mimics, if any."""
+
+    effort: float
+    speed: float
+    mimics: str
+
+
+class XmlFile:
+    """An XML file, its root, and where a link or joint of some name stands in it."""
+
+    def __init__(self, path: Path) -> None:
+        """Read the file. Raises ``RobotError`` where it is no URDF and no MJCF."""
+        self.path = path
+        try:
+            self.text = path.read_text(encoding="utf-8")
+            self.root = ElementTree.fromstring(self.text)
+        except OSError as error:
+            raise self.error(f"the file cannot be read: {error.strerror}") from error
+        except UnicodeDecodeError as error:
+            raise self.error("this is no text in UTF-8", "URDF or MJCF") from error
+        except ElementTree.ParseError as error:
+            line, column = error.position
+            what = f"this is no XML: {error.msg.partition(':')[0]}"
+            fault = RobotFault((), what, line=line, column=column + 1)
+            raise RobotError(str(path), [fault]) from error
+        if self.root.tag not in ("robot", "mujoco"):
+            raise self.error(
+                "this is neither a URDF nor an MJCF file",
+                "the root element <robot> of a URDF or <mujoco> of an MJCF file",
+                f"<{self.root.tag}>",
+            )
+
+    @property
+    def is_urdf(self) -> bool:
+        """Whether it is a URDF, else it is MJCF."""
+        return bool(self.root.tag == "robot")
+
+    def error(self, message: str, expected: str = "", found: str = "", fix: str = "") -> RobotError:
+        """An error of the file as a whole."""
+        return RobotError(str(self.path), [RobotFault((), message, expected, found, fix)])
+
+    def place(self, tag: str, name: str) -> tuple[int, int]:
+        """Line and column of the element of that tag and name; (0, 0) if it is not found."""
+        pattern = rf"<{tag}\s(?:[^>]*?\s)?name\s*=\s*[\"']{re.escape(name)}[\"']"
+        found = re.search(pattern, self.text)
+        if not found:
+            return 0, 0
+        before = self.text[: found.start()]
+        return before.count("\n") + 1, found.start() - before.rfind("\n")
+
+
+def urdf_joints(file: XmlFile) -> dict[str, UrdfJoint]:
+    """Every joint's effort, speed and mimic by name."""
+    found = {}
+    for joint in file.root.findall("joint"):
+        limit, mimic = joint.find("limit"), joint.find("mimic")
+        effort, speed = (
+            _value(limit.get(key)) if limit is not None else math.nan
+            for key in ("effort", "velocity")
+        )
+        mimics = mimic.get("joint", "") if mimic is not None else ""
+        found[joint.get("name", "")] = UrdfJoint(effort, speed, mimics)
+    return found
+
+
+def check_urdf(file: XmlFile) -> None:
+    """Raise ``RobotError`` with everything that no reader of a URDF could make sense of."""
+    faults: list[RobotFault] = []
+
+    def add(tag: str, name: str, message: str, expected: str = "", found: str = "") -> None:
+        line, column = file.place(tag, name)
+        faults.append(RobotFault((), message, expected, found, line=line, column=column))
+
+    links = [link.get("name", "") for link in file.root.findall("link")]
+    if not links:
+        raise file.error("the URDF has no links", "at least one <link>", "none")
+    for name in dict.fromkeys(links):
+        if links.count(name) > 1:
+            add("link", name, f"link {name!r} is there {links.count(name)} times", "each name once")
+    carried: dict[str, str] = {}
+    joints = [joint.get("name", "") for joint in file.root.findall("joint")]
+    for name in dict.fromkeys(joints):
+        if joints.count(name) > 1:
+            add(
+                "joint",
+                name,
+                f"joint {name!r} is there {joints.count(name)} times",
+                "each name once",
+            )
+    for joint in file.root.findall("joint"):
+        name, kind = joint.get("name", ""), joint.get("type", "")
+        if kind not in KINDS:
+            add(
+                "joint",
+                name,
+                f"joint {name} has no type that a URDF knows",
+                listing(KINDS),
+                repr(kind),
+            )
+        for end in ("parent", "child"):
+            element = joint.find(end)
+            link = element.get("link", "") if element is not None else ""
+            if link not in links:
+                what = f"the {end} of joint {name} is {link!r}, and there is no such link"
+                add("joint", name, what, listing(links), repr(link))
+            elif end == "child" and link in carried:
+                what = f"link {link} is carried by two joints, {carried[link]} and {name}"
+                add("joint", name, what, "one joint that carries each link")
+            elif end == "child":
+                carried[link] = name
+        axis = joint.find("axis")
+        if kind in (*HINGES, "prismatic") and axis is not None:
+            values = [_value(text) for text in (axis.get("xyz") or "").split()]
+            if len(values) != 3 or not math.isfinite(math.hypot(*values)) or not any(values):
+                add("joint", name, f"the axis of joint {name} is no direction",
+                    "three numbers that are not all zero", repr(axis.get("xyz")))  # fmt: skip
+        limit = joint.find("limit")
+        if limit is not None and kind in ("revolute", "prismatic"):
+            lower, upper = (_value(limit.get(key, "0")) for key in ("lower", "upper"))
+            if not lower < upper:
+                add("joint", name, f"the limits of joint {name} leave it no room or are reversed",
+                    "lower < upper", f"lower {number(lower)}, upper {number(upper)}")  # fmt: skip
+    roots = [name for name in dict.fromkeys(links) if name not in carried]
+    if len(roots) != 1 and not faults:
+        add("link", (roots or links)[0], f"the links make no single tree: {len(roots)} have no parent",
+            "one link that no joint carries", listing(roots))  # fmt: skip
+    if faults:
+        raise RobotError(str(file.path), faults)
+
+
+def _value(text: str | None) -> float:
+    try:
+        return float(text) if text is not None else math.nan
+    except ValueError:
+        return math.nan

@@ -1,0 +1,1 @@
+"""BRUCE, the biped of the paper: its description as one data file."""
