@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from .runtime.loading import LoadError
     from .runtime.running.run_result import RunResult
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 _HOMES = {
     "write_recording": "logs.recording.finished_run",

@@ -2,7 +2,7 @@
 
 The contact point of such a foot, and its sole, are the ball's lowest point in the world, however
 the foot is turned: its centre less its radius straight down. The positions that the description
-gives are where these are at the zero pose. Contact points of other feet are fixed to the foot.
+gives are where these are in the standing pose. Contact points of other feet are fixed to the foot.
 """
 
 from __future__ import annotations
@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
+
+from .link_poses import contact_centres
 
 if TYPE_CHECKING:
     from .robot_description import RobotDescription
@@ -32,9 +34,10 @@ class BallFoot:
 
 def ball_feet(robot: RobotDescription) -> tuple[BallFoot, ...]:
     """The robot's feet with exactly one contact point, in the order of its contact points."""
+    centres = contact_centres(robot)
     owners = robot.foot_of_contact()
     return tuple(
-        BallFoot(foot, point, contact.radius, np.add(contact.position, (0.0, 0.0, contact.radius)))
+        BallFoot(foot, point, contact.radius, centres[point])
         for point, (foot, contact) in enumerate(zip(owners, robot.contacts, strict=True))
         if owners.count(foot) == 1
     )

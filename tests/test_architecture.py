@@ -66,7 +66,18 @@ ALLOWED: dict[str, tuple[str, ...]] = {
 }  # fmt: skip
 """The rooms, and which rooms the files of each may import. The longest name that fits a file is its
 room; a room may import itself. What is allowed is a room with all that lies in it."""
-HEAVY = {"mujoco", "pinocchio", "qpsolvers", "daqp", "rerun", "scipy", "numba", "pyarrow", "PIL"}
+HEAVY = {
+    "mujoco",
+    "pinocchio",
+    "qpsolvers",
+    "daqp",
+    "rerun",
+    "scipy",
+    "numba",
+    "pyarrow",
+    "PIL",
+    "matplotlib",
+}
 LONGEST = 400
 ROOMS_BY_NAME = tuple(name for name in PACKAGES if name != "planner")
 

@@ -124,9 +124,9 @@ class Dynamics(Block):
         to_matrix(q[3:7], terms.base_rotation)
 
         for ball in self._balls:
-            point = self._points[ball.point]
-            lowest_point(ball.centre, ball.radius, self._foot_turn[ball.foot], point)
-            self._soles[ball.foot][...] = point
+            lowest = self._points[ball.point]
+            lowest_point(ball.centre, ball.radius, self._foot_turn[ball.foot], lowest)
+            self._soles[ball.foot][...] = lowest
         for foot, sole in enumerate(self._soles):
             turn = self._foot_turn[foot]
             terms.foot_rotation[foot] = turn

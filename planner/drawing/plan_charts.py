@@ -1,6 +1,6 @@
-"""A plan over time as charts: what it does, and how near it comes to every limit.
+"""A plan over time as panels: what it does, and how near it comes to every limit.
 
-Limits are dashed; the phases are shaded.
+Limits are thin, grey and dashed; the phases are shaded.
 """
 
 from __future__ import annotations
@@ -9,86 +9,88 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...blocks.signals import Phase
+from ...plotting import Line, Panel, Shade
 from ..checking.evidence import Evidence
 from ..checking.plan_tests import allowed_motor_torque
 from ..task.plan import JumpPlan
-from .line_chart import Chart, Line
 
 Array = NDArray[np.float64]
 
+OTHER = "#b4bdc6"
+"""The colour of motors that have no name in a panel."""
+MOST_SHARE = 150.0
+"""Shares of what a motor can do are drawn up to here [%]."""
 
-def charts_of(e: Evidence) -> list[Chart]:
-    """All charts, three in a row."""
-    charts = [
-        com_chart(e.plan), velocity_chart(e.plan), momentum_chart(e.plan),
-        force_chart(e), friction_chart(e), feet_chart(e),
-        torque_chart(e), torque_share_chart(e), speed_chart(e),
+
+def plan_panels(e: Evidence) -> list[Panel]:
+    """All panels of a plan, three in a row; the last row says what x is."""
+    shades = phases_of(e.plan)
+    rows = [
+        com_lines(e.plan), velocity_lines(e.plan), momentum_lines(e.plan),
+        force_lines(e), friction_lines(e), feet_lines(e),
+        torque_lines(e), torque_share_lines(e), speed_lines(e),
     ]  # fmt: skip
-    for chart in charts:
-        chart.shaded += phases_of(e.plan)
-    return charts
+    last = len(rows) - 3
+    return [
+        Panel(title, lines, "time [s]" if number >= last else "", None, shades)
+        for number, (title, lines) in enumerate(rows)
+    ]
 
 
-def phases_of(plan: JumpPlan) -> list[tuple[float, float, str]]:
-    """From when to when each phase lasts, with its name."""
+def phases_of(plan: JumpPlan) -> list[Shade]:
+    """From when to when each phase lasts [s], with its name."""
     changes = np.flatnonzero(np.diff(plan.phase)) + 1
     starts = np.concatenate([[0], changes])
     ends = np.append(changes, len(plan.time) - 1)
+    names = [Phase(int(plan.phase[start])).name.lower() for start in starts]
     return [
-        (float(plan.time[start]), float(plan.time[end]), Phase(int(plan.phase[start])).name.lower())
-        for start, end in zip(starts, ends, strict=True)
+        Shade(float(plan.time[start]), float(plan.time[end]), name, name)
+        for start, end, name in zip(starts, ends, names, strict=True)
         if plan.time[end] > plan.time[start]
     ]
 
 
-def com_chart(plan: JumpPlan) -> Chart:
-    """The way of the centre of mass."""
-    way = 100.0 * (plan.com - plan.com[0])
-    lines = [Line(name, plan.time, way[:, k]) for k, name in enumerate(("forward", "left", "up"))]
-    return Chart("centre of mass from standing [cm]", lines)
+def com_lines(plan: JumpPlan) -> tuple[str, list[Line]]:
+    """The path of the centre of mass, from where it stands at first."""
+    path = 100.0 * (plan.com - plan.com[0])
+    lines = [Line(name, plan.time, path[:, k]) for k, name in enumerate(("forward", "left", "up"))]
+    return "centre of mass, from standing [cm]", lines
 
 
-def velocity_chart(plan: JumpPlan) -> Chart:
-    """Its velocity."""
+def velocity_lines(plan: JumpPlan) -> tuple[str, list[Line]]:
+    """The velocity of the centre of mass."""
     names = ("forward", "left", "up")
     lines = [Line(name, plan.time, plan.com_velocity[:, k]) for k, name in enumerate(names)]
-    return Chart("its velocity [m/s]", lines)
+    return "velocity of the centre of mass [m/s]", lines
 
 
-def momentum_chart(plan: JumpPlan) -> Chart:
-    """The angular momentum."""
+def momentum_lines(plan: JumpPlan) -> tuple[str, list[Line]]:
+    """The angular momentum about the centre of mass."""
     names = ("roll", "pitch", "yaw")
     lines = [Line(n, plan.time, plan.angular_momentum[:, k]) for k, n in enumerate(names)]
-    return Chart("angular momentum about it [N m s]", lines)
+    return "angular momentum about the centre of mass [N m s]", lines
 
 
-def _steps(plan: JumpPlan) -> tuple[Array, NDArray[np.int64]]:
-    """Both ends of every interval that lasts, for what is constant over it, and the intervals."""
-    lasting = np.diff(plan.time) > 0.0
-    time = np.repeat(plan.time, 2)[1:-1].reshape(-1, 2)[lasting].ravel()
-    return time, np.repeat(np.flatnonzero(lasting), 2)
-
-
-def force_chart(e: Evidence) -> Chart:
-    """The vertical force on every contact, constant over each interval, and on all of them."""
-    time, k = _steps(e.plan)
+def force_lines(e: Evidence) -> tuple[str, list[Line]]:
+    """The vertical force on every contact point, and the sum of all; constant over each interval."""
+    time, k = _interval_ends(e.plan)
     up = e.plan.contact_force[k, :, 2]
     lines = [Line(c.name, time, up[:, n]) for n, c in enumerate(e.robot.contacts)]
-    return Chart("vertical force of the ground [N]", [*lines, Line("all", time, up.sum(axis=1))])
+    return "vertical contact force [N]", [*lines, Line("all", time, up.sum(axis=1))]
 
 
-def friction_chart(e: Evidence) -> Chart:
-    """How much of its friction cone every contact's force uses; nothing where there is none."""
-    time, k = _steps(e.plan)
+def friction_lines(e: Evidence) -> tuple[str, list[Line]]:
+    """How much of its friction cone the force on every contact point uses; no line without force."""
+    time, k = _interval_ends(e.plan)
     force = e.plan.contact_force[k]
     up = force[:, :, 2]
     most = e.plan.task.friction * np.where(up > 0.5, up, np.nan)
     share = 100.0 * np.hypot(force[:, :, 0], force[:, :, 1]) / most
     lines = [Line(c.name, time, share[:, n]) for n, c in enumerate(e.robot.contacts)]
-    return Chart("friction used [% of the cone]", [*lines, _level("limit", time, 100.0)])
+    return "friction used [% of the cone]", [*lines, _limit(time, 100.0)]
 
 
-def feet_chart(e: Evidence) -> Chart:
+def feet_lines(e: Evidence) -> tuple[str, list[Line]]:
     """The heights of the contact points, and of the ground under each of them."""
     s = e.replay.samples
     ground = 100.0 * (s.points[:, :, 2] - e.point_height)
@@ -98,52 +100,71 @@ def feet_chart(e: Evidence) -> Chart:
     ]
     for k in range(len(e.robot.contacts)):
         last = k == len(e.robot.contacts) - 1
-        lines.append(Line("ground" if last else "", s.time, ground[:, k], level=True))
-    return Chart("height of toes and heels [cm]", lines)
+        lines.append(Line("ground" if last else "", s.time, ground[:, k], limit=True))
+    return "height of the contact points [cm]", lines
 
 
-def torque_chart(e: Evidence) -> Chart:
-    """The torques of the two busiest motors that differ, and what their speed allows each instant."""
+def torque_lines(e: Evidence) -> tuple[str, list[Line]]:
+    """The torques of the two motors that work hardest, and what their speed allows at each instant.
+
+    Of two motors that do the same, as the legs' do in a jump straight ahead, one is shown.
+    """
     time, allowed = e.replay.samples.time, allowed_motor_torque(e, e.effort)
-    lines, levels = [], []
+    lines, limits = [], []
     for k in _busiest(_torque_share(e), np.abs(e.motor_torque))[:2]:
         torque = e.motor_torque[:, k]
         lines.append(Line(_name(e, k), time, torque))
         # The limit on the side on which the motor works; braking and driving differ.
-        level = np.where(torque < 0.0, -allowed[:, k], allowed[:, k])
-        level[np.flatnonzero(np.diff(np.sign(level)))] = np.nan
-        levels.append(Line("", time, level, level=True))
-    levels[-1] = Line("allowed at that speed", levels[-1].x, levels[-1].y, level=True)
-    return Chart("motor torque [N m]", [*lines, *levels])
+        limit = np.where(torque < 0.0, -allowed[:, k], allowed[:, k])
+        limit[np.flatnonzero(np.diff(np.sign(limit)))] = np.nan
+        limits.append(Line("", time, limit, limit=True))
+    limits[-1] = Line("limit at its speed", limits[-1].x, limits[-1].y, limit=True)
+    return "motor torque [N m]", [*lines, *limits]
 
 
-def torque_share_chart(e: Evidence) -> Chart:
+def torque_share_lines(e: Evidence) -> tuple[str, list[Line]]:
     """All motor torques as shares of what the motors can do at their speed."""
-    return _motor_chart(e, "motor torque [% of what its speed allows]", 100.0 * _torque_share(e))
+    lines = _motor_lines(e, 100.0 * _torque_share(e))
+    return "motor torque [% of the limit at its speed]", lines
 
 
-def speed_chart(e: Evidence) -> Chart:
+def speed_lines(e: Evidence) -> tuple[str, list[Line]]:
     """Motor speeds as shares of the speed without load."""
     share = np.abs(e.motor_speed) / e.robot.profiles[e.plan.task.profile].no_load_speed
-    return _motor_chart(e, "motor speed [% of no-load speed]", 100.0 * share)
+    return "motor speed [% of the no-load speed]", _motor_lines(e, 100.0 * share)
+
+
+def _interval_ends(plan: JumpPlan) -> tuple[Array, NDArray[np.int64]]:
+    """The times of both ends of every interval that has a length, and the interval's number.
+
+    Lines of what is constant over each interval have these points.
+    """
+    lasting = np.diff(plan.time) > 0.0
+    time = np.repeat(plan.time, 2)[1:-1].reshape(-1, 2)[lasting].ravel()
+    return time, np.repeat(np.flatnonzero(lasting), 2)
 
 
 def _torque_share(e: Evidence) -> Array:
+    """The motor torques as shares of what the motors can do at their speed, (samples, n_motors)."""
     return np.asarray(np.abs(e.motor_torque) / np.maximum(allowed_motor_torque(e, 1.0), 1e-3))
 
 
-def _motor_chart(e: Evidence, title: str, shares: Array) -> Chart:
-    time, shares = e.replay.samples.time, np.minimum(shares, 150.0)
+def _motor_lines(e: Evidence, shares: Array) -> list[Line]:
+    """The three motors that work hardest with their names, all others grey below them, the limit."""
+    time, shares = e.replay.samples.time, np.minimum(shares, MOST_SHARE)
     named = _busiest(shares / 100.0, shares)[:3]
-    lines = [
-        Line(_name(e, k) if k in named else "", time, shares[:, k]) for k in range(shares.shape[1])
-    ]
-    return Chart(title, [*lines, _level("limit", time, 100.0 * e.effort)])
+    others = [k for k in range(shares.shape[1]) if k not in named]
+    lines = [Line("", time, shares[:, k], OTHER) for k in others]
+    lines += [Line(_name(e, k), time, shares[:, k]) for k in named]
+    return [*lines, _limit(time, 100.0 * e.effort)]
 
 
 def _busiest(shares: Array, lines: Array) -> list[int]:
-    """Motors in the order of their root mean square share, without those whose line hides behind another
-    one's: of a jump straight ahead both legs do the same."""
+    """The motors in the order of their root mean square share, the largest first.
+
+    A motor whose line is hidden behind the line of one before it is left out: in a jump straight
+    ahead both legs do the same.
+    """
     found: list[int] = []
     room = 0.05 * float(lines.max())
     for k in np.argsort(-(np.minimum(shares, 1.5) ** 2).mean(axis=0), kind="stable").tolist():
@@ -156,5 +177,6 @@ def _name(e: Evidence, motor: int) -> str:
     return e.robot.transmission.motors[motor].removesuffix("_motor")
 
 
-def _level(name: str, time: Array, value: float) -> Line:
-    return Line(name, np.array([time[0], time[-1]]), np.full(2, value), level=True)
+def _limit(time: Array, value: float) -> Line:
+    """A limit that does not change."""
+    return Line("limit", np.array([time[0], time[-1]]), np.full(2, value), limit=True)

@@ -1,18 +1,28 @@
-"""One line a cell: a dot with its interval, and the goal where there is one."""
+"""A chart with one row for each cell: a dot with its interval, and the goal where there is one."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from . import svg
+from ...plotting import COLOURS, FAINT, INK, new_figure, style, svg_text
 
-STEP, TOP, WIDTH = 26.0, 62.0, 460.0
+MET, MISSED, PLAIN = COLOURS[2], COLOURS[1], COLOURS[0]
+"""The colours of a dot whose goal is met, whose goal is missed, and that has no goal."""
 
 
 @dataclass(frozen=True)
 class Dot:
-    """A value with its interval; ``note`` stands at the right, ``goal`` is a mark."""
+    """One row of the chart.
+
+    Attributes:
+        name: what is written at the left.
+        value: where the dot is.
+        low, high: the ends of its interval.
+        note: what is written at the right.
+        goal: where the mark of the goal is; ``None`` for no goal.
+        met: whether the goal is met.
+    """
 
     name: str
     value: float
@@ -24,38 +34,48 @@ class Dot:
 
 
 def dot_chart(title: str, x_label: str, dots: Sequence[Dot], *, share: bool = False) -> str:
-    """Dots under each other. With ``share`` the axis is from 0 to 100 %."""
-    low, high = 0.0, 1.0
-    if not share:
-        low = min((d.low for d in dots), default=0.0)
-        high = max((d.high for d in dots), default=1.0)
-        room = 0.05 * (high - low) or 0.5
-        low, high = (0.0 if 0 <= low < 0.3 * high else low - room), high + room
-    left = 34 + svg.CHARACTER * max((len(d.name) for d in dots), default=0)
-    bottom = TOP + STEP * len(dots)
+    """The chart as SVG text, the first dot at the top.
 
-    def across(value: float) -> float:
-        return left + (value - low) / (high - low) * WIDTH
+    With ``share`` the values are shares, and the axis goes from 0 to 100 %.
+    """
+    from matplotlib.ticker import PercentFormatter
 
-    out: list[str] = []
-    for value in svg.round_values(low, high, 6):
-        words = f"{value:.0%}" if share else f"{value:g}"
-        out.append(svg.line(across(value), TOP - 6, across(value), bottom))
-        out.append(
-            svg.text(across(value), bottom + 17, words, anchor="middle", size=11, fill=svg.FAINT)
-        )
-    for number, each in enumerate(dots):
-        y = TOP + STEP * (number + 0.5)
-        ink = {True: 2, False: 1, None: 0}[each.met]
-        out.append(svg.text(left - 12, y + 4, each.name, anchor="end"))
-        look = f'stroke="{svg.colour(ink)}" stroke-width="3" stroke-opacity="0.45" '
-        look += 'stroke-linecap="round"'
-        out.append(svg.line(across(each.low), y, across(each.high), y, look))
-        if each.goal is not None:
-            x = across(each.goal)
-            out.append(svg.line(x, y - 9, x, y + 9, f'stroke="{svg.INK}" stroke-width="1.5"'))
-        out.append(svg.dot(across(each.value), y, ink, 4.5))
-        out.append(svg.text(left + WIDTH + 14, y + 4, each.note, size=11, fill=svg.FAINT))
-    out.append(svg.text(left + WIDTH / 2, bottom + 36, x_label, anchor="middle"))
-    width = left + WIDTH + 34 + 6 * max((len(d.note) for d in dots), default=0)
-    return svg.page(title, max(width, 50 + 9 * len(title)), bottom + 50, out)
+    letters = max((len(dot.name) for dot in dots), default=0)
+    notes = max((len(dot.note) for dot in dots), default=0)
+    width = max(4.8 + 0.075 * (letters + notes), 0.6 + 0.105 * len(title))
+    with style():
+        figure = new_figure(width, 1.1 + 0.26 * max(len(dots), 1), title)
+        axes = figure.add_subplot()
+        axes.grid(axis="y", visible=False)
+        for row, dot in enumerate(dots):
+            colour = {True: MET, False: MISSED, None: PLAIN}[dot.met]
+            axes.plot(
+                [dot.low, dot.high], [row, row], color=colour, alpha=0.45, linewidth=3,
+                solid_capstyle="round", gid=f"interval-{row}",
+            )  # fmt: skip
+            if dot.goal is not None:
+                axes.plot(
+                    dot.goal, row, "|", color=INK, markersize=13, markeredgewidth=1.4, clip_on=False
+                )
+            axes.plot(
+                dot.value, row, "o", color=colour, markersize=6.5, markeredgecolor="white",
+                clip_on=False, gid=f"dot-{row}",
+            )  # fmt: skip
+            axes.annotate(
+                dot.note, (1.0, row), (8, 0), xycoords=axes.get_yaxis_transform(),
+                textcoords="offset points", va="center", fontsize=8, color=FAINT,
+            )  # fmt: skip
+        axes.set_yticks(range(len(dots)), [dot.name for dot in dots], color=INK)
+        axes.tick_params(axis="y", length=0)
+        axes.spines["left"].set_visible(False)
+        axes.set_ylim(len(dots) - 0.4, -0.6)
+        axes.set_xlabel(x_label)
+        if share:
+            axes.set_xlim(0.0, 1.0)
+            axes.xaxis.set_major_formatter(PercentFormatter(1.0, 0))
+        else:
+            axes.margins(x=0.05)
+            _, high = axes.get_xlim()
+            if 0.0 <= min((dot.low for dot in dots), default=1.0) < 0.3 * high:
+                axes.set_xlim(0.0, high)
+        return svg_text(figure)

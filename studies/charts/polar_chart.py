@@ -1,4 +1,4 @@
-"""A polar chart: one closed curve for every arm around the origin."""
+"""A polar chart: one curve for every line around the origin."""
 
 from __future__ import annotations
 
@@ -6,12 +6,10 @@ import math
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
 
-from . import svg
+from ...plotting import FAINT, look, new_figure, style, svg_text
 
-RADIUS = 230.0
-TOP = 60.0
 MOST_FILLED = 3
-"""More curves than these are not filled: what lies below would be hidden."""
+"""Where there are more curves than this, none is filled: it would hide what lies below."""
 
 
 def polar_chart(
@@ -21,60 +19,51 @@ def polar_chart(
     rings: Sequence[float],
     unit: str,
 ) -> str:
-    """Curves of (angle [rad], radius); zero is up and angles grow to the left, as seen from above.
+    """The chart as SVG text.
 
-    The rings are labelled with their values; the largest is the edge. A curve whose angles go
-    once around is closed; another one stays open.
+    Args:
+        title: stands on top.
+        subtitle: stands below it.
+        curves: points (angle [rad], radius) by the curve's name. Angle zero is up, and angles grow
+            to the left, as seen from above. A curve whose angles go once around is closed.
+        rings: the radii that are drawn and labelled; the largest one is the edge.
+        unit: what the radius is, with its unit.
     """
-    edge = max(rings) or 1.0
-    centre_x, centre_y = 50 + RADIUS, TOP + 40 + RADIUS
-
-    def place(angle: float, radius: float) -> tuple[float, float]:
-        length = RADIUS * radius / edge
-        return centre_x - length * math.sin(angle), centre_y - length * math.cos(angle)
-
-    out = [svg.text(20, 47, subtitle, fill=svg.FAINT)]
-    for degrees in range(0, 360, 15):
-        far = place(math.radians(degrees), edge)
-        out.append(svg.line(centre_x, centre_y, *far, f'stroke="{svg.PALE}" stroke-width="0.7"'))
-        if degrees % 45 == 0:
-            x, y = place(math.radians(degrees), edge * 1.075)
-            out.append(svg.text(x, y + 4, f"{degrees}°", anchor="middle", fill=svg.FAINT))
-    for ring in rings:
-        length = RADIUS * ring / edge
-        heavy = 1.4 if ring == edge else 0.8
-        out.append(
-            f'<circle cx="{centre_x:.1f}" cy="{centre_y:.1f}" r="{length:.1f}" fill="none" '
-            f'stroke="{svg.PALE}" stroke-width="{heavy}"/>'
-        )
-    for number, points in enumerate(curves.values()):
-        ordered = sorted(points)
-        placed = [place(angle, radius) for angle, radius in ordered]
-        closed = _goes_around([angle for angle, _ in ordered])
-        filled = closed and len(curves) <= MOST_FILLED
-        fill = f'fill="{svg.colour(number)}" fill-opacity="0.06"' if filled else 'fill="none"'
-        out.append(svg.path(placed, f"{fill} {svg.stroke(number)}", closed=closed))
-        out += [svg.dot(x, y, number) for x, y in placed]
-    label = math.radians(-7.5)
-    for ring in rings:
-        x, y = place(label, ring)
-        out.append(
-            f'<rect x="{x - 13:.1f}" y="{y - 7:.1f}" width="26" height="13" fill="white" '
-            'fill-opacity="0.85"/>'
-        )
-        out.append(svg.text(x, y + 4, f"{ring:g}", anchor="middle", size=11, fill=svg.FAINT))
-    x, y = place(label, edge * 1.075)
-    out.append(svg.text(x + 4, y, unit, size=11, fill=svg.FAINT))
-    names = list(curves)
-    legend_x = centre_x + RADIUS + 60
-    out.append(svg.legend(names, legend_x, TOP + 40))
-    width = legend_x + svg.legend_width(names) + 20
-    height = max(centre_y + RADIUS + 45, TOP + 60 + 20 * len(names))
-    return svg.page(title, max(width, 60 + 9 * len(title)), height, out)
+    edge = max(rings, default=1.0)
+    letters = max((len(name) for name in curves), default=0)
+    width = max(6.0 + 0.085 * letters, 0.6 + 0.105 * len(title), 0.6 + 0.08 * len(subtitle))
+    with style():
+        figure = new_figure(width, 6.2, f"{title}\n")
+        figure.text(0.01, 1.0 - 0.42 / 6.2, subtitle, color=FAINT, va="center")
+        axes = figure.add_subplot(projection="polar")
+        axes.set_theta_zero_location("N")
+        axes.set_theta_direction(1)
+        axes.set_thetagrids(range(0, 360, 45))
+        axes.set_ylim(0.0, edge)
+        axes.set_rgrids(
+            rings, [f"{ring:g}" for ring in rings], angle=-22.5, fontsize=8, color=FAINT,
+            ha="center", va="center",
+            bbox={"boxstyle": "square,pad=0.1", "facecolor": "white", "edgecolor": "none"},
+        )  # fmt: skip
+        axes.text(math.radians(-22.5), 1.1 * edge, unit, color=FAINT, fontsize=8, ha="left")
+        for number, (name, points) in enumerate(curves.items()):
+            ordered = sorted(points)
+            closed = goes_around([angle for angle, _ in ordered])
+            if closed:
+                ordered.append(ordered[0])
+            angles, radii = [angle for angle, _ in ordered], [radius for _, radius in ordered]
+            if closed and len(curves) <= MOST_FILLED:
+                axes.fill(angles, radii, color=look(number)["color"], alpha=0.06, linewidth=0)
+            axes.plot(
+                angles, radii, marker="o", markersize=4.5, markeredgecolor="white", clip_on=False,
+                markeredgewidth=0.7, label=name, gid=f"line-{number}", **look(number),
+            )  # fmt: skip
+        figure.legend(loc="outside right upper")
+        return svg_text(figure)
 
 
-def _goes_around(angles: Sequence[float]) -> bool:
-    """Whether the largest gap between neighbours is no more than a quarter turn."""
+def goes_around(angles: Sequence[float]) -> bool:
+    """Whether no two neighbours of the sorted angles [rad] are more than a quarter turn apart."""
     if len(angles) < 3:
         return False
     around = [*angles, angles[0] + 2 * math.pi]

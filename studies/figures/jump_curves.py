@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..charts.svg import colour
-from .canvas import Column, Curve, Panel, Shade, draw_columns
+from ...plotting import COLOURS, Line, Panel, Shade
+from .canvas import Column, draw_columns
 from .trace import Trace, pitch_and_roll
 
 if TYPE_CHECKING:
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 BEFORE, AFTER = 0.6, 0.7
 """What is shown before lift-off and after touchdown [s]."""
 AXES = ("x", "y", "z")
-MEASURED, PLANNED = colour(0), colour(1)
+MEASURED, PLANNED = COLOURS[0], COLOURS[1]
 
 
 def draw_jump(trace: Trace, robot: RobotDescription) -> Image:
@@ -30,22 +30,22 @@ def draw_jump(trace: Trace, robot: RobotDescription) -> Image:
     x_range = (max(float(t[0]), start - BEFORE), min(float(t[-1]), end + AFTER))
     mass = robot.total_mass
 
-    def panel(title: str, *curves: Curve) -> Panel:
-        return Panel(title, curves, x_range, shades)
+    def panel(title: str, *lines: Line) -> Panel:
+        return Panel(title, lines, "time [s]", x_range, shades)
 
     def both(title: str, name: str, axis: int, scale: float = 1.0) -> Panel:
         return panel(
             title,
-            Curve("simulated", t, scale * trace.truth(name)[:, axis], MEASURED),
-            Curve("plan", t, scale * trace.plan(name)[:, axis], PLANNED, True),
+            Line("simulated", t, scale * trace.truth(name)[:, axis], MEASURED),
+            Line("plan", t, scale * trace.plan(name)[:, axis], PLANNED, True),
         )
 
     momentum = [
-        Curve(f"l_{axis}", t, mass * trace.truth("com_velocity")[:, k], colour(k))
+        Line(f"l_{axis}", t, mass * trace.truth("com_velocity")[:, k], COLOURS[k])
         for k, axis in enumerate(AXES)
     ]
     angular = [
-        Curve(f"k_{axis}", t, trace.truth("angular_momentum")[:, k], colour(k))
+        Line(f"k_{axis}", t, trace.truth("angular_momentum")[:, k], COLOURS[k])
         for k, axis in enumerate(AXES)
     ]
     pitch, _ = pitch_and_roll(trace.truth("base_orientation"))
@@ -57,11 +57,11 @@ def draw_jump(trace: Trace, robot: RobotDescription) -> Image:
         if joint.name in ("left_hip_pitch", "left_knee", "left_ankle")
     ]
     velocity = [
-        Curve(name, t, trace.truth("joint_velocity")[:, k], colour(n))
+        Line(name, t, trace.truth("joint_velocity")[:, k], COLOURS[n])
         for n, (k, name) in enumerate(left)
     ]
     torque = [
-        Curve(name, t, trace.signals["robot.joints.torque"][:, k], colour(n))
+        Line(name, t, trace.signals["robot.joints.torque"][:, k], COLOURS[n])
         for n, (k, name) in enumerate(left)
     ]
     body = Column(
@@ -72,12 +72,11 @@ def draw_jump(trace: Trace, robot: RobotDescription) -> Image:
             both("CoM forward position [cm]", "com", 0, 100.0),
             panel(
                 "torso pitch [deg], forward positive",
-                Curve("simulated", t, np.degrees(pitch), MEASURED),
-                Curve("plan", t, np.degrees(planned_pitch), PLANNED, True),
+                Line("simulated", t, np.degrees(pitch), MEASURED),
+                Line("plan", t, np.degrees(planned_pitch), PLANNED, True),
             ),
-            panel("contact force, vertical [N]", Curve("", t, force, MEASURED)),
+            panel("contact force, vertical [N]", Line("", t, force, MEASURED)),
         ],
-        "time [s]",
     )
     legs = Column(
         "",
@@ -86,12 +85,8 @@ def draw_jump(trace: Trace, robot: RobotDescription) -> Image:
             panel("angular momentum about the CoM, all axes [N m s]", *angular),
             both("angular momentum about the CoM, k_y [N m s]", "angular_momentum", 1),
             panel("joint velocity, left leg [rad/s]", *velocity),
-            panel(
-                "joint torque, left leg [N m]",
-                *torque,
-            ),
+            panel("joint torque, left leg [N m]", *torque),
         ],
-        "time [s]",
     )
     verdict = "succeeded" if trace.outcome.success else f"no success: {trace.outcome.reason}"
     notes = [f"Closed loop in the standard trial, seed {trace.seed}: {verdict}. Flight shaded."]

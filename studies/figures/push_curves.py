@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ..charts.svg import colour
-from .canvas import PUSH, Column, Curve, Panel, Shade, draw_columns
+from ...plotting import COLOURS, Line, Panel, Shade
+from .canvas import Column, draw_columns
 from .trace import Trace, pitch_and_roll
 
 if TYPE_CHECKING:
@@ -44,7 +44,7 @@ def draw_push(arms: Mapping[str, Sequence[Trace]]) -> Image:
 def _column(header: str, axis: int, traces: Mapping[str, Trace]) -> Column:
     """``axis`` is 0 for a push along x, 1 along y."""
     other, letter, about = (1, "x", "y") if axis == 0 else (0, "y", "x")
-    rows: list[list[Curve]] = [[], [], [], [], []]
+    rows: list[list[Line]] = [[], [], [], [], []]
     shades: list[Shade] = []
     longest = 0.0
     for number, (arm, trace) in enumerate(traces.items()):
@@ -54,20 +54,20 @@ def _column(header: str, axis: int, traces: Mapping[str, Trace]) -> Column:
         t = 1000.0 * (trace.time[ticks] - trace.time[ticks.start])
         longest = max(longest, float(t[-1]))
         shades = shades or _push(trace, ticks)
-        look = colour(number)
+        look = COLOURS[number]
         pitch, roll = pitch_and_roll(trace.truth("base_orientation"))
         tilt = np.degrees(pitch if axis == 0 else roll)[ticks]
         placed = 100.0 * trace.signals["landing.feet.landing"][ticks]
         reached = 100.0 * (trace.feet - trace.truth("com")[:, None])[ticks]
-        rows[0].append(Curve(arm, t, trace.truth("com_velocity")[ticks, axis], look))
-        rows[1].append(Curve(arm, t, trace.truth("angular_momentum")[ticks, other], look))
+        rows[0].append(Line(arm, t, trace.truth("com_velocity")[ticks, axis], look))
+        rows[1].append(Line(arm, t, trace.truth("angular_momentum")[ticks, other], look))
         if axis == 0:
-            rows[2].append(Curve(arm, t, placed[:, :, 0].mean(axis=1), look))
-            rows[3].append(Curve(arm, t, reached[:, :, 0].mean(axis=1), look))
+            rows[2].append(Line(arm, t, placed[:, :, 0].mean(axis=1), look))
+            rows[3].append(Line(arm, t, reached[:, :, 0].mean(axis=1), look))
         else:
             rows[2] += _feet(arm, t, placed, look)
             rows[3] += _feet(arm, t, reached, look)
-        rows[4].append(Curve(arm, t, tilt, look))
+        rows[4].append(Line(arm, t, tilt, look))
     feet = "both feet's middle" if axis == 0 else "left solid, right dashed"
     lean = "pitch" if axis == 0 else "roll"
     titles = (
@@ -78,24 +78,17 @@ def _column(header: str, axis: int, traces: Mapping[str, Trace]) -> Column:
         f"torso {lean} [deg]",
     )
     panels = [
-        Panel(
-            title, named if k == 0 else [unnamed(c) for c in named], (0.0, longest or 1.0), shades
-        )
-        for k, (title, named) in enumerate(zip(titles, rows, strict=True))
+        Panel(title, named, "time since lift-off [ms]", (0.0, longest or 1.0), shades)
+        for title, named in zip(titles, rows, strict=True)
     ]
-    return Column(header, panels, "time since lift-off [ms]")
+    return Column(header, panels)
 
 
-def _feet(arm: str, t: Array, places: Array, look: str) -> list[Curve]:
+def _feet(arm: str, t: Array, places: Array, look: str) -> list[Line]:
     return [
-        Curve(arm, t, places[:, LEFT, 1], look),
-        Curve("", t, places[:, RIGHT, 1], look, True),
+        Line(arm, t, places[:, LEFT, 1], look),
+        Line("", t, places[:, RIGHT, 1], look, dashed=True),
     ]
-
-
-def unnamed(curve: Curve) -> Curve:
-    """The same without an entry in the legend."""
-    return Curve("", curve.x, curve.y, curve.colour, curve.dashed)
 
 
 def _push(trace: Trace, flight: slice) -> list[Shade]:
@@ -104,7 +97,7 @@ def _push(trace: Trace, flight: slice) -> list[Shade]:
         return []
     lift_off, period = trace.time[flight.start], trace.time[1] - trace.time[0]
     start, end = trace.time[pushed[0]] - lift_off, trace.time[pushed[-1]] + period - lift_off
-    return [Shade(1000.0 * float(start), 1000.0 * float(end), PUSH)]
+    return [Shade(1000.0 * float(start), 1000.0 * float(end), "push")]
 
 
 def push_numbers(trace: Trace, axis: int) -> Mapping[str, float]:

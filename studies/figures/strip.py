@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ..charts.svg import FAINT, INK
-from .canvas import font
+from ...plotting import FAINT, image, new_figure, style
 from .offscreen import Offscreen, View
 
 if TYPE_CHECKING:
@@ -21,8 +20,12 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-FRAME = (340, 360)
-MARGIN, HEAD, CAPTION, LINE = 12, 44, 26, 20
+FRAME = (2.3, 2.43)
+"""The size of a frame [inch]."""
+PIXELS = (510, 540)
+"""The size in which a frame is rendered: more than its pixels in the picture, which smooths it."""
+MARGIN, HEAD, NOTE, CAPTION = 0.08, 0.42, 0.2, 0.26
+"""Between frames, above the notes, of one note, and below a frame [inch]."""
 
 
 @dataclass(frozen=True)
@@ -58,34 +61,35 @@ def draw_strip(
     view: View,
     columns: int = 4,
 ) -> Image:
-    """Frames in rows, read like a text.
+    """The frames in rows, each with its text below, under a title and lines of notes.
 
     Raises:
         NoRendererError: there is nothing here to draw with.
     """
-    from PIL import Image, ImageDraw
-
-    width, height = FRAME
     rows = -(-len(moments) // columns)
-    head = HEAD + LINE * len(notes)
-    size = (
-        MARGIN + columns * (width + MARGIN),
-        head + rows * (height + CAPTION + MARGIN),
-    )
-    picture = Image.new("RGB", size, "white")
-    pen = ImageDraw.Draw(picture)
-    pen.text((MARGIN, 12), title, fill=INK, font=font(19))
-    for number, note in enumerate(notes):
-        pen.text((MARGIN, HEAD - 4 + LINE * number), note, fill=FAINT, font=font(13))
-    with Offscreen(robot, scene, width * 3 // 2, height * 3 // 2) as renderer:
+    head = HEAD + NOTE * len(notes)
+    height = head + rows * (FRAME[1] + CAPTION)
+    with style(), Offscreen(robot, scene, *PIXELS) as renderer:
+        figure = new_figure(columns * (FRAME[0] + MARGIN) + MARGIN, height)
+        figure.set_layout_engine("none")
+        width = figure.get_figwidth()
+        figure.text(MARGIN / width, 1.0 - 0.1 / height, title, va="top", size=12, weight="bold")
+        for number, note in enumerate(notes):
+            y = 1.0 - (HEAD + NOTE * number) / height
+            figure.text(MARGIN / width, y, note, va="top", size=8, color=FAINT)
         for number, moment in enumerate(moments):
-            left = MARGIN + (number % columns) * (width + MARGIN)
-            top = head + (number // columns) * (height + CAPTION + MARGIN)
-            pixels = renderer.picture(*motion.at(moment.time), view)
-            frame = Image.fromarray(pixels).resize(FRAME, Image.Resampling.LANCZOS)
-            picture.paste(frame, (left, top))
-            pen.text((left, top + height + 5), moment.text, fill=INK, font=font(14))
-    return picture
+            row, column = divmod(number, columns)
+            left = MARGIN + column * (FRAME[0] + MARGIN)
+            below = height - head - row * (FRAME[1] + CAPTION) - FRAME[1]
+            axes = figure.add_axes(
+                (left / width, below / height, FRAME[0] / width, FRAME[1] / height)
+            )
+            axes.imshow(renderer.picture(*motion.at(moment.time), view), aspect="auto")
+            axes.set_axis_off()
+            axes.text(
+                0.0, -0.015, moment.text, transform=axes.transAxes, ha="left", va="top", size=9
+            )
+        return image(figure)
 
 
 def moments_of(start: float, lift_off: float, touchdown: float, end: float) -> list[Moment]:

@@ -53,13 +53,20 @@ def words(picture: ElementTree.Element) -> list[str]:
     return [element.text or "" for element in picture.iter(f"{SVG}text")]
 
 
+def line(picture: ElementTree.Element, gid: str) -> list[tuple[float, float]]:
+    """The points of the line with that name."""
+    (group,) = [group for group in picture.iter(f"{SVG}g") if group.get("id") == gid]
+    path = group.find(f"{SVG}path")
+    assert path is not None
+    found = re.findall(r"[ML] ([\d.-]+) ([\d.-]+)", path.get("d", ""))
+    return [(float(x), float(y)) for x, y in found]
+
+
 def test_the_polar_curve_is_the_largest_force_up_to_which_all_is_well(study: Read) -> None:
     picture = drawn(study(TEXT), "polar")
-    curves = [polygon.get("points", "") for polygon in picture.iter(f"{SVG}polygon")]
-    weak, strong = (
-        [tuple(map(float, pair.split(","))) for pair in curve.split()] for curve in curves
-    )
-    (x0, top), (left, _), (_, bottom), (right, _) = strong
+    weak, strong = (line(picture, f"line-{number}") for number in (0, 1))
+    (x0, top), (left, _), (_, bottom), (right, _), end = strong
+    assert end == (x0, top), "the curve is closed"
     middle = (left + right) / 2
     assert x0 == pytest.approx(middle) and bottom - top == pytest.approx(right - left)
     radius = (right - left) / 2
@@ -79,9 +86,8 @@ def test_reach_stops_at_the_first_failure() -> None:
 def test_lines_have_panels_that_share_their_axes_and_text_is_escaped(study: Read) -> None:
     picture = drawn(study(TEXT), "lines")
     assert {"0 deg", "90 deg", "180 deg", "270 deg", "a < b", "100%"} <= set(words(picture))
-    lines = [line.get("points", "") for line in picture.iter(f"{SVG}polyline")]
-    assert len(lines) == 8
-    heights = [[float(p.split(",")[1]) for p in line.split()] for line in lines]
+    names = [f"panel-{panel}-line-{number}" for panel in range(4) for number in range(2)]
+    heights = [[y for _, y in line(picture, name)] for name in names]
     assert heights[1] == [heights[1][0]] * 3  # strong at 0 deg: always at the top
     assert heights[0][0] == heights[1][0] < heights[0][1] == heights[0][2]
 
