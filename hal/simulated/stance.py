@@ -61,8 +61,9 @@ def place_standing(
         raise StartError(uneven)
     names = [contact.name for contact in robot.contacts]
     places = np.array([data.site(name).xpos for name in names])
+    below = depth_of_contacts(robot)
     down = -_sole_middle(data, robot)
-    height = float(places[:, 2].mean() + down[2])
+    height = float((places[:, 2] - below).mean() + down[2])
     if abs(height) > 1e-9:  # the sole centre is not at the height of the contact points
         down[2] -= height
     base.shift(down)
@@ -118,10 +119,12 @@ def holding_torque(model: MjModel, data: MjData, base: FixedBase, robot: RobotDe
     size = base.velocities
     if size == 0 or not robot.contacts:
         return np.array(data.qfrc_bias[size:])
+    below = depth_of_contacts(robot)
     jacobian = np.zeros((3 * len(robot.contacts), model.nv))
     for k, contact in enumerate(robot.contacts):
         rows = jacobian[3 * k : 3 * k + 3]
-        mujoco.mj_jacSite(model, data, rows, None, data.site(contact.name).id)
+        place = data.site(contact.name).xpos - [0.0, 0.0, below[k]]
+        mujoco.mj_jac(model, data, rows, None, place, int(model.site(contact.name).bodyid[0]))
     # The force of least norm among those that carry the base: base_rows (base_rows' base_rows)^-1 w.
     base_rows = np.ascontiguousarray(jacobian[:, :size])
     square, multiplier = np.zeros((size, size)), np.zeros(size)
@@ -141,6 +144,15 @@ def centre_on_origin(data: MjData, base: FixedBase, robot: RobotDescription) -> 
         offset = -_sole_middle(data, robot)
         offset[2] = 0.0
         base.shift(offset)
+
+
+def depth_of_contacts(robot: RobotDescription) -> Array:
+    """How far every contact point is below its site in the simulator's model [m], (n_contacts,):
+    the radius of the ball that is all of a foot, whose site is at its centre, and else zero."""
+    below = np.zeros(len(robot.contacts))
+    for ball in ball_feet(robot):
+        below[ball.point] = ball.radius
+    return below
 
 
 def _leg_joints(robot: RobotDescription) -> NDArray[np.int64]:

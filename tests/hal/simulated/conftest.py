@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import pytest
@@ -48,8 +47,7 @@ def quadruped() -> dict[str, Any]:
             parent = child
         links[-1]["shapes"] = [{"start": [0, 0, -0.02], "end": [0, 0, -0.15], "radius": 0.01}]
         standing |= {f"{name}_thigh_joint": 0.8, f"{name}_shank_joint": -1.6}
-        # The lowest point of a ball at the end of a shank that is turned by -0.8 rad about y.
-        lowest = [-radius * math.sin(0.8), 0.0, -length - radius * math.cos(0.8)]
+        lowest = [0.0, 0.0, -length - radius]  # with the shank upright, as at the zero pose
         feet.append({"name": name, "link": parent, "sole": lowest})
         contacts.append({"name": f"{name}_ball", "foot": name, "position": lowest,
                          "radius": radius})  # fmt: skip

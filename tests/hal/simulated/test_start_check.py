@@ -64,7 +64,7 @@ def test_a_pose_that_tips_over(quadruped: Data) -> None:
     quadruped["links"][0]["com"] = [0.35, 0.0, 0.0]
     assert failure(quadruped) == (
         "stand as its description says when it is held in its standing pose for 0.3 s: its centre "
-        "of mass is 37 mm outside its contact points, so it tips over"
+        "of mass is 36 mm outside its contact points, so it tips over"
     )
 
 
@@ -86,7 +86,7 @@ def test_feet_at_different_heights_are_reported_at_load(quadruped: Data) -> None
         start(quadruped)
     assert str(caught.value).startswith(
         "MujocoRobot: quadruped cannot stand on level ground: in its standing pose these contact "
-        "points are above the lowest one: rear_left_ball by 32 mm"
+        "points are above the lowest one: rear_left_ball by 31 mm"
     )
 
 
