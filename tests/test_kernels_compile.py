@@ -109,7 +109,7 @@ UNUSED = {
     "aloft.mathematics.inertial_filter.right_up": (
         np.array([0.0, 0.0, 0.0, 1.0]), np.array([0.3, 0.2, 9.8]), 0.01, np.zeros(3),
     ),
-    "aloft.mathematics.invariant_contacts.forget": (1, np.full((37, 37), 0.5)),
+    "aloft.mathematics.invariant_contacts.remove_contact": (1, np.full((37, 37), 0.5)),
     "aloft.mathematics.extended_pose.exponential": (
         np.linspace(-0.5, 0.6, 12), np.zeros(4), np.zeros((3, 3)),
     ),
