@@ -29,6 +29,7 @@ def check_fit(draft: Draft, settings: Settings, problems: Problems) -> None:
         robot=settings.robot,
         wired=tuple(flat.wires),
         folder=flat.folder,
+        graph_folder=settings.folder,
     )
     for misfit in find_misfits(draft.block_type, draft.params, context):
         report_misfit(draft, misfit, problems)

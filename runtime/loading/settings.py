@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import yaml
@@ -37,6 +38,8 @@ class Settings:
     """False where a robot is named but could not be read."""
     dimensions: Mapping[str, int] = field(default_factory=dict)
     clock: ClockSpec = field(default_factory=ClockSpec)
+    folder: Path = Path()
+    """Where the graph's file lies."""
 
 
 def read_settings(graph: FlatGraph, problems: Problems) -> Settings:
@@ -68,6 +71,7 @@ def read_settings(graph: FlatGraph, problems: Problems) -> Settings:
         known,
         _read_dimensions(graph, robot, problems),
         _read_clock(graph, problems),
+        graph.folder,
     )
 
 

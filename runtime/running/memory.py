@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -163,6 +164,7 @@ class BoundGraph:
                 robot=graph.robot,
                 wired=tuple(spec.wires),
                 folder=spec.folder,
+                graph_folder=Path(graph.file).parent,
             )
             try:
                 block = spec.block_type(spec.params, context)
