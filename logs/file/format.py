@@ -46,6 +46,7 @@ from numpy.typing import NDArray
 from ...robots.description import RobotDescription
 from ...runtime.language.layout import Layout
 from ...runtime.language.signals import Slot
+from ...runtime.language.terrain import Ground, Terrain
 
 FORMAT = 2
 """The number of this format; a reader refuses any other."""
@@ -146,6 +147,7 @@ class Header:
         bus_start: the bytes of the bus before the first tick.
         robot: the robot's description, if the graph has one.
         source: the graph file, as the run was told.
+        terrain: the ground of the simulated world, if there is one.
     """
 
     name: str
@@ -166,6 +168,7 @@ class Header:
     order: tuple[str, ...] = ()
     robot: RobotDescription | None = None
     source: str = ""
+    terrain: Terrain | None = None
     format: int = FORMAT
 
     @property
@@ -192,7 +195,16 @@ class Header:
         data["bus_start"] = b64decode(data["bus_start"])
         data["blocks"] = tuple(RecordedBlock(**block) for block in data["blocks"])
         data["order"] = tuple(data["order"])
+        data["terrain"] = _terrain(data.get("terrain"))
         return cls(**data)
+
+
+def _terrain(data: Mapping[str, Any] | None) -> Terrain | None:
+    """Back from plain data; recordings before version 0.2 have none."""
+    if data is None:
+        return None
+    blocks = tuple(Ground(tuple(b["least"]), tuple(b["most"])) for b in data["blocks"])
+    return Terrain(data["floor"], blocks)
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,7 @@ from pathlib import Path
 from ...runtime.language.layout import Layout
 from ...runtime.language.signals import Field
 from ...runtime.language.stages import BlockSpec, CheckedGraph
+from ...runtime.language.terrain import Terrain
 from ...runtime.running.memory import BoundGraph
 from .format import Header, RecordedBlock, RecordedField, RecordedLayout
 
@@ -64,8 +65,14 @@ def make_header(
         blocks=tuple(_block(spec) for spec in graph.blocks),
         order=graph.order,
         robot=graph.robot,
+        terrain=next((found for spec in graph.blocks if (found := terrain_of(spec))), None),
         source=graph.file or next((spec.where.file for spec in graph.blocks if spec.where), ""),
     )
+
+
+def terrain_of(spec: BlockSpec) -> Terrain | None:
+    """The ground that a block knows of."""
+    return spec.block_type.terrain(spec.params)
 
 
 def _block(spec: BlockSpec) -> RecordedBlock:

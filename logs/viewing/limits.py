@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
+from ...robots.description import RobotDescription
 from ..file.format import Header, RecordedField
 
 
@@ -23,23 +25,32 @@ def limits_of(field: RecordedField, header: Header) -> list[tuple[str, float]]:
             for side, value in zip(("least", "most"), joint.limits or (), strict=False)
         ]
         return _once(named)
-    names = {str(value) for value in header.parameters.values()}
-    profile = next((p for name, p in robot.profiles.items() if name in names), None)
-    if profile is None:
-        return []
-    motor = "motor" in field.field_name
+    motors, motor = _robot_in_use(header, robot).motors, "motor" in field.field_name
     if field.unit == "N m" and motor:
-        return _both("peak torque", [profile.peak_torque])
+        return _both("peak torque", motors.peak_torque)
     if field.unit == "N m":
-        peaks = np.abs(robot.joint_to_motor.T).sum(axis=1) * profile.peak_torque
-        return _both("peak torque", sorted(set(peaks.tolist())))
+        return _both("peak torque", np.abs(robot.joint_to_motor.T) @ motors.peak_torque)
     if field.unit == "rad/s" and motor:
-        return _both("no-load speed", [profile.no_load_speed])
+        return _both("no-load speed", motors.no_load_speed)
     return []
 
 
-def _both(name: str, values: list[float]) -> list[tuple[str, float]]:
-    return [(f"{sign}{name}", factor * v) for v in values for sign, factor in (("+", 1), ("-", -1))]
+def _robot_in_use(header: Header, robot: RobotDescription) -> RobotDescription:
+    """The robot with the actuator profile of the run. Before version 0.2 a parameter of some block
+    named the profile."""
+    said = {str(value) for value in header.parameters.values()}
+    earlier = [name for name in robot.profiles if name in said]
+    return robot.with_profile(earlier[0]) if earlier and not robot.profile else robot
+
+
+def _both(name: str, values: NDArray[np.float64]) -> list[tuple[str, float]]:
+    """Every value that occurs, upwards and downwards."""
+    different = sorted(set(values.tolist()))
+    return [
+        (f"{sign}{name}", factor * value)
+        for value in different
+        for sign, factor in (("+", 1), ("-", -1))
+    ]
 
 
 def _once(named: list[tuple[str, float]]) -> list[tuple[str, float]]:
