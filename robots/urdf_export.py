@@ -74,8 +74,8 @@ def _add_world(root: Element, robot: RobotDescription) -> None:
         joint = _connect(root, name, kind, parent, child)
         SubElement(joint, "axis", xyz=axis)
         if kind == "prismatic":
-            limits = {"lower": repr(-FREE), "upper": repr(FREE)}
-            SubElement(joint, "limit", **limits, effort="0", velocity="0")
+            far = repr(FREE)
+            SubElement(joint, "limit", lower=f"-{far}", upper=far, effort="0", velocity="0")
         parent = child
 
 
@@ -93,8 +93,9 @@ def _add_link(root: Element, link: Link) -> None:
         SubElement(inertial, "origin", xyz=_numbers(link.com), rpy="0 0 0")
         SubElement(inertial, "mass", value=repr(link.mass))
         names = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
-        values = {name: repr(value) for name, value in zip(names, link.inertia, strict=True)}
-        SubElement(inertial, "inertia", **values)
+        inertia = SubElement(inertial, "inertia")
+        for name, value in zip(names, link.inertia, strict=True):
+            inertia.set(name, repr(value))
     for shape in link.shapes:
         for kind in ("visual", "collision"):
             _add_capsule(element, kind, shape)
