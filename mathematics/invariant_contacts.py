@@ -20,7 +20,7 @@ Indices = NDArray[np.int64]
 
 
 @kernel
-def forget(point: int, covariance: Array) -> None:
+def remove_contact(point: int, covariance: Array) -> None:
     """Take a contact point out of the state."""
     first = 9 + 3 * point
     covariance[first : first + 3, :] = 0.0
@@ -28,7 +28,7 @@ def forget(point: int, covariance: Array) -> None:
 
 
 @kernel
-def look(world_jacobian: Array, offsets: int, sensitivity: Array) -> None:
+def place_jacobian(world_jacobian: Array, offsets: int, sensitivity: Array) -> None:
     """H (3, n) of where a point is by leg kinematics, but for the point's own columns.
 
     Args:
@@ -43,13 +43,13 @@ def look(world_jacobian: Array, offsets: int, sensitivity: Array) -> None:
 
 
 @kernel
-def admit(
+def add_contact(
     point: int, sensitivity: Array, noise: Array, covariance: Array, rows: Array, corner: Array
 ) -> None:
     """Put a contact point into the state, where leg kinematics see it now.
 
     Args:
-        sensitivity: from ``look``; minus it times the error is the point's error.
+        sensitivity: from ``place_jacobian``; minus it times the error is the point's error.
         noise: of the place that is seen [m^2], (3, 3).
         rows, corner: scratch, (3, n) and (3, 3).
     """
@@ -79,8 +79,8 @@ def innovation(point: int, world_point: Array, vectors: Array, residual: Array) 
 
 
 @kernel
-def watch(point: int, sensitivity: Array) -> None:
-    """Complete H from ``look`` by the point's own columns."""
+def measurement_jacobian(point: int, sensitivity: Array) -> None:
+    """Complete H from ``place_jacobian`` by the point's own columns."""
     first = 9 + 3 * point
     for i in range(3):
         for k in range(3):
@@ -88,7 +88,7 @@ def watch(point: int, sensitivity: Array) -> None:
 
 
 @kernel
-def level(
+def height_row(
     row: int, point: int, reference: int, height: float, vectors: Array,
     sensitivity: Array, residual: Array,
 ) -> None:  # fmt: skip
@@ -115,33 +115,39 @@ def level(
 
 
 @kernel
-def centre(levers: Array, vectors: Array, sensitivity: Array) -> None:
+def world_definition_jacobian(levers: Array, vectors: Array, sensitivity: Array) -> None:
     """H (3, n) of where the world is by the feet: its origin in the points' middle, x and y, and
-    its x axis where the feet point on average.
+    its x axis where the feet point.
+
+    The third row is zero where the levers are: such points show no heading.
 
     Args:
-        levers: how far every point lies ahead of its foot's middle [m], (N,).
+        levers: places about a middle that turn with the feet's heading [m], (N, 2).
     """
     n, total = levers.shape[0], 0.0
     for row in range(3):
         for k in range(sensitivity.shape[1]):
             sensitivity[row, k] = 0.0
     for point in range(n):
-        total += float(levers[point]) * float(levers[point])
+        ahead, aside = float(levers[point, 0]), float(levers[point, 1])
+        total += ahead * ahead + aside * aside
     for point in range(n):
-        column, share = 9 + 3 * point, float(levers[point]) / total
+        column = 9 + 3 * point
         x, y = float(vectors[2 + point, 0]), float(vectors[2 + point, 1])
         # The error of a place is xi_d and what the error of rotation about z makes of it.
         sensitivity[0, column] = 1.0 / n
         sensitivity[0, 2] -= y / n
         sensitivity[1, column + 1] = 1.0 / n
         sensitivity[1, 2] += x / n
-        sensitivity[2, column + 1] = share
-        sensitivity[2, 2] += x * share
+        if total > 0.0:
+            ahead, aside = float(levers[point, 0]) / total, float(levers[point, 1]) / total
+            sensitivity[2, column] = -aside
+            sensitivity[2, column + 1] = ahead
+            sensitivity[2, 2] += x * ahead + y * aside
 
 
 @kernel
-def creep(
+def add_contact_noise(
     feet: Indices, present: Flags, own: float, shared: float, period: float, covariance: Array
 ) -> None:
     """What stands moves a little in a period: the points of a foot together, each by itself.

@@ -26,7 +26,7 @@ Indices = NDArray[np.int64]
 
 
 @kernel
-def drift(gravity: float, period: float, transition: Array) -> None:
+def error_transition(gravity: float, period: float, transition: Array) -> None:
     """The constant part of the transition matrix (n, n): exp of the equation above."""
     for i in range(transition.shape[0]):
         for k in range(transition.shape[1]):
@@ -40,7 +40,7 @@ def drift(gravity: float, period: float, transition: Array) -> None:
 
 
 @kernel
-def spread(
+def input_jacobian(
     rotation: Array, vectors: Array, present: Flags, gravity: float, period: float, reach: Array
 ) -> None:
     """What a constant error of the IMU does to the state's in one period: ``reach`` (n, 6).
@@ -77,7 +77,7 @@ def spread(
 
 
 @kernel
-def grow(
+def propagate_covariance(
     transition: Array, reach: Array, bias: int, noise: Array, covariance: Array,
     scaled: Array, product: Array,
 ) -> None:  # fmt: skip
@@ -100,7 +100,7 @@ def grow(
 
 
 @kernel
-def deviation(covariance: Array, first: int, vector: Array) -> float:
+def vector_deviation(covariance: Array, first: int, vector: Array) -> float:
     """The standard deviation of the norm of a vector's own error.
 
     The error of a vector u is xi_u and what the error of rotation does to it: xi_u + xi_R x u.
@@ -121,7 +121,7 @@ def deviation(covariance: Array, first: int, vector: Array) -> float:
 
 
 @kernel
-def inflate(
+def sample_deviations(
     reading: Array, limit: float, noise: float, doubt: float, run: Indices, out: Array
 ) -> bool:
     """The standard deviation of a sample's axes; whether one of them is at the end of its range.

@@ -33,8 +33,11 @@ class ContactKinematics:
         com_velocity: of the centre of mass relative to the base's origin [m/s, body], (3,).
         centres: of the contacts' round rubber [m, body], (n_contacts, 3).
         jacobians: of the centres by the joints [m, body], (n_contacts, 3, n_joints).
+        heading_levers: places of the contact points about a middle that turn with the feet's heading
+            [m], (n_contacts, 2): within each foot, or in the pattern that feet of one point make. They
+            are constant, and zero where the points show no heading.
 
-    The last two are brought up to date by ``differentiate`` only.
+    ``centres`` and ``jacobians`` are brought up to date by ``differentiate`` only.
     """
 
     def __init__(self, robot: RobotDescription) -> None:
@@ -74,6 +77,21 @@ class ContactKinematics:
         self._of_leg = np.array([joints_above(robot, foot.link) for foot in robot.feet], float)
         self.centres = np.zeros((len(self._radii), 3))
         self.jacobians = np.zeros((len(self._radii), 3, n_joints))
+        self.heading_levers = self._find_heading_levers()
+
+    def _find_heading_levers(self) -> Array:
+        levers = np.zeros((len(self._radii), 2))
+        if self._pattern is not None:
+            levers[...] = self._pattern.T
+            return levers
+        for point, foot in enumerate(self._foot_of_point):
+            ahead = [
+                float(centre[0])
+                for centre, other in zip(self._centres, self._foot_of_point, strict=True)
+                if other == foot
+            ]
+            levers[point, 0] = float(self._centres[point][0]) - sum(ahead) / len(ahead)
+        return levers
 
     def evaluate(
         self, orientation: Array, angular_velocity: Array, position: Array, velocity: Array

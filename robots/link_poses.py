@@ -17,9 +17,6 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-_STEP = 1e-9
-"""Directions are rounded to this, so that a sole that is meant flat is flat to the last bit."""
-
 
 def link_poses(robot: RobotDescription, position: Array) -> Mapping[str, tuple[Array, Array]]:
     """The rotation (3, 3) from link to base and the origin [m, base frame] (3,) of every link.
@@ -56,19 +53,13 @@ def axis_rotation(axis: tuple[float, float, float], angle: float) -> Array:
 def contact_centres(robot: RobotDescription) -> Array:
     """The centre of the round rubber of every contact point [m, link frame], (n_contacts, 3).
 
-    A contact's ``position`` is the lowest point of its rubber when the robot stands upright in its
-    standing pose. The centre is therefore ``radius`` above that point in the base's frame, which
-    is another direction in the frame of a link that is tilted in the standing pose, such as the
-    shank of a quadruped. It does not change as the link turns: what touches the ground is always
-    the lowest point of the same sphere.
+    A contact's ``position`` is the lowest point of its rubber at the zero pose, where all link
+    frames are parallel to the base's: the centre is ``radius`` above it in the link's own frame.
+    It does not change as the link turns: what touches the ground is always the lowest point of
+    the same sphere.
     """
-    poses = link_poses(robot, robot.standing_position)
-    links = {foot.name: foot.link for foot in robot.feet}
-    centres = np.zeros((len(robot.contacts), 3))
-    for k, contact in enumerate(robot.contacts):
-        up = np.rint(poses[links[contact.foot]][0][2] / _STEP) * _STEP
-        centres[k] = np.array(contact.position) + contact.radius * up
-    return centres
+    rows = [np.add(contact.position, (0.0, 0.0, contact.radius)) for contact in robot.contacts]
+    return np.array(rows).reshape(-1, 3)
 
 
 def standing_heights(robot: RobotDescription) -> Array:

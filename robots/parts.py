@@ -83,8 +83,11 @@ class Foot(Part):
 
 
 class ContactPoint(Part):
-    """A point that may carry load: ``position`` of its lowest point [m, link frame] and the
-    ``radius`` [m] of the rubber there."""
+    """A point that may carry load, with rubber that is a ball of ``radius`` [m].
+
+    ``position`` [m, link frame] is the ball's lowest point at the zero pose, so its centre is
+    ``radius`` above that in the link's frame, however the link is turned later.
+    """
 
     name: str
     foot: str

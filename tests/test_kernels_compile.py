@@ -49,6 +49,10 @@ TARGET = np.array([[0.05, -0.08, -0.3], [0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0,
 POSE = np.array([[0.02, -0.06, -0.3], [1.0, 0.0, 0.0], [0.0, 0.8, -0.6], [0.0, 0.6, 0.8]])
 CHAIN = (LIMB.links, LIMB.tip, LIMB.limits, TARGET, np.array([1.0, 0.9, 0.3]))
 UNUSED = {
+    "aloft.blocks.control.balance_target.pattern_turn": (
+        POSE, POSE[0], TARGET, np.array([0.01, 0.02, 0.0]),
+    ),
+    "aloft.blocks.jumping.landing_heuristic.turn_places": (POSE, 0.3, np.zeros((4, 3))),
     "aloft.robots.limb.place_limb": (
         LIMB.links, LIMB.tip, MIDDLE, np.zeros((5, 6)), np.zeros((4, 3)),
     ),
@@ -105,7 +109,7 @@ UNUSED = {
     "aloft.mathematics.inertial_filter.right_up": (
         np.array([0.0, 0.0, 0.0, 1.0]), np.array([0.3, 0.2, 9.8]), 0.01, np.zeros(3),
     ),
-    "aloft.mathematics.invariant_contacts.forget": (1, np.full((37, 37), 0.5)),
+    "aloft.mathematics.invariant_contacts.remove_contact": (1, np.full((37, 37), 0.5)),
     "aloft.mathematics.extended_pose.exponential": (
         np.linspace(-0.5, 0.6, 12), np.zeros(4), np.zeros((3, 3)),
     ),

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from ...mathematics.kernel import kernel
 from ...mathematics.polynomials import minimum_jerk
 from ...mathematics.rotations import conjugate, exponential, from_matrix, logarithm, multiply
+from ...robots.limb import FootKind, foot_shape
 from ...runtime.language.block import Block, Input, Output, State
 from ...runtime.language.parameters import Parameters, live_parameter
 from ...runtime.language.signals import Field, Signal
@@ -31,13 +32,18 @@ class BalanceMemory(Signal):
 
 
 class BalanceTarget(Block):
-    """Follows the plan until its last touchdown; then rest over the middle of the measured feet.
+    """Follows the plan until its last touchdown; then rests over the middle of the measured feet.
 
-    Before the last touchdown positions and heading are the plan's, shifted and turned with the measured
-    feet: the plan is relative to where the feet stand, so a drift of the estimated position or
-    heading does not matter.
+    It serves any number of feet. The middle is the mean of the sole centres. Where the feet head
+    is the mean of the headings of the line and flat feet. Point feet have no heading of their own:
+    several of them turn with the pattern in which they stand, compared with the planned one by
+    least squares, and a single one heads as the base does.
 
-    So every error of a landing is carried on to the next, unless ``place_gain`` feeds back the
+    Before the last touchdown positions and heading are the plan's, shifted and turned with the
+    measured feet. The plan is relative to where the feet stand, so a drift of the estimated
+    position or heading does not matter.
+
+    This carries every error of a landing on to the next, unless ``place_gain`` feeds back the
     place. In the last T_p = ``place_time`` before a lift-off the jump is lengthened: with e how far
     the feet's middle then is, by the estimated position, from where the plan has it, and T_f the
     planned flight,
@@ -48,16 +54,16 @@ class BalanceTarget(Block):
 
     is added to the velocity, its integral to the place and its derivative to the acceleration of
     the centre of mass: at touchdown these are worth d. The plan's place in the world is that of
-    the first tick. Feet that land at their heading's error stay there.
+    the first tick. An error of the feet's heading is not made up for.
 
     After that touchdown the centre of mass goes over the middle of the sole centres, at
-    ``landing_depth`` below standing height; when the phase is RECOVER it rises to standing height
-    with least jerk within ``rise_time``. The torso goes level, heading as the feet do on average.
-    Joint friction leaves a small steady tilt; ``trim`` integrates it away,
+    ``landing_depth`` below standing height. When the phase is RECOVER it rises to standing height
+    with least jerk within ``rise_time``. The base goes level, heading as the feet do. Joint
+    friction leaves a small steady tilt; ``trim`` integrates it away,
 
         trim' = trim_rate Log(R' R_level), within trim_limit,    R_target = R_level Exp(trim),
 
-    about the body's x and y axes. Angular momentum and its rate are wanted zero.
+    about the body's x and y axes. Angular momentum and its rate should be zero.
 
     A robot that is not quite the model misses the plan at lift-off, much the same way in every
     jump of a task. ``velocity_correction`` dv and ``momentum_correction`` dk make up for what is
@@ -70,7 +76,7 @@ class BalanceTarget(Block):
 
     class Params(Parameters):
         landing_depth: float = live_parameter(
-            0.06, unit="m", ge=0.0, le=0.2, text="height held after touchdown, below standing"
+            0.06, unit="m", ge=0.0, le=0.5, text="height held after touchdown, below standing"
         )
         rise_time: float = live_parameter(
             0.6, unit="s", gt=0.0, text="from there to standing height"
@@ -105,6 +111,7 @@ class BalanceTarget(Block):
             0.2, unit="s", gt=0.0, le=1.0, text="how long before lift-off it begins to"
         )
 
+    needs = ("floating base", "feet")
     params: Params
     reference = Input(JumpReference, text="the plan")
     phase = Input(PhaseState, text="the phase the robot is in")
@@ -118,7 +125,12 @@ class BalanceTarget(Block):
         self._vector = np.zeros(3)
         self._middle = np.zeros(3)
         self._planned_middle = np.zeros(3)
-        self._feet = self.context.dimensions["n_feet"]
+        robot = self.robot
+        self._feet = len(robot.feet)
+        kinds = [foot_shape(robot, foot)[0] for foot in range(self._feet)]
+        self._heads = np.array([kind != FootKind.POINT for kind in kinds])
+        self._counted = np.ones(self._feet, bool) if not self._heads.any() else self._heads
+        self._count, self._base_counts = int(self._counted.sum()), np.ones(1, bool)
         self.on_parameters()
 
     def on_parameters(self) -> None:
@@ -130,7 +142,7 @@ class BalanceTarget(Block):
     def step(self) -> None:
         phase, reference = int(self.phase.phase), self.reference
         middle_point(self.terms.foot_position, self._middle)
-        heading = mean_heading(self.terms.foot_rotation)
+        heading = self._heading()
         if not self.memory.started:
             self._begin(heading)
         goes_on = float(reference.lift_off_time) > float(reference.time)
@@ -154,10 +166,23 @@ class BalanceTarget(Block):
         np.subtract(self._middle, self._vector, out=memory.origin)
         memory.started[()] = True
 
+    def _heading(self) -> float:
+        """Where the feet head [rad]: by their own directions, or by how they stand together."""
+        terms, reference = self.terms, self.reference
+        if self._heads.any():
+            return mean_heading(terms.foot_rotation, self._heads)
+        if self._feet == 1:
+            return mean_heading(terms.base_rotation[None], self._base_counts)
+        middle_point(reference.foot_position, self._planned_middle)
+        return self._planned_heading() + pattern_turn(
+            reference.foot_position, self._planned_middle, terms.foot_position, self._middle
+        )
+
     def _planned_heading(self) -> float:
         planned = 0.0
         for foot in range(self._feet):
-            planned += float(self.reference.foot_yaw[foot]) / self._feet
+            if self._counted[foot]:
+                planned += float(self.reference.foot_yaw[foot]) / self._count
         return planned
 
     def _follow(self, heading: float) -> float:
@@ -251,13 +276,31 @@ def middle_point(points: Array, out: Array) -> None:
 
 
 @kernel
-def mean_heading(rotations: Array) -> float:
-    """The heading [rad] of the mean of the x axes of rotations (n, 3, 3)."""
+def mean_heading(rotations: Array, counted: NDArray[np.bool_]) -> float:
+    """The heading [rad] of the mean of the x axes of those rotations (n, 3, 3) that count (n,)."""
     x = y = 0.0
     for i in range(rotations.shape[0]):
-        x += float(rotations[i, 0, 0])
-        y += float(rotations[i, 1, 0])
+        if counted[i]:
+            x += float(rotations[i, 0, 0])
+            y += float(rotations[i, 1, 0])
     return math.atan2(y, x)
+
+
+@kernel
+def pattern_turn(planned: Array, planned_middle: Array, points: Array, middle: Array) -> float:
+    """How far a pattern of points (n, 3) has turned about the vertical [rad], by least squares.
+
+    Args:
+        planned, planned_middle: the pattern before it turned, and its middle (3,).
+        points, middle: the same points now, and their middle.
+    """
+    sine = cosine = 0.0
+    for i in range(planned.shape[0]):
+        ax, ay = float(planned[i, 0] - planned_middle[0]), float(planned[i, 1] - planned_middle[1])
+        bx, by = float(points[i, 0] - middle[0]), float(points[i, 1] - middle[1])
+        sine += ax * by - ay * bx
+        cosine += ax * bx + ay * by
+    return math.atan2(sine, cosine)
 
 
 @kernel

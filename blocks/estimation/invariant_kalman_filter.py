@@ -12,16 +12,22 @@ from ...mathematics.constants import GRAVITY
 from ...mathematics.extended_pose import retract
 from ...mathematics.inertial_filter import misalignment, propagate, turn, upright
 from ...mathematics.invariant_contacts import (
-    admit,
-    centre,
-    creep,
-    forget,
+    add_contact,
+    add_contact_noise,
+    height_row,
     innovation,
-    level,
-    look,
-    watch,
+    measurement_jacobian,
+    place_jacobian,
+    remove_contact,
+    world_definition_jacobian,
 )
-from ...mathematics.invariant_propagation import deviation, drift, grow, inflate, spread
+from ...mathematics.invariant_propagation import (
+    error_transition,
+    input_jacobian,
+    propagate_covariance,
+    sample_deviations,
+    vector_deviation,
+)
 from ...mathematics.kalman_update import correct, weigh
 from ...mathematics.rotations import rotate, to_matrix
 from ...robots.contact_kinematics import ContactKinematics
@@ -111,12 +117,11 @@ class InvariantKalmanFilter(Block):
         self._points, n_joints = len(robot.contacts), len(robot.joints)
         self._radius = [contact.radius for contact in robot.contacts]
         self._foot_of_point = np.array(robot.foot_of_contact(), dtype=np.int64)
-        self._levers = np.array(_levers(robot))
         self._bias = 9 + 3 * self._points
         self._offsets = self._bias + 6
         n = self._offsets + n_joints
         self._transition = np.zeros((n, n))
-        drift(GRAVITY, self.period, self._transition)
+        error_transition(GRAVITY, self.period, self._transition)
         self._reach, self._scaled = np.zeros((n, 6)), np.zeros((n, 6))
         self._product, self._correction = np.zeros((n, n)), np.zeros(n)
         self._sensitivity, self._rows = np.zeros((3, n)), np.zeros((3, n))
@@ -160,11 +165,11 @@ class InvariantKalmanFilter(Block):
     def _watch_saturation(self) -> None:
         """The noise of this tick's samples, axis by axis."""
         params, health, run = self.params, self.health, self.estimate.saturated_run
-        health.gyro_saturated[()] = inflate(
+        health.gyro_saturated[()] = sample_deviations(
             self._gyro, params.gyro_range or math.inf, params.gyro_noise, params.saturated_rate,
             run[:3], self._noise[:3],
         )  # fmt: skip
-        health.accelerometer_saturated[()] = inflate(
+        health.accelerometer_saturated[()] = sample_deviations(
             self._force, params.accelerometer_range or math.inf, params.accelerometer_noise,
             params.saturated_force, run[3:], self._noise[3:],
         )  # fmt: skip
@@ -186,14 +191,14 @@ class InvariantKalmanFilter(Block):
             gained = 0.5 * period * float(self._acceleration[axis])
             vectors[0, axis] -= gained
             vectors[1, axis] -= 0.5 * period * float(vectors[0, axis])
-        spread(self._rotation, vectors, estimate.present, GRAVITY, period, self._reach)
-        grow(
+        input_jacobian(self._rotation, vectors, estimate.present, GRAVITY, period, self._reach)
+        propagate_covariance(
             self._transition, self._reach, self._bias, self._noise, covariance,
             self._scaled, self._product,
         )  # fmt: skip
         pressed = max(math.hypot(*self._force.tolist()) - GRAVITY, 0.0)
         slide = math.hypot(params.slide_noise, params.impact_slide * pressed)
-        creep(
+        add_contact_noise(
             self._foot_of_point, estimate.present, params.contact_noise, slide, period, covariance
         )
         for first, walk in (
@@ -220,7 +225,7 @@ class InvariantKalmanFilter(Block):
         np.dot(self._kinematics.jacobians[point], self._angles, out=self._spare)
         np.subtract(self._kinematics.centres[point], self._spare, out=self._spare)
         np.dot(self._rotation, self._spare, out=self._world_point)
-        look(self._world_jacobian, self._offsets, self._sensitivity)
+        place_jacobian(self._world_jacobian, self._offsets, self._sensitivity)
 
     def _start(self) -> None:
         """Standing on level ground around the origin, the feet pointing along x."""
@@ -261,7 +266,7 @@ class InvariantKalmanFilter(Block):
         n, vectors = self._points, self.estimate.vectors
         for first in range(0, n, 3):
             self._level(range(first, min(first + 3, n)), -1, self.params.ground_noise**2)
-        centre(self._levers, vectors, self._sensitivity)
+        world_definition_jacobian(self._kinematics.heading_levers, vectors, self._sensitivity)
         self._residual.fill(0.0)
         np.multiply(self._identity, _EXACT * _EXACT, out=self._row_noise)
         self._weigh(self._row_noise)
@@ -282,7 +287,7 @@ class InvariantKalmanFilter(Block):
                 continue
             if believed:
                 self._look(point)
-                watch(point, self._sensitivity)
+                measurement_jacobian(point, self._sensitivity)
                 innovation(point, self._world_point, estimate.vectors, self._residual)
                 if self._weigh(self._place_noise) <= params.gate:
                     self._correct(self._place_noise)
@@ -290,7 +295,7 @@ class InvariantKalmanFilter(Block):
                     continue
                 refused = True
             estimate.present[point] = False
-            forget(point, estimate.covariance)
+            remove_contact(point, estimate.covariance)
         if refused and not agreed:
             for k in range(3, 6):
                 estimate.covariance[k, k] += _OPENING * _OPENING * self.period
@@ -303,7 +308,7 @@ class InvariantKalmanFilter(Block):
             if not self._believed[point] or estimate.present[point]:
                 continue
             self._look(point)
-            admit(
+            add_contact(
                 point, self._sensitivity, self._place_noise, estimate.covariance,
                 self._rows, self._corner,
             )  # fmt: skip
@@ -330,7 +335,7 @@ class InvariantKalmanFilter(Block):
             height = self._radius[point]
             if reference >= 0:
                 height -= self._radius[reference]
-            level(row, point, reference, height, vectors, self._sensitivity, self._residual)
+            height_row(row, point, reference, height, vectors, self._sensitivity, self._residual)
             for column in range(len(points)):
                 shared = variance if reference >= 0 else 0.0
                 noise[row, column] = shared + (variance if row == column else 0.0)
@@ -366,18 +371,8 @@ class InvariantKalmanFilter(Block):
         base.linear_velocity[...] = estimate.vectors[0]
         base.angular_velocity[...] = estimate.angular_velocity
         covariance, vectors = estimate.covariance, estimate.vectors
-        health.velocity_std[()] = deviation(covariance, 3, vectors[0])
-        health.position_std[()] = deviation(covariance, 6, vectors[1])
+        health.velocity_std[()] = vector_deviation(covariance, 3, vectors[0])
+        health.position_std[()] = vector_deviation(covariance, 6, vectors[1])
         tilt = float(covariance[0, 0]) + float(covariance[1, 1])
         health.tilt_std[()] = math.sqrt(max(tilt, 0.0))
         health.yaw_std[()] = math.sqrt(max(float(covariance[2, 2]), 0.0))
-
-
-def _levers(robot: RobotDescription) -> list[float]:
-    """How far every contact point lies ahead of its foot's middle [m]."""
-    feet, ahead = robot.foot_of_contact(), [contact.position[0] for contact in robot.contacts]
-    middle = [
-        sum(x for x, other in zip(ahead, feet, strict=True) if other == foot) / feet.count(foot)
-        for foot in feet
-    ]
-    return [x - m for x, m in zip(ahead, middle, strict=True)]

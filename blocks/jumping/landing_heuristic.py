@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from typing import Annotated, Literal
 
 import numpy as np
@@ -19,9 +20,11 @@ from ...mathematics.rotations import (
     logarithm,
     multiply,
     to_matrix,
+    yaw,
 )
 from ...robots.description import RobotDescription
-from ...runtime.language.block import Block, Input, Output, State
+from ...robots.kinematics import link_poses
+from ...runtime.language.block import Block, Input, Misfit, Output, State
 from ...runtime.language.parameters import Parameters, live_parameter, parameter
 from ...runtime.language.signals import Field, Signal
 from ..signals import DynamicsTerms, FootTarget, JumpReference, Phase, PhaseState
@@ -55,14 +58,19 @@ class LandingMemory(Signal):
 class LandingHeuristic(Block):
     """Foot targets in flight from momentum feedback (paper, IV).
 
-    All places are relative to the centre of mass, in world axes. The law, for foot i (0 left,
-    1 right), with p_nom the planned foot:
+    All places are relative to the centre of mass, in world axes. The law, for each of any number
+    of feet, with p_nom the planned foot and its side s = 1 on the left of the base, -1 on the
+    right and 0 in the middle (the paper's (-1)^i):
 
         p^x = p_nom^x + W_l^x l^x + W_k^x k^y
         p^y = p_nom^y + W_l^y l^y + W_k^y k^x
         Delta y = W_c |l^y|
-        p_des^x = p^x                       where |p^x| <= p_max^x, else p_max^x sgn(p^x)
-        p_des^y = p^y + (-1)^i Delta y      likewise, of the sum, with p_max^y
+        p_des^x = p^x                   where |p^x - c^x| <= p_max^x, else at that limit
+        p_des^y = p^y + s Delta y       likewise, of the sum, with p_max^y
+
+    The limits are centred at c: the centre of mass with ``limits_about: com``, as in the paper;
+    the foot's place below a standing robot with ``limits_about: stance``, for robots whose feet
+    stand far from the centre of mass, such as quadrupeds.
 
     With ``law: paper`` l and k are the measured momenta. With ``law: deviation`` they are what
     the measured ones deviate from the plan's: the plan's footholds already fit its own momentum,
@@ -99,6 +107,9 @@ class LandingHeuristic(Block):
         p_max: tuple[float, float] = live_parameter(
             (0.15, 0.16), unit="m", text="farthest places ahead and aside the leg can reach"
         )
+        limits_about: Literal["com", "stance"] = parameter(
+            "com", text="from where p_max counts: the centre of mass, or where each foot stands"
+        )
         alpha: Shares = live_parameter(
             (1.0, 1.0, 1.0),
             text="share of the torso's rotation about x, y and z that the legs make up for",
@@ -121,10 +132,33 @@ class LandingHeuristic(Block):
     feet = Output(FootTarget, text="where the feet should be, and where they should land")
     memory = State(LandingMemory, text="lift-off, and the plan as long as it lasts")
 
+    @classmethod
+    def requires(cls, params: Parameters, robot: RobotDescription | None) -> Iterable[Misfit]:
+        """Limits within which the robot can stand."""
+        assert isinstance(params, cls.Params) and robot is not None
+        if params.limits_about == "stance":
+            return
+        for foot, place in zip(robot.feet, standing_feet(robot), strict=True):
+            x, y = abs(float(place[0])), abs(float(place[1]))
+            if x > params.p_max[0] or y > params.p_max[1]:
+                yield Misfit(
+                    f"{foot.name} of {robot.name} stands {x:.3f} m ahead or behind and {y:.3f} m "
+                    "beside the centre of mass, which is beyond p_max",
+                    parameter="p_max",
+                    expected="limits within which every foot stands",
+                    found=f"({params.p_max[0]} m, {params.p_max[1]} m)",
+                    fix="limits_about: stance",
+                )
+                return
+
     def setup(self) -> None:
         robot = self.robot
         self._mass = robot.total_mass
-        self._sides = foot_sides(robot)
+        stance = standing_feet(robot)
+        self._sides = foot_sides(stance)
+        self._turned = self.params.limits_about == "stance"
+        self._stance = stance if self._turned else np.zeros_like(stance)
+        self._centres = np.zeros_like(stance)
         self.on_parameters()
         n = len(robot.feet)
         self._place, self._speed = np.zeros((n, 3)), np.zeros(3)
@@ -158,11 +192,13 @@ class LandingHeuristic(Block):
         lift, lift_rate = retraction(left, p.retraction, p.retraction_time)
         lowest = lowest_height(terms.foot_position)
         self._turn_frame(overdue)
+        if self._turned:
+            turn_places(self._stance, yaw(memory.orientation), self._centres)
         for foot in range(len(self._sides)):
             planned, place = memory.planned[foot], self.feet.landing[foot]
             landing_place(
                 planned, self._sides[foot], self._linear, self._angular,
-                self._w_l, self._w_k, p.w_c, self._p_max, place,
+                self._w_l, self._w_k, p.w_c, self._p_max, self._centres[foot], place,
             )  # fmt: skip
             np.subtract(reference.foot_velocity[foot], reference.com_velocity, out=self._speed)
             if overdue:
@@ -236,17 +272,23 @@ class LandingHeuristic(Block):
         np.dot(turn, self._heading, feet.rotation[foot])
 
 
-def foot_sides(robot: RobotDescription) -> tuple[float, ...]:
-    """For every foot (-1)^i: 1 on the left of the base, -1 on the right."""
-    sides = []
-    for foot in robot.feet:
-        link, aside = foot.link, foot.sole[1]
-        while link != robot.base:
-            joint = next(j for j in robot.joints if j.child == link)
-            aside += joint.origin[1]
-            link = joint.parent
-        sides.append(1.0 if aside >= 0.0 else -1.0)
-    return tuple(sides)
+def standing_feet(robot: RobotDescription) -> Array:
+    """The sole centres (n_feet, 3) [m] from the centre of mass, of a robot in its standing pose."""
+    level = np.array([[0.0, 0.0, 0.0, 1.0]])
+    poses = link_poses(robot, np.zeros((1, 3)), level, robot.standing_position[None])
+    com, feet = np.zeros(3), np.zeros((len(robot.feet), 3))
+    for link in robot.links:
+        place, turn = poses.of(link.name)
+        com += link.mass / robot.total_mass * (place[0] + turn[0] @ np.array(link.com))
+    for number, foot in enumerate(robot.feet):
+        place, turn = poses.of(foot.link)
+        feet[number] = place[0] + turn[0] @ np.array(foot.sole) - com
+    return feet
+
+
+def foot_sides(feet: Array) -> tuple[float, ...]:
+    """For every foot 1 on the left of the base, -1 on the right, 0 in the middle (1 mm)."""
+    return tuple(math.copysign(1.0, y) if abs(y) > 1e-3 else 0.0 for y in feet[:, 1].tolist())
 
 
 @kernel
@@ -259,21 +301,33 @@ def landing_place(
     w_k: Array,
     w_c: float,
     p_max: Array,
+    centre: Array,
     out: Array,
 ) -> None:
     """The paper's law: the place (3,) from the nominal one (3,); z stays.
 
     Args:
-        side: (-1)^i, 1 for the left foot.
+        side: 1 for a foot on the left, -1 on the right, 0 in the middle.
         linear, angular: the momenta l and k fed back.
+        p_max, centre: how far ahead and aside the place may be from where (3,).
     """
     x = float(nominal[0]) + float(w_l[0]) * float(linear[0]) + float(w_k[0]) * float(angular[1])
     y = float(nominal[1]) + float(w_l[1]) * float(linear[1]) + float(w_k[1]) * float(angular[0])
     y += side * w_c * abs(float(linear[1]))
     far_x, far_y = float(p_max[0]), float(p_max[1])
-    out[0] = x if abs(x) <= far_x else math.copysign(far_x, x)
-    out[1] = y if abs(y) <= far_y else math.copysign(far_y, y)
+    dx, dy = x - float(centre[0]), y - float(centre[1])
+    out[0] = x if abs(dx) <= far_x else float(centre[0]) + math.copysign(far_x, dx)
+    out[1] = y if abs(dy) <= far_y else float(centre[1]) + math.copysign(far_y, dy)
     out[2] = nominal[2]
+
+
+@kernel
+def turn_places(places: Array, angle: float, out: Array) -> None:
+    """Places (n, 3) turned about the vertical by ``angle`` [rad]."""
+    cosine, sine = math.cos(angle), math.sin(angle)
+    for i in range(places.shape[0]):
+        x, y = float(places[i, 0]), float(places[i, 1])
+        out[i, 0], out[i, 1], out[i, 2] = cosine * x - sine * y, sine * x + cosine * y, places[i, 2]
 
 
 @kernel
@@ -314,9 +368,9 @@ def retraction(left: float, speed: float, duration: float) -> tuple[float, float
 
 
 @kernel
-def heading_matrix(yaw: float, out: Array) -> None:
-    """The rotation about the vertical by ``yaw`` (3, 3)."""
-    cosine, sine = math.cos(yaw), math.sin(yaw)
+def heading_matrix(angle: float, out: Array) -> None:
+    """The rotation about the vertical by ``angle`` [rad], (3, 3)."""
+    cosine, sine = math.cos(angle), math.sin(angle)
     out[:, :] = 0.0
     out[0, 0] = out[1, 1] = cosine
     out[0, 1], out[1, 0], out[2, 2] = -sine, sine, 1.0

@@ -37,9 +37,9 @@ class JumpRecord(Signal):
     squat_height = Field(unit="m", text="lowest height of the com before lift-off")
     apex_height = Field(unit="m", text="greatest height of the com since lift-off")
     start_foot = Field(("n_feet", 2), unit="m", text="middle of every foot at the start")
-    start_direction = Field(("n_feet", 2), unit="m", text="from its last to its first point then")
+    start_direction = Field(("n_feet", 2), unit="m", text="where it points then")
     foot = Field(("n_feet", 2), unit="m", text="middle of every foot now")
-    direction = Field(("n_feet", 2), unit="m", text="from its last to its first point now")
+    direction = Field(("n_feet", 2), unit="m", text="where it points now")
     landed_foot = Field(("n_feet", 2), unit="m", text="middle of every foot after touchdown")
     foot_slip = Field(unit="m", text="farthest that a foot's middle has moved since then")
     lifted_time = Field("n_feet", unit="s", text="for how long each foot has carried no load")
@@ -49,8 +49,10 @@ class JumpRecord(Signal):
     com_speed = Field(unit="m/s", text="speed of the com, when judged")
     angular_speed = Field(unit="rad/s", text="of the base, when judged")
     margin = Field(unit="m", text="distance of the com from the edge of support, when judged")
-    load_share = Field(unit="", text="the less loaded foot's share of the weight, when judged")
-    points_unloaded = Field(dtype="int64", text="contact points without load, when judged")
+    load_share = Field(unit="", text="the least loaded foot's share of the weight, when judged")
+    points_unloaded = Field(
+        dtype="int64", text="contact points that should be loaded and are not, when judged"
+    )
     ground_low = Field(unit="m", text="lowest ground under a contact point, when judged")
     ground_high = Field(unit="m", text="highest ground under a contact point, when judged")
     forbidden = Field(dtype="int64", text="physics steps with a forbidden contact")
@@ -102,7 +104,9 @@ class JumpCriteria(Parameters):
     final_com_speed: float = parameter(0.05, unit="m/s", text="largest at rest")
     final_angular_speed: float = parameter(0.2, unit="rad/s", text="largest at rest")
     support_margin: float = parameter(0.01, unit="m", text="least distance inside the support")
-    load_share: float = parameter(0.2, text="least share of the weight on each foot at rest")
+    load_share: float | None = parameter(
+        None, text="least share of the weight on each foot at rest; by default 0.4 / feet"
+    )
     slip_delay: float = parameter(0.15, unit="s", ge=0, text="feet may settle so long")
     foot_slip: float = parameter(
         0.005, unit="m", text="feet may move so far after that; 20 mm for a recovered push"
@@ -115,8 +119,10 @@ class JumpCriteria(Parameters):
     )
     joint_limit: float = parameter(0.0, unit="rad", ge=0, text="largest excess over a joint limit")
     fall_tilt: float = parameter(radians(69), unit="rad", text="more is a fall")
-    fall_height: float = parameter(
-        0.12, unit="m", text="a base lower above the ground than this is a fall"
+    fall_height: float | None = parameter(
+        None,
+        unit="m",
+        text="a base lower above the ground has fallen; by default 0.315 of the standing height",
     )
 
 
@@ -142,6 +148,7 @@ def first_failure(record: JumpRecord, limits: JumpCriteria, planned: bool) -> st
 
 def _judge(r: JumpRecord, c: JumpCriteria, planned: bool) -> Iterator[Verdict]:
     """Every criterion of any jump, in the order in which a failure explains those behind it."""
+    assert c.fall_height is not None and c.load_share is not None
     yield (
         r.fall_time == NEVER,
         (
@@ -153,7 +160,7 @@ def _judge(r: JumpRecord, c: JumpCriteria, planned: bool) -> Iterator[Verdict]:
     yield (
         r.forbidden == 0,
         (
-            f"something other than toes and heels touched, first at {r.forbidden_time:.3f} s, "
+            f"something other than the contact points touched, first at {r.forbidden_time:.3f} s, "
             f"in {r.forbidden} physics steps"
         ),
     )

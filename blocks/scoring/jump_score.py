@@ -11,6 +11,7 @@ from ...mathematics.constants import GRAVITY
 from ...mathematics.support_margin import support_margin
 from ...runtime.language.block import Block, Input, Metric, State
 from ..signals import JumpReference, RobotTruth, WholeBodyCommand
+from .footing import Footing
 from .jump_criteria import NEVER, JumpCriteria, JumpRecord, feet_moved, feet_turned, first_failure
 from .jump_series import (
     EARLY_LIFT_OFF,
@@ -28,17 +29,17 @@ class JumpScore(Block):
 
     A jump is a success when all of these hold; every tolerance is a parameter:
 
-    1. Nothing but toes and heels ever touches the ground, and no leg the other.
-    2. It does not fall: tilt at most 69 deg, base at least 0.12 m above the ground. A fall ends
-       the run.
+    1. Nothing but the contact points ever touches the ground, and no leg another.
+    2. It does not fall: tilt at most 69 deg, base above the ground by at least 0.315 of the height
+       it stands at (0.12 m for BRUCE). A fall ends the run.
     3. Real flight: all contact points unloaded for at least 90 % of the planned flight time, and
        the com's vertical speed at lift-off within 10 % of the plan's. (A flight begins when all
        points have been unloaded for 20 ms, and counts from the beginning of that time.)
     4. No joint ever beyond its limit; every motor torque within what its speed allows.
     5. Tilt after touchdown always below 15 deg (set 45 deg for pushes).
     6. 1.5 s after touchdown: tilt below 5 deg, com slower than 0.05 m/s, base slower than
-       0.2 rad/s, all contact points loaded, each foot with over 20 % of the weight, com at least
-       10 mm inside the support polygon.
+       0.2 rad/s, every sole flat (all its points loaded, or three of more), each foot with over
+       0.4 of an equal share of the weight, com at least 10 mm inside the support polygon.
     7. From 0.15 s after touchdown to the end: no foot unloaded for more than 20 ms, and the
        middle of each foot stays within 5 mm horizontally (set 20 mm for pushes).
     8. Task: apex above standing within 10 % of its target, feet within 2 cm and 5 deg of theirs;
@@ -68,14 +69,15 @@ class JumpScore(Block):
 
     def setup(self) -> None:
         """Group the contact points by foot."""
-        robot = self.robot
-        foot_of_contact = robot.foot_of_contact()
-        self._points_of_foot = [
-            [k for k, foot in enumerate(foot_of_contact) if foot == number]
-            for number in range(len(robot.feet))
-        ]
-        self._weight = robot.total_mass * GRAVITY
+        self._footing = footing = Footing(self.robot)
+        chosen, given = self.params, dict[str, float]()
+        if chosen.fall_height is None:
+            given["fall_height"] = footing.fall_height
+        if chosen.load_share is None:
+            given["load_share"] = footing.load_share
+        self._limits = chosen.model_copy(update=given)
         self._planned = "reference" in self.context.wired
+        self._fall_height = float(self._limits.fall_height or 0.0)
         self._difference = np.zeros(2)
 
     def step(self) -> None:
@@ -84,7 +86,9 @@ class JumpScore(Block):
         time = self.time
         first = record.ticks == 0
         record.now[()] = time
-        self._follow_feet(first)
+        self._footing.measure(
+            truth.contact_position, truth.base_orientation, record.foot, record.direction
+        )
         if self._planned:
             self._follow_reference(time, first)
         if first:
@@ -93,7 +97,7 @@ class JumpScore(Block):
         self._follow_machine()
         tilt = self._tilt()
         base_height = truth.base_position.item(2) - max(truth.ground_height.tolist())
-        fallen = tilt > self.params.fall_tilt or base_height < self.params.fall_height
+        fallen = tilt > self.params.fall_tilt or base_height < self._fall_height
         if fallen and record.fall_time == NEVER:
             record.fall_time[()] = time
             record.fall_tilt[()] = tilt
@@ -111,7 +115,7 @@ class JumpScore(Block):
         record = self.record
         if record.ticks == 0:
             return {"success": False, "reason": "the run had no ticks"}
-        failure = first_failure(record, self.params, self._planned)
+        failure = first_failure(record, self._limits, self._planned)
         made = int(self.series.made) + int(record.touchdown_time != NEVER)
         if self.params.jumps > 1 and record.fall_time == NEVER and not record.forbidden:
             failure = series_failure(self.series, self.params, made) or failure
@@ -180,19 +184,9 @@ class JumpScore(Block):
         record.start_foot[:] = record.foot
         record.start_direction[:] = record.direction
 
-    def _follow_feet(self, first: bool) -> None:
-        """The middle of every foot and where it points, from its contact points."""
-        places = self.truth.contact_position
-        for number, points in enumerate(self._points_of_foot):
-            for axis in range(2):
-                ends = places[points[0]].item(axis), places[points[-1]].item(axis)
-                middle = sum(places[k].item(axis) for k in points) / len(points)
-                self.record.foot[number, axis] = middle
-                self.record.direction[number, axis] = ends[0] - ends[1]
-
     def _follow_reference(self, time: float, first: bool) -> None:
         record, plan = self.record, self.reference
-        yaw = sum(plan.foot_yaw.tolist()) / len(self._points_of_foot)
+        yaw = sum(plan.foot_yaw.tolist()) / len(self._footing.points_of_foot)
         record.planned_foot[:] = plan.foot_position[:, :2]
         record.planned_yaw[()] = yaw
         height = plan.com.item(2)
@@ -293,7 +287,7 @@ class JumpScore(Block):
             record.landed_foot[:] = record.foot
         else:
             touched = truth.contact_touched.tolist()
-            for number, points in enumerate(self._points_of_foot):
+            for number, points in enumerate(self._footing.points_of_foot):
                 np.subtract(record.foot[number], record.landed_foot[number], out=self._difference)
                 moved = hypot(self._difference.item(0), self._difference.item(1))
                 record.foot_slip[()] = max(record.foot_slip.item(), moved)
@@ -313,13 +307,10 @@ class JumpScore(Block):
         record.com_speed[()] = sqrt(sum(v * v for v in truth.com_velocity.tolist()))
         record.angular_speed[()] = sqrt(sum(w * w for w in truth.base_angular_velocity.tolist()))
         touched = truth.contact_touched
-        record.points_unloaded[()] = sum(not t for t in touched.tolist())
+        record.points_unloaded[()] = self._footing.points_missing(touched)
         record.margin[()] = support_margin(
             truth.contact_position, touched, truth.com.item(0), truth.com.item(1)
         )
-        record.load_share[()] = min(
-            sum(truth.contact_force[k].item(2) for k in points) / self._weight
-            for points in self._points_of_foot
-        )
+        record.load_share[()] = self._footing.least_load(truth.contact_force)
         record.ground_low[()] = min(truth.ground_height.tolist())
         record.ground_high[()] = max(truth.ground_height.tolist())

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from ..link_poses import contact_centres, link_poses, standing_heights
+from ..link_poses import link_poses, standing_heights
 from ..parts import Array, Shape
 from ..robot_description import RobotDescription
 from ..standing_pose import find_standing_pose
@@ -28,44 +28,17 @@ def fit_to_ground(
     if not robot.feet:
         return robot, []
     notes = []
-    # The file's contacts are where they are at the zero of all joints, whatever the robot does.
-    loose = robot.changed(standing={})
-    angles, centres = robot.standing, contact_centres(loose)
     if not standing_given:
-        pose = find_standing_pose(loose, start)
+        pose = find_standing_pose(robot, start)
         if pose.holds:
-            angles = pose.angles
+            robot = robot.changed(standing=pose.angles)
             notes.append("standing is not given: the pose was found")
         else:
             notes.append(
                 f"no standing pose was found: contacts differ in height by {pose.level:.1g} m, soles "
                 f"tilt by {pose.flatness:.1g} rad, the centre of mass is off by {pose.balance:.1g} m"
             )
-    robot = _standing(robot.changed(standing=angles), centres)
     return _without_low_shapes(robot, notes), notes
-
-
-def _standing(robot: RobotDescription, centres: Array) -> RobotDescription:
-    """The robot with its contact points at the lowest points of their rubber as it stands.
-
-    Args:
-        robot: in its standing pose, with the contact points of the zero pose.
-        centres: of the contacts' rubber [m, link frame], (n_contacts, 3).
-    """
-    poses = link_poses(robot, robot.standing_position)
-    links = {foot.name: foot.link for foot in robot.feet}
-    moved: dict[str, list[Array]] = {foot.name: [] for foot in robot.feet}
-    contacts = []
-    for contact, centre in zip(robot.contacts, centres, strict=True):
-        up = poses[links[contact.foot]][0][2]
-        place = np.round(centre - contact.radius * up, 12) + 0.0
-        moved[contact.foot].append(place - contact.position)
-        contacts.append(contact.model_copy(update={"position": tuple(place.tolist())}))
-    feet = []
-    for foot in robot.feet:
-        sole = np.round(np.array(foot.sole) + np.mean(moved[foot.name], axis=0), 12) + 0.0
-        feet.append(foot.model_copy(update={"sole": tuple(sole.tolist())}))
-    return robot.changed(contacts=tuple(contacts), feet=tuple(feet))
 
 
 def _without_low_shapes(robot: RobotDescription, notes: list[str]) -> RobotDescription:

@@ -1,7 +1,7 @@
 """The actuator profile that a URDF or MJCF file implies.
 
 These formats give each joint at most an effort and a speed. What they leave open is assumed here,
-cautiously, and said in the notes: the torque falls from half the speed limit on, and a motor bears
+cautiously, and said in the notes: the torque falls from 0.6 of the speed limit on, and a motor bears
 two fifths of its peak torque for long.
 """
 
@@ -16,7 +16,7 @@ from ..validation.faults import listing
 from .raw_model import RawJoint
 
 NAME = "rated"
-CORNER = 0.5
+CORNER = 0.6
 """Corner speed as a share of the speed limit, which is taken for the no-load speed."""
 CONTINUOUS = 0.4
 """Continuous torque as a share of the effort limit."""
@@ -59,7 +59,7 @@ def _values(joint: RawJoint, is_urdf: bool) -> dict[str, float]:
     speed = joint.speed if joint.speed > 0.0 else SPEED
     return {
         "peak_torque": effort,
-        "corner_speed": CORNER * speed,
+        "corner_speed": round(CORNER * speed, 9),
         "no_load_speed": speed,
         "continuous_torque": round(CONTINUOUS * effort, 9),
         "rotor_inertia": joint.rotor_inertia,

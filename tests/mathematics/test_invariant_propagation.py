@@ -8,7 +8,12 @@ import pytest
 from aloft.mathematics import extended_pose, rotations
 from aloft.mathematics.constants import GRAVITY
 from aloft.mathematics.inertial_filter import propagate
-from aloft.mathematics.invariant_propagation import deviation, drift, grow, spread
+from aloft.mathematics.invariant_propagation import (
+    error_transition,
+    input_jacobian,
+    propagate_covariance,
+    vector_deviation,
+)
 
 PERIOD, N = 0.002, 2
 SIZE = 9 + 3 * N
@@ -50,7 +55,7 @@ def test_the_error_is_log_linear(seed):
     """Of any size and along any trajectory it grows by the same matrix, exactly."""
     random = np.random.default_rng(seed)
     transition = np.empty((SIZE, SIZE))
-    drift(GRAVITY, PERIOD, transition)
+    error_transition(GRAVITY, PERIOD, transition)
     truth = make(random)
     start = random.uniform(-0.8, 0.8, SIZE)
     estimate, expected = perturbed(truth, start), start
@@ -89,7 +94,9 @@ def test_what_a_bias_does(seed):
     rotations.to_matrix(middle, rotation)
     end = (truth[0].copy(), truth[1].copy())
     advance(end, rate, force)
-    spread(rotation, 0.5 * (truth[1] + end[1]), np.ones(N, dtype=bool), GRAVITY, PERIOD, reach)
+    input_jacobian(
+        rotation, 0.5 * (truth[1] + end[1]), np.ones(N, dtype=bool), GRAVITY, PERIOD, reach
+    )
     for column in range(6):
         bias = np.zeros(6)
         bias[column] = 1e-3
@@ -102,7 +109,7 @@ def test_what_a_bias_does(seed):
 
 def test_points_that_are_not_there_do_not_move():
     reach = np.ones((SIZE, 6))
-    spread(np.eye(3), np.ones((2 + N, 3)), np.array([False, True]), GRAVITY, PERIOD, reach)
+    input_jacobian(np.eye(3), np.ones((2 + N, 3)), np.array([False, True]), GRAVITY, PERIOD, reach)
     assert not reach[9:12, :3].any()
     assert reach[12:15, :3].any()
 
@@ -117,14 +124,14 @@ def test_the_covariance_is_that_of_a_swarm():
     swarm = [(perturbed(truth, s[:SIZE]), s[SIZE:]) for s in random.normal(size=(count, bias + 6)) * first]  # fmt: skip
     covariance = np.diag(first**2)
     transition, reach = np.empty((bias + 6, bias + 6)), np.zeros((bias + 6, 6))
-    drift(GRAVITY, PERIOD, transition)
+    error_transition(GRAVITY, PERIOD, transition)
     for _ in range(ticks):
         rate, force = 3.0 * random.normal(size=3), 10.0 * random.normal(size=3)
         middle, rotation = np.empty(4), np.empty((3, 3))
         rotations.integrate(truth[0], rate, PERIOD / 2, middle)
         rotations.to_matrix(middle, rotation)
-        spread(rotation, truth[1], np.ones(N, dtype=bool), GRAVITY, PERIOD, reach)
-        grow(transition, reach, bias, noise, covariance, np.empty((bias + 6, 6)),
+        input_jacobian(rotation, truth[1], np.ones(N, dtype=bool), GRAVITY, PERIOD, reach)
+        propagate_covariance(transition, reach, bias, noise, covariance, np.empty((bias + 6, 6)),
              np.empty((bias + 6, bias + 6)))  # fmt: skip
         for estimate, own in swarm:
             sample = own + noise * random.normal(size=6)
@@ -148,4 +155,4 @@ def test_the_deviation_of_a_vectors_own_error(first):
         for _ in range(4000)
     ]  # fmt: skip
     expected = np.sqrt(np.mean(np.square(errors)))
-    assert deviation(root @ root.T, first, vector) == pytest.approx(expected, rel=0.05)
+    assert vector_deviation(root @ root.T, first, vector) == pytest.approx(expected, rel=0.05)

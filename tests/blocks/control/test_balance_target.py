@@ -14,6 +14,8 @@ from aloft.blocks.signals import Phase
 from aloft.mathematics.rotations import to_matrix
 from aloft.runtime.testing import BlockBench
 
+from ...robots.limbed_robots import quadruped
+
 FEET = np.array([[0.0, -0.08, 0.0], [0.0, 0.08, 0.0]])
 LEVEL = [0.0, 0.0, 0.0, 1.0]
 STANDING = 0.33
@@ -258,3 +260,57 @@ def test_the_lengthening_is_one_motion_and_bounded(share, x, y, gain):
         assert now[k + 1] == pytest.approx((after[k] - before[k]) / (2 * step), abs=1e-4)
     place, velocity, _ = added(1.0)
     assert math.hypot(*(place + flight * velocity)) <= limit + 1e-12
+
+
+SQUARE = np.array([[0.2, 0.15, 0.0], [0.2, -0.15, 0.0], [-0.2, 0.15, 0.0], [-0.2, -0.15, 0.0]])
+
+
+def turned(points, angle):
+    cosine, sine = math.cos(angle), math.sin(angle)
+    return points @ np.array([[cosine, sine, 0.0], [-sine, cosine, 0.0], [0.0, 0.0, 1.0]])
+
+
+def make_quadruped(calves):
+    """Four point feet whose links head anywhere; standing in the first tick as planned."""
+    bench = BlockBench(BalanceTarget, robot=quadruped())
+    bench.set("reference", com=[0.0, 0.0, 0.3], orientation=LEVEL, foot_position=SQUARE)
+    bench.set("terms", foot_position=SQUARE, base_rotation=np.eye(3), foot_rotation=calves)
+    bench.step()
+    return bench
+
+
+def test_point_feet_head_as_their_pattern_does():
+    calves = np.stack([matrix(about(2, 0.7 * k)) @ matrix(about(1, 1.9)) for k in range(4)])
+    bench = make_quadruped(calves)
+    where = turned(SQUARE, 0.3) + np.array([0.5, -0.2, 0.0])
+    bench.set("terms", foot_position=where)
+    bench.set("reference", com=[0.02, 0.0, 0.3], com_velocity=[1.0, 0.0, 0.0])
+    bench.step()
+    target = bench.get("target")
+    lean = np.array([0.02 * math.cos(0.3), 0.02 * math.sin(0.3), 0.3])
+    assert target.com == pytest.approx(np.array([0.5, -0.2, 0.0]) + lean, abs=1e-12)
+    assert target.com_velocity == pytest.approx([math.cos(0.3), math.sin(0.3), 0.0], abs=1e-12)
+    assert target.orientation == pytest.approx(about(2, 0.3), abs=1e-12)
+
+
+def test_after_touchdown_four_feet_carry_the_body_over_their_middle():
+    bench = make_quadruped(np.stack([np.eye(3)] * 4))
+    where = turned(SQUARE, -0.2) + np.array([0.1, 0.3, 0.02])
+    where[0] += [0.02, 0.0, 0.0]
+    bench.set("terms", foot_position=where, base_rotation=matrix(about(2, -0.2)))
+    bench.set("phase", phase=Phase.LANDING)
+    bench.step()
+    target = bench.get("target")
+    assert target.com == pytest.approx([0.105, 0.3, 0.02 + 0.3 - 0.06], abs=1e-12)
+    assert 2.0 * math.asin(target.orientation[2]) == pytest.approx(-0.2, abs=0.03)
+
+
+def test_a_single_point_foot_heads_as_its_base_does():
+    robot = quadruped()
+    hopper = robot.model_copy(update={"feet": robot.feet[:1], "contacts": robot.contacts[:1]})
+    bench = BlockBench(BalanceTarget, robot=hopper)
+    bench.set("reference", com=[0.0, 0.0, 0.3], orientation=LEVEL, foot_position=SQUARE[:1])
+    turn = matrix(about(2, 0.4))
+    bench.set("terms", foot_position=SQUARE[:1], base_rotation=turn, foot_rotation=np.eye(3)[None])
+    bench.step()
+    assert bench.get("target").orientation == pytest.approx(about(2, 0.4), abs=1e-12)

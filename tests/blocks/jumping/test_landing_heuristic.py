@@ -14,12 +14,15 @@ from aloft.blocks.jumping.landing_heuristic import (
     foot_sides,
     landing_place,
     retraction,
+    standing_feet,
     swing,
 )
 from aloft.blocks.signals import Phase
 from aloft.mathematics.rotations import exponential, multiply, rotate, to_matrix
 from aloft.robots.description import find_robot
 from aloft.runtime.testing import BlockBench
+
+from ...robots.limbed_robots import quadruped
 
 ROBOT = find_robot("bruce")
 MASS = ROBOT.total_mass
@@ -29,11 +32,20 @@ COM = np.array([0.0, 0.0, 0.32])
 GAINS = {"w_l": [0.03, 0.04], "w_k": [0.3, -0.1], "w_c": 0.05}
 
 
-def place(nominal, side, linear, angular, w_l=(0.03, 0.04), w_k=(0.3, -0.1), w_c=0.05):
+def place(
+    nominal,
+    side,
+    linear,
+    angular,
+    w_l=(0.03, 0.04),
+    w_k=(0.3, -0.1),
+    w_c=0.05,
+    centre=(0.0, 0.0, 0.0),
+):
     out = np.zeros(3)
     landing_place(
         np.array(nominal), side, np.array(linear), np.array(angular), np.array(w_l),
-        np.array(w_k), w_c, np.array([0.15, 0.16]), out,
+        np.array(w_k), w_c, np.array([0.15, 0.16]), np.asarray(centre), out,
     )  # fmt: skip
     return out
 
@@ -103,7 +115,47 @@ def test_the_law_is_mirror_symmetric(along, aside, roll, pitch, lateral):
 
 def test_sides_of_the_feet_are_those_of_the_paper():
     assert [foot.name for foot in ROBOT.feet] == ["right_foot", "left_foot"]
-    assert foot_sides(ROBOT) == (-1.0, 1.0)
+    assert foot_sides(standing_feet(ROBOT)) == (-1.0, 1.0)
+
+
+def test_sides_of_any_number_of_feet():
+    assert foot_sides(standing_feet(quadruped())) == (1.0, -1.0, 1.0, -1.0)
+    assert foot_sides(np.array([[0.1, 0.0, -0.3], [0.0, 0.2, -0.3]])) == (0.0, 1.0)
+
+
+def test_limits_are_about_the_stance_of_each_foot_where_asked_for():
+    far = place([0.3, 0.2, 0.0], 1.0, [0.0] * 3, [0.0] * 3, centre=(0.2, 0.15, 0.0))
+    assert far == pytest.approx([0.3, 0.2, 0.0], abs=1e-15)
+    beyond = place([0.4, -0.2, 0.0], 1.0, [0.0] * 3, [0.0] * 3, centre=(0.2, 0.15, 0.0))
+    assert beyond == pytest.approx([0.35, -0.01, 0.0], abs=1e-15)
+
+
+def test_limits_in_which_a_robot_cannot_stand_are_in_the_load_report():
+    Params = LandingHeuristic.Params
+    assert not list(LandingHeuristic.requires(Params(), ROBOT))
+    (misfit,) = LandingHeuristic.requires(Params(), quadruped())
+    assert misfit.message.startswith("front_left of quadruped stands 0.")
+    assert misfit.message.endswith("beside the centre of mass, which is beyond p_max")
+    assert (misfit.parameter, misfit.fix) == ("p_max", "limits_about: stance")
+    assert not list(LandingHeuristic.requires(Params(limits_about="stance"), quadruped()))
+
+
+def test_four_feet_land_where_planned_and_spread_when_pushed_aside():
+    robot = quadruped()
+    feet = standing_feet(robot)
+    bench = BlockBench(LandingHeuristic, {"limits_about": "stance"}, robot=robot)
+    com = np.array([0.0, 0.0, 0.3])
+    bench.set("reference", com=com, orientation=LEVEL, foot_position=feet + com)
+    bench.set("terms", com=com, foot_position=feet + com, base_rotation=np.eye(3))
+    bench.set("phase", phase=Phase.FLIGHT, time_to_touchdown=0.2)
+    bench.step()
+    assert bench.get("feet").landing == pytest.approx(feet, abs=1e-12)
+    bench.set("terms", linear_momentum=[0.0, 0.5, 0.0])
+    bench.step()
+    moved = bench.get("feet").landing - feet
+    expected = 0.04 * 0.5 + np.array([1.0, -1.0, 1.0, -1.0]) * 0.04 * 0.5
+    assert moved[:, 1] == pytest.approx(expected, abs=1e-12)
+    assert np.abs(moved[:, 0]).max() < 1e-12
 
 
 # Which momentum.

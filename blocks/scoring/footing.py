@@ -1,0 +1,110 @@
+"""How a robot of any kind stands on its feet: what the scores need to know of it."""
+
+from __future__ import annotations
+
+from math import cos, sin
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...mathematics.constants import GRAVITY
+from ...mathematics.rotations import yaw
+from ...robots.description import RobotDescription
+from ...robots.limb import place_limb, read_limb
+
+Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+FALL_SHARE = 0.315
+"""A base below this share of the height it stands at has fallen: 0.12 m for BRUCE."""
+LOAD_SHARE = 0.4
+"""Least load of a foot at rest, by the load of a foot where all carry the same."""
+PLANE = 3
+"""So many loaded points show that a sole with at least as many is flat on the ground."""
+
+
+class Footing:
+    """A robot's feet and contact points, its weight and the height it stands at.
+
+    Attributes:
+        points_of_foot: for every foot the indices of its contact points.
+        weight: of the robot [N].
+        standing_height: of the base above the contact points in the standing pose [m].
+    """
+
+    def __init__(self, robot: RobotDescription) -> None:
+        foot_of_contact = robot.foot_of_contact()
+        self.points_of_foot = [
+            [k for k, foot in enumerate(foot_of_contact) if foot == number]
+            for number in range(len(robot.feet))
+        ]
+        self.weight = robot.total_mass * GRAVITY
+        self.standing_height = standing_height(robot)
+
+    @property
+    def fall_height(self) -> float:
+        """A base lower above the ground than this has fallen, unless told otherwise [m]."""
+        return float(round(FALL_SHARE * self.standing_height, 3))
+
+    @property
+    def load_share(self) -> float:
+        """The least share of the weight on each foot at rest, unless told otherwise."""
+        return LOAD_SHARE / len(self.points_of_foot)
+
+    def measure(self, points: Array, orientation: Array, middle: Array, direction: Array) -> None:
+        """Where every foot is and which way it points, seen from above.
+
+        Args:
+            points: the contact points [m, world], (n_contacts, 3).
+            orientation: of the base, quaternion x, y, z, w.
+            middle: out, the middle of every foot's points (n_feet, 2).
+            direction: out, from a foot's last point to its first (n_feet, 2). For a foot of one
+                point it leads there from the middle of all feet, and for a robot with a single
+                such foot it is where the base heads. What counts is how far it turns.
+        """
+        count = len(self.points_of_foot)
+        for number, indices in enumerate(self.points_of_foot):
+            for axis in range(2):
+                ends = points[indices[0]].item(axis), points[indices[-1]].item(axis)
+                middle[number, axis] = sum(points[k].item(axis) for k in indices) / len(indices)
+                direction[number, axis] = ends[0] - ends[1]
+        for number, indices in enumerate(self.points_of_foot):
+            if len(indices) > 1:
+                continue
+            if count == 1:
+                heading = yaw(orientation)
+                direction[number, 0], direction[number, 1] = cos(heading), sin(heading)
+                continue
+            for axis in range(2):
+                mean = sum(middle[k].item(axis) for k in range(count)) / count
+                direction[number, axis] = middle[number].item(axis) - mean
+
+    def points_missing(self, touched: Flags) -> int:
+        """How many more points would have to carry load for every sole to be flat on the ground.
+
+        All points of a point or line foot; of a foot with more points, three.
+        """
+        loaded = touched.tolist()
+        return sum(
+            max(0, min(len(indices), PLANE) - sum(loaded[k] for k in indices))
+            for indices in self.points_of_foot
+        )
+
+    def least_load(self, force: Array) -> float:
+        """The least loaded foot's share of the weight; ``force`` on each point [N, world]."""
+        loads = [sum(force[k].item(2) for k in indices) for indices in self.points_of_foot]
+        return float(min(loads)) / self.weight
+
+
+def standing_height(robot: RobotDescription) -> float:
+    """How high the base's origin is above the lowest contact point in the standing pose [m]."""
+    lowest = 0.0
+    names = [foot.name for foot in robot.feet]
+    for contact in robot.contacts:
+        number = names.index(contact.foot)
+        limb, pose = read_limb(robot, number), np.zeros((4, 3))
+        angles = robot.standing_position[list(limb.joints)]
+        place_limb(limb.links, limb.tip, angles, np.zeros((len(angles), 6)), pose)
+        lever = np.array(contact.position) - np.array(robot.feet[number].sole)
+        lowest = min(lowest, float((pose[0] + pose[1:] @ lever)[2]))
+    return -lowest
