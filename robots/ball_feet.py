@@ -2,7 +2,7 @@
 
 The contact point of such a foot, and its sole, are the ball's lowest point in the world, however
 the foot is turned: its centre less its radius straight down. The positions that the description
-gives are where these are in the standing pose. Contact points of other feet are fixed to the foot.
+gives are where these are at the zero pose. Contact points of other feet are fixed to the foot.
 """
 
 from __future__ import annotations

@@ -67,10 +67,14 @@ def standing_heights(robot: RobotDescription) -> Array:
     (n_contacts,). All are equal where every foot can stand on level ground."""
     poses = link_poses(robot, robot.standing_position)
     links = {foot.name: foot.link for foot in robot.feet}
+    owners, centres = robot.foot_of_contact(), contact_centres(robot)
     heights = np.zeros(len(robot.contacts))
     for k, contact in enumerate(robot.contacts):
         turn, place = poses[links[contact.foot]]
-        heights[k] = (place + turn @ np.array(contact.position))[2]
+        if owners.count(owners[k]) == 1:  # a ball: straight below its centre
+            heights[k] = (place + turn @ centres[k])[2] - contact.radius
+        else:
+            heights[k] = (place + turn @ np.array(contact.position))[2]
     return heights
 
 

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from math import degrees, hypot, sqrt
-
-import numpy as np
+from math import degrees, hypot
 
 from ...mathematics.constants import GRAVITY
-from ...mathematics.support_margin import support_margin
+from ...mathematics.rotations import tilt
 from ...runtime.language.block import Block, Input, Metric, State
 from ..signals import JumpReference, RobotTruth, WholeBodyCommand
 from .footing import Footing
-from .jump_criteria import NEVER, JumpCriteria, JumpRecord, feet_moved, feet_turned, first_failure
+from .jump_criteria import JumpCriteria, JumpRecord, feet_moved, feet_turned, first_failure
 from .jump_series import (
     EARLY_LIFT_OFF,
     JumpSeries,
@@ -22,6 +20,8 @@ from .jump_series import (
     note_place,
     series_failure,
 )
+from .stand_criteria import NEVER
+from .stand_following import begin, note_fall, note_feet, note_machine, note_rest
 
 
 class JumpScore(Block):
@@ -69,16 +69,11 @@ class JumpScore(Block):
 
     def setup(self) -> None:
         """Group the contact points by foot."""
-        self._footing = footing = Footing(self.robot)
-        chosen, given = self.params, dict[str, float]()
-        if chosen.fall_height is None:
-            given["fall_height"] = footing.fall_height
-        if chosen.load_share is None:
-            given["load_share"] = footing.load_share
-        self._limits = chosen.model_copy(update=given)
+        self._footing = Footing(self.robot)
+        limits = self.params.for_robot(self._footing)
+        assert isinstance(limits, JumpCriteria)
+        self._limits = limits
         self._planned = "reference" in self.context.wired
-        self._fall_height = float(self._limits.fall_height or 0.0)
-        self._difference = np.zeros(2)
 
     def step(self) -> None:
         """Follow the jump by one tick."""
@@ -94,18 +89,13 @@ class JumpScore(Block):
         if first:
             self._begin()
         record.ticks += 1
-        self._follow_machine()
-        tilt = self._tilt()
-        base_height = truth.base_position.item(2) - max(truth.ground_height.tolist())
-        fallen = tilt > self.params.fall_tilt or base_height < self._fall_height
-        if fallen and record.fall_time == NEVER:
-            record.fall_time[()] = time
-            record.fall_tilt[()] = tilt
-            record.fall_height[()] = base_height
+        note_machine(record, truth)
+        record.failures[()] = self.wbc.failures
+        if note_fall(record, truth, self._limits):
             self.request_stop("the robot fell")
         self._follow_flight(time)
         if record.touchdown_time != NEVER:
-            self._follow_landing(time - float(record.touchdown_time), tilt)
+            self._follow_landing(time - float(record.touchdown_time))
         elif self.series.made:
             self._follow_row(time)
         record.vertical_speed[()] = truth.com_velocity.item(2)
@@ -174,12 +164,13 @@ class JumpScore(Block):
 
     def _begin(self) -> None:
         record, height = self.record, self.truth.com[2]
+        begin(record, self.truth)
         for instant in (
-            record.fall_time, record.unloaded_time, record.lift_off_time, record.touchdown_time,
-            record.judged_time, record.forbidden_time, record.planned_speed_time,
+            record.unloaded_time, record.lift_off_time, record.touchdown_time,
+            record.planned_speed_time,
         ):  # fmt: skip
             instant[()] = NEVER
-        for start in (record.standing_height, record.squat_height, record.apex_height):
+        for start in (record.squat_height, record.apex_height):
             start[()] = height
         record.start_foot[:] = record.foot
         record.start_direction[:] = record.direction
@@ -209,29 +200,6 @@ class JumpScore(Block):
             # The plan's own ballistic flight takes it back to the planned instant.
             late = plan.time.item() - plan.lift_off_time.item()
             record.planned_speed[()] = plan.com_velocity.item(2) + GRAVITY * late
-
-    def _follow_machine(self) -> None:
-        """Contacts, limits, motors and solver: what must never be exceeded at any time."""
-        record, truth = self.record, self.truth
-        if truth.forbidden_contacts and not record.forbidden:
-            record.forbidden_time[()] = record.now
-        record.forbidden += truth.forbidden_contacts
-        record.failures[()] = self.wbc.failures
-        record.saturated += truth.saturated_share
-        for largest, value in (
-            (record.violation, truth.joint_limit_violation.item()),
-            (record.overload, truth.motor_overload.item()),
-            (record.peak_torque, max(abs(t) for t in truth.motor_torque.tolist())),
-            (record.peak_speed, max(abs(v) for v in truth.motor_speed.tolist())),
-        ):
-            largest[()] = max(largest.item(), value)
-
-    def _tilt(self) -> float:
-        """The angle between the base's z axis and the world's [rad]."""
-        x, y, z, w = self.truth.base_orientation.tolist()
-        # The half angle's sine is exact where the angle is small, unlike the whole one's cosine.
-        sine = hypot(x, y) / sqrt(x * x + y * y + z * z + w * w)
-        return 2.0 * float(np.arcsin(min(1.0, sine)))
 
     def _follow_flight(self, time: float) -> None:
         """Lift-off, apex and touchdown, by the simulator's contacts."""
@@ -279,38 +247,14 @@ class JumpScore(Block):
         if self.record.lift_off_time == NEVER and landed >= self.params.rest_time - 1e-9:
             self.request_stop(f"no other jump {landed:.2f} s after touchdown")
 
-    def _follow_landing(self, landed: float, tilt: float) -> None:
+    def _follow_landing(self, landed: float) -> None:
         """Peaks since touchdown, feet that slide or step, and the rest when its time comes."""
         record, truth, params = self.record, self.truth, self.params
-        record.peak_tilt[()] = max(record.peak_tilt.item(), tilt)
-        if landed < params.slip_delay - 1e-9:
-            record.landed_foot[:] = record.foot
-        else:
-            touched = truth.contact_touched.tolist()
-            for number, points in enumerate(self._footing.points_of_foot):
-                np.subtract(record.foot[number], record.landed_foot[number], out=self._difference)
-                moved = hypot(self._difference.item(0), self._difference.item(1))
-                record.foot_slip[()] = max(record.foot_slip.item(), moved)
-                lifted = 0.0 if any(touched[k] for k in points) else self.period
-                total = record.lifted_time.item(number) + lifted if lifted else 0.0
-                record.lifted_time[number] = total
-                record.longest_lift[()] = max(record.longest_lift.item(), total)
+        record.peak_tilt[()] = max(record.peak_tilt.item(), tilt(truth.base_orientation))
+        note_feet(record, truth, self._footing, self.period, landed >= params.slip_delay - 1e-9)
         if record.judged_time == NEVER and landed >= params.rest_time - 1e-9:
-            self._judge_rest(tilt)
+            note_rest(record, truth, self._footing)
+            record.ground_low[()] = min(truth.ground_height.tolist())
+            record.ground_high[()] = max(truth.ground_height.tolist())
         if landed >= params.rest_time + params.settle_time - 1e-9:
             self.request_stop(f"{landed:.2f} s after touchdown")
-
-    def _judge_rest(self, tilt: float) -> None:
-        record, truth = self.record, self.truth
-        record.judged_time[()] = record.now
-        record.tilt[()] = tilt
-        record.com_speed[()] = sqrt(sum(v * v for v in truth.com_velocity.tolist()))
-        record.angular_speed[()] = sqrt(sum(w * w for w in truth.base_angular_velocity.tolist()))
-        touched = truth.contact_touched
-        record.points_unloaded[()] = self._footing.points_missing(touched)
-        record.margin[()] = support_margin(
-            truth.contact_position, touched, truth.com.item(0), truth.com.item(1)
-        )
-        record.load_share[()] = self._footing.least_load(truth.contact_force)
-        record.ground_low[()] = min(truth.ground_height.tolist())
-        record.ground_high[()] = max(truth.ground_height.tolist())

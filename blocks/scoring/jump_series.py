@@ -9,7 +9,8 @@ from __future__ import annotations
 from math import degrees, hypot
 
 from ...runtime.language.signals import Field, Signal
-from .jump_criteria import NEVER, JumpCriteria, JumpRecord, feet_turned
+from .jump_criteria import JumpCriteria, JumpRecord, feet_turned
+from .stand_criteria import NEVER
 
 EARLY_LIFT_OFF = 0.1
 """Feet that leave the ground longer than this [s] before the planned lift-off bounce."""

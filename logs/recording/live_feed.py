@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...runtime.running.life_cycle import describe
+from ...runtime.running.failures import describe
 from ...runtime.running.notes import Note
 from ..file.format import Header
 from ..viewing.blueprint import recording_blueprint

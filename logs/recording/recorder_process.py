@@ -24,7 +24,7 @@ from typing import Any
 
 import numpy as np
 
-from ...runtime.running.life_cycle import describe
+from ...runtime.running.failures import describe
 from ...runtime.running.memory import Snapshot
 from ...runtime.running.notes import Note
 from ..file.format import Header

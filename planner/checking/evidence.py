@@ -10,8 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...mathematics.constants import GRAVITY
-from ...robots.description import RobotDescription
+from ...robots.description import Motors, RobotDescription
 from ...robots.kinematics import LinkPoses, link_poses, matrices_of_quaternions
+from ...robots.welding import welded
+from ..models.symmetry import mirrored_pairs, symmetrised
 from ..task.plan import JumpPlan
 from .clearance import ground_height
 from .replay import Replay
@@ -45,6 +47,29 @@ class Evidence:
     def effort(self) -> float:
         """The share of the motors' limits the plan may use."""
         return self.plan.task.effort
+
+    @property
+    def motors(self) -> Motors:
+        """What every motor can do."""
+        return self.robot.motors
+
+    @cached_property
+    def asymmetric(self) -> bool:
+        """Whether the robot is nearly the same left and right but not exactly: its plans in
+        mirrored coordinates are made for the robot that is."""
+        robot = welded(self.robot).robot
+        pairs = mirrored_pairs(robot)
+        return pairs is not None and symmetrised(robot, pairs) != robot
+
+    def model_error(self, exact: float, nearly: float) -> float:
+        """What a test of the planner's own equations allows: ``exact``, or ``nearly`` where the
+        planner's model is the robot made the same left and right."""
+        return nearly if self.asymmetric else exact
+
+    @property
+    def weight(self) -> float:
+        """The robot's weight [N]."""
+        return GRAVITY * self.robot.total_mass
 
     @cached_property
     def motor_torque(self) -> Array:

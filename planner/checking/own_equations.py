@@ -122,7 +122,7 @@ def unmodelled_momentum(plan: JumpPlan, dynamics: ExactDynamics) -> Array:
 def own_residuals(plan: JumpPlan, robot: RobotDescription) -> dict[str, float]:
     """Those of the plan's formulation; none for ``full``, which ``midpoint`` is for."""
     evaluate = RESIDUALS.get(plan.task.formulation)
-    return evaluate(plan, ExactDynamics(robot, plan.task.profile)) if evaluate else {}
+    return evaluate(plan, ExactDynamics(plan.task.equipped(robot))) if evaluate else {}
 
 
 RESIDUALS = {"paper": paper_residuals, "srbm": rigid_body_residuals}

@@ -51,8 +51,10 @@ def states(e: Evidence) -> Iterator[Found]:
         yield Found(name, np.abs(planned - exact).max(), limit, unit, "its error at the knots")
     s = r.samples
     missed = np.abs(s.torque[e.middles] - plan.joint_torque[s.knot[e.middles]])
-    k, joint = worst(missed)
-    yield Found("joint_torque", missed.max(), 0.2, "N m", "its error in the middle of an interval",
+    most = np.maximum(0.2, 0.01 * e.motors.peak_torque)
+    k, joint = worst(missed / most)
+    yield Found("joint_torque", missed[k, joint], most[joint], "N m",
+                "its error in the middle of an interval",
                 f"{e.robot.joints[joint].name} {e.moment(int(e.middles[k]))}")  # fmt: skip
 
 
@@ -79,7 +81,13 @@ def discretisation(e: Evidence) -> Iterator[Found]:
     gap, wrench = e.replay.gap, e.replay.wrench
     for name, found, limit, unit, text in (
         ("violation", gap, 1e-6, "m or rad", "what the states miss of a constant acceleration"),
-        ("force_balance", wrench, 1e-3, "N or N m", "what forces miss in an interval's middle"),
+        (
+            "force_balance",
+            wrench,
+            e.model_error(1e-3, 1e-3 * e.weight),
+            "N or N m",
+            "what forces miss in an interval's middle",
+        ),
     ):
         k = int(found.argmax())
         yield Found(name, found[k], limit, unit, text, f"from {e.plan.time[k]:.3f} s")
@@ -173,14 +181,16 @@ def touchdown(e: Evidence) -> Iterator[Found]:
     if plan.task.impact:
         if plan.task.formulation != "full":
             return
-        found = np.array([_impact(e, k) for k in knots])
-        k = int(np.argmax(found[:, 0]))
-        yield Found("impact", found[k, 0], 1e-3, "m/s or rad/s",
+        found = [_impact(e, k) for k in knots]
+        k = int(np.argmax([error for error, _ in found]))
+        yield Found("impact", found[k][0], e.model_error(1e-3, 1e-2), "m/s or rad/s",
                     "how far the impulse's velocities miss exact dynamics'", _which(e, k))  # fmt: skip
-        k = int(np.argmax(found[:, 1]))
-        peak = e.effort * e.robot.profiles[plan.task.profile].peak_torque
-        yield Found("held_joints", found[k, 1], peak * SHORTEST_IMPACT, "N m s",
-                    "the impulse of a motor whose joint keeps still", _which(e, k))  # fmt: skip
+        kept = np.array([impulse for _, impulse in found])
+        most = e.effort * e.motors.peak_torque * SHORTEST_IMPACT
+        k, motor = worst(kept / most)
+        yield Found("held_joints", kept[k, motor], most[motor], "N m s",
+                    "the impulse of a motor whose joint keeps still",
+                    e.robot.transmission.motors[motor] + _which(e, k))  # fmt: skip
         yield from _hits(e, knots)
         return
     samples = np.searchsorted(s.time, plan.time[knots] - 1e-9)
@@ -213,18 +223,23 @@ def _hits(e: Evidence, knots: list[int]) -> Iterator[Found]:
             yield Found(name, float(found), most + 0.05, "m/s", text)
 
 
-def _impact(e: Evidence, knot: int) -> tuple[float, float]:
-    """The error of all generalised velocities behind the impulse at a knot, or of all of them
-    without an impact; and the largest motor impulse that keeps a joint still [N m s]."""
+def _impact(e: Evidence, knot: int) -> tuple[float, Array]:
+    """The error of all generalised velocities behind the impulse at a knot, infinite where there
+    is no impact, and every motor's impulse that keeps a joint still [N m s] (n_joints,).
+
+    Joints that the description holds yield a little under an impact and come back: the impulse
+    of their motors counts as none.
+    """
     plan = e.plan
     if knot + 1 >= len(plan.time) or plan.time[knot + 1] > plan.time[knot]:
-        return math.inf, 0.0
-    dynamics = ExactDynamics(e.robot, plan.task.profile)
+        return math.inf, np.zeros(len(e.robot.joints))
+    dynamics = ExactDynamics(e.robot)
     q, v, impulse = plan.position[knot], plan.velocity[knot], plan.contact_force[knot]
     exact, kept = dynamics.velocity_after_impact(q, v, impulse, held_joints(plan, knot))
     moved = np.abs(plan.position[knot + 1] - q).max()
     error = max(np.abs(exact - plan.velocity[knot + 1]).max(), moved)
-    return float(error), float(np.abs(e.robot.torque_to_motor @ kept).max())
+    kept[[joint.name in e.robot.held for joint in e.robot.joints]] = 0.0
+    return float(error), np.abs(e.robot.torque_to_motor @ kept)
 
 
 def momentum(e: Evidence) -> Iterator[Found]:
@@ -243,39 +258,41 @@ def momentum(e: Evidence) -> Iterator[Found]:
 
 def machine(e: Evidence) -> Iterator[Found]:
     """Joints stay within their limits, motors within what they can do at their speed."""
-    robot, task, s = e.robot, e.plan.task, e.replay.samples
+    robot, s = e.robot, e.replay.samples
     angles, limits = s.position[:, 7:], robot.joint_limits
     excess = np.maximum(angles - limits[:, 1], limits[:, 0] - angles)
     sample, joint = worst(excess)
     yield Found("joint_limits", excess.max(), 5e-3, "rad", "how far a joint passes its limit",
                 f"{robot.joints[joint].name} {e.moment(sample)}")  # fmt: skip
-    profile = robot.profiles[task.profile]
-    speed = np.abs(e.motor_speed)
-    sample, motor = worst(speed)
-    yield Found("motor_speed", speed.max(), 1.01 * e.effort * profile.no_load_speed, "rad/s",
-                "the largest motor speed",
+    motors = e.motors
+    # Each motor is compared with its own limits: as a share where they may differ.
+    share = np.abs(e.motor_speed) / motors.no_load_speed
+    sample, motor = worst(share)
+    yield Found("motor_speed", share[sample, motor] * motors.no_load_speed[motor],
+                1.01 * e.effort * motors.no_load_speed[motor], "rad/s", "the largest motor speed",
                 f"{robot.transmission.motors[motor]} {e.moment(sample)}")  # fmt: skip
+    peak = motors.peak_torque
     over = np.abs(e.motor_torque) - allowed_motor_torque(e, 1.0)
-    sample, motor = worst(over)
-    yield Found("motor_torque", over.max(), 0.03 * profile.peak_torque, "N m",
+    sample, motor = worst(over / peak)
+    yield Found("motor_torque", over[sample, motor], 0.03 * peak[motor], "N m",
                 "how far a motor torque passes what its speed allows",
                 f"{robot.transmission.motors[motor]} {e.moment(sample)}")  # fmt: skip
     # The share that is kept for feedback is a matter of whole intervals, not of their ends.
     middle = e.middles
     over = np.abs(e.motor_torque[middle]) - allowed_motor_torque(e, e.effort)[middle]
-    sample, motor = worst(over)
-    yield Found("effort", over.max(), 0.01 * profile.peak_torque, "N m",
+    sample, motor = worst(over / peak)
+    yield Found("effort", over[sample, motor], 0.01 * peak[motor], "N m",
                 "how far a motor torque passes the share of it that the task allows",
                 f"{robot.transmission.motors[motor]} {e.moment(int(middle[sample]))}")  # fmt: skip
 
 
 def allowed_motor_torque(e: Evidence, effort: float) -> Array:
     """The torque [N m] that a share of the motors' abilities allows at the samples' speeds."""
-    profile = e.robot.profiles[e.plan.task.profile]
+    motors = e.motors
     # Braking torque is the peak at any speed; driving torque falls between corner and no load.
     driving = np.sign(e.motor_torque) * e.motor_speed / effort
-    fall = (profile.no_load_speed - driving) / (profile.no_load_speed - profile.corner_speed)
-    return np.asarray(effort * profile.peak_torque * np.clip(fall, 0.0, 1.0))
+    fall = (motors.no_load_speed - driving) / (motors.no_load_speed - motors.corner_speed)
+    return np.asarray(effort * motors.peak_torque * np.clip(fall, 0.0, 1.0))
 
 
 def clearances(e: Evidence) -> Iterator[Found]:
@@ -292,11 +309,14 @@ def clearances(e: Evidence) -> Iterator[Found]:
                 "what the feet lack of the clearance asked for in the middle of the flight",
                 names[int(missing.argmax())])  # fmt: skip
     heights = body_heights(robot, task, e.poses, e.progress)
-    link = min(heights, key=lambda name: float(heights[name].min()))
-    sample = int(heights[link].argmin())
-    yield Found("body_on_ground", -float(heights[link][sample]), 0.0, "m",
-                "how deep the body is in the ground", f"{link} {e.moment(sample)}")  # fmt: skip
+    if heights:
+        link = min(heights, key=lambda name: float(heights[name].min()))
+        sample = int(heights[link].argmin())
+        yield Found("body_on_ground", -float(heights[link][sample]), 0.0, "m",
+                    "how deep the body is in the ground", f"{link} {e.moment(sample)}")  # fmt: skip
     gap = leg_gap(robot, e.poses)
+    if not np.isfinite(gap).all():
+        return  # no two legs have shapes that could touch
     sample = int(gap.argmin())
     yield Found("leg_clearance", task.leg_clearance - float(gap[sample]), MILLIMETRE, "m",
                 "what the legs lack of the gap asked for", e.moment(sample))  # fmt: skip

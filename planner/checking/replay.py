@@ -71,12 +71,12 @@ class Replay:
 
 
 def replay(plan: JumpPlan, robot: RobotDescription) -> Replay:
-    """Replay a plan.
+    """Replay a plan on the robot with the actuator profile that the plan is for.
 
     Raises:
         ValueError: it has not one flight for every jump of its task.
     """
-    dynamics = ExactDynamics(robot, plan.task.profile)
+    dynamics = ExactDynamics(robot)
     flights = flight_knots(plan)
     flown = [_fly(plan, dynamics, lift_off, touchdown) for lift_off, touchdown in flights]
     defect = np.array([_interval_defect(plan, dynamics, k) for k in range(len(plan.time) - 1)])

@@ -84,7 +84,8 @@ class ValidityReport:
 
 
 def check_plan(plan: JumpPlan, robot: RobotDescription) -> ValidityReport:
-    """Test a plan; about 0.1 s."""
+    """Test a plan with the actuator profile it is for; about 0.1 s."""
+    robot = plan.task.equipped(robot)
     broken = broken_array(plan, robot)
     if broken:
         return ValidityReport((PlanTest("arrays", False, math.inf, 0.0, "", broken, "the arrays"),))

@@ -137,9 +137,9 @@ class PlanLibrary:
 
     def nearest(self, task: JumpTask) -> tuple[JumpPlan, float] | None:
         """The valid plan of the nearest task that can be started from, and how far it is."""
-        found = []
+        found, task = [], task.resolved(self.robot)
         for path, kept in self.tasks():
-            distance = task_distance(task, kept)
+            distance = task_distance(task, kept.resolved(self.robot))
             if distance is not None:
                 found.append((distance, str(path)))
         for distance, name in sorted(found):

@@ -40,7 +40,7 @@ STEP = 0.002
 
 def reference_table(plan: JumpPlan, robot: RobotDescription, stand_time: float) -> JumpTable:
     """The plan as a table that begins with standing still for ``stand_time`` [s]."""
-    dynamics = ExactDynamics(robot, plan.task.profile)
+    dynamics = ExactDynamics(plan.task.equipped(robot))
     forces = _MiddleValues(plan, plan.contact_force)
     torques = _MiddleValues(plan, plan.joint_torque)
     rows: dict[str, list[Array]] = {}

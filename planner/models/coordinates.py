@@ -1,8 +1,9 @@
 """The coordinates a jump is planned in: all of the robot's, or those of a mirrored motion.
 
-A jump straight ahead needs the sagittal plane only: the base's motion in it and the joints of one
-leg that turn about y. The other leg mirrors it, and the legs do not splay. The problem is then less
-than half as large in states, and in solution time about a tenth.
+A jump straight ahead is the same left and right, so half of the limbs need to be computed and the
+others mirror them. Where the robot stands with its legs upright, only the joints that turn about y
+move: that is the sagittal plane, and the problem is then less than half as large in states and
+takes about a tenth of the time. Where the legs splay, all joints of the computed limbs move.
 """
 
 from __future__ import annotations
@@ -14,8 +15,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...robots.description import RobotDescription
 from .symbolic_model import SymbolicModel
+from .symmetry import Pair, mirrored_pairs
 
 Array = NDArray[np.float64]
 
@@ -25,7 +26,7 @@ class Coordinates:
     """A linear embedding: the robot's coordinates are ``matrix`` times the reduced ones.
 
     Attributes:
-        name: ``full`` or ``sagittal``.
+        name: ``full``, ``sagittal`` or ``mirrored``.
         matrix: (n_velocities, size); also takes velocities and accelerations.
         limbs: the limbs that are computed; the others mirror them.
         share: how many limbs each computed one stands for.
@@ -77,6 +78,10 @@ class Coordinates:
         """The contact force variables from all contact forces (..., 3 n_contacts)."""
         return np.asarray(forces @ np.linalg.pinv(self.force_matrix).T)
 
+    def contains(self, whole: Array) -> bool:
+        """Whether these positions (..., n_velocities) are ones that the coordinates can take."""
+        return bool(np.allclose(self.reduce(whole) @ self.matrix.T, whole, rtol=0.0, atol=1e-12))
+
 
 def full_coordinates(model: SymbolicModel) -> Coordinates:
     """Everything moves on its own."""
@@ -89,67 +94,49 @@ def full_coordinates(model: SymbolicModel) -> Coordinates:
 
 
 def sagittal_coordinates(model: SymbolicModel) -> Coordinates | None:
-    """Motion in the sagittal plane, or none if the robot is not the same left and right."""
+    """Motion in the sagittal plane: the joints about y move, left and right alike, and all others
+    keep their zero; ``None`` if the robot is not the same left and right."""
+    return _mirrored(model, "sagittal")
+
+
+def mirrored_coordinates(model: SymbolicModel) -> Coordinates | None:
+    """Motion that is the same left and right, with all joints of the computed limbs; ``None`` if
+    the robot is not the same left and right."""
+    return _mirrored(model, "mirrored")
+
+
+def _mirrored(model: SymbolicModel, name: str) -> Coordinates | None:
     robot = model.robot
-    if len(model.limbs) != 2 or len(model.limbs[0]) != len(model.limbs[1]):
+    pairs = mirrored_pairs(robot)
+    if pairs is None:
         return None
-    first, second = model.limbs
-    if not _mirrored(robot, first, second):
-        return None
-    pairs = [(i, j) for i, j in zip(first, second, strict=True) if robot.joints[i].axis[1]]
-    matrix = np.zeros((model.size, 3 + len(pairs)))
+    flat = name == "sagittal"
+    twins = [twin for pair in pairs for twin in pair.joints]
+    moving = [
+        (i, j, sign) for i, j, sign in twins
+        if not flat or (robot.joints[i].kind == "hinge" and abs(robot.joints[i].axis[1]) == 1.0)
+    ]  # fmt: skip
+    matrix = np.zeros((model.size, 3 + len(moving)))
     matrix[0, 0] = matrix[2, 1] = matrix[3, 2] = 1.0
-    for column, (i, j) in enumerate(pairs, start=3):
-        matrix[6 + i, column] = matrix[6 + j, column] = 1.0
-    of_first, of_second = ([c for c, limb in _contacts(model) if limb == k] for k in (0, 1))
-    forces = np.zeros((3 * len(robot.contacts), 2 * len(of_first)))
-    for column, (i, j) in enumerate(zip(of_first, of_second, strict=True)):
-        for c in (i, j):
-            forces[3 * c, 2 * column] = forces[3 * c + 2, 2 * column + 1] = 1.0
+    for column, (i, j, sign) in enumerate(moving, start=3):
+        matrix[6 + i, column], matrix[6 + j, column] = 1.0, sign
+    axes = (0, 2) if flat else (0, 1, 2)
     return Coordinates(
-        "sagittal", matrix, (0,), 2, (0, 2, 4), tuple(first), tuple(i for i, _ in pairs),
-        tuple(of_first), (0, 2), forces,
+        name, matrix, tuple(pair.limbs[0] for pair in pairs), 2, (0, 2, 4),
+        tuple(i for i, _, _ in twins), tuple(i for i, _, _ in moving),
+        tuple(c for pair in pairs for c, _ in pair.contacts), axes,
+        _force_matrix(len(robot.contacts), pairs, axes),
     )  # fmt: skip
 
 
-def _contacts(model: SymbolicModel) -> list[tuple[int, int]]:
-    """Every contact's index and limb."""
-    link_of = {foot.name: foot.link for foot in model.robot.feet}
-    return [
-        (index, model.limb_of_link[link_of[contact.foot]])
-        for index, contact in enumerate(model.robot.contacts)
-    ]
-
-
-def _mirrored(robot: RobotDescription, first: Sequence[int], second: Sequence[int]) -> bool:
-    """Whether the second limb, the base, transmission and feet are the first's mirror image."""
-    flip = np.array([1.0, -1.0, 1.0])
-    tensor = np.array([1.0, 1.0, 1.0, -1.0, 1.0, -1.0])
-    base = robot.link(robot.base)
-    pairs: list[tuple[Any, Any]] = [
-        (np.array(base.com) * flip, base.com),
-        (np.array(base.inertia) * tensor, base.inertia),
-    ]
-    matrix = robot.joint_to_motor.T @ robot.joint_to_motor
-    signs = np.array([1.0 if robot.joints[i].axis[1] else -1.0 for i in first])
-    pairs.append((matrix[np.ix_(first, first)] * np.outer(signs, signs),
-                  matrix[np.ix_(second, second)]))  # fmt: skip
-    for i, j in zip(first, second, strict=True):
-        one, other = robot.joints[i], robot.joints[j]
-        limits = np.array(one.limits) if one.axis[1] else -np.array(one.limits)[::-1]
-        link, twin = robot.link(one.child), robot.link(other.child)
-        pairs += [
-            (one.axis, other.axis),
-            (np.array(one.origin) * flip, other.origin),
-            (limits, other.limits),
-            (link.mass, twin.mass),
-            (np.array(link.com) * flip, twin.com),
-            (np.array(link.inertia) * tensor, twin.inertia),
-        ]
-    links = [{robot.joints[i].child for i in limb} for limb in (first, second)]
-    link_of = {foot.name: foot.link for foot in robot.feet}
-    points = [[c for c in robot.contacts if link_of[c.foot] in group] for group in links]
-    if len(points[0]) != len(points[1]) or len(points[0]) * 2 != len(robot.contacts):
-        return False
-    pairs += [(np.array(a.position) * flip, b.position) for a, b in zip(*points, strict=True)]
-    return all(np.allclose(a, b, rtol=0.0, atol=1e-12) for a, b in pairs)
+def _force_matrix(contacts: int, pairs: Sequence[Pair], axes: tuple[int, ...]) -> Array:
+    """All contact forces by those on the computed limbs; mirrored forces push the other way
+    sideways."""
+    twins = [twin for pair in pairs for twin in pair.contacts]
+    forces = np.zeros((3 * contacts, len(axes) * len(twins)))
+    for number, (c, d) in enumerate(twins):
+        for place, axis in enumerate(axes):
+            column = len(axes) * number + place
+            forces[3 * c + axis, column] = 1.0
+            forces[3 * d + axis, column] = -1.0 if axis == 1 else 1.0
+    return forces

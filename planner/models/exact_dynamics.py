@@ -47,12 +47,12 @@ class JointMotion:
 
 
 class ExactDynamics:
-    """The whole-body model of a robot with the rotors of one actuator profile."""
+    """The whole-body model of a robot, with the rotors of its actuator profile in use."""
 
-    def __init__(self, robot: RobotDescription, profile: str) -> None:
+    def __init__(self, robot: RobotDescription) -> None:
         import pinocchio
 
-        built = build_pinocchio_model(robot, profile)
+        built = build_pinocchio_model(robot)
         self.pin: Any = pinocchio
         self.model = built.model
         self.data = built.model.createData()

@@ -27,8 +27,12 @@ class Stance:
     heading: float
 
 
+UNEVEN = 5e-4
+"""m; by how much the contact points of a stance may be above or below the ground."""
+
+
 class StanceFinder:
-    """Places a robot with flat soles on the ground for given joint angles."""
+    """Places a robot on the ground for given joint angles, with all contact points on it."""
 
     def __init__(self, model: SymbolicModel) -> None:
         import casadi as ca
@@ -45,7 +49,6 @@ class StanceFinder:
                 ca.horzcat(*model.contact_points(q)),
                 model.com(q),
                 sum(soles) / len(soles),
-                frames[robot.feet[0].link][0],
             ],
         )
 
@@ -55,25 +58,35 @@ class StanceFinder:
     def place(
         self, joints: Array, *, heading: float = 0.0, at: tuple[float, float, float] = (0, 0, 0)
     ) -> Stance:
-        """The stance with the soles' middle at ``at`` [m].
+        """The stance with the soles' middle over ``at`` [m] and the contact points at its height.
+
+        The base leans so that the plane through all contact points is level.
 
         Raises:
-            PlanError: the joint angles do not put both soles flat on the ground.
+            PlanError: the contact points do not lie in one plane with these joint angles, or there
+                are none.
         """
         q = np.zeros(self.model.size)
         q[6:] = joints
-        foot = self._evaluate(q)[3]
-        q[3] = -np.arctan2(-foot[2, 0], foot[0, 0])
-        q[5] = heading
-        if heading and q[3]:  # turn the leaning pose as a whole: R = Rz(heading) Ry(lean)
-            q[3:6] = _turned(q[3], heading)
-        q[:3] = np.array(at) - self._evaluate(q)[2].ravel()
-        points, com, _, _ = self._evaluate(q)
-        if np.abs(points[2] - at[2]).max() > 1e-6:
+        points = self._evaluate(q)[0]
+        if not points.size:
             raise PlanError(
-                "the soles are not flat on the ground: with these joint angles the contact points "
-                f"are at heights {np.round(points[2], 4).tolist()} m; choose angles with equal "
-                "hip pitch + knee + ankle sums and leg lengths",
+                f"{self.model.robot.name} has no contact points to stand on", family="stance"
+            )
+        q[3:5] = _lean(_normal(points.T))
+        if heading:  # turn the leaning pose as a whole: R = Rz(heading) R(lean)
+            q[3:6] = _turned(q[3:5], heading)
+        points, _, soles = self._evaluate(q)
+        q[:2] = np.array(at[:2]) - soles.ravel()[:2]
+        q[2] = at[2] - points[2].mean()
+        points, com, _ = self._evaluate(q)
+        heights = points[2] - at[2]
+        if np.abs(heights).max() > UNEVEN:
+            names = [contact.name for contact in self.model.robot.contacts]
+            found = ", ".join(f"{n} {1e3 * h:+.1f}" for n, h in zip(names, heights, strict=True))
+            raise PlanError(
+                "with these joint angles the contact points do not lie in one plane: they are off "
+                f"the best one by [mm] {found}; choose angles that put all feet on the ground",
                 family="stance",
             )
         return Stance(q, points.T.copy(), com.ravel(), heading)
@@ -83,7 +96,7 @@ def stances_of(task: JumpTask, robot: RobotDescription, finder: StanceFinder
                ) -> tuple[Stance, ...]:  # fmt: skip
     """The task's stances: at the start, between jumps, with the same joint angles, and at the end.
     The pitch includes the body's turns so far."""
-    names = [joint.name for joint in robot.joints]
+    names = [joint.name for joint in finder.model.robot.joints]
     first, last = task.start_joints(robot), task.end_joints(robot)
     places = task.places()
     found = []
@@ -100,10 +113,29 @@ def stances_of(task: JumpTask, robot: RobotDescription, finder: StanceFinder
     return tuple(found)
 
 
-def _turned(lean: float, heading: float) -> Array:
-    """Pitch, roll, yaw of a base leaning by ``lean`` that is then turned by ``heading``."""
-    cl, sl, ch, sh = np.cos(lean), np.sin(lean), np.cos(heading), np.sin(heading)
-    rotation = np.array([[ch * cl, -sh, ch * sl], [sh * cl, ch, sh * sl], [-sl, 0.0, cl]])
+def _normal(points: Array) -> Array:
+    """The upward normal of the plane nearest to points (n, 3); it leans in no direction in which
+    the points have no width, so one point or a line of them is on level ground as it is."""
+    off = points - points.mean(axis=0)
+    slopes = np.linalg.lstsq(off[:, :2], off[:, 2], rcond=1e-6)[0]
+    normal = np.array([-slopes[0], -slopes[1], 1.0])
+    return np.asarray(normal / np.linalg.norm(normal))
+
+
+def _lean(normal: Array) -> Array:
+    """Pitch and roll of the base that make a direction of the body vertical."""
+    roll = np.arctan2(normal[1], normal[2])
+    return np.array([np.arctan2(-normal[0], np.hypot(normal[1], normal[2])), roll])
+
+
+def _turned(lean: Array, heading: float) -> Array:
+    """Pitch, roll, yaw of a base with that pitch and roll that is then turned by ``heading``."""
+    ch, sh = np.cos(heading), np.sin(heading)
+    (cp, cr), (sp, sr) = np.cos(lean), np.sin(lean)
+    turn = np.array([[ch, -sh, 0.0], [sh, ch, 0.0], [0.0, 0.0, 1.0]])
+    pitch = np.array([[cp, 0.0, sp], [0.0, 1.0, 0.0], [-sp, 0.0, cp]])
+    roll = np.array([[1.0, 0.0, 0.0], [0.0, cr, -sr], [0.0, sr, cr]])
+    rotation = turn @ pitch @ roll
     return np.array(
         [
             np.arctan2(rotation[0, 2], rotation[2, 2]),

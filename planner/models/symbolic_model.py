@@ -18,6 +18,8 @@ import numpy as np
 
 from ...mathematics.constants import GRAVITY
 from ...robots.description import Joint, Link, RobotDescription
+from ...robots.welding import HeldLoad
+from .symmetry import limbs_of
 
 Expression = Any
 """A CasADi SX or DM; the library has no types of its own."""
@@ -68,37 +70,22 @@ def base_angular_acceleration(
 
 
 class SymbolicModel:
-    """Expressions of a robot's motion, for one actuator profile's rotors.
+    """Expressions of a robot's motion, with the rotors of its actuator profile in use.
 
-    Every method takes CasADi expressions and returns expressions. Raises ``ValueError`` for a joint
-    that is no hinge about a coordinate axis or is listed before the one that carries it.
+    Joints may be hinges or slides with any axis. ``loads`` are what hangs on joints that are held
+    and so are none of this robot's. Every method takes CasADi expressions and returns
+    expressions.
+
+    Raises:
+        ValueError: a joint is listed before the one that carries it.
     """
 
-    def __init__(self, robot: RobotDescription, profile: str = "koala") -> None:
-        self.robot = robot
+    def __init__(self, robot: RobotDescription, loads: Sequence[HeldLoad] = ()) -> None:
+        self.robot, self.loads = robot, tuple(loads)
         self.n_joints = len(robot.joints)
         self.size = self.n_joints + 6
-        matrix = robot.joint_to_motor
-        self.rotors = robot.profiles[profile].rotor_inertia * matrix.T @ matrix
-        limb_of = {robot.base: -1}
-        self.limbs: list[list[int]] = []
-        for index, joint in enumerate(robot.joints):
-            if joint.parent not in limb_of:
-                raise ValueError(
-                    f"{robot.name}: joint {joint.name} is listed before its parent link"
-                )
-            if sorted(abs(x) for x in joint.axis) != [0.0, 0.0, 1.0]:
-                raise ValueError(
-                    f"{robot.name}: the planner needs hinges about x, y or z; "
-                    f"{joint.name} turns about {joint.axis}"
-                )
-            if joint.parent == robot.base:
-                limb_of[joint.child] = len(self.limbs)
-                self.limbs.append([])
-            else:
-                limb_of[joint.child] = limb_of[joint.parent]
-            self.limbs[limb_of[joint.child]].append(index)
-        self.limb_of_link = limb_of
+        self.rotors = robot.rotor_matrix
+        self.limbs, self.limb_of_link = limbs_of(robot)
         self._joint_of = {joint.child: index for index, joint in enumerate(robot.joints)}
 
     # Kinematics
@@ -114,7 +101,7 @@ class SymbolicModel:
             turn = _joint_rotation(joint, q[6 + index])
             frames[joint.child] = (
                 ca.mtimes(rotation, turn),
-                origin + ca.mtimes(rotation, ca.DM(joint.origin)),
+                origin + ca.mtimes(rotation, _joint_origin(joint, q[6 + index])),
             )
         return frames
 
@@ -178,10 +165,13 @@ class SymbolicModel:
         speeds = {base: ca.mtimes(rotation.T, v[0:3])}
         for index, joint in enumerate(self.robot.joints):
             back = _joint_rotation(joint, q[6 + index]).T
-            carried = speeds[joint.parent] + ca.cross(spins[joint.parent], ca.DM(joint.origin))
-            speeds[joint.child] = ca.mtimes(back, carried)
-            axis = ca.DM(list(joint.axis))
-            spins[joint.child] = ca.mtimes(back, spins[joint.parent]) + axis * v[6 + index]
+            origin = _joint_origin(joint, q[6 + index])
+            carried = speeds[joint.parent] + ca.cross(spins[joint.parent], origin)
+            rate = ca.DM(list(joint.axis)) * v[6 + index]
+            slides = joint.kind == "slide"
+            speeds[joint.child] = ca.mtimes(back, carried + rate if slides else carried)
+            spin = ca.mtimes(back, spins[joint.parent])
+            spins[joint.child] = spin if slides else spin + rate
         return spins, speeds
 
     # Dynamics
@@ -206,10 +196,7 @@ class SymbolicModel:
 
         robot, base = self.robot, self.robot.base
         down = base_rotation(q[3:6]).T
-        spins = {base: base_angular_velocity(q[3:6], v[3:6])}
-        turns = {base: base_angular_acceleration(q[3:6], v[3:6], a[3:6])}
-        lifted = ca.vertcat(a[0], a[1], a[2] + GRAVITY)
-        pulls = {base: ca.mtimes(down, lifted)}
+        spins, turns, pulls = self._accelerations(q, v, a, limbs)
         pushes = {name: {base: ca.mtimes(down, force)} for name, force in forces.items()}
         needed = {base: self._body_wrench(robot.link(base), spins[base], turns[base], pulls[base])}
         link_of = {foot.name: foot.link for foot in robot.feet}
@@ -219,20 +206,6 @@ class SymbolicModel:
             joint = robot.joints[index]
             parent, child = joint.parent, joint.child
             back = backs[child] = _joint_rotation(joint, q[6 + index]).T
-            axis = ca.DM(list(joint.axis))
-            spin = ca.mtimes(back, spins[parent])
-            rate = axis * v[6 + index]
-            spins[child] = spin + rate
-            turns[child] = (
-                ca.mtimes(back, turns[parent]) + ca.cross(spin, rate) + axis * a[6 + index]
-            )
-            origin = ca.DM(list(joint.origin))
-            pulls[child] = ca.mtimes(
-                back,
-                pulls[parent]
-                + ca.cross(turns[parent], origin)
-                + ca.cross(spins[parent], ca.cross(spins[parent], origin)),
-            )
             wrench = self._body_wrench(robot.link(child), spins[child], turns[child], pulls[child])
             for contact in robot.contacts:
                 push = pushes.get(contact.name)
@@ -248,10 +221,12 @@ class SymbolicModel:
         for index in reversed(joints):
             joint = robot.joints[index]
             wrench = needed[joint.child]
-            torques[index] = ca.dot(ca.DM(list(joint.axis)), wrench[3:6])
+            own = wrench[0:3] if joint.kind == "slide" else wrench[3:6]
+            torques[index] = ca.dot(ca.DM(list(joint.axis)), own)
             turn = backs[joint.child].T
             force, moment = ca.mtimes(turn, wrench[0:3]), ca.mtimes(turn, wrench[3:6])
-            passed = ca.vertcat(force, moment + ca.cross(ca.DM(list(joint.origin)), force))
+            origin = _joint_origin(joint, q[6 + index])
+            passed = ca.vertcat(force, moment + ca.cross(origin, force))
             if joint.parent == base:
                 limb_wrenches[self.limb_of_link[joint.child]] = passed
             else:
@@ -259,6 +234,63 @@ class SymbolicModel:
         spun = ca.mtimes(ca.DM(self.rotors), a[6:])
         moved = [torques[i] + spun[i] if i in joints else torques[i] for i in range(self.n_joints)]
         return needed[base], limb_wrenches, ca.vertcat(*moved)
+
+    def held_torques(
+        self, q: Expression, v: Expression, a: Expression, limbs: Sequence[int] | None = None
+    ) -> list[Any]:
+        """The torques that keep held joints still in a motion, of those ``loads`` on the base and
+        those limbs."""
+        import casadi as ca
+
+        spins, turns, pulls = self._accelerations(q, v, a, limbs)
+        found = []
+        for load in self.loads:
+            if load.link not in spins:
+                continue
+            spin, turn = spins[load.link], turns[load.link]
+            centre, arm = ca.DM(list(load.com)), ca.DM(list(load.com)) - ca.DM(list(load.origin))
+            lifted = pulls[load.link] + ca.cross(turn, centre)
+            force = load.mass * (lifted + ca.cross(spin, ca.cross(spin, centre)))
+            tensor = ca.DM(_tensor(load))
+            moment = ca.mtimes(tensor, turn) + ca.cross(spin, ca.mtimes(tensor, spin))
+            found.append(ca.dot(ca.DM(list(load.axis)), moment + ca.cross(arm, force)))
+        return found
+
+    def _accelerations(
+        self, q: Expression, v: Expression, a: Expression, limbs: Sequence[int] | None
+    ) -> tuple[dict[str, Any], dict[str, Any], dict[str, Any]]:
+        """Angular velocity, angular acceleration and acceleration of the origin, with gravity's
+        opposite added, of the links of the base and those limbs, each in its own frame."""
+        import casadi as ca
+
+        base = self.robot.base
+        spins = {base: base_angular_velocity(q[3:6], v[3:6])}
+        turns = {base: base_angular_acceleration(q[3:6], v[3:6], a[3:6])}
+        lifted = ca.vertcat(a[0], a[1], a[2] + GRAVITY)
+        pulls = {base: ca.mtimes(base_rotation(q[3:6]).T, lifted)}
+        for index in self._joints(limbs):
+            joint = self.robot.joints[index]
+            parent, child = joint.parent, joint.child
+            back = _joint_rotation(joint, q[6 + index]).T
+            axis = ca.DM(list(joint.axis))
+            spin = ca.mtimes(back, spins[parent])
+            rate = axis * v[6 + index]
+            origin = _joint_origin(joint, q[6 + index])
+            pull = (
+                pulls[parent]
+                + ca.cross(turns[parent], origin)
+                + ca.cross(spins[parent], ca.cross(spins[parent], origin))
+            )
+            if joint.kind == "slide":
+                spins[child], turns[child] = spin, ca.mtimes(back, turns[parent])
+                pull = pull + 2.0 * ca.cross(spins[parent], rate) + axis * a[6 + index]
+            else:
+                spins[child] = spin + rate
+                turns[child] = (
+                    ca.mtimes(back, turns[parent]) + ca.cross(spin, rate) + axis * a[6 + index]
+                )
+            pulls[child] = ca.mtimes(back, pull)
+        return spins, turns, pulls
 
     def _body_wrench(self, link: Link, spin: Any, turn: Any, pull: Any) -> Any:
         """Force and moment about the link's origin that its own mass needs, in its frame."""
@@ -288,11 +320,29 @@ class SymbolicModel:
         return sorted(index for limb in chosen for index in self.limbs[limb])
 
 
-def _joint_rotation(joint: Joint, angle: Expression) -> Expression:
-    """The rotation from child to parent of a hinge about a coordinate axis."""
+def _joint_origin(joint: Joint, place: Expression) -> Expression:
+    """The child's origin in the parent's frame; a slide carries it along its axis."""
     import casadi as ca
 
+    origin = ca.DM(list(joint.origin))
+    return origin + ca.DM(list(joint.axis)) * place if joint.kind == "slide" else origin
+
+
+def _joint_rotation(joint: Joint, angle: Expression) -> Expression:
+    """The rotation from child to parent: none for a slide, Rodrigues' formula for a hinge.
+
+    A hinge about a coordinate axis gets a matrix with structural zeros, which is far cheaper.
+    """
+    import casadi as ca
+
+    if joint.kind == "slide":
+        return ca.SX.eye(3)
     axis = int(np.argmax(np.abs(joint.axis)))
+    if abs(joint.axis[axis]) != 1.0:
+        x, y, z = joint.axis
+        cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+        turned = ca.DM(cross) * ca.sin(angle) + ca.DM(cross @ cross) * (1.0 - ca.cos(angle))
+        return ca.SX.eye(3) + turned
     sine, cosine = joint.axis[axis] * ca.sin(angle), ca.cos(angle)
     first, second = (axis + 1) % 3, (axis + 2) % 3
     rotation = ca.SX(3, 3)
@@ -302,6 +352,6 @@ def _joint_rotation(joint: Joint, angle: Expression) -> Expression:
     return rotation
 
 
-def _tensor(link: Link) -> np.ndarray[Any, np.dtype[np.float64]]:
+def _tensor(link: Link | HeldLoad) -> np.ndarray[Any, np.dtype[np.float64]]:
     xx, yy, zz, xy, xz, yz = link.inertia
     return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])

@@ -1,8 +1,11 @@
 """Which rows of the ``contact`` piece hold the feet on the ground.
 
 The piece has, for every contact point, its place error along the foot, across it and upwards, with
-the errors' velocities before them. A foot is a line: with two points on the ground it is held by
-five rows, as it turns about its own line, so ``along`` is held at one point of a foot only.
+the errors' velocities before them. A foot is rigid, so not all of its points' rows are independent,
+and dependent rows make the solver's matrix singular. A point foot is held by its three rows. A line
+foot is held by five, as it turns about its own line: ``along`` is held at one of its points only. A
+flat foot is held by six. The rows are chosen one after the other, points in their order, each only
+if it adds to the rank.
 """
 
 from __future__ import annotations
@@ -16,6 +19,11 @@ from ...robots.description import RobotDescription
 from ..models.coordinates import Coordinates
 
 Indices = NDArray[np.int64]
+Array = NDArray[np.float64]
+LENGTH = 0.05
+"""m; turns of a foot count as velocities at this distance."""
+TOLERANCE = 1e-2
+"""Points of a foot that are closer to a line than this times ``LENGTH`` are on one."""
 
 
 def reduced_contacts(coordinates: Coordinates, points: Iterable[int]) -> set[int]:
@@ -37,10 +45,16 @@ def is_mirrored(coordinates: Coordinates, points: Iterable[int]) -> bool:
 
 
 class ContactRows:
-    """The rows of the piece for sets of contact points, indices among the coordinates' own."""
+    """The rows of the piece for sets of contact points, indices among the coordinates' own.
 
-    def __init__(self, robot: RobotDescription, coordinates: Coordinates) -> None:
+    ``places`` are all contact points as the robot stands (n_contacts, 3), in axes along the feet,
+    across them and upwards.
+    """
+
+    def __init__(self, robot: RobotDescription, coordinates: Coordinates, places: Array) -> None:
         self._foot = [robot.contacts[c].foot for c in coordinates.contacts]
+        self._place = places[list(coordinates.contacts)]
+        self._axes = coordinates.axes
         self._each = len(coordinates.axes)
         self._errors = self._each * len(self._foot)
 
@@ -59,10 +73,33 @@ class ContactRows:
         return self._rows(points - held, points & held) + self._errors
 
     def _rows(self, points: set[int], others: set[int]) -> Indices:
-        seen = {self._foot[i] for i in others}
+        """The rows of points that say what no row before them does, nor those of the others."""
         rows = []
-        for i in sorted(points):
-            first = self._each * i + (self._foot[i] in seen)
-            rows += list(range(first, self._each * (i + 1)))
-            seen.add(self._foot[i])
-        return np.array(rows, dtype=np.int64)
+        for foot in dict.fromkeys(self._foot):
+            here = [i for i in range(len(self._foot)) if self._foot[i] == foot]
+            centre = self._place[here].mean(axis=0)
+            known = [self._motion(i, axis, centre)
+                     for i in here if i in others for axis in self._axes]  # fmt: skip
+            rank = _rank(known)
+            for i in here:
+                if i not in points:
+                    continue
+                for number, axis in enumerate(self._axes):
+                    more = [*known, self._motion(i, axis, centre)]
+                    if _rank(more) > rank:
+                        known, rank = more, rank + 1
+                        rows.append(self._each * i + number)
+        return np.array(sorted(rows), dtype=np.int64)
+
+    def _motion(self, point: int, axis: int, centre: Array) -> Array:
+        """How a foot's own motion, three velocities and three turns, moves a point along an axis.
+        In the sagittal plane a foot turns about y only."""
+        direction = np.eye(3)[axis]
+        turns = np.cross((self._place[point] - centre) / LENGTH, direction)
+        if 1 not in self._axes:
+            turns[[0, 2]] = 0.0
+        return np.concatenate([direction, turns])
+
+
+def _rank(rows: list[Array]) -> int:
+    return int(np.linalg.matrix_rank(np.array(rows), tol=TOLERANCE)) if rows else 0

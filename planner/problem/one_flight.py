@@ -105,9 +105,9 @@ def joint_torques(
     dynamics: ExactDynamics, time: Array, position: Array, velocity: Array, force: Array
 ) -> Array:
     """The torques [N m] that a planned motion needs in the middle of its intervals, (N, n_joints),
-    by exact inverse dynamics under the planned contact forces (N, n_contacts, 3)."""
+    by exact inverse dynamics under the planned contact forces (N, n_contacts, 3); zero at impacts."""
     torque = np.zeros((len(time), velocity.shape[1] - 6))
-    for k in range(len(time) - 1):
+    for k in map(int, np.flatnonzero(np.diff(time) > 0.0)):
         motion = joint_motion(position, velocity, time, k)
         half = 0.5 * motion.duration
         _, q, v = dynamics.integrate(position[k], velocity[k], motion, force[k], half)[0]

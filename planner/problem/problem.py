@@ -7,7 +7,7 @@ chooses, and so is that of any other phase whose time is free.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -27,6 +27,13 @@ from .stage_functions import Piece, body_points, parameter_sizes
 from .structure import STEP_DOWN_SHARE, STEP_UP_SHARE, Structure
 
 Array = NDArray[np.float64]
+Rows = tuple[str, int, float, float]
+"""Constraint rows that follow each other: their family, their number and their bounds."""
+
+
+def rows_of_each(family: str, low: Array, high: Array) -> list[Rows]:
+    """One row for each pair of bounds."""
+    return [(family, 1, float(a), float(b)) for a, b in zip(low, high, strict=True)]
 
 
 @dataclass(frozen=True)
@@ -42,6 +49,8 @@ class Problem:
         families: of every constraint row the name of what it asks for.
         stretches: the phases with their intervals.
         steps: the interval lengths [s]; by their mean where that is a variable.
+        exact: the model of the robot as it is; ``model`` is the same left and right in mirrored
+            coordinates.
     """
 
     task: JumpTask
@@ -57,6 +66,7 @@ class Problem:
     families: list[str]
     stretches: tuple[Stretch, ...]
     steps: Array
+    exact: SymbolicModel
 
     @property
     def knots(self) -> int:
@@ -112,8 +122,10 @@ class ProblemBuilder:
         coordinates: Coordinates,
         pieces: Mapping[str, Piece],
         stances: Sequence[Stance],
+        exact: SymbolicModel | None = None,
     ) -> None:
         self.task, self.model, self.coordinates = task, model, coordinates
+        self.exact = exact or model
         self.structure = Structure(task, model, coordinates, pieces, stances)
         self.stretches, self.of_knot = self.structure.stretches, self.structure.of_knot
         self.stances, self.hops = self.structure.stances, self.structure.hops
@@ -136,8 +148,18 @@ class ProblemBuilder:
         self.problem = Problem(
             self.task, self.model, self.coordinates, self.assembly, self.stances,
             self.lower, self.upper, self.row_lower, self.row_upper, self.parameters,
-            self.families, self.stretches, self.steps,
+            self.families, self.stretches, self.steps, self.exact,
         )  # fmt: skip
+        fill: Mapping[str, Callable[[int], None]] = {
+            "stance": self._fill_stance,
+            "free_stance": self._fill_stance,
+            "flight": self._fill_flight,
+            "impact": self._fill_impact,
+            "contact": self._fill_contact,
+            "take_off": self._fill_take_off,
+            "air": self._fill_air,
+            "obstacle": self._fill_obstacle,
+        }
         for k in range(len(self.of_knot) + 1):
             self._bound_state(k)
             for row, (_, value, family) in zip(
@@ -146,8 +168,7 @@ class ProblemBuilder:
                 self.row_lower[row] = self.row_upper[row] = value
                 self.families[row] = family
             for name in self.assembly.knots[k].pieces:
-                fill = {"free_stance": "stance"}.get(name, name)
-                getattr(self, f"_fill_{fill}")(k)
+                fill[name](k)
         return self.problem
 
     # Bounds of the variables
@@ -193,7 +214,7 @@ class ProblemBuilder:
 
     # What a piece's rows ask for, and its parameters
 
-    def _rows(self, name: str, k: int, families: list[tuple[str, int, float, float]]) -> None:
+    def _rows(self, name: str, k: int, families: list[Rows]) -> None:
         """Bounds and families of a piece's rows, given for all rows after the gap in turn."""
         start, kept = self.assembly.rows_of(name, k)
         table: list[tuple[str, float, float]] = []
@@ -212,19 +233,39 @@ class ProblemBuilder:
                 self.parameters[start : start + size] = values[key]
             start += size
 
-    def _motor_rows(self) -> list[tuple[str, int, float, float]]:
-        profile, effort = self.model.robot.profiles[self.task.profile], self.task.effort
-        peak, top = profile.peak_torque * effort, profile.no_load_speed * effort
+    def _motor_rows(self) -> list[Rows]:
+        peak, top = self._peak_torque(), self._top_speed()
         line = self._slope() * top
+        links = [
+            "",
+            *(j.child for i in self.coordinates.joints for j in [self.model.robot.joints[i]]),
+        ]
+        links[0] = self.model.robot.base
+        held = self.task.effort * np.array(
+            [load.most for load in self.model.loads if load.link in links]
+        )
         return [
-            ("motor torque", self.m, -peak, peak),
-            ("motor torque at speed", 2 * self.m, -line, line),
-            ("motor speed", self.m, -top, top),
+            *rows_of_each("motor torque", -peak, peak),
+            *rows_of_each("motor torque at speed", -line, line) * 2,
+            *rows_of_each("motor speed", -top, top),
+            *rows_of_each("held joints", -held, held),
         ]
 
-    def _slope(self) -> float:
-        profile = self.model.robot.profiles[self.task.profile]
-        return profile.peak_torque / (profile.no_load_speed - profile.corner_speed)
+    def _peak_torque(self) -> Array:
+        """The most torque of the computed motors that the plan may use [N m]."""
+        chosen = list(self.coordinates.joints)
+        return np.asarray(self.model.robot.motors.peak_torque[chosen] * self.task.effort)
+
+    def _top_speed(self) -> Array:
+        """The highest speed of the computed motors that the plan may use [rad/s]."""
+        chosen = list(self.coordinates.joints)
+        return np.asarray(self.model.robot.motors.no_load_speed[chosen] * self.task.effort)
+
+    def _slope(self) -> Array:
+        """How steeply the computed motors' torque falls with speed [N m s/rad]."""
+        motors, chosen = self.model.robot.motors, list(self.coordinates.joints)
+        slope = motors.peak_torque / (motors.no_load_speed - motors.corner_speed)
+        return np.asarray(slope[chosen])
 
     def _interval(self, k: int) -> dict[str, Any]:
         weights, base = self.task.weights, self.coordinates.free_base
@@ -254,18 +295,19 @@ class ProblemBuilder:
         pressure = ("pressure", len(self.coordinates.contacts), 0.0, np.inf)
         self._rows(stretch.piece, k, [base, *self._motor_rows(), self._cones(), pressure])
 
-    def _cones(self) -> tuple[str, int, float, float]:
+    def _cones(self) -> Rows:
         cones = 2 * (len(self.coordinates.axes) - 1) * len(self.coordinates.contacts)
         return ("friction", cones, 0.0, np.inf)
 
     def _fill_impact(self, k: int) -> None:
-        top = self.model.robot.profiles[self.task.profile].no_load_speed * self.task.effort
+        top = self._top_speed()
         self._set(
             "impact", k, impulse=self.task.weights.impulse,
             friction=self.task.friction / np.sqrt(2.0),
         )  # fmt: skip
         balance = ("impact", self.n, 0.0, 0.0)
-        self._rows("impact", k, [balance, ("motor speed", self.m, -top, top), self._cones()])
+        speeds = rows_of_each("motor speed", -top, top)
+        self._rows("impact", k, [balance, *speeds, self._cones()])
 
     def _fill_flight(self, k: int) -> None:
         self._set("flight", k, share=self.steps[k], **self._interval(k))
@@ -340,5 +382,6 @@ class ProblemBuilder:
             ("ground clearance", len(points) - n_feet, ground, np.inf),
             ("ground clearance", n_feet, *ahead),
             free,
-            ("leg clearance", len(points), 0.5 * task.leg_clearance, np.inf),
+            *(("leg clearance", 1, 0.5 * task.leg_clearance if side else -np.inf, np.inf)
+              for _, _, side in points),
         ])  # fmt: skip

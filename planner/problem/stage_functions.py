@@ -5,12 +5,13 @@ and the Hessian of its Lagrangian come with it. With n coordinates ``q`` and m j
 reduced coordinates of ``Coordinates``:
 
 ``stance``  z = q, v, a, F.     Interval on the ground. Rows: gap (2n), base dynamics, motor torque,
-            torque-speed line and motor speed (m each), friction pyramid (4 a contact point, or 2).
+            torque-speed line and motor speed (m each), torques of held joints, friction pyramid
+            (4 a contact point, or 2).
 ``free_stance`` z = q, v, h, a, F. The same, ``share`` h seconds long. Rows: gap (2n + 1), then alike.
 ``impact``  z = q, v, dv, L.    Touchdown: velocities change by dv under impulses L, M dv = J' L, with
             none from the motors. Rows: gap (2n), impulse balance (n), motor speed (m), friction.
 ``flight``  z = q, v, h, a.     Interval of ``share`` h seconds in the air. Rows: gap (2n + 1), base dynamics,
-            motor torque, torque-speed line at begin and end, motor speed.
+            motor torque, torque-speed line at begin and end, motor speed, torques of held joints.
 ``contact`` z = q, v.           Rows: velocity + 10/s x place error of every contact point along its
             foot, across it and upwards (2 in the sagittal plane), then the place errors;
             ``ContactRows`` says which of them are independent.
@@ -28,13 +29,19 @@ by ``Parameters``. Not modelled: friction in the joints and the rotors' gyroscop
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from ...mathematics.constants import GRAVITY
-from ..models.coordinates import Coordinates, full_coordinates, sagittal_coordinates
+from ..models.coordinates import (
+    Coordinates,
+    full_coordinates,
+    mirrored_coordinates,
+    sagittal_coordinates,
+)
 from ..models.symbolic_model import SymbolicModel, base_rotation
 from .obstacles import heights_above_step
 
@@ -78,9 +85,17 @@ def parameter_sizes(coordinates: Coordinates) -> dict[str, dict[str, int]]:
     }
 
 
+COORDINATES: Mapping[str, Callable[[SymbolicModel], Coordinates | None]] = {
+    "full": full_coordinates,
+    "sagittal": sagittal_coordinates,
+    "mirrored": mirrored_coordinates,
+}
+"""By their name."""
+
+
 def make_coordinates(model: SymbolicModel, name: str) -> Coordinates:
     """The coordinates of that name. Raises ``ValueError`` where the robot has none."""
-    chosen = full_coordinates(model) if name == "full" else sagittal_coordinates(model)
+    chosen = COORDINATES[name](model)
     if chosen is None:
         raise ValueError(f"{model.robot.name} is not the same left and right")
     return chosen
@@ -121,6 +136,12 @@ def piece_expressions(
             named,
             coordinates.limbs,
         )
+        held = model.held_torques(
+            coordinates.expand(half_q),
+            coordinates.expand(half_v),
+            coordinates.expand(a),
+            coordinates.limbs,
+        )
         wrench = base + coordinates.share * sum(limbs.values())
         to_motor = model.robot.torque_to_motor[np.ix_(coordinates.joints, coordinates.joints)]
         geared = _geared(model, coordinates)
@@ -137,6 +158,7 @@ def piece_expressions(
             motor + w["slope"] * speed,
             motor + w["slope"] * end_speed,
             speed,
+            *held,
         ]
         off = q - w["nominal"]
         cost = (

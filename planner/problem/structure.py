@@ -22,7 +22,15 @@ from .layout import Stretch, layout
 from .obstacles import ObstacleRows
 from .stage_functions import Piece
 
+Array = NDArray[np.float64]
 STEP_UP_SHARE, STEP_DOWN_SHARE = 0.45, 0.75
+
+
+def _along_feet(stance: Stance) -> Array:
+    """The contact points of a stance in axes along its heading, across it and upwards."""
+    cosine, sine = np.cos(stance.heading), np.sin(stance.heading)
+    turn = np.array([[cosine, sine, 0.0], [-sine, cosine, 0.0], [0.0, 0.0, 1.0]])
+    return np.asarray(stance.points @ turn.T)
 
 
 class Structure:
@@ -48,7 +56,7 @@ class Structure:
         self.hops, self.places = task.hops(), task.places()
         self.stretches = layout(task, model.robot)
         self.of_knot = [stretch for stretch in self.stretches for _ in range(stretch.count)]
-        self.contact_rows = ContactRows(model.robot, coordinates)
+        self.contact_rows = ContactRows(model.robot, coordinates, _along_feet(self.stances[0]))
         self.obstacles = ObstacleRows(model, coordinates)
         self.given: dict[int, list[tuple[int, float, str]]] = {}
         self.knots = self._knots()

@@ -31,7 +31,7 @@ def knot_times(problem: Problem, values: Array) -> Array:
 
 def unpack(problem: Problem, values: Array) -> dict[str, Any]:
     """The arrays of a plan, and its lift-off and touchdown times."""
-    assembly, coordinates, model = problem.assembly, problem.coordinates, problem.model
+    assembly, coordinates, model = problem.assembly, problem.coordinates, problem.exact
     n, count = coordinates.size, problem.knots
     times = knot_times(problem, values)
     q = np.array([values[s : s + n] for s in assembly.state_start]) @ coordinates.matrix.T

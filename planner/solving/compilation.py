@@ -32,6 +32,7 @@ are the same everywhere. Higher optimisation takes twice as long to compile and 
 
 SOURCES = (
     "models/symbolic_model.py",
+    "models/symmetry.py",
     "models/coordinates.py",
     "problem/stage_functions.py",
     "problem/obstacles.py",
@@ -64,17 +65,24 @@ class FunctionSet:
     make: Callable[[str], Piece]
 
 
-def content_hash(robot: RobotDescription, rotors: float, name: str,
-                 sources: tuple[str, ...] = SOURCES) -> str:  # fmt: skip
-    """The name of a library: the same for the same content."""
+UNUSED = {"profiles", "profile", "sensors", "standing", "held", "points", "text"}
+"""Parts of a description that no function depends on; of the profiles only the rotors count."""
+
+
+def content_hash(
+    robot: RobotDescription, name: str, sources: tuple[str, ...] = SOURCES, more: object = None
+) -> str:
+    """The name of a library: the same for the same content; ``more`` is anything else that decides
+    it."""
     import casadi as ca
 
     digest = hashlib.sha256()
     for source in sources:
         digest.update((Path(__file__).parents[1] / source).read_bytes())
-    kept = robot.model_dump(mode="json", exclude={"profiles", "standing", "points", "text"})
+    kept = robot.model_dump(mode="json", exclude=UNUSED)
+    kept["rotors"] = robot.rotor_matrix.tolist()
     digest.update(json.dumps(kept, sort_keys=True).encode())
-    digest.update(repr((rotors, name, ca.CasadiMeta.version(), FLAGS)).encode())
+    digest.update(repr((name, more, ca.CasadiMeta.version(), FLAGS)).encode())
     return digest.hexdigest()[:20]
 
 
@@ -82,7 +90,6 @@ def load_pieces(
     model: SymbolicModel,
     coordinates: Coordinates,
     *,
-    profile: str,
     names: tuple[str, ...] = PIECES,
     compiled: bool = True,
     progress: Progress | None = None,
@@ -92,20 +99,18 @@ def load_pieces(
     functions = FunctionSet(
         coordinates.name, names, SOURCES, lambda name: make_piece(model, coordinates, name)
     )
-    return load_functions(functions, model, profile, compiled=compiled, progress=progress)
+    return load_functions(functions, model, compiled=compiled, progress=progress)
 
 
 def load_functions(
     functions: FunctionSet,
     model: SymbolicModel,
-    profile: str,
     *,
     compiled: bool = True,
     progress: Progress | None = None,
 ) -> dict[str, Piece]:
     """The same for any set of pieces."""
-    rotors = model.robot.profiles[profile].rotor_inertia
-    key = content_hash(model.robot, rotors, functions.name, functions.sources)
+    key = content_hash(model.robot, functions.name, functions.sources, model.loads)
     held = _held.setdefault((key, compiled), {})
     missing = tuple(name for name in functions.pieces if name not in held)
     if missing:

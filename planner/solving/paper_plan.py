@@ -18,9 +18,10 @@ from ..problem.one_flight import joint_torques
 from ..problem.paper_problem import PaperProblemBuilder
 from ..problem.program import Program
 from ..task.plan import JumpPlan
-from ..task.task import JumpTask, Knots
+from ..task.task import JumpTask
 from .bounded import cpu_time
 from .compilation import FunctionSet, Progress, load_functions
+from .options import SolveOptions
 from .outcome import failure, statistics_of, versions
 from .solver import solve
 
@@ -41,35 +42,26 @@ def paper_problem(
     Raises:
         PlanError: the task asks for what the paper's formulation has not.
     """
-    model, finder = model_of(robot, task.profile)
+    model, finder = model_of(task.equipped(robot))
     functions = FunctionSet(
         stages.NAME, stages.PIECES, stages.SOURCES, lambda name: stages.make_piece(model, name)
     )
-    pieces = load_functions(functions, model, task.profile, compiled=compiled, progress=progress)
+    pieces = load_functions(functions, model, compiled=compiled, progress=progress)
     stances = stances_of(task, robot, finder)
     return PaperProblemBuilder(task, model, pieces, stances[0], stances[-1]).build()
 
 
-def solve_paper(
-    task: JumpTask,
-    robot: RobotDescription,
-    *,
-    warm_start: JumpPlan | None = None,
-    progress: Progress | None = None,
-    compiled: bool = True,
-    solver: str = "",
-    knots: Knots | None = None,
-) -> JumpPlan:
+def solve_paper(task: JumpTask, robot: RobotDescription, options: SolveOptions) -> JumpPlan:
     """The plan of a task as the paper would make it; see ``solve_jump``.
 
     A ``warm_start`` is not used. IPOPT is tried first: the equations have index three, as the
     centre of mass is tied to the joints by position, and fatrop more often ends early.
     """
     started = cpu_time()
-    if knots is not None:
-        task = task.model_copy(update={"knots": knots})
-    problem = paper_problem(task, robot, compiled=compiled, progress=progress)
-    tries = [solver] if solver else ["ipopt", "fatrop"]
+    if options.knots is not None:
+        task = task.model_copy(update={"knots": options.knots})
+    problem = paper_problem(task, robot, compiled=options.compiled, progress=options.progress)
+    tries = [options.solver] if options.solver else ["ipopt", "fatrop"]
     for name in tries:
         solution = solve(problem, problem.guess, solver=name, limit=LIMIT)
         if solution.solved:
@@ -106,7 +98,7 @@ def unpack(problem: Program, values: Array, robot: RobotDescription) -> dict[str
     contact = np.append(grounded, grounded[-1])
     forces = force.reshape(count, -1, 3)
     phases = [int(phase) for phase in grid.phases]
-    dynamics = ExactDynamics(robot, problem.task.profile)
+    dynamics = ExactDynamics(problem.model.robot)
     return {
         "time": grid.times,
         "position": position,

@@ -21,9 +21,10 @@ from ..problem.program import Program
 from ..problem.rigid_body_problem import STATES, RigidBodyProblemBuilder
 from ..problem.unpacking import twist
 from ..task.plan import JumpPlan
-from ..task.task import JumpTask, Knots
+from ..task.task import JumpTask
 from .bounded import cpu_time
 from .compilation import FunctionSet, Progress, load_functions
+from .options import SolveOptions
 from .outcome import failure, statistics_of, versions
 from .rigid_body_motion import FeetPath, whole_body
 from .solver import solve
@@ -43,37 +44,30 @@ def rigid_body_problem(
     Raises:
         PlanError: the task asks for what the formulation has not.
     """
-    model, finder = model_of(robot, task.profile)
+    model, finder = model_of(task.equipped(robot))
     functions = FunctionSet(
         stages.NAME, stages.PIECES, stages.SOURCES, lambda name: stages.make_piece(model, name)
     )
-    pieces = load_functions(functions, model, task.profile, compiled=compiled, progress=progress)
+    pieces = load_functions(functions, model, compiled=compiled, progress=progress)
     stances = stances_of(task, robot, finder)
     body = lump(model, stances[0])
     builder = RigidBodyProblemBuilder(task, model, pieces, body, stances[0], stances[-1])
     return builder.build(), body
 
 
-def solve_rigid_body(
-    task: JumpTask,
-    robot: RobotDescription,
-    *,
-    warm_start: JumpPlan | None = None,
-    progress: Progress | None = None,
-    compiled: bool = True,
-    solver: str = "",
-    knots: Knots | None = None,
-) -> JumpPlan:
+def solve_rigid_body(task: JumpTask, robot: RobotDescription, options: SolveOptions) -> JumpPlan:
     """The plan of a task for a single rigid body; see ``solve_jump``. A ``warm_start`` is not used.
 
     Raises:
         PlanError: no motion was found, or the robot's legs cannot follow it.
     """
     started = cpu_time()
-    if knots is not None:
-        task = task.model_copy(update={"knots": knots})
-    problem, body = rigid_body_problem(task, robot, compiled=compiled, progress=progress)
-    solution = solve(problem, problem.guess, solver=solver)
+    if options.knots is not None:
+        task = task.model_copy(update={"knots": options.knots})
+    problem, body = rigid_body_problem(
+        task, robot, compiled=options.compiled, progress=options.progress
+    )
+    solution = solve(problem, problem.guess, solver=options.solver)
     if not solution.solved:
         raise failure(task, solution)
     statistics = statistics_of(problem, solution)
@@ -116,7 +110,7 @@ def unpack(
     phases = [int(phase) for phase in grid.phases]
     contact = np.array([phase != Phase.FLIGHT for phase in [*phases, phases[-1]]])
     forces = force.reshape(count, -1, 3)
-    dynamics = ExactDynamics(robot, problem.task.profile)
+    dynamics = ExactDynamics(problem.model.robot)
     return {
         "time": times,
         "position": position,

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Protocol
+from collections.abc import Callable, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...robots.description import RobotDescription
+from ...robots.welding import welded
 from ..models.coordinates import Coordinates
-from ..models.robot_model import model_of
+from ..models.robot_model import model_of, symmetric_model_of
 from ..models.stance import Stance, stances_of
 from ..models.symbolic_model import SymbolicModel
 from ..problem.contact_rows import is_mirrored
@@ -25,31 +25,20 @@ from ..task.task import JumpTask, Knots
 from .bounded import cpu_time
 from .compilation import Progress, load_pieces
 from .easing import EASES, eased, from_eased, tighten, with_impacts
+from .options import SolveOptions
 from .outcome import failure, versions
 from .paper_plan import solve_paper
 from .refinement import asks_for_finer, finer_knots, with_knots
 from .rigid_body_plan import solve_rigid_body
 from .solver import Solution, solve
+from .whole_robot import for_all_joints, for_moving_joints
 
 Array = NDArray[np.float64]
 
 
-class Formulation(Protocol):
-    """Makes a plan of a task with one set of decision variables, cost and constraints."""
-
-    def __call__(
-        self,
-        task: JumpTask,
-        robot: RobotDescription,
-        *,
-        warm_start: JumpPlan | None = None,
-        progress: Progress | None = None,
-        compiled: bool = True,
-        solver: str = "",
-        knots: Knots | None = None,
-    ) -> JumpPlan:
-        """As ``solve_jump``."""
-        ...
+Formulation = Callable[[JumpTask, RobotDescription, SolveOptions], JumpPlan]
+"""Makes a plan of a task with one set of decision variables, cost and constraints; the plan leaves
+out the robot's held joints."""
 
 
 def solve_jump(
@@ -62,41 +51,34 @@ def solve_jump(
     solver: str = "",
     knots: Knots | None = None,
 ) -> JumpPlan:
-    """The plan of a task, in the formulation that it names.
+    """The plan of a task, in the formulation that it names; ``SolveOptions`` explains the rest.
 
-    ``warm_start`` is a plan of a near task, on any grid; one that goes through other phases is not
-    used. A plan of this very task that failed the validity check is solved again on finer
-    intervals (see ``refinement``). ``knots`` are numbers of intervals to use in place of both.
-    ``progress`` is told when functions are compiled, once per robot. ``solver`` insists on
-    ``fatrop`` or ``ipopt``. The result does not depend on the number of threads.
+    Joints that the robot's description holds keep still. The result does not depend on the number
+    of threads.
 
     Raises:
         PlanError: no motion was found; ``family`` names the constraints that could not be met.
-        TaskError: the task names joints that the robot has not.
+        TaskError: the task names joints or a profile that the robot has not.
     """
-    return FORMULATIONS[task.formulation](
-        task, robot, warm_start=warm_start, progress=progress, compiled=compiled, solver=solver,
-        knots=knots,
-    )  # fmt: skip
+    robot, task = task.equipped(robot), task.resolved(robot)
+    model_of(robot)  # raises what is wrong with the robot itself
+    part = welded(robot)
+    start = warm_start and for_moving_joints(warm_start, part)
+    options = SolveOptions(start, progress, compiled, solver, knots)
+    plan = FORMULATIONS[task.formulation](task, robot, options)
+    return for_all_joints(plan, part, robot)
 
 
-def solve_full(
-    task: JumpTask,
-    robot: RobotDescription,
-    *,
-    warm_start: JumpPlan | None = None,
-    progress: Progress | None = None,
-    compiled: bool = True,
-    solver: str = "",
-    knots: Knots | None = None,
-) -> JumpPlan:
+def solve_full(task: JumpTask, robot: RobotDescription, options: SolveOptions) -> JumpPlan:
     """The ``full`` formulation: the whole body's dynamics with its motors' limits; see ``problem``."""
     started = cpu_time()
+    warm_start, solver = options.warm_start, options.solver
+    knots = options.knots
     if knots is None:
         again = warm_start is not None and asks_for_finer(task, warm_start)
         knots = finer_knots(warm_start) if again and warm_start is not None else task.knots
     gridded = with_knots(task, knots)
-    problem = make_problem(gridded, robot, compiled=compiled, progress=progress)
+    problem = make_problem(gridded, robot, compiled=options.compiled, progress=options.progress)
     guess = ballistic_guess(problem)
     solution, warm = None, False
     if warm_start is not None and can_start(problem, warm_start):
@@ -154,40 +136,54 @@ def make_problem(
 
     Raises ``PlanError`` and ``TaskError`` as ``solve_jump`` does.
     """
-    model, finder = model_of(robot, task.profile)
-    stances = stances_of(task, robot, finder)
+    robot, task = task.equipped(robot), task.resolved(robot)
+    exact, finder = model_of(robot)
+    model, stances = exact, stances_of(task, robot, finder)
     stretches = layout(task, robot)
-    chosen = _choose(model, task, stances, stretches, coordinates)
+    chosen = None
+    wanted = (coordinates,) if coordinates else _mirrors(task)
+    if any(name != "full" for name in wanted):
+        alike, finder = symmetric_model_of(robot)
+        placed = stances_of(task, robot, finder)
+        chosen = _choose(alike, wanted, placed, stretches)
+        if chosen is not None:
+            model, stances = alike, placed
+    if chosen is None:
+        if coordinates not in ("", "full"):
+            raise ValueError(f"{robot.name} does not do this jump in {coordinates} coordinates")
+        chosen = make_coordinates(exact, "full")
     free = any(stretch.timed and not stretch.flies for stretch in stretches)
     if free and chosen.name == "full" and not coordinates:
         given = with_ground_times(task, robot, compiled=compiled, progress=progress)
         return make_problem(given, robot, compiled=compiled, progress=progress)
     used = {"contact", "take_off", "air", "obstacle", *(stretch.piece for stretch in stretches)}
     names = tuple(name for name in PIECES if name in used)
-    pieces = load_pieces(
-        model, chosen, profile=task.profile, names=names, compiled=compiled, progress=progress
-    )
-    return ProblemBuilder(task, model, chosen, pieces, stances).build()
+    pieces = load_pieces(model, chosen, names=names, compiled=compiled, progress=progress)
+    return ProblemBuilder(task, model, chosen, pieces, stances, exact).build()
+
+
+def _mirrors(task: JumpTask) -> tuple[str, ...]:
+    """The coordinates to try for a task, the smallest first, before all of the robot's."""
+    # An impact leaves motors that keep still without an impulse, which a plane cannot tell.
+    straight = all(not hop.distance_y and not hop.twist for hop in task.hops())
+    return ("sagittal", "mirrored") if straight else ()
 
 
 def _choose(
-    model: SymbolicModel, task: JumpTask, stances: tuple[Stance, ...],
-    stretches: tuple[Stretch, ...], asked: str,
-) -> Coordinates:  # fmt: skip
-    if asked:
-        return make_coordinates(model, asked)
-    # An impact leaves the roll and yaw motors without an impulse, which a plane cannot tell.
-    if all(not hop.distance_y and not hop.twist for hop in task.hops()):
+    model: SymbolicModel, names: tuple[str, ...], stances: tuple[Stance, ...],
+    stretches: tuple[Stretch, ...],
+) -> Coordinates | None:  # fmt: skip
+    """The first of these coordinates that the stances and the contacts allow."""
+    every = np.array([stance.coordinates for stance in stances])
+    for name in names:
         try:
-            plane = make_coordinates(model, "sagittal")
+            found = make_coordinates(model, name)
         except ValueError:
-            return make_coordinates(model, "full")
-        every = np.array([stance.coordinates for stance in stances])
-        if np.allclose(plane.reduce(every) @ plane.matrix.T, every, rtol=0.0, atol=1e-12) and all(
-            is_mirrored(plane, stretch.contacts) for stretch in stretches
-        ):
-            return plane
-    return make_coordinates(model, "full")
+            return None
+        stands = all(is_mirrored(found, stretch.contacts) for stretch in stretches)
+        if stands and found.contains(every):
+            return found
+    return None
 
 
 def with_ground_times(
@@ -227,11 +223,11 @@ def straight_ahead(task: JumpTask) -> JumpTask:
 
 def _displaced(problem: Problem, robot: RobotDescription) -> Array | None:
     """A guess from the same jump straight ahead, where there is one and it can be solved."""
-    if problem.coordinates.name == "sagittal":
+    if problem.coordinates.name != "full":
         return None
     task = straight_ahead(problem.task)
     straight = make_problem(task, robot, compiled=not problem.assembly.interpreted)
-    if straight.coordinates.name != "sagittal":
+    if straight.coordinates.name == "full":
         return None
     solution = solve(straight, ballistic_guess(straight), solver="fatrop")
     return displaced_guess(problem, straight, solution.values) if solution.solved else None

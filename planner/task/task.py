@@ -21,6 +21,7 @@ from ...runtime.language.parameters import Parameters, parameter
 from .errors import TaskError
 from .margins import Margins
 from .placed_file import PlacedFile, read_placed
+from .scaling import scaled_defaults
 from .sequence import FreeTimes, Hop, Place, Span, check_spans, places_of
 
 __all__ = ["JumpTask", "Knots", "TaskError", "Weights", "make_task", "read_task"]
@@ -140,7 +141,7 @@ class JumpTask(FreeTimes):
         "arrive at rest"
     )  # fmt: skip
     knots: Knots = parameter(Knots(), text="intervals in each phase")
-    profile: str = parameter("koala", text="actuator profile of the robot")
+    profile: str = parameter("", text="actuator profile; empty: the one the robot is used with")
     effort: float = parameter(
         1.0, gt=0.0, le=1.0,
         text="share of the profile's torque and speed the plan may use; the rest is the feedback's",
@@ -236,6 +237,25 @@ class JumpTask(FreeTimes):
         """Joint angles [rad] by name at the end. Raises ``TaskError`` for an unknown joint."""
         return _stance(robot, self.final, "final")
 
+    def equipped(self, robot: RobotDescription) -> RobotDescription:
+        """The robot with the task's actuator profile in use.
+
+        Raises:
+            TaskError: the robot has no such profile; the message names those that it has.
+        """
+        try:
+            return robot.with_profile(self.profile) if self.profile else robot
+        except LookupError as error:
+            raise TaskError(f"profile: {error.args[0]}") from error
+
+    def resolved(self, robot: RobotDescription) -> JumpTask:
+        """The task with all that it leaves to the robot: the actuator profile in use, and times
+        and weights that suit its size; see ``scaling``."""
+        changed = scaled_defaults(self, robot)
+        if not self.profile:
+            changed["profile"] = robot.motors.profile
+        return self.model_copy(update=changed) if changed else self
+
     def content(self) -> dict[str, Any]:
         """All that decides the plan, as plain data: everything but the name."""
         # What is not given is left out, so that a parameter added later changes no hash.
@@ -247,7 +267,7 @@ class JumpTask(FreeTimes):
         """What a plan of this task is kept under: the same for the same task, robot and format."""
         whole = {
             "format": PLAN_FORMAT,
-            "task": self.content(),
+            "task": self.resolved(robot).content(),
             # The task says itself which actuators it is planned for.
             "robot": robot.changed(profile="").model_dump(mode="json"),
         }
@@ -263,7 +283,7 @@ def _stance(robot: RobotDescription, given: Mapping[str, float], which: str) -> 
             f"{which}: {robot.name} has no joint {', '.join(unknown)}; there is {', '.join(known)}"
         )
     standing = dict(zip(known, robot.standing_position.tolist(), strict=True))
-    return standing | dict(given)
+    return standing | dict(robot.held) | dict(given)
 
 
 def make_task(

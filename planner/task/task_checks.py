@@ -45,7 +45,7 @@ def require_consistent(task: JumpTask, robot: RobotDescription) -> None:
 def _unknown_names(task: JumpTask, robot: RobotDescription) -> Iterator[Contradiction]:
     from ...runtime.loading.problems import nearest
 
-    if task.profile not in robot.profiles:
+    if task.profile and task.profile not in robot.profiles:
         there = ", ".join(robot.profiles)
         yield "profile", f"{robot.name} has no actuator profile {task.profile!r}; there is {there}"
     joints = dict(zip((j.name for j in robot.joints), robot.joint_limits.tolist(), strict=True))

@@ -16,6 +16,8 @@ import numpy as np
 from .errors import DeclarationError
 from .signals import DTYPES, Signal, Slot
 
+LARGEST = 1_000_000_000
+"""How many bytes the signals and states of a graph may need; those of a robot need some 10 kB."""
 ALIGNMENT = 64
 """Bytes: a cache line, and what the widest vector instructions like."""
 

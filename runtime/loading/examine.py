@@ -15,6 +15,7 @@ from ..language.registry import BlockImportError, find_block, nearest_names
 from ..language.schedule import ScheduleBlock, find_loops, order_blocks
 from ..language.signals import Signal
 from ..language.stages import BlockSpec, CheckedGraph, Position, Wire
+from .declaration_check import check_defaults, check_emit
 from .fit import check_fit, lacks_robot
 from .flat import FlatBlock, FlatGraph
 from .inserted import insert_constant, insert_delay, read_values
@@ -22,6 +23,7 @@ from .parameter_check import check_parameters
 from .problems import Code, Problems, nearest
 from .rates import check_hyperperiod, read_offset, read_period
 from .settings import Settings, read_settings
+from .sizes import check_sizes
 from .wire_check import Draft, WireCheck
 
 
@@ -36,6 +38,7 @@ def examine(graph: FlatGraph, problems: Problems) -> CheckedGraph | None:
         check_hyperperiod(drafts.values(), graph.rate.key_where, problems)
     wires = WireCheck(graph, drafts, problems)
     values: dict[str, Any] = {}
+    check_sizes(graph, drafts, problems)
     for draft in drafts.values():
         wires.check(draft)
         _read_values(draft, drafts, values, problems)
@@ -56,6 +59,7 @@ def _draft(flat: FlatBlock, graph: FlatGraph, settings: Settings, problems: Prob
     draft.block_type = _find(flat, graph, problems) if flat.use else None
     if draft.block_type is None:
         return draft
+    check_emit(draft, problems)
     draft.params = check_parameters(flat, draft.block_type, problems, settings.robot)
     draft.dimensions = settings.dimensions
     if draft.params is None:
@@ -77,6 +81,8 @@ def _draft(flat: FlatBlock, graph: FlatGraph, settings: Settings, problems: Prob
         check_fit(draft, settings, problems)  # this explains missing dimensions, too
         return draft
     draft.complete = _check_dimensions(draft, settings, problems)
+    if draft.complete:
+        check_defaults(draft, problems)
     if settings.robot_known:
         check_fit(draft, settings, problems)
     return draft

@@ -14,8 +14,9 @@ from typing import Any
 from ..language.block import Metric
 from ..language.errors import AloftError, ExitCode, RunError
 from ..language.stages import CheckedGraph, ClockSpec
+from .failures import describe
 from .interrupts import Interrupts
-from .life_cycle import LifeCycle, LifeState, describe
+from .life_cycle import LifeCycle, LifeState
 from .memory import BoundGraph
 from .notes import Note, TakesNotes
 from .pacing import TimeSource, WallTime

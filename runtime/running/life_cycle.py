@@ -11,6 +11,7 @@ from enum import Enum
 
 from ..language.block import Block
 from ..language.errors import AloftError, RunError
+from .failures import describe
 
 STOP_CYCLES = 5
 """Rounds of stop cycles: more than one, since a bus may lose a packet."""
@@ -102,10 +103,3 @@ class LifeCycle:
         except BaseException as error:  # noqa: BLE001  # the next block must get its turn
             who = f"block '{path}'" if path else "the runtime"
             self.problems.append(f"{who} failed in {what}: {describe(error)}")
-
-
-def describe(error: BaseException) -> str:
-    """The text of an error, with its type unless it was raised for users to read."""
-    if isinstance(error, AloftError):
-        return str(error)
-    return f"{type(error).__name__}: {error}" if str(error) else type(error).__name__

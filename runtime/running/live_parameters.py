@@ -15,7 +15,7 @@ from collections.abc import Callable, Mapping
 from ..language.block import Block
 from ..language.errors import AloftError
 from ..language.parameter_change import Adjustment, ParameterChange
-from .life_cycle import describe
+from .failures import describe
 
 ANSWER_TIME = 2.0
 """Seconds that ``submit`` waits for the next tick."""

@@ -15,10 +15,11 @@ from numpy.typing import NDArray
 
 from ...robots.description import RobotDescription
 from ..language.block import Block, Clock, Context
-from ..language.errors import AloftError, DeclarationError, RunError
-from ..language.layout import ALIGNMENT, Layout, PortLayout
+from ..language.errors import DeclarationError, RunError
+from ..language.layout import ALIGNMENT, LARGEST, Layout, PortLayout
 from ..language.signals import DTYPES, Signal
 from ..language.stages import BlockSpec, CheckedGraph
+from .failures import blame
 from .live_parameters import LiveParameters
 
 
@@ -54,6 +55,21 @@ class Region:
         )
 
 
+def _allocate(layout: Layout, what: str) -> Region:
+    """The memory of a layout. Raises ``RunError`` where that is more than a graph may need."""
+    try:
+        if layout.size <= LARGEST:
+            return Region(layout)
+    except MemoryError:
+        pass
+    name = max(layout.slots, key=lambda name: layout.slots[name].size)
+    raise RunError(
+        f"the {what} of the graph need {layout.size / 1e9:.3g} GB of memory; the largest is {name} "
+        f"of shape {list(layout.slots[name].shape)}",
+        block=name.rpartition(".")[0].rpartition(".")[0],
+    )
+
+
 @dataclass(frozen=True)
 class Snapshot:
     """Everything a graph remembers at one instant: bus, declared state and tick."""
@@ -64,7 +80,8 @@ class Snapshot:
 
 
 class Memory:
-    """The bus and the state of some blocks.
+    """The bus and the state of some blocks. Raises ``RunError`` where a block cannot say how large
+    its state is, or the machine has not enough memory.
 
     The bus holds all outputs in file order, and behind them one constant for every input without a
     wire: its declared default, zero where it says nothing.
@@ -82,14 +99,13 @@ class Memory:
                         PortLayout(f"{spec.path}.{name}", port.signal, spec.dimensions)
                     )
             if spec.block_type.states:
-                sizes = {
-                    **spec.dimensions,
-                    **spec.block_type.state_dimensions(spec.params, robot),
-                }
+                with blame(spec, "state_dimensions"):
+                    further = spec.block_type.state_dimensions(spec.params, robot)
+                sizes = {**spec.dimensions, **further}
                 for name, state in spec.block_type.states.items():
                     states.append(PortLayout(f"{spec.path}.{name}", state.signal, sizes))
-        self.bus = Region(Layout.of([*outputs, *constants]))
-        self.state = Region(Layout.of(states))
+        self.bus = _allocate(Layout.of([*outputs, *constants]), "signals")
+        self.state = _allocate(Layout.of(states), "states")
         for spec in specs:
             for name, port in spec.block_type.inputs.items():
                 if name not in spec.wires:
@@ -164,15 +180,10 @@ class BoundGraph:
                 wired=tuple(spec.wires),
                 folder=spec.folder,
             )
-            try:
+            with blame(spec, "setup"):
                 block = spec.block_type(spec.params, context)
                 self.memory.bind(block, spec)
                 block.setup()
-            except Exception as error:
-                kind = "" if isinstance(error, AloftError) else f"{type(error).__name__}: "
-                raise RunError(
-                    f"block '{spec.path}' failed in setup: {kind}{error}", block=spec.path
-                ) from error
             self.blocks[spec.path] = block
         self.parameters = LiveParameters(self.blocks)
 

@@ -15,8 +15,8 @@ from ..language.block import Block
 from ..language.errors import RunError
 from ..language.schedule import phases
 from ..language.stages import ClockSpec
+from .failures import describe
 from .finite import FiniteCheck, NotFiniteError
-from .life_cycle import describe
 from .memory import BoundGraph
 from .notes import Note
 from .pacing import RobotDriven, TimeSource, make_pacer

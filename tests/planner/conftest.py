@@ -24,13 +24,13 @@ EVERY = 5
 def squat_jump_plan() -> JumpPlan:
     """The squat jump as a plan. Its feet hit the ground with the speed of the fall."""
     robot = find_robot("bruce")
-    dynamics = ExactDynamics(robot, "koala")
+    dynamics = ExactDynamics(robot)
     names = set(SquatJumpTask.__dataclass_fields__)
     defaults = {k: v for k, v in SquatJumpReference.Params().model_dump().items() if k in names}
     jump = SquatJumpTask(
         **defaults | {"rise": RISE, "touchdown_pitch": 0.0, "stand_time": 0.1, "pause_time": 0.05}
     )
-    table = plan_squat_jump(build_pinocchio_model(robot), robot, jump, "koala")
+    table = plan_squat_jump(build_pinocchio_model(robot), robot, jump)
     breaks = np.flatnonzero(np.diff(table.time) < 1e-9).tolist()
     ends = [0, *[k + 1 for k in breaks], len(table.time)]
     rows = []

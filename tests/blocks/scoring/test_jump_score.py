@@ -193,7 +193,7 @@ CASES: dict[str, tuple[Callable[[float, Fields], None], str]] = {
     "peak": (at(1.5, base_orientation=quaternion(0.3)), r"^tilted by 17.2 deg after touchdown"),
     "final tilt": (after(0.1, base_orientation=quaternion(0.1, 0)), r"^tilt at rest 5.73 deg"),
     "speed at rest": (after(1.4, com_velocity=[0.06, 0, 0]), r"^centre of mass at rest moves at 0.060"),
-    "turning": (after(1.4, base_angular_velocity=[0, 0, 0.3]), r"^torso at rest turns at 0.300 rad/s"),
+    "turning": (after(1.4, base_angular_velocity=[0, 0, 0.3]), r"^base at rest turns at 0.300 rad/s"),
     "heel": (after(1.4, contact_touched=[True, False, True, True]), r"^1 contact points carry no load"),
     "load": (
         after(1.4, contact_force=np.array([[0, 0, 1.0], [0, 0, 1.0], [0, 0, 24.0], [0, 0, 24.0]])),

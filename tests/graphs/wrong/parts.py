@@ -220,3 +220,15 @@ class LiveSprings(Block):
     joints = Output(Joints)
 
     def step(self) -> None: ...
+
+
+class Hasty(Block):
+    """A Moore block that does not wait for its input."""
+
+    height = Input(Height)
+    again = Output(Height)
+
+    def emit(self) -> None:
+        self.again.height[()] = self.height.height
+
+    def update(self) -> None: ...

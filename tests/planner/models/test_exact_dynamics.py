@@ -9,7 +9,7 @@ from aloft.robots.description import find_robot
 
 @pytest.fixture(scope="module")
 def dynamics() -> ExactDynamics:
-    return ExactDynamics(find_robot("bruce"), "koala")
+    return ExactDynamics(find_robot("bruce"))
 
 
 def random_state(dynamics: ExactDynamics, seed: int) -> tuple[np.ndarray, np.ndarray]:

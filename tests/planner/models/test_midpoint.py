@@ -45,7 +45,7 @@ def test_angles_follow_a_somersault() -> None:
 
 
 def test_the_residual_is_what_a_force_is_wrong_by(by_hand: JumpPlan) -> None:
-    dynamics = ExactDynamics(find_robot("bruce"), "koala")
+    dynamics = ExactDynamics(find_robot("bruce"))
     gap, wrench = midpoint_residuals(by_hand, dynamics)
     # Made with small steps of another method: fulfilled to second order only.
     assert gap.max() < 1e-2

@@ -123,10 +123,3 @@ def test_one_limb_alone_is_its_share_of_the_whole() -> None:
     assert max(np.abs(x).max() for x in found[:2]) < 1e-9
     # Rotors of other limbs do not move with this one.
     assert np.abs(found[2]).max() == 0.0
-
-
-def test_a_slanted_hinge_is_refused() -> None:
-    joints = [ROBOT.joints[0].model_copy(update={"axis": (0.6, 0.8, 0.0)}), *ROBOT.joints[1:]]
-    robot = ROBOT.model_copy(update={"joints": tuple(joints)})
-    with pytest.raises(ValueError, match="right_hip_yaw turns about"):
-        SymbolicModel(robot)

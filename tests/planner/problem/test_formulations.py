@@ -23,7 +23,7 @@ from aloft.planner.task.task import make_task
 from aloft.robots.description import find_robot
 
 ROBOT = find_robot("bruce")
-DYNAMICS = ExactDynamics(ROBOT, "koala")
+DYNAMICS = ExactDynamics(ROBOT)
 JUMPS: dict[str, dict[str, Any]] = {
     "in situ": {"rise": 0.15},
     "forward": {"rise": 0.15, "distance_x": 0.1},

@@ -29,8 +29,8 @@ FUNCTIONS = FunctionSet("test", PIECES, (), make)
 
 def load(**options: Any) -> dict[str, Piece]:
     model: Any = type("Model", (SymbolicModel,), {"__init__": lambda self: None})()
-    model.robot = find_robot("bruce")
-    return load_functions(FUNCTIONS, model, "koala", **options)
+    model.robot, model.loads = find_robot("bruce"), ()
+    return load_functions(FUNCTIONS, model, **options)
 
 
 @pytest.fixture(autouse=True)
@@ -73,7 +73,7 @@ def test_what_another_process_compiles_is_waited_for_last(
     made: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     robot = find_robot("bruce")
-    key = compilation.content_hash(robot, robot.profiles["koala"].rotor_inertia, "test", ())
+    key = compilation.content_hash(robot, "test", (), ())
     library = compilation.cache_folder() / key / "slow.so"
     library.parent.mkdir(parents=True)
     # A second description of the open file: this process holds the lock as another one would.

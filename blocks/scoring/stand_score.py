@@ -1,0 +1,164 @@
+"""The judge of robots that should stand, squat or take a push without falling."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from math import degrees
+
+from ...mathematics.rotations import tilt
+from ...runtime.language.block import Block, Input, Metric, State
+from ...runtime.language.parameters import parameter
+from ...runtime.language.signals import Field
+from ..signals import JumpReference, RobotTruth, WholeBodyCommand
+from .footing import Footing
+from .stand_criteria import (
+    NEVER,
+    StandCriteria,
+    StandRecord,
+    Verdict,
+    judge_feet,
+    judge_machine,
+    judge_rest,
+    judge_safety,
+)
+from .stand_following import begin, note_fall, note_feet, note_machine, note_rest
+
+
+class SquatRecord(StandRecord):
+    """What the judgement of a stance or a squat needs."""
+
+    lowest_height = Field(unit="m", text="least height of the com so far")
+    planned_standing = Field(unit="m", text="com height of the reference at the start")
+    planned_lowest = Field(unit="m", text="least com height of the reference so far")
+
+
+class SquatCriteria(StandCriteria):
+    """The tolerances of a successful stance or squat."""
+
+    judge_time: float = parameter(
+        3.0, unit="s", gt=0, text="when the rest is judged, and the run ends"
+    )
+    settle_time: float = parameter(
+        0.3, unit="s", ge=0, text="the robot may settle on the ground for so long"
+    )
+    squat_depth: float | None = parameter(
+        None, unit="m", ge=0, text="how far the com should go down; by default as the reference"
+    )
+    depth_tolerance: float = parameter(0.1, ge=0, text="of that depth, as a share of it")
+
+
+class StandScore(Block):
+    """Judges a robot that stands, squats or takes a push, and ends the run. No controller sees it.
+
+    It is a success when all of these hold, which are those of a jump that concern standing;
+    every tolerance is a parameter:
+
+    1. Nothing but the contact points ever touches the ground, and no leg another.
+    2. It does not fall: tilt at most 69 deg, base above the ground by at least 0.315 of the height
+       it stands at. A fall ends the run.
+    3. No joint is ever beyond its limit; every motor torque is within what its speed allows.
+    4. From ``settle_time`` on: tilt always below 15 deg (set 45 deg for pushes); no foot unloaded
+       for more than 20 ms; the middle of each foot within 5 mm horizontally (set 20 mm for pushes).
+    5. At ``judge_time``: tilt below 5 deg, com slower than 0.05 m/s, base slower than 0.2 rad/s,
+       every sole flat (all its points loaded, or three of more), each foot with over 0.4 of an
+       equal share of the weight, com at least 10 mm inside the support polygon.
+    6. The com has gone down by ``squat_depth``, or else as far as the reference's, within 10 %.
+       Without either this is not judged, nor for a depth of less than 1 mm.
+
+    The run ends once the rest has been judged. Metrics: ``success``, ``reason`` (the first failed
+    criterion with its figures) and the figures themselves.
+    """
+
+    Params = SquatCriteria
+    needs = ("floating base", "feet")
+    params: SquatCriteria
+    truth = Input(RobotTruth, reads_truth=True, text="what the simulator knows")
+    reference = Input(JumpReference, default={}, text="the planned squat, for its depth")
+    wbc = Input(WholeBodyCommand, default={}, text="the controller's answers, to count failures")
+    record = State(SquatRecord, text="everything the judgement needs")
+
+    def setup(self) -> None:
+        self._footing = Footing(self.robot)
+        self._limits = self.params.for_robot(self._footing)
+        self._planned = "reference" in self.context.wired
+
+    def step(self) -> None:
+        """Follow the robot by one tick."""
+        record, truth, height = self.record, self.truth, self.truth.com.item(2)
+        record.now[()] = self.time
+        self._footing.measure(
+            truth.contact_position, truth.base_orientation, record.foot, record.direction
+        )
+        if record.ticks == 0:
+            begin(record, truth)
+            record.lowest_height[()] = height
+            record.planned_standing[()] = record.planned_lowest[()] = self.reference.com[2]
+        record.ticks += 1
+        note_machine(record, truth)
+        record.failures[()] = self.wbc.failures
+        if note_fall(record, truth, self._limits):
+            self.request_stop("the robot fell")
+        record.lowest_height[()] = min(record.lowest_height.item(), height)
+        lowest = min(record.planned_lowest.item(), self.reference.com.item(2))
+        record.planned_lowest[()] = lowest
+        settled = self.time >= self.params.settle_time - 1e-9
+        if settled:
+            record.peak_tilt[()] = max(record.peak_tilt.item(), tilt(truth.base_orientation))
+        note_feet(record, truth, self._footing, self.period, settled)
+        if record.judged_time == NEVER and self.time >= self.params.judge_time - 1e-9:
+            note_rest(record, truth, self._footing)
+            self.request_stop(f"judged at {self.time:.2f} s")
+
+    def metrics(self) -> Mapping[str, Metric]:
+        """The judgement and its figures."""
+        record = self.record
+        if record.ticks == 0:
+            return {"success": False, "reason": "the run had no ticks"}
+        failure = next((text for holds, text in self._judge() if not holds), None)
+        values: dict[str, Metric] = {
+            "success": failure is None,
+            "reason": failure or "all criteria hold",
+            "qp_failures": int(record.failures),
+            "saturated_share": float(record.saturated / record.ticks),
+            "peak_motor_torque_nm": float(record.peak_torque),
+            "peak_motor_speed_rad_s": float(record.peak_speed),
+            "forbidden_contacts": int(record.forbidden),
+            "joint_limit_violation_rad": float(record.violation),
+            "motor_overload_nm": float(record.overload),
+            "squat_depth_m": float(record.standing_height - record.lowest_height),
+            "peak_tilt_deg": degrees(record.peak_tilt),
+            "foot_slip_m": float(record.foot_slip),
+        }
+        if record.judged_time != NEVER:
+            values |= {
+                "final_tilt_deg": degrees(record.tilt),
+                "final_com_speed_m_s": float(record.com_speed),
+                "final_angular_speed_rad_s": float(record.angular_speed),
+                "final_support_margin_m": float(record.margin),
+                "final_load_share": float(record.load_share),
+            }
+        return values
+
+    def _judge(self) -> Iterator[Verdict]:
+        """Every criterion, in the order in which a failure explains those behind it."""
+        r, c = self.record, self._limits
+        yield from judge_safety(r, c)
+        yield from judge_machine(r, c)
+        yield (
+            r.judged_time != NEVER,
+            f"the run ended at {r.now:.3f} s, before {self.params.judge_time} s",
+        )
+        yield from judge_rest(r, c, "while it should stand")
+        yield from judge_feet(r, c, "while it should stand")
+        depth, target = float(r.standing_height - r.lowest_height), self.params.squat_depth
+        if target is None and self._planned:
+            target = float(r.planned_standing - r.planned_lowest)
+        if target is not None and target >= 1e-3:
+            tolerance = self.params.depth_tolerance
+            yield (
+                abs(depth - target) <= tolerance * target,
+                (
+                    f"squatted by {1e3 * depth:.1f} mm, not within {tolerance:.0%} of "
+                    f"{1e3 * target:.1f} mm"
+                ),
+            )
