@@ -1,4 +1,4 @@
-"""A stretch of a recorded run turned into a regression test of one of its blocks."""
+"""Turns a stretch of a recorded run into a regression test of one of its blocks."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class RegressionTest:
 
 
 class _Watch:
-    """Keeps what the block remembered before the first tick of the stretch."""
+    """Keeps the block's state before the first tick of the stretch."""
 
     def __init__(self, path: str, tick: int) -> None:
         self._path, self._tick = path, tick
@@ -71,7 +71,7 @@ def capture(
 ) -> tuple[Stretch, dict[str, Any], Difference | None]:
     """The block at ``path`` in the ticks from ``first`` up to, without, ``last``.
 
-    Its state is had by running it, fed from the recording, from the keyframe before.
+    The block's state is found by running the block on recorded inputs from the keyframe before.
 
     Returns:
         The stretch, the parameters at its beginning, and what the block as it is now does
