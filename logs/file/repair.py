@@ -1,9 +1,9 @@
 """Repairs a recording that was cut off: the file is shortened to its last complete message.
 
-An ``.rrd`` file has a head of twelve bytes and then messages. A message has its kind and its length,
-eight bytes each, and then that many bytes. A writer that is killed, or that finds the disk full,
-leaves the last message incomplete. No reader can read such a file, but all messages before the last
-one are intact.
+An ``.rrd`` file has a head of twelve bytes and then messages. A message has its kind and its
+length, eight bytes each, and then that many bytes. A writer that is killed, or that finds the disk
+full, leaves the last message incomplete. No reader can read such a file, but all messages before
+the last one are intact.
 """
 
 from __future__ import annotations

@@ -2,8 +2,8 @@
 
 Every piece of a Rerun file costs the writer memory until the file is closed, and costs the reader
 time. Therefore thousands of ticks are written at once. Until then they are in the tail, so that a
-killed process does not lose them: for each tick its number as int64, then the bytes of the bus. The file is emptied
-when its ticks are in the recording, and removed when the recording is whole.
+killed process does not lose them: for each tick its number as int64, then the bytes of the bus. The
+file is emptied when its ticks are in the recording, and removed when the recording is whole.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Writes two runs into one Rerun file, which shows them together in every view.
 
-The file has everything that ``format`` describes, except keyframes and properties: the first run below
-``first`` and the second one below ``second``. Both runs begin at the same time.
+The file has everything that ``format`` describes, except keyframes and properties: the first run
+below ``first`` and the second one below ``second``. Both runs begin at the same time.
 """
 
 from __future__ import annotations

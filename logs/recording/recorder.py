@@ -4,8 +4,8 @@
 
     result = aloft.load("graphs/jump.yaml").run(sinks=[Recorder("jump.rrd")], log=False)
 
-Each tick costs one copy of the bus into a ring of shared memory. The run goes on whatever happens to
-the writing process or to the disk; ``warnings`` says what is missing then.
+Each tick costs one copy of the bus into a ring of shared memory. The run goes on whatever happens
+to the writing process or to the disk; ``warnings`` says what is missing then.
 """
 
 from __future__ import annotations

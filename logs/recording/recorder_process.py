@@ -66,7 +66,8 @@ class Task:
 @dataclass
 class Report:
     """What was done: rows surely written, the file's size [bytes], the most memory used [bytes], and
-    what went wrong, if anything; then ``lost`` rows may not be in the file. ``live_problem`` says why
+    what went wrong, if anything; then ``lost`` rows may not be in the file. ``live_problem`` says
+    why
     the viewer did not show all of the run."""
 
     rows: int = 0

@@ -1,6 +1,7 @@
 """The plots of signals over time, laid out from the graph.
 
-A plot shows one field with its limits, several fields of one unit, or the same field of two runs. Its
+A plot shows one field with its limits, several fields of one unit, or the same field of two runs.
+Its
 title has the name and the unit."""
 
 from __future__ import annotations
@@ -92,7 +93,8 @@ def _series(header: Header, line: Line, label: str, *, other: bool) -> Any:
 def main_plots(header: Header, ports: ScenePorts | None, shown: Sequence[Shown]) -> list[Any]:
     """The plots that are shown first.
 
-    They show the robot's true, estimated and planned motion, forces and motors. For a graph without a
+    They show the robot's true, estimated and planned motion, forces and motors. For a graph without
+    a
     robot they show its first fields."""
     fields = {field.name: field for field in header.bus.fields if not field.constant}
     if ports is None:
