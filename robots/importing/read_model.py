@@ -212,13 +212,13 @@ def _motor_torque(model: Any, j: int) -> float:
 
     found = 0.0
     for k in range(model.nu):
-        on_joint = model.actuator_trntype[k] in (
-            mujoco.mjtTrn.mjTRN_JOINT, mujoco.mjtTrn.mjTRN_JOINTINPARENT,
+        on_joint = int(model.actuator_trntype[k]) in (
+            int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT),
         )  # fmt: skip
         if not on_joint or model.actuator_trnid[k][0] != j:
             continue
         gear, gain = abs(float(model.actuator_gear[k][0])), abs(float(model.actuator_gainprm[k][0]))
-        is_motor = model.actuator_biastype[k] == mujoco.mjtBias.mjBIAS_NONE
+        is_motor = int(model.actuator_biastype[k]) == int(mujoco.mjtBias.mjBIAS_NONE)
         if model.actuator_forcelimited[k]:
             torque = gear * float(np.max(np.abs(model.actuator_forcerange[k])))
         elif is_motor and model.actuator_ctrllimited[k]:
