@@ -30,6 +30,7 @@ ROOMS = ("mathematics", "blocks", "hal")
 HOT = [path for room in ROOMS for path in sorted((ROOT / room).rglob("*.py"))]
 PLAIN = {"Array", "Flags", "Indices", "float", "int", "bool"}
 NOT_HOT = {
+    "blocks.jumping.landing_heuristic.foot_sides": "of the description, when a graph is loaded",
     "hal.simulated.random_streams._signed": "of exact integers, when a run is restored",
     "hal.simulated.scenes.step": "makes a scene, when a run is loaded",
     "hal.simulated.scenes.platform": "makes a scene, when a run is loaded",
