@@ -19,9 +19,6 @@ if TYPE_CHECKING:
     from ...planner.task.task import JumpTask
     from ...robots.description import RobotDescription
 
-SHIPPED = Path(__file__).parents[2] / "graphs"
-"""Where tasks are looked for that are not beside the graph."""
-
 
 class JumpPlan(Block):
     """The motion of a jump that the kino-dynamic planner found (section III): what to follow.
@@ -31,21 +28,21 @@ class JumpPlan(Block):
     library under the task's hash: the shipped plans need no solver. Where there is none it is
     solved while the graph loads, from the nearest plan of the library, and kept.
 
-    Every plan, also a kept one, first passes the validity check (``planner/checking/validity``) with
-    exact dynamics. With ``check: reported`` one that fails it is followed all the same, to compare
-    the formulations ``paper`` and ``srbm``, whose plans always fail: then the run's cautions say so
-    with every test that failed, and the metrics have ``plan_valid`` and ``plan_tests_failed``. Of
-    those formulations the reference has the centre of mass and momentum that the plan believes in.
-    ``formulation`` plans the same task in another one, without what only ``full`` has: impacts,
-    margins and limits of the motors.
+    Every plan, also a kept one, first passes the validity check
+    (``planner/checking/validity``) with exact dynamics. With ``check: reported`` a plan that fails
+    it is followed all the same, to compare the formulations ``paper`` and ``srbm``, whose plans
+    always fail: then the run's cautions say so with every test that failed, and the metrics have
+    ``plan_valid`` and ``plan_tests_failed``. For those formulations the reference has the centre of
+    mass and momentum that the plan believes in. ``formulation`` plans the same task in another one,
+    without what only ``full`` has: impacts, margins and limits of the motors.
 
-    At the start the robot stands still for ``stand_time``; at the end it stays
-    where the plan ended. Between the plan's knots the reference is read from a table of 2 ms steps
-    (``planner/library/reference_table``), what is fed forward ``lead`` ahead of time.
+    At the start the robot stands still for ``stand_time``; at the end it stays where the plan
+    ended. Between the plan's knots the reference is read from a table of 2 ms steps
+    (``planner/library/reference_table``); what is fed forward is read ``lead`` ahead of time.
 
-    It follows time alone and knows nothing of what the robot really does. Raises ``BlockError`` at
-    load where the task cannot be read or is for another robot, cannot be planned, or its plan is
-    not valid and must be; the message says which constraint or which test.
+    The block follows time alone and knows nothing of what the robot really does. It raises
+    ``BlockError`` at load where the task cannot be read or is for another robot, where it cannot be
+    planned, or where its plan must be valid and is not; the message says which constraint or test.
     """
 
     class Params(Parameters):
@@ -80,12 +77,13 @@ class JumpPlan(Block):
     @classmethod
     def requires_of_graph(cls, params: Parameters, context: Context) -> Iterable[Misfit]:
         """A task that can be read, for the graph's robot and with its actuator profile."""
+        from ...planner.library.shipped import shipped_graphs
         from ...planner.task.task import TaskError
 
         assert isinstance(params, cls.Params) and context.robot is not None
         robot = context.robot
         try:
-            task = find_task(params.task, context)
+            task = read_or_make_task(params.task, context)
         except TaskError as error:
             for line in str(error).splitlines():
                 place, _, rest = line.partition(": ")
@@ -96,7 +94,9 @@ class JumpPlan(Block):
                 )
             return
         except LookupError as error:
-            there = sorted(f"tasks/{path.name}" for path in (SHIPPED / "tasks").glob("*.yaml"))
+            there = sorted(
+                f"tasks/{path.name}" for path in (shipped_graphs() / "tasks").glob("*.yaml")
+            )
             near = get_close_matches(str(params.task), there, 3)
             yield Misfit(
                 str(error.args[0]),
@@ -166,7 +166,7 @@ class JumpPlan(Block):
         return report
 
     def _task(self) -> JumpTask:
-        task = find_task(self.params.task, self.context)
+        task = read_or_make_task(self.params.task, self.context)
         chosen = self.params.formulation
         if chosen is None:
             return task
@@ -193,19 +193,20 @@ class JumpPlan(Block):
         return plan
 
 
-def find_task(wanted: str | Mapping[str, Any], context: Context) -> JumpTask:
+def read_or_make_task(wanted: str | Mapping[str, Any], context: Context) -> JumpTask:
     """The task that a graph names or spells out.
 
     Raises:
         LookupError: there is no file of that name beside the graph or among the shipped tasks.
         TaskError: it cannot be read as a task.
     """
+    from ...planner.library.shipped import shipped_graphs
     from ...planner.task.task import make_task, read_task
 
     if not isinstance(wanted, str):
         robot = {"robot": context.robot.name} if context.robot is not None else {}
         return make_task({"name": context.path, **robot, **wanted})
-    places = [folder / wanted for folder in (context.folder, Path(), SHIPPED)]
+    places = [folder / wanted for folder in (context.folder, Path(), shipped_graphs())]
     found = next((place for place in places if place.is_file()), None)
     if found is None:
         raise LookupError(f"there is no task {wanted!r} beside the graph or among the shipped ones")

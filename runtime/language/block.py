@@ -151,7 +151,9 @@ class Context:
 
     ``period_ticks`` and ``offset_ticks`` say in which base ticks the block runs; ``dimensions``
     holds every resolved dimension the block can see; ``wired`` names its wired inputs;
-    ``folder`` is where the graph file lies, to which files that a parameter names are relative.
+    ``folder`` is where the file lies that declares the block, to which files that a parameter names
+    are relative; ``graph_folder`` is where the graph lies that was loaded, beside which a user
+    keeps modules.
     """
 
     path: str
@@ -162,6 +164,7 @@ class Context:
     robot: RobotDescription | None = None
     wired: tuple[str, ...] = ()
     folder: Path = Path()
+    graph_folder: Path = Path()
 
     @property
     def period(self) -> float:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 from ...robots.description import RobotDescription
@@ -34,6 +35,8 @@ class Settings:
     """False where a robot is named but could not be read."""
     dimensions: Mapping[str, int] = field(default_factory=dict)
     clock: ClockSpec = field(default_factory=ClockSpec)
+    folder: Path = Path()
+    """Where the graph's file lies."""
 
 
 def read_settings(graph: FlatGraph, problems: Problems) -> Settings:
@@ -62,6 +65,7 @@ def read_settings(graph: FlatGraph, problems: Problems) -> Settings:
         robot is not None or graph.robot is None,
         _read_dimensions(graph, robot, problems),
         _read_clock(graph, problems),
+        graph.folder,
     )
 
 
