@@ -138,6 +138,16 @@ def test_friction_pushes_the_way_the_joint_moves():
     assert command.torque == pytest.approx(np.r_[np.full(5, 0.07), np.full(5, -0.07)])
 
 
+def test_a_share_of_the_motors_own_friction_is_made_up_for():
+    bench = make(friction_share=0.5)
+    bench.set("wbc", torque=0.0)
+    bench.set("joints", velocity=np.full(10, 10.0))
+    motors = ROBOT.motors
+    wanted = 0.5 * (motors.friction + 10.0 * motors.damping)
+    assert wanted.any()
+    assert settle(bench, Phase.STAND, True).torque == pytest.approx(wanted)
+
+
 def test_a_soft_stop_pushes_back_from_a_limit_and_brakes():
     """The left knee stands 20 mrad from its upper limit and moves on at 2 rad/s."""
     knee = 3
