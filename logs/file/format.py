@@ -58,10 +58,19 @@ EXACT, BUS, STATE, NOTE, SPAN = "exact", "bus", "state", "note", "span"
 
 @dataclass(frozen=True)
 class RecordedField:
-    """One field of the bus or of the state, without the code it was declared in.
+    """One field of the bus or of the state, without the code that declared it.
 
-    ``dimensions`` are the shape as declared (``n_joints``), ``shape`` in numbers; ``values`` names
-    the numbers of an int64 field; ``constant`` is true for an unwired input.
+    Attributes:
+        name: ``block.port.field``.
+        dtype: ``float64``, ``int64`` or ``bool``.
+        start: where it begins in its section of the buffer.
+        shape: its shape in numbers.
+        dimensions: its shape as declared (``n_joints``).
+        unit, frame, text: as declared.
+        values: the names of the numbers of an int64 field.
+        constant: whether it belongs to an unwired input.
+        signals: the name of the signal's class, and those of the signals that it derives from;
+            empty in recordings of versions before 0.2.
     """
 
     name: str
@@ -74,6 +83,7 @@ class RecordedField:
     text: str = ""
     values: Mapping[int, str] = field(default_factory=dict)
     constant: bool = False
+    signals: tuple[str, ...] = ()
 
     @property
     def field_name(self) -> str:
@@ -84,8 +94,9 @@ class RecordedField:
     def from_json(cls, data: Mapping[str, Any]) -> Self:
         """The field that ``dataclasses.asdict`` made plain."""
         values = {int(number): name for number, name in data["values"].items()}
-        shape, dimensions = tuple(data["shape"]), tuple(data["dimensions"])
-        return cls(**{**data, "values": values, "shape": shape, "dimensions": dimensions})
+        lists = ("shape", "dimensions", "signals")
+        tuples = {name: tuple(data[name]) for name in lists if name in data}
+        return cls(**{**data, "values": values, **tuples})
 
 
 @dataclass(frozen=True)

@@ -93,13 +93,14 @@ def main_plots(header: Header, ports: ScenePorts | None, shown: Sequence[Shown])
     fields = {field.name: field for field in header.bus.fields if not field.constant}
     if ports is None:
         return [field_plot(header, field, shown) for field in list(fields.values())[:MOST_PLOTS]]
-    base = ports.pose.base_position
+    pose = ports.pose.block
     velocity = next(
         (n for end in ("base_linear_velocity", "linear_velocity")
-         if (n := f"{block_of(base)}.{end}") in fields),
+         if (n := f"{pose}.{end}") in fields),
         "",
     )  # fmt: skip
-    estimate = ports.estimate.base_position if ports.estimate else ""
+    base = ports.pose.base_position or ""
+    estimate = (ports.estimate.base_position or "") if ports.estimate else ""
     overlays = (
         ("centre of mass", ports.com or "", "", f"{ports.plan}.com"),
         ("base", base, estimate, ""),
@@ -112,7 +113,7 @@ def main_plots(header: Header, ports: ScenePorts | None, shown: Sequence[Shown])
         if lines:
             lines.sort(key=lambda line: line.label != "")  # the true one first: it names the unit
             plots.append(plot(header, name, [_named(line) for line in lines], shown))
-    names = [f"{block_of(base)}.{field}" for field in MAIN_FIELDS]
+    names = [f"{pose}.{field}" for field in MAIN_FIELDS]
     plots += [field_plot(header, fields[name], shown) for name in names if name in fields]
     return plots
 
