@@ -12,6 +12,7 @@ from ...mathematics.rotations import rotate, yaw
 from ...robots.ball_feet import ball_feet
 from ...robots.description import RobotDescription
 from ...robots.limb import place_limb, read_limb
+from ...robots.link_poses import standing_heights
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -42,7 +43,7 @@ class Footing:
         self._balls = [(ball, read_limb(robot, ball.foot)) for ball in ball_feet(robot)]
         self._pose, self._axis = np.zeros((4, 3)), np.zeros(3)
         self.weight = robot.total_mass * GRAVITY
-        self.standing_height = standing_height(robot)
+        self.standing_height = -float(standing_heights(robot).min())
 
     @property
     def fall_height(self) -> float:
@@ -119,17 +120,3 @@ class Footing:
         """The least loaded foot's share of the weight; ``force`` on each point [N, world]."""
         loads = [sum(force[k].item(2) for k in indices) for indices in self.points_of_foot]
         return float(min(loads)) / self.weight
-
-
-def standing_height(robot: RobotDescription) -> float:
-    """How high the base's origin is above the lowest contact point in the standing pose [m]."""
-    lowest = 0.0
-    names = [foot.name for foot in robot.feet]
-    for contact in robot.contacts:
-        number = names.index(contact.foot)
-        limb, pose = read_limb(robot, number), np.zeros((4, 3))
-        angles = robot.standing_position[list(limb.joints)]
-        place_limb(limb.links, limb.tip, angles, np.zeros((len(angles), 6)), pose)
-        lever = np.array(contact.position) - np.array(robot.feet[number].sole)
-        lowest = min(lowest, float((pose[0] + pose[1:] @ lever)[2]))
-    return -lowest
