@@ -65,6 +65,7 @@ def import_robot(path: Path, added: Mapping[str, Any]) -> Imported:
         data["points"] = {"torso_com": [built.base, list(base["com"])]}
     known = {name: angle for name, angle in model.pose.items() if name in names}
     data["standing"] = known
+    data["sensors"] = {"imu": data["base_joint"] != "fixed", "switches": bool(contacts)}
     for key in ("profile", "sensors", "standing", "held"):
         if key in added:
             data[key] = added[key]
