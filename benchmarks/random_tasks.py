@@ -1,7 +1,7 @@
 """The planner's success on jumps that nobody chose: tasks that are drawn by a seed.
 
 The range, within reach of BRUCE's real actuators, uniform and independent unless said (signs are
-drawn too; all is for the ``koala`` profile at full effort, with no weight or time changed):
+drawn too; all is for the robot's first actuator profile at full effort, with no weight or time changed):
 
 ================  ===========  ==================  =======================================
 kind              rise         distance            besides

@@ -40,7 +40,7 @@ PUSH = Role("ExternalForce", ("force", "point"))
 ROLES = (TRUTH, LOADS, GROUND, BASE, JOINTS, TERMS, FORCES, PLAN, FEET, PUSH)
 OTHERS = (
     "ContactState", "ContactSwitches", "EstimatorHealth", "ImuReading", "JointCommand",
-    "JointTarget", "PhaseState", "WholeBodyTarget",
+    "JointTarget", "JointTorque", "PhaseState", "WholeBodyTarget",
 )  # fmt: skip
 """Signals of the common vocabulary that have no role: similar fields do not give them one."""
 
