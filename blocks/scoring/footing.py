@@ -11,6 +11,7 @@ from ...mathematics.constants import GRAVITY
 from ...mathematics.rotations import rotate, yaw
 from ...robots.ball_feet import ball_feet
 from ...robots.description import RobotDescription
+from ...robots.limb import place_limb, read_limb
 from ...robots.link_poses import standing_heights
 
 Array = NDArray[np.float64]
