@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...robots.ball_feet import ball_feet
 from ...robots.description import RobotDescription
 from ...robots.pinocchio_model import build_pinocchio_model
 
@@ -58,6 +59,7 @@ class ExactDynamics:
         self.data = built.model.createData()
         self.contact_frames = built.contact_frames
         self.sole_frames = built.sole_frames
+        self.balls = ball_feet(robot)
         self.mass = robot.total_mass
         self._rotor_coupling = built.rotor_coupling
 
@@ -69,24 +71,50 @@ class ExactDynamics:
         pin.updateFramePlacements(self.model, self.data)
         axes = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
         rows = [
-            pin.getFrameJacobian(self.model, self.data, frame, axes)[:3]
+            np.array(pin.getFrameJacobian(self.model, self.data, frame, axes))
             for frame in self.contact_frames
         ]
-        return self._places(self.contact_frames), np.vstack(rows)
+        found = [row[:3] for row in rows]
+        points = self._contact_places()
+        for ball in self.balls:
+            # The material at the lowest point moves with the frame's origin and turns about it.
+            frame = self.data.oMf[self.contact_frames[ball.point]]
+            x, y, z = points[ball.point] - frame.translation
+            lever = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+            found[ball.point] = rows[ball.point][:3] - lever @ rows[ball.point][3:]
+        return points, np.vstack(found)
 
     def points(self, q: Array) -> Array:
-        """The contact points in the world [m], (n_contacts, 3)."""
+        """The contact points in the world [m], of balls the lowest points, (n_contacts, 3)."""
         self.pin.framesForwardKinematics(self.model, self.data, q)
-        return self._places(self.contact_frames)
+        return self._contact_places()
 
     def soles(self, q: Array) -> tuple[Array, Array]:
-        """The sole centres (n_feet, 3) and the feet's rotations to the world (n_feet, 3, 3)."""
+        """The sole centres (n_feet, 3), of balls the lowest points, and the feet's rotations to the
+        world (n_feet, 3, 3)."""
         self.pin.framesForwardKinematics(self.model, self.data, q)
-        turns = [self.data.oMf[frame].rotation.copy() for frame in self.sole_frames]
-        return self._places(self.sole_frames), np.array(turns)
+        return self.sole_places(), self.sole_rotations()
+
+    def sole_places(self) -> Array:
+        """The sole centres in the state that was evaluated last."""
+        places, points = self._places(self.sole_frames), self._contact_places()
+        for ball in self.balls:
+            places[ball.foot] = points[ball.point]
+        return places
+
+    def sole_rotations(self) -> Array:
+        """The feet's rotations to the world in the state that was evaluated last."""
+        return np.array([self.data.oMf[frame].rotation.copy() for frame in self.sole_frames])
+
+    def _contact_places(self) -> Array:
+        places = self._places(self.contact_frames)
+        for ball in self.balls:
+            turn = self.data.oMf[self.contact_frames[ball.point]].rotation
+            places[ball.point] += ball.radius * (turn[:, 2] - np.array([0.0, 0.0, 1.0]))
+        return places
 
     def _places(self, frames: tuple[int, ...]) -> Array:
-        return np.array([self.data.oMf[frame].translation for frame in frames])
+        return np.array([self.data.oMf[frame].translation for frame in frames]).reshape(-1, 3)
 
     def centroidal(self, q: Array, v: Array) -> tuple[Array, Array, Array]:
         """Centre of mass [m], its velocity [m/s] and the angular momentum about it [N m s]."""
