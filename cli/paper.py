@@ -47,7 +47,7 @@ def draw_paper(
     from ..studies.reading import read_study
     from ..studies.summary import summarise
     from ..studies.table import make_table, write_table
-    from .study import check_cells, make_all, report_stop
+    from .study_runs import check_cells, make_all, report_stop
 
     found = read_study(study)
     chosen = parse_seeds(seeds) if seeds else list(found.seeds)

@@ -1,4 +1,4 @@
-"""Signals while many things are done: what is done is kept and told, and the exit code says why."""
+"""Stopping a long piece of work by a signal, so that what is done can be kept and reported."""
 
 from __future__ import annotations
 

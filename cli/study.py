@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import signal
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -13,15 +11,13 @@ import typer
 from ..runtime.language.errors import AloftError, ExitCode
 from .output import console, errors_reported, print_json, print_warning, say
 from .study_output import print_rows, print_tuned, study_json, tuned_json
+from .study_runs import check_cells, make_all, report_stop
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from rich.console import Console
 
-    from ..studies.execution import Run
-    from ..studies.expansion import Cell
-    from ..studies.journal import Journal, Outcome
     from ..studies.study import Filter, Study
 
 
@@ -181,85 +177,8 @@ def tune_study(
     return ExitCode.SUCCESS
 
 
-def check_cells(found: Study, expanded: Sequence[Cell], screen: Console) -> list[Cell]:
-    """The cells, each checked as ``aloft check`` does."""
-    from ..studies.expansion import checked_cells
-    from ..studies.fingerprint import code_fingerprint
-    from .progress import progress_bar
-
-    with progress_bar(screen, f"checking {len(expanded)} cells", len(expanded)) as (bar, task):
-        return checked_cells(expanded, found, code_fingerprint(), lambda: bar.advance(task))
-
-
-def make_all(
-    runs: Sequence[Run],
-    journal: Journal,
-    workers: int,
-    cluster: str,
-    screen: Console,
-    text: str,
-) -> list[Run] | signal.Signals:
-    """The runs with their outcomes, or the signal that stopped them."""
-    from ..studies.execution import make_runs
-    from .progress import progress_bar
-
-    successes = 0
-    keys = {run.key for run in runs}
-    known = len(keys & journal.outcomes.keys())
-    if known:
-        say(screen, f"{known} of {len(keys)} runs are there from before")
-    with (
-        stop_signals() as received,
-        progress_bar(screen, text, len(keys)) as (bar, task),
-    ):
-
-        def on_run(outcome: Outcome) -> None:
-            nonlocal successes
-            successes += outcome.success
-            bar.update(task, advance=1, description=f"{text}: {successes} succeeded")
-
-        try:
-            return make_runs(runs, journal, workers=workers, cluster=cluster, on_run=on_run)
-        except KeyboardInterrupt:
-            if not received:
-                raise
-    return received[0]
-
-
-@contextmanager
-def stop_signals() -> Iterator[list[signal.Signals]]:
-    """SIGINT and SIGTERM as ``KeyboardInterrupt``; which they were is in the list."""
-    received: list[signal.Signals] = []
-
-    def stop(number: int, _: object) -> None:
-        received.append(signal.Signals(number))
-        raise KeyboardInterrupt
-
-    before = {number: signal.signal(number, stop) for number in (signal.SIGINT, signal.SIGTERM)}
-    try:
-        yield received
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
-
-
-def report_stop(
-    stopped: signal.Signals, runs: Sequence[Run], journal: Journal, screen: Console, as_json: bool
-) -> ExitCode:
-    """Say how far it came."""
-    journal.read_back()
-    keys = {run.key for run in runs}
-    done, all_runs = len(keys & journal.outcomes.keys()), len(keys)
-    reason = f"stopped by {stopped.name} after {done} of {all_runs} runs, which are kept"
-    if as_json:
-        print_json({"success": False, "reason": reason, "done": done, "runs": all_runs})
-    else:
-        print_warning(f"{reason}; the same command goes on from there")
-    return ExitCode(128 + stopped)
-
-
 def json_text(value: dict[str, Any]) -> str:
-    """A file's text: numbers that are not finite become null."""
+    """The text of a JSON file; numbers that are not finite become null."""
     import json
 
     from .output import plain

@@ -3,37 +3,47 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Mapping
 from typing import ClassVar, Literal
 
 from ..blocks.signals import ContactSwitches, ImuReading, JointCommand, JointState
+from ..robots.description import RobotDescription
 from ..runtime.language.block import Block, Input, Output
+from ..runtime.language.parameters import Parameters
 
 
 class Robot(Block, ABC):
-    """The base of everything that drives a robot: the same ports, so that graphs do not care.
+    """The base of every block that drives a robot, simulated or real.
 
-    A robot is a Moore block. In a tick ``n`` of the control clock it first publishes the sensors
-    sampled at ``t_n`` (``emit``); the controller runs; then it takes the command and lives on to
-    ``t_{n+1}`` (``update``). A driver implements four methods, each called once a tick by the
-    control thread, none of which may allocate arrays, block without a time-out or raise on a
-    single bad packet:
+    All robots have the same ports, so a graph runs unchanged on any of them. A robot is a Moore
+    block. In tick ``n`` of the control clock it first publishes the sensors as they were at the
+    instant ``t_n`` (``emit``). The controller runs. Then the robot takes the command and its time
+    goes on to ``t_{n+1}`` (``update``).
 
-    * ``read``: write the latest sensor sample into ``imu``, ``joints`` and ``contacts``;
-    * ``write``: send ``command`` to the drives;
-    * ``advance``: let the time to the next tick pass: a simulator computes it; a robot that drives
-      the clock waits for its bus's next cycle; one that is paced by the runtime returns at once;
-    * ``damp``: one cycle of coming to rest: put all drives into damping, whatever was commanded,
-      and let one period pass. It is called at least five times at the end of every run, also
-      after an exception, a signal or a lost machine, so it must not depend on what failed.
+    A driver implements five methods. ``open`` is called once. The other four are called by the
+    control thread once in every tick, so they must not allocate arrays, must not wait without a
+    time-out, and must not raise because a single packet is bad:
 
-    Life: ``setup`` builds models and buffers and touches no hardware; ``open`` connects, verifies
-    identities, voltages and limits, brings the drives into a safe holding state and returns when
-    the first sensor sample is there, or raises; then ticks; then ``damp`` cycles; then ``close``,
-    which disables the drives and frees the link, and may be called without ``open`` having
-    succeeded.
+    * ``read`` writes the latest sensor sample into ``imu``, ``joints`` and ``contacts``.
+    * ``write`` sends ``command`` to the drives.
+    * ``advance`` lets the time to the next tick pass. A simulator computes it. A robot that drives
+      the clock waits for the next cycle of its bus. One that the runtime paces returns at once.
+    * ``damp`` is one cycle of coming to rest: it puts all drives into damping, whatever was
+      commanded, and lets one period pass. The runtime calls it at least five times at the end of
+      every run, also after an exception, a signal or the loss of a machine. It must therefore not
+      depend on anything that may have failed.
 
-    Errors: ``open`` raises what the link raises, naming the device. Losing the link during a run
-    is the driver's to report by ``request_stop`` after its time-out.
+    The life of a driver: ``setup`` builds models and buffers and touches no hardware. ``open``
+    connects, verifies identities, voltages and limits, brings the drives into a safe holding state
+    and returns when the first sensor sample is there. Then come the ticks, then the ``damp``
+    cycles, then ``close``, which disables the drives and frees the link. ``close`` may be called
+    although ``open`` has failed or was never called.
+
+    A robot whose description says that it has no IMU, or no contact switches, publishes zeros at
+    that port; a wire from there is an error at load (``absent_outputs``).
+
+    Errors: ``open`` raises what the link raises, with the name of the device. When the link is lost
+    during a run, the driver reports it by ``request_stop`` after its time-out.
     """
 
     outside: ClassVar[Literal["no", "simulated", "real"]] = "real"
@@ -42,6 +52,20 @@ class Robot(Block, ABC):
     joints = Output(JointState, text="joint encoders and motor currents, at the same instant")
     contacts = Output(ContactSwitches, text="tactile switches, at the same instant")
     command = Input(JointCommand, text="what the drives are to do")
+
+    @classmethod
+    def absent_outputs(
+        cls, params: Parameters, robot: RobotDescription | None
+    ) -> Mapping[str, str]:
+        """The sensors that the robot's description says it does not have."""
+        absent: dict[str, str] = {}
+        if robot is not None and not robot.sensors.imu:
+            absent["imu"] = f"{robot.name} has no IMU"
+        if robot is not None and not robot.contacts:
+            absent["contacts"] = f"{robot.name} has no contact points"
+        elif robot is not None and not robot.sensors.switches:
+            absent["contacts"] = f"{robot.name} has no contact switches"
+        return absent
 
     def emit(self) -> None:
         """Publish the sensors."""

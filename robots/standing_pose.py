@@ -97,7 +97,7 @@ class _Search:
         self.free = np.flatnonzero(legs & ~held)
         middle = np.where(np.isfinite(limits).all(axis=1), limits.mean(axis=1), 0.0)
         self.start = np.where(legs, np.clip(middle, -WIDEST, WIDEST), 0.0)
-        given = {**robot.held, **start}
+        given = {**start, **robot.held}
         for k, joint in enumerate(robot.joints):
             self.start[k] = given.get(joint.name, self.start[k])
         self.start = np.clip(self.start, limits[:, 0], limits[:, 1])
@@ -128,19 +128,22 @@ class _Search:
         return link_poses(self.robot, np.zeros((count, 3)), upright, angles)
 
     def _points(self, poses: LinkPoses) -> tuple[Array, Array]:
-        """The height of each contact's lowest point (n, n_contacts), each sole (n, n_feet, 3)."""
-        heights = []
+        """The height of each contact's lowest point (n, n_contacts), each sole (n, n_feet, 3);
+        that of a ball is its centre."""
+        heights, balls = [], {}
         for foot, centre, contact in zip(
             self.foot_of_point, self.centres, self.robot.contacts, strict=True
         ):
             k = self.index[self.robot.feet[foot].link]
             place = poses.position[:, k] + poses.rotation[:, k] @ centre
             heights.append(place[:, 2] - contact.radius)
-        soles = [
-            poses.position[:, self.index[foot.link]]
-            + poses.rotation[:, self.index[foot.link]] @ np.array(foot.sole)
-            for foot in self.robot.feet
-        ]
+            balls[int(foot)] = place
+        soles = []
+        for k, each in enumerate(self.robot.feet):
+            link = self.index[each.link]
+            place = poses.position[:, link] + poses.rotation[:, link] @ np.array(each.sole)
+            single = list(self.foot_of_point).count(k) == 1
+            soles.append(balls[k] if single else place)
         return np.array(heights).T, np.moveaxis(np.array(soles), 0, 1)
 
     def parts(self, angles: Array) -> tuple[Array, Array, Array, Array]:

@@ -15,7 +15,7 @@ MuJoCo scales the stiffness of a contact with the mass that it carries: a time c
 damping ratio are given, so robots of any mass sink in by the same fraction of a millimetre.
 
 Names in the model: links, joints and contact points as in the description (a contact point is a
-geom and a site; a link called ``world`` is the body ``link/world``), motors ``motor/<joint>``,
+geom and a site, which is at the centre of the ball where it is all of a foot; a link called ``world`` is the body ``link/world``), motors ``motor/<joint>``,
 named points sites ``point/<name>``, and the sensors ``com``, ``com_velocity``,
 ``angular_momentum``, ``accelerometer``, ``contacts`` (how many contacts there are at all),
 ``load/<contact point>`` (how many with the ground, and their net force on it).
@@ -29,6 +29,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...mathematics.constants import GRAVITY
+from ...robots.ball_feet import ball_feet
 from ...robots.description import RobotDescription
 from ...robots.link_poses import contact_centres
 from .base import BASES
@@ -178,6 +179,7 @@ def _add_robot(spec: MjSpec, robot: RobotDescription, variation: Variation) -> N
 
     limb = _limb_of_link(robot)
     centres = contact_centres(robot)
+    balls = [robot.contacts[ball.point].name for ball in ball_feet(robot)]
     bodies: dict[str, Any] = {}
 
     def add_link(name: str, parent: Any, position: tuple[float, float, float]) -> None:
@@ -211,7 +213,8 @@ def _add_robot(spec: MjSpec, robot: RobotDescription, variation: Variation) -> N
                     name=contact.name, type=mujoco.mjtGeom.mjGEOM_SPHERE, mass=0.0,
                     size=[contact.radius, 0, 0], pos=centre, **bits, **_surface(variation),
                 )  # fmt: skip
-                body.add_site(name=contact.name, pos=contact.position)
+                is_ball = contact.name in balls
+                body.add_site(name=contact.name, pos=centre if is_ball else contact.position)
         for point, (owner, place) in robot.points.items():
             if owner == name:
                 body.add_site(name=f"point/{point}", pos=place)

@@ -21,12 +21,16 @@ from .parameters import SimulatorParameters
 from .random_streams import WORDS, Purpose, RandomStreams, stream
 from .rotors import unfit_motor
 from .sensors import Sensors
-from .stance import centre_on_origin, holding_torque, place_standing
+from .stance import centre_on_origin, holding_torque, place_standing, uneven_contacts
+from .start_check import StartCheck
 from .state import DriveState, PhysicsState, TickRecord
 from .truth import TruthReport
 from .world import build_world, draw_variation
 
 SETTLING_TIME = 0.3
+"""For how long a robot settles before it is checked whether it stands [s]."""
+OBSERVED_TIME = 0.02
+"""The last part of that, in which the load on its feet is averaged [s]."""
 
 
 class MujocoRobot(Robot):
@@ -89,10 +93,17 @@ class MujocoRobot(Robot):
 
     @classmethod
     def requires(cls, params: Parameters, robot: RobotDescription | None) -> Iterable[Misfit]:
-        """A transmission that the simulator can express."""
-        complaint = unfit_motor(robot) if robot is not None else ""
+        """A transmission that the simulator can express, and a pose in which feet can stand."""
+        assert robot is not None
+        complaint = unfit_motor(robot)
         if complaint:
             yield Misfit(complaint, fix="correct `transmission` in the robot's description")
+        uneven = uneven_contacts(robot) if robot.base_joint != "fixed" else ""
+        if uneven:
+            yield Misfit(
+                uneven,
+                fix="correct `standing` or the positions under `contacts` in its description",
+            )
 
     @classmethod
     def requires_of_graph(cls, params: Parameters, context: Context) -> Iterable[Misfit]:
@@ -187,6 +198,8 @@ class MujocoRobot(Robot):
         mujoco.mj_resetData(self._model, self._data)
         model, data, base, robot = self._model, self._data, self._base, self._robot
         place_standing(model, data, base, robot, attitude * params.initial_attitude_error)
+        rotation = data.body(body_name(robot.base)).xmat.reshape(3, 3).copy()
+        pose = self._position.copy()
         torque = holding_torque(model, data, base, robot)
         held = self._position + self._sensors.encoder_offset
         self._drives.hold(held, torque, self._stiffness, self._damping)
@@ -196,7 +209,12 @@ class MujocoRobot(Robot):
         early = math.floor(phase / params.timestep)
         self._late = phase - early * params.timestep
         self._step1(self._model, self._data)
-        self._settle(math.ceil(SETTLING_TIME / params.timestep) + early)
+        observed = math.ceil(OBSERVED_TIME / params.timestep)
+        self._settle(math.ceil(SETTLING_TIME / params.timestep) + early - observed)
+        self._clear_record()
+        self._settle(observed)
+        load = self.record.load[:, 3] / -observed
+        StartCheck(model, data, base, robot).check(load, pose, torque, rotation)
         centre_on_origin(data, base, robot)
         self._data.time = 0.0
         self.physics.step[()] = -self._steps

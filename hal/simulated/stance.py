@@ -56,11 +56,14 @@ def place_standing(
     if not robot.contacts:
         _put_down(model, data, base, robot)
         return
-    check_level(robot)
+    uneven = uneven_contacts(robot)
+    if uneven:
+        raise StartError(uneven)
     names = [contact.name for contact in robot.contacts]
     places = np.array([data.site(name).xpos for name in names])
+    below = depth_of_contacts(robot)
     down = -_sole_middle(data, robot)
-    height = float(places[:, 2].mean() + down[2])
+    height = float((places[:, 2] - below).mean() + down[2])
     if abs(height) > 1e-9:  # the sole centre is not at the height of the contact points
         down[2] -= height
     base.shift(down)
@@ -89,21 +92,21 @@ def place_standing(
         )
 
 
-def check_level(robot: RobotDescription) -> None:
-    """Raise ``StartError`` unless all contact points are at one height in the standing pose."""
+def uneven_contacts(robot: RobotDescription) -> str:
+    """What keeps the robot from standing on level ground in its standing pose: contact points that
+    are above the lowest one, each with its height; empty where all are at one height."""
     heights = standing_heights(robot)
     above = heights - heights.min(initial=np.inf)
     if float(above.max(initial=0.0)) <= UNEVEN:
-        return
+        return ""
     found = [
         f"{contact.name} by {1e3 * height:.0f} mm"
         for contact, height in zip(robot.contacts, above.tolist(), strict=True)
         if height > UNEVEN
     ]
-    raise StartError(
+    return (
         f"{robot.name} cannot stand on level ground: in its standing pose these contact points are "
-        f"above the lowest one: {', '.join(found)}; correct `standing` or the positions under "
-        "`contacts` in its description"
+        f"above the lowest one: {', '.join(found)}"
     )
 
 
@@ -116,10 +119,12 @@ def holding_torque(model: MjModel, data: MjData, base: FixedBase, robot: RobotDe
     size = base.velocities
     if size == 0 or not robot.contacts:
         return np.array(data.qfrc_bias[size:])
+    below = depth_of_contacts(robot)
     jacobian = np.zeros((3 * len(robot.contacts), model.nv))
     for k, contact in enumerate(robot.contacts):
         rows = jacobian[3 * k : 3 * k + 3]
-        mujoco.mj_jacSite(model, data, rows, None, data.site(contact.name).id)
+        place = data.site(contact.name).xpos - [0.0, 0.0, below[k]]
+        mujoco.mj_jac(model, data, rows, None, place, int(model.site(contact.name).bodyid[0]))
     # The force of least norm among those that carry the base: base_rows (base_rows' base_rows)^-1 w.
     base_rows = np.ascontiguousarray(jacobian[:, :size])
     square, multiplier = np.zeros((size, size)), np.zeros(size)
@@ -139,6 +144,15 @@ def centre_on_origin(data: MjData, base: FixedBase, robot: RobotDescription) -> 
         offset = -_sole_middle(data, robot)
         offset[2] = 0.0
         base.shift(offset)
+
+
+def depth_of_contacts(robot: RobotDescription) -> Array:
+    """How far every contact point is below its site in the simulator's model [m], (n_contacts,):
+    the radius of the ball that is all of a foot, whose site is at its centre, and else zero."""
+    below = np.zeros(len(robot.contacts))
+    for ball in ball_feet(robot):
+        below[ball.point] = ball.radius
+    return below
 
 
 def _leg_joints(robot: RobotDescription) -> NDArray[np.int64]:

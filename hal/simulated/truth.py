@@ -10,6 +10,7 @@ from ...blocks.signals import RobotTruth
 from ...robots.description import RobotDescription
 from .base import FixedBase
 from .scenes import Scene
+from .stance import depth_of_contacts
 from .state import TickRecord
 
 if TYPE_CHECKING:
@@ -35,6 +36,7 @@ class TruthReport:
         self._com, self._com_velocity, self._angular_momentum = (
             data.sensor(name).data for name in ("com", "com_velocity", "angular_momentum")
         )
+        self._below = depth_of_contacts(robot)
         self._places = [data.site(contact.name).xpos for contact in robot.contacts]
         n = len(robot.joints)
         self._negative, self._is_low = np.zeros(n), np.zeros(n, dtype=np.bool_)
@@ -51,13 +53,16 @@ class TruthReport:
         np.divide(record.load[:, 1:], -steps, out=truth.contact_force)
         for k, place in enumerate(self._places):
             truth.contact_position[k] = place
+            truth.contact_position[k, 2] -= self._below.item(k)
             truth.ground_height[k] = self._scene.ground_height(place.item(0), place.item(1))
             force = truth.contact_force[k]
             truth.contact_touched[k] = any(force.item(axis) != 0.0 for axis in range(3))
         truth.forbidden_contacts[()] = record.forbidden
-        truth.joint_limit_violation[()] = max(record.violation.tolist())
-        truth.motor_overload[()] = max(record.overload.tolist())
-        truth.saturated_share[()] = sum(record.saturated.tolist()) / (steps * len(self._is_low))
+        truth.joint_limit_violation[()] = max(record.violation.tolist(), default=0.0)
+        truth.motor_overload[()] = max(record.overload.tolist(), default=0.0)
+        truth.saturated_share[()] = sum(record.saturated.tolist()) / (
+            steps * max(1, len(self._is_low))
+        )
         for high, low, out in (
             (record.torque_high, record.torque_low, truth.motor_torque),
             (record.speed_high, record.speed_low, truth.motor_speed),

@@ -1,21 +1,45 @@
-"""Recorded signals as flat columns: one a number, called ``block.port.field[i, j]``."""
+"""Recorded signals as a table with one column for each number, called ``block.port.field[i, j]``."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, NoReturn, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .format import RecordedField
-from .reader import RecordedRun
 
 TICK, TIME = "tick", "t"
 """The first two columns; the second is in seconds."""
 
 
-def flat_columns(run: RecordedRun, names: Sequence[str] = ()) -> dict[str, NDArray[Any]]:
+class SignalSource(Protocol):
+    """What the tables need of a recording that is read."""
+
+    @property
+    def ticks(self) -> NDArray[np.int64]:
+        """The recorded ticks, (ticks,)."""
+
+    @property
+    def time(self) -> NDArray[np.float64]:
+        """Their times [s], (ticks,)."""
+
+    @property
+    def rows(self) -> NDArray[np.uint8]:
+        """All signals' bytes at every tick, (ticks, bytes)."""
+
+    def signals(self) -> Mapping[str, RecordedField]:
+        """The recorded signals by name."""
+
+    def nearest(self, name: str) -> NoReturn:
+        """Raise the ``KeyError`` that names the signals nearest to a wrong name."""
+
+    def __getitem__(self, name: str) -> NDArray[Any]:
+        """One signal at every tick, (ticks, ...)."""
+
+
+def flat_columns(run: SignalSource, names: Sequence[str] = ()) -> dict[str, NDArray[Any]]:
     """``tick``, ``t`` and every number of some signals, by default of all, each (ticks,).
 
     Args:
@@ -36,8 +60,12 @@ def flat_columns(run: RecordedRun, names: Sequence[str] = ()) -> dict[str, NDArr
     return columns
 
 
-def chosen(run: RecordedRun, names: Sequence[str]) -> list[RecordedField]:
-    """The signals that ``names`` mean, in file order, all for none. Raises ``KeyError``."""
+def chosen(run: SignalSource, names: Sequence[str]) -> list[RecordedField]:
+    """The signals that ``names`` mean, in the order of the file; all of them without names.
+
+    Raises:
+        KeyError: no signal has such a name or beginning.
+    """
     known = run.signals()
     if not names:
         return list(known.values())
@@ -52,11 +80,11 @@ def _means(name: str, signal: str) -> bool:
 
 
 def column_name(field: RecordedField, place: Sequence[int]) -> str:
-    """What one number of a field is called."""
+    """The name of the column of one number of a field."""
     return f"{field.name}[{', '.join(map(str, place))}]" if len(place) else field.name
 
 
-def units(run: RecordedRun, names: Sequence[str] = ()) -> Mapping[str, str]:
+def units(run: SignalSource, names: Sequence[str] = ()) -> Mapping[str, str]:
     """The unit of every column that has one, as text."""
     found = {TIME: "s"}
     for field in chosen(run, names):

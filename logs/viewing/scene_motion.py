@@ -31,7 +31,7 @@ class MassCentrePart(ScenePart):
         self.send("com", moments, rr.Points3D.columns(positions=com))
         foot = com.copy()
         foot[:, 2] = ABOVE_GROUND
-        if self.ports.ground_height is not None:
+        if self.ports.ground_height is not None and self.robot.contacts:
             foot[:, 2] += moments[self.ports.ground_height].min(axis=1)
         # a small cross on the ground at the end of the line
         arm = np.array(

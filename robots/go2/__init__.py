@@ -1,1 +1,1 @@
-"""BRUCE, the biped of the paper: its description as one data file."""
+"""Unitree Go2: what its URDF lacks, as one data file."""

@@ -260,6 +260,18 @@ class Block:
         return ()
 
     @classmethod
+    def absent_outputs(
+        cls, params: Parameters, robot: RobotDescription | None
+    ) -> Mapping[str, str]:
+        """Outputs that mean nothing with these parameters and this robot, and why each.
+
+        Such an output keeps its place in memory, holds zeros, and must not be wired: a wire from it
+        is reported at load with the reason, such as ``go2 has no IMU``. Asked under the same
+        conditions as ``requires``.
+        """
+        return {}
+
+    @classmethod
     def state_dimensions(
         cls, params: Parameters, robot: RobotDescription | None
     ) -> Mapping[str, int]:

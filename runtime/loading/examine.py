@@ -84,7 +84,7 @@ def _draft(flat: FlatBlock, graph: FlatGraph, settings: Settings, problems: Prob
     if draft.complete:
         check_defaults(draft, problems)
     if settings.robot_known:
-        check_fit(draft, settings, problems)
+        draft.absent = check_fit(draft, settings, problems)
     return draft
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from ..language.block import Clock, Context, Misfit
 from ..language.fit import find_misfits, unmet_needs
 from .nodes import ListNode, MapNode, Node
@@ -16,8 +18,12 @@ def lacks_robot(draft: Draft, settings: Settings) -> bool:
     return bool(unmet_needs(draft.block_type, settings.robot))
 
 
-def check_fit(draft: Draft, settings: Settings, problems: Problems) -> None:
-    """Report every misfit of one block, whose parameters are known to be right."""
+def check_fit(draft: Draft, settings: Settings, problems: Problems) -> Mapping[str, str]:
+    """Report every misfit of one block, whose parameters are known to be right.
+
+    Returns:
+        The outputs that mean nothing for this robot, and why.
+    """
     assert draft.block_type is not None and draft.params is not None
     flat = draft.flat
     context = Context(
@@ -30,8 +36,10 @@ def check_fit(draft: Draft, settings: Settings, problems: Problems) -> None:
         wired=tuple(flat.wires),
         folder=flat.folder,
     )
-    for misfit in find_misfits(draft.block_type, draft.params, context):
+    misfits = find_misfits(draft.block_type, draft.params, context)
+    for misfit in misfits:
         report_misfit(draft, misfit, problems)
+    return {} if misfits else draft.block_type.absent_outputs(draft.params, settings.robot)
 
 
 def report_misfit(draft: Draft, misfit: Misfit, problems: Problems) -> None:

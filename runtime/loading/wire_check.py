@@ -16,13 +16,15 @@ from .problems import Code, Problems, listing, nearest
 
 @dataclass
 class Draft:
-    """A block while it is checked; ``complete`` where its dimensions are all known."""
+    """A block while it is checked: ``complete`` where its dimensions are all known, ``absent`` with
+    the outputs that mean nothing here and why."""
 
     flat: FlatBlock
     block_type: type[Block] | None = None
     params: Parameters | None = None
     dimensions: Mapping[str, int] = field(default_factory=dict)
     complete: bool = False
+    absent: Mapping[str, str] = field(default_factory=dict)
     period_ticks: int = 1
     offset_ticks: int = 0
 
@@ -210,6 +212,19 @@ class WireCheck:
                 if nearby
                 else allowed,
             )
+        reason = source.absent.get(wire.source_port)
+        if reason is not None:
+            self.problems.add(
+                Code.MISFIT,
+                f"{at} reads {wire.source}, which is not there: {reason}",
+                wire.where,
+                **other,
+                expected="a signal that this robot has",
+                found=reason,
+                nearest=self._local(self._candidates(target, port), at, wire),
+                fix="" if port.optional else f"leave {name!r} out, or use another block",
+            )
+            return
         missing = [n for n in port.signal.fields if n not in output.signal.fields]
         if missing:
             candidates = self._local(self._candidates(target, port), at, wire)
@@ -308,7 +323,7 @@ class WireCheck:
             if source is target:
                 continue
             for name, output in source.outputs.items():
-                if fits(output, port, source, target):
+                if name not in source.absent and fits(output, port, source, target):
                     same = output.signal is port.signal
                     (exact if same else other).append(f"{source.flat.path}.{name}")
         return tuple([*exact, *other][:3])

@@ -1,28 +1,31 @@
-"""Jobs done by a Dask cluster's workers; ``jobs`` is how others use it."""
+"""Does jobs on the workers of a Dask cluster. Other modules use it through ``jobs``."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Generator, Iterable
+from importlib.metadata import version
 from typing import Any
 
 from ...runtime.language.errors import AloftError
-from .jobs import JobResult, attempt
+from .job import JobResult, attempt
 
 WAIT = 10.0
 """How long to wait for the scheduler and for a first worker [s]."""
 AHEAD = 2
-"""Jobs that are handed over for every thread of the cluster, so that none ever waits."""
-
+"""How many jobs are submitted for every thread of the cluster, so that no thread ever waits."""
 MOST_LOSSES = 10
-"""How often the result of one job may be lost with its worker before it is given up."""
+"""How often the result of one job may be lost with its worker before the job is given up."""
 
 
 def cluster_results(
     function: Callable[[Any], Any], jobs: Iterable[Any], address: str
 ) -> Generator[JobResult, None, None]:
-    """See ``jobs.job_results``. A worker that is lost is the scheduler's affair: it gives the job
-    to another one, and gives up on a job that costs it several. It cannot tell that job from
-    others that were at the same worker, so all that it gave up are done once more, one by one."""
+    """The results of all jobs; see ``jobs.job_results`` for the parameters.
+
+    When a worker is lost, the scheduler gives its jobs to another one. It gives up on all jobs that
+    were on several lost workers, because it cannot tell which of them was the cause. These jobs are
+    done once more at the end, one at a time.
+    """
     client = _connect(address)
     from distributed import as_completed
 
@@ -32,7 +35,7 @@ def cluster_results(
     losses: dict[Any, int] = {}
     under_way = as_completed(loop=client.loop)
 
-    def hand_over() -> None:
+    def submit_next() -> None:
         for index, job in numbered:
             future = client.submit(attempt, function, job, pure=False)
             numbers[future.key] = index, job
@@ -41,16 +44,16 @@ def cluster_results(
 
     try:
         for _ in range(AHEAD * sum(client.nthreads().values())):
-            hand_over()
+            submit_next()
         for future in under_way:
             index, job = numbers.pop(future.key)
             if future.status == "finished":
                 yield JobResult(index, *future.result())
             elif future.status == "error":
-                # What a job raises is caught where it is done: this is the cluster's own error.
+                # An exception in a job is caught by the worker, so this is an error of the cluster.
                 suspects.append((index, job))
             elif client.status == "running" and future.status in ("pending", "lost"):
-                # Its worker ended before the result was fetched: the scheduler has it done again.
+                # Its worker ended before the result was fetched: the scheduler has the job done again.
                 losses[future.key] = losses.get(future.key, 0) + 1
                 if losses[future.key] <= MOST_LOSSES:
                     numbers[future.key] = index, job
@@ -60,7 +63,7 @@ def cluster_results(
             else:
                 raise AloftError(f"the Dask scheduler at {address} has gone; what is done is kept")
             future.release()
-            hand_over()
+            submit_next()
         for index, job in suspects:
             future = client.submit(attempt, function, job, pure=False)
             error = future.exception()
@@ -74,13 +77,13 @@ def cluster_results(
 
 
 def _connect(address: str) -> Any:
-    """A client of a cluster that has workers which know aloft.
+    """A client of a cluster whose workers have the same version of aloft.
 
     Raises:
-        AloftError: there is no Dask here, no scheduler there, or no such worker.
+        AloftError: Dask is not installed, there is no scheduler at the address, or a worker has no
+            aloft or another version of it.
     """
-    from ... import __version__
-
+    own = _version()
     try:
         from distributed import Client
     except ImportError as error:
@@ -100,18 +103,17 @@ def _connect(address: str) -> Any:
     except TimeoutError as error:
         client.close()
         raise AloftError(f"the Dask scheduler at {address} has no workers") from error
-    wrong = {name: v for name, v in found.items() if v != __version__}
+    wrong = {name: v for name, v in found.items() if v != own}
     if wrong:
         client.close()
         name, problem = next(iter(wrong.items()))
         raise AloftError(
-            f"the Dask worker {name} cannot do what aloft {__version__} wants: {problem}; install "
+            f"the Dask worker {name} cannot do what aloft {own} wants: {problem}; install "
             "the same aloft on every worker"
         )
     return client
 
 
 def _version() -> str:
-    from ... import __version__
-
-    return __version__
+    """The version of aloft that is installed in the process that calls this."""
+    return version("aloft")

@@ -2,37 +2,23 @@
 
     run_jobs(plan_one, tasks, workers=0, on_result=keep)
 
-A job is the one argument of a function. Both travel to other processes, so the function is one
-that can be imported by name and the argument one that can be pickled. Results come one by one, as
-soon as each is there: whoever keeps them at once loses nothing but what was under way when the
-whole is killed, and continues later by leaving out the jobs whose results are kept.
+A job is the one argument of a function. Both are sent to other processes, so it must be possible to
+import the function by its name and to pickle the argument. Results come one by one, each as soon as
+it is there. A caller that stores every result at once loses only the jobs that were under way when
+everything was killed. It continues later by leaving out the jobs whose results it has.
 
-A job that fails stops no other: an exception, also one that nobody expected, and the death of its
-process become the text of its result's ``error``. A process that dies is replaced, and its job is
-tried once more.
+A job that fails does not stop the others. Any exception in a job, and the death of its process,
+become the text of its result's ``error``. A process that dies is replaced, and its job is tried once
+more.
 """
 
 from __future__ import annotations
 
 import os
 from collections.abc import Callable, Generator, Iterable
-from dataclasses import dataclass
 from typing import Any
 
-
-@dataclass(frozen=True)
-class JobResult:
-    """What came of the job with that number, counted from zero.
-
-    Attributes:
-        index: the job's number.
-        value: what the function returned; ``None`` where it failed.
-        error: why it failed; empty where it did not.
-    """
-
-    index: int
-    value: Any
-    error: str = ""
+from .job import JobResult
 
 
 def run_jobs(
@@ -43,10 +29,10 @@ def run_jobs(
     cluster: str | None = None,
     on_result: Callable[[JobResult], None],
 ) -> None:
-    """Do all jobs; ``on_result`` is called here, with each result in the order they are ready.
+    """Do all jobs, and call ``on_result`` in this process with each result as soon as it is there.
 
-    What ``on_result`` raises stops the jobs under way and is raised on. For the parameters and the
-    errors see ``job_results``.
+    An exception in ``on_result`` stops the jobs under way and is passed on. For the parameters and
+    the errors see ``job_results``.
     """
     results = job_results(function, jobs, workers=workers, cluster=cluster)
     try:
@@ -63,14 +49,18 @@ def job_results(
     workers: int = 0,
     cluster: str | None = None,
 ) -> Generator[JobResult, None, None]:
-    """The results of all jobs, in the order they are ready; jobs are taken as they are needed.
+    """The results of all jobs, in the order in which they are ready.
 
-    ``workers`` is how many processes of this machine work at once; 0 is one for every processor.
-    With ``cluster``, the address of a Dask scheduler (``tcp://127.0.0.1:8786``), its workers do
-    the work, which needs the package ``distributed``; ``workers`` is then not looked at.
+    Jobs are taken from ``jobs`` only as they are needed. Closing the generator, or an exception in
+    it, stops the jobs under way: their processes get SIGTERM, and SIGKILL if they have not ended
+    10 s later.
 
-    Closing the generator, or an exception in it, stops the jobs under way: their processes get
-    SIGTERM, and SIGKILL if they have not ended 10 s later.
+    Args:
+        function: does one job.
+        jobs: the arguments of ``function``.
+        workers: how many processes of this machine work at once; 0 for one for every processor.
+        cluster: the address of a Dask scheduler (``tcp://127.0.0.1:8786``) whose workers do the
+            jobs instead, which needs the package ``distributed``. ``workers`` is ignored then.
 
     Raises:
         AloftError: no process can be started, or the cluster cannot be reached or used.
@@ -89,20 +79,3 @@ def processors() -> int:
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
-
-
-def attempt(function: Callable[[Any], Any], job: Any) -> tuple[Any, str]:
-    """The function's value, or ``None`` and why there is none. Used where the work is done."""
-    import traceback
-
-    from ...runtime.language.errors import AloftError
-
-    try:
-        return function(job), ""
-    except AloftError as error:
-        return None, str(error)
-    except Exception as error:  # noqa: BLE001  (a mistake in one job must not cost the others)
-        last = traceback.format_exception_only(error)[-1].strip()
-        frames = traceback.extract_tb(error.__traceback__)
-        where = f" ({frames[-1].filename}:{frames[-1].lineno})" if frames else ""
-        return None, f"{last}{where}"

@@ -1,4 +1,4 @@
-"""One graph run with many seeds, spread over processes; rows come back in the order of the seeds."""
+"""Runs one graph with many seeds on all processors; the results come in the order of the seeds."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ class SeedRow:
 
 
 def parse_seeds(text: str) -> list[int]:
-    """``0:20`` (20 not among them), ``1,5,7`` or ``3``, or several of these with commas.
+    """The seeds that a text means: ``0:20`` (20 excluded), ``1,5,7``, ``3``, or ``0:5,8``.
 
     Raises:
-        AloftError: the text is neither, or names no seed or one twice.
+        AloftError: the text is not of this form, names no seed, names one twice or one below zero.
     """
     seeds: list[int] = []
     try:
@@ -36,14 +36,18 @@ def parse_seeds(text: str) -> list[int]:
             first, colon, end = part.partition(":")
             seeds += range(int(first), int(end)) if colon else [int(first)]
     except ValueError:
-        raise AloftError(f"seeds {text!r} are neither a range 0:20 nor a list 1,5,7") from None
+        raise AloftError(
+            f"seeds {text!r}: expected a range such as 0:20 or a list such as 1,5,7"
+        ) from None
     if not seeds or len(set(seeds)) < len(seeds) or min(seeds) < 0:
-        raise AloftError(f"seeds {text!r} are none, one of them twice, or below zero")
+        raise AloftError(
+            f"seeds {text!r}: expected at least one seed, each once and none below zero"
+        )
     return seeds
 
 
 def overrides_for(graph: Graph, overrides: Sequence[str], seed: int) -> list[str]:
-    """``overrides`` and every parameter called ``seed`` set.
+    """``overrides``, and one more for every parameter of the graph that is called ``seed``.
 
     Raises:
         AloftError: the graph has no such parameter.
@@ -56,7 +60,7 @@ def overrides_for(graph: Graph, overrides: Sequence[str], seed: int) -> list[str
 def run_seeds(
     path: Path, overrides: Sequence[str], seeds: Sequence[int]
 ) -> Generator[SeedRow, None, None]:
-    """Run the graph once a seed, on all processors; each run is what it would be by itself.
+    """Run the graph once with each seed. A run does not depend on the others beside it.
 
     Raises:
         LoadError: the graph may not run.
@@ -66,7 +70,7 @@ def run_seeds(
     jobs = [(path, overrides_for(graph, overrides, seed), seed) for seed in seeds]
     rows: dict[int, SeedRow] = {}
     done = 0
-    # The robots of runs that are under way when this is closed come to rest first.
+    # When this generator is closed, the robots of runs under way come to rest first.
     with closing(job_results(_run_one, jobs)) as results:
         for result in results:
             failed = SeedRow(seeds[result.index], False, result.error, {}, "")

@@ -1,8 +1,8 @@
-"""Jobs done by processes of this machine; ``jobs`` is how others use it.
+"""Does jobs in processes of this machine. Other modules use it through ``jobs``.
 
-The standard library's pool breaks as a whole when one of its processes is killed, and hangs where
-that happens while work is being cancelled. Here every process has a pipe of its own: what died is
-known, replaced, and its job tried again.
+The standard library's process pool fails as a whole when one of its processes is killed, and hangs
+when that happens while work is being cancelled. Here every process has its own pipe, so it is known
+which process died and which job it had. The process is replaced, and the job is tried again.
 """
 
 from __future__ import annotations
@@ -21,12 +21,12 @@ from time import monotonic
 from typing import Any
 
 from ...runtime.language.errors import AloftError
-from .jobs import JobResult, attempt
+from .job import JobResult, attempt
 
 ATTEMPTS = 2
-"""How often a job is begun at most where its process dies: a second time is its own fault."""
+"""How often a job is tried whose process dies; if it dies twice, the job is taken for the cause."""
 PATIENCE = 10.0
-"""How long processes that are told to stop may take [s]."""
+"""How long processes may take to stop before they are killed [s]."""
 ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 Numbered = tuple[int, Any]
@@ -45,7 +45,7 @@ class _Worker:
 def process_results(
     function: Callable[[Any], Any], jobs: Iterable[Any], count: int
 ) -> Generator[JobResult, None, None]:
-    """See ``jobs.job_results``; ``count`` processes at most."""
+    """The results of all jobs, done by at most ``count`` processes; see ``jobs.job_results``."""
     numbered = enumerate(jobs)
     again: deque[Numbered] = deque()
     begun: dict[int, int] = {}
@@ -57,65 +57,67 @@ def process_results(
     try:
         while True:
             for worker in workers:
-                if worker.job is None and not _give(worker, next_job(), begun):
+                if worker.job is None and not _assign(worker, next_job(), begun):
                     break
             while len(workers) < count and (job := next_job()) is not None:
                 workers.append(_start(function))
-                _give(workers[-1], job, begun)
+                _assign(workers[-1], job, begun)
             busy = {worker.pipe: worker for worker in workers if worker.job is not None}
             if not busy:
                 return
             for pipe in wait(list(busy)):
                 worker = busy[pipe]  # type: ignore[index]
                 try:
-                    said = worker.pipe.recv()
+                    message = worker.pipe.recv()
                 except (EOFError, OSError):
                     workers.remove(worker)
-                    reason, job = _buried(worker), worker.job
+                    reason, job = _exit_reason(worker), worker.job
                     if job is not None and begun[job[0]] < ATTEMPTS:
                         again.append(job)
                     elif job is not None:
                         yield JobResult(job[0], None, reason)
                     continue
-                if said is None:
+                if message is None:
                     worker.ready = True
                 else:
                     worker.job = None
-                    begun.pop(said[0], None)
-                    yield JobResult(*said)
+                    begun.pop(message[0], None)
+                    yield JobResult(*message)
     finally:
         _stop(workers)
 
 
-def _give(worker: _Worker, job: Numbered | None, begun: dict[int, int]) -> bool:
-    """Let a worker begin a job; whether there was one."""
+def _assign(worker: _Worker, job: Numbered | None, begun: dict[int, int]) -> bool:
+    """Let a worker begin a job. Returns whether there was one."""
     if job is None:
         return False
     worker.job = job
     begun[job[0]] = begun.get(job[0], 0) + 1
-    with suppress(OSError):  # it died while it had nothing to do, which reading from it will tell
+    with suppress(OSError):  # it died while it was idle; the next read from its pipe shows that
         worker.pipe.send(job)
     return True
 
 
 def _start(function: Callable[[Any], Any]) -> _Worker:
-    # Spawned, not forked: no state of this process reaches a job.
+    """Start a worker's process. It is spawned, not forked, so it has no state of this process."""
     context = multiprocessing.get_context("spawn")
     here, there = context.Pipe()
-    process = context.Process(target=_serve, args=(there, function), daemon=True)
-    with _surroundings():
+    process = context.Process(target=_work, args=(there, function), daemon=True)
+    with _worker_environment():
         process.start()
-    there.close()  # or its end would not be noticed
+    there.close()  # while this end is open too, the end of the process would not be noticed
     return _Worker(process, here)
 
 
 @contextmanager
-def _surroundings() -> Iterator[None]:
-    """What a new process inherits: one thread for its linear algebra, because as many as there are
-    processors would fight each other, and no SIGINT, which a terminal sends to all processes and
-    is this one's to deal with."""
+def _worker_environment() -> Iterator[None]:
+    """Set what a process that is started within the context inherits.
+
+    Linear algebra gets one thread, because the workers already use all processors. SIGINT is
+    blocked: a terminal sends it to all processes, and only this one is to react to it.
+    """
     before = {name: os.environ.get(name) for name in ONE_THREAD}
-    # It would otherwise be started by the new process's start and let SIGINT through.
+    # Otherwise the start of the new process would start the tracker, which lets SIGINT through.
     resource_tracker.ensure_running()
     mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     os.environ.update(dict.fromkeys(ONE_THREAD, "1"))
@@ -130,11 +132,11 @@ def _surroundings() -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_SETMASK, mask)
 
 
-def _buried(worker: _Worker) -> str:
-    """Why a process is no more.
+def _exit_reason(worker: _Worker) -> str:
+    """Why a worker's process ended.
 
     Raises:
-        AloftError: it could not even start, as no other would.
+        AloftError: the process could not even start, so no other one would either.
     """
     worker.pipe.close()
     worker.process.join(PATIENCE)
@@ -150,7 +152,7 @@ def _buried(worker: _Worker) -> str:
 
 
 def _stop(workers: list[_Worker]) -> None:
-    """End all processes: at once where they wait, soon where they work."""
+    """End all processes: idle ones at once, working ones as soon as they have cleaned up."""
     for worker in workers:
         worker.pipe.close()
         if worker.job is not None:
@@ -164,23 +166,23 @@ def _stop(workers: list[_Worker]) -> None:
 
 
 class _StoppedError(BaseException):
-    """In a worker: told to stop."""
+    """Raised in a worker that is told to stop."""
 
 
-_told_to_stop = False
+_stopping = False
 
 
-def _serve(pipe: Connection, function: Callable[[Any], Any]) -> None:
-    """The life of a worker: one job after another until the pipe is closed.
+def _work(pipe: Connection, function: Callable[[Any], Any]) -> None:
+    """What a worker's process does: one job after another until its pipe is closed.
 
-    SIGTERM ends the job under way as an exception does, so that it can clean up; a graph that runs
-    takes the signal itself, and its robot comes to rest.
+    SIGTERM raises an exception in the job under way, so that the job can clean up. A running graph
+    handles the signal itself, and its robot comes to rest.
     """
     try:
-        signal.signal(signal.SIGTERM, _told)
-        threading.Thread(target=_follow_parent, daemon=True).start()
+        signal.signal(signal.SIGTERM, _on_terminate)
+        threading.Thread(target=_end_with_parent, daemon=True).start()
         pipe.send(None)
-        while not _told_to_stop:
+        while not _stopping:
             index, job = pipe.recv()
             value, error = attempt(function, job)
             try:
@@ -188,20 +190,20 @@ def _serve(pipe: Connection, function: Callable[[Any], Any]) -> None:
             except (TypeError, AttributeError, ValueError) as problem:
                 pipe.send((index, None, f"the result cannot be sent: {problem}"))
     except (EOFError, OSError, _StoppedError):
-        pass  # nobody is there any more, or nobody wants more
+        pass  # the process that wants the results has ended, or wants no more of them
     finally:
-        signal.signal(signal.SIGTERM, signal.SIG_IGN)  # what ends anyway needs no telling
+        signal.signal(signal.SIGTERM, signal.SIG_IGN)  # this process ends anyway
 
 
-def _told(number: int, frame: object) -> None:
-    global _told_to_stop
-    _told_to_stop = True
+def _on_terminate(number: int, frame: object) -> None:
+    global _stopping
+    _stopping = True
     signal.signal(signal.SIGTERM, signal.SIG_IGN)
     raise _StoppedError
 
 
-def _follow_parent() -> None:
-    """End when the process that wants the results does, however it ended."""
+def _end_with_parent() -> None:
+    """End this process when the one that wants the results ends, whatever the cause."""
     parent = multiprocessing.parent_process()
     if parent is not None:
         parent.join()

@@ -20,7 +20,7 @@ def test_only_feet_with_one_contact_point_are_balls():
     assert ball_feet(find_robot("bruce")) == ()
     ball, contact = ball_feet(robot)[2], robot.contacts[2]
     assert (ball.point, ball.radius) == (2, contact.radius)
-    assert np.abs(ball.centre - contact.position).max() <= contact.radius
+    assert ball.centre.tolist() == np.add(contact.position, (0.0, 0.0, contact.radius)).tolist()
 
 
 def test_the_lowest_point_is_below_the_centre_for_everybody():

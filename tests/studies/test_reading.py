@@ -43,7 +43,7 @@ plots:
         "nearest    count.yaml",
         "wrong.yaml:2:1: unknown-key: 'sedes' is not a key of a study file",
         "fix        seeds: 1",
-        "wrong.yaml:3:8: bad-value: seeds '5:1' are none, one of them twice, or below zero",
+        "wrong.yaml:3:8: bad-value: seeds '5:1': expected at least one seed, each once and none below zero",
         "wrong.yaml:4:21: unknown-key: 'tuen' is not a key of arm 'a'",
         "wrong.yaml:6:3: bad-value: 'seed' cannot name an axis",
         "wrong.yaml:7:9: wrong-kind: axis 'flat' cannot be a list",

@@ -10,7 +10,8 @@ from collections.abc import Iterator
 import pytest
 
 from aloft.runtime.language.errors import AloftError
-from aloft.studies.batch.jobs import JobResult, run_jobs
+from aloft.studies.batch.job import JobResult
+from aloft.studies.batch.jobs import run_jobs
 
 pytest.importorskip("distributed")
 

@@ -1,0 +1,1 @@
+"""Unitree A1: what its URDF lacks, as one data file."""

@@ -1,0 +1,1 @@
+"""ANYmal C: what its URDF lacks, as one data file."""

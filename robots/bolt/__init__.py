@@ -1,0 +1,1 @@
+"""Bolt: what its URDF lacks, as one data file."""

@@ -1,0 +1,1 @@
+"""HyQ: what its URDF lacks, as one data file."""

@@ -1,0 +1,1 @@
+"""The simple humanoid: what its URDF lacks, as one data file."""

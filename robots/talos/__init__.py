@@ -1,0 +1,1 @@
+"""TALOS: what its URDF lacks, as one data file."""
