@@ -90,10 +90,10 @@ class ExactDynamics:
         return self._contact_places()
 
     def soles(self, q: Array) -> tuple[Array, Array]:
-        """The sole centres (n_feet, 3), of balls the lowest points, and the feet's rotations to the
-        world (n_feet, 3, 3)."""
+        """The sole centres [m] (n_feet, 3), of balls the lowest points, and the feet's headings
+        [rad] (n_feet,)."""
         self.pin.framesForwardKinematics(self.model, self.data, q)
-        return self.sole_places(), self.sole_rotations()
+        return self.sole_places(), self.foot_angles()[0]
 
     def sole_places(self) -> Array:
         """The sole centres in the state that was evaluated last."""
@@ -102,9 +102,31 @@ class ExactDynamics:
             places[ball.foot] = points[ball.point]
         return places
 
-    def sole_rotations(self) -> Array:
-        """The feet's rotations to the world in the state that was evaluated last."""
-        return np.array([self.data.oMf[frame].rotation.copy() for frame in self.sole_frames])
+    def sole_velocities(self, v: Array) -> Array:
+        """The velocities of ``sole_places`` in the state that was evaluated last, (n_feet, 3)."""
+        pin, axes = self.pin, self.pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+        found = [
+            pin.getFrameJacobian(self.model, self.data, frame, axes) @ v
+            for frame in self.sole_frames
+        ]
+        rates = np.array([row[:3] for row in found])
+        for ball in self.balls:
+            # The lowest point moves as the centre does, which is above the sole at the zero pose.
+            up = self.data.oMf[self.sole_frames[ball.foot]].rotation[:, 2]
+            rates[ball.foot] += ball.radius * np.cross(found[ball.foot][3:], up)
+        return rates
+
+    def foot_angles(self) -> tuple[Array, Array]:
+        """Heading and pitch of the feet [rad], both (n_feet,), in the state that was evaluated
+        last. A ball has none of its own: it has the base's heading and no pitch."""
+        turns = np.array([self.data.oMf[frame].rotation for frame in self.sole_frames])
+        base = self.data.oMi[1].rotation
+        ahead = turns.reshape(-1, 3, 3)[:, :, 0]
+        yaw = np.arctan2(ahead[:, 1], ahead[:, 0])
+        pitch = np.arctan2(-ahead[:, 2], np.hypot(ahead[:, 0], ahead[:, 1]))
+        for ball in self.balls:
+            yaw[ball.foot], pitch[ball.foot] = np.arctan2(base[1, 0], base[0, 0]), 0.0
+        return yaw, pitch
 
     def _contact_places(self) -> Array:
         places = self._places(self.contact_frames)

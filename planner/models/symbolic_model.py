@@ -141,7 +141,8 @@ class SymbolicModel:
             if ball is None:
                 found.append(self.point(frames, link, contact.position))
                 continue
-            lowest = self.point(frames, link, ball.centre) - ca.DM([0.0, 0.0, ball.radius])
+            centre = [float(value) for value in ball.centre]
+            lowest = self.point(frames, link, centre) - ca.DM([0.0, 0.0, ball.radius])
             turn = frames[link][0]
             about_y, about_x = ca.atan2(turn[0, 2], turn[2, 2]), ca.asin(-turn[1, 2])
             way = ball.radius * ca.vertcat(about_y, -about_x, 0.0)
