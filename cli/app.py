@@ -19,6 +19,7 @@ from .output import print_json
 from .params import params
 from .plan import plan
 from .replay import replay
+from .robot import robot
 from .run import run
 from .study import study
 from .test import test
@@ -46,6 +47,7 @@ for _verb in (run, view, replay, check, graph, blocks, plan, bench, study, test)
     app.command(epilog=EXIT_CODES if _verb is run else None)(_verb)
 app.add_typer(params)
 app.add_typer(log)
+app.add_typer(robot)
 
 
 def _print_version(wanted: bool) -> None:

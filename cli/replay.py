@@ -141,6 +141,11 @@ def execute(
     from ..logs.replay.replay import replay as replay_run
     from .progress import TickCounter, progress_bar
 
+    if first is not None and until is not None and until <= first:
+        raise AloftError(
+            f"--from {first} --until {until} is no stretch of the run: the end must lie behind the "
+            f"beginning, e.g. --from {first} --until {first + 100}"
+        )
     settings = [text for texts in changed.values() for text in texts]
     graph = opened.load(settings) if settings else opened.graph
     end = min(until or int(opened.ticks[-1]) + 1, int(opened.ticks[-1]) + 1)

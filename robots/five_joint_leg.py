@@ -22,7 +22,6 @@ from numpy.typing import NDArray
 from ..mathematics.kernel import kernel
 from ..mathematics.least_squares import solve_damped
 from ..mathematics.rotations import wrap
-from ..runtime.language.errors import BlockError
 from .limb import FootKind, chain_to, foot_shape
 from .robot_description import RobotDescription
 
@@ -62,12 +61,12 @@ def read_leg(robot: RobotDescription, foot: int) -> Leg:
     """The leg that ends in foot number ``foot``.
 
     Raises:
-        BlockError: the chain from base to foot is not a leg of the kind described above.
+        ValueError: the chain from base to foot is not a leg of the kind described above.
     """
     chain = chain_to(robot, robot.feet[foot].link)
     mismatch = _mismatch(robot, foot, chain)
     if mismatch:
-        raise BlockError(
+        raise ValueError(
             f"foot {robot.feet[foot].name}: {mismatch}; this inverse kinematics is for legs of hip "
             "yaw (z), pitch (y) and roll (x) with intersecting axes, then knee (y) and ankle (y) in "
             "one plane, that end in a line foot"

@@ -21,7 +21,9 @@ Array = NDArray[np.float64]
 class Part(BaseModel):
     """Unchangeable data with no keys but those declared."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, ignored_types=(cached_property,))
+    model_config = ConfigDict(
+        extra="forbid", frozen=True, ignored_types=(cached_property,), defer_build=True
+    )
 
     later: ClassVar[tuple[str, ...]] = ()
     """Fields that came after version 0.1. They are left out where they have their default, so that

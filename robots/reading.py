@@ -6,13 +6,16 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 from .importing.packages import SCHEME, find_file, package_of
 from .placed_yaml import PlacedYaml
 from .robot_description import RobotDescription
 from .shipped import robot_names
 from .validation import RobotError, RobotFault, find_faults
+
+if TYPE_CHECKING:
+    from .importing.description_data import Imported
 
 SHIPPED = Path(__file__).parent
 MODEL_FILES = (".urdf", ".xml", ".mjcf")
@@ -108,6 +111,7 @@ def _named_file(path: Path, text: PlacedYaml) -> Path:
 def _read_model(path: Path, added: Path | None, text: PlacedYaml | None) -> ReadRobot:
     from .importing.description_data import import_robot
     from .importing.fit_to_ground import fit_to_ground
+    from .importing.places import written_path
 
     content = text.data if text is not None and text.data is not None else {}
     if not isinstance(content, Mapping):
@@ -116,41 +120,27 @@ def _read_model(path: Path, added: Path | None, text: PlacedYaml | None) -> Read
     faults = [*(text.faults if text else ()), *imported.faults]
     # A fault of the YAML's own keys also shows in what is made of them: once is enough.
     own = {fault.path[:2] for fault in faults}
-    faults += [f for f in find_faults(imported.data) if _written(f, imported.data)[:2] not in own]
+    found = find_faults(imported.data)
+    faults += [f for f in found if written_path(f, imported.data)[:2] not in own]
     if faults:
-        placed = [_placed(f, imported.data, imported.model, added, text) for f in faults]
+        placed = [_placed(fault, imported, text) for fault in faults]
         raise RobotError(str(added or path), placed)
     robot = RobotDescription.model_validate(imported.data)
     robot, more = fit_to_ground(robot, "standing" in content, imported.model.pose)
     return ReadRobot(robot, added or path, path, (*imported.notes, *more))
 
 
-def _written(fault: RobotFault, data: Mapping[str, Any]) -> tuple[str | int, ...]:
-    """The path of a fault as a short YAML has it: links and joints by name."""
-    path = fault.path
-    if len(path) > 1 and path[0] in ("links", "joints") and isinstance(path[1], int):
-        return (path[0], str(data[path[0]][path[1]]["name"]), *path[2:])
-    return path
-
-
-def _placed(
-    fault: RobotFault, data: Mapping[str, Any], model: Any, added: Path | None, text: Any
-) -> RobotFault:
+def _placed(fault: RobotFault, imported: Imported, added: PlacedYaml | None) -> RobotFault:
     """The fault with its place: in the YAML where that says it, else in the URDF or MJCF file."""
-    from .importing.urdf_text import XmlFile
+    from .importing.places import placed_in_model, written_path
 
-    path = _written(fault, data)
-    if text is not None and text.holds(path):
-        return text.placed(replace(fault, path=path))  # type: ignore[no-any-return]
-    tags = {"links": ("link", "body"), "joints": ("joint", "joint")}
-    line = column = 0
-    if len(path) > 1 and path[0] in tags:
-        line, column = XmlFile(model.path).place(
-            tags[str(path[0])][not model.is_urdf], str(path[1])
-        )
-    if not line and text is not None:
-        return text.placed(replace(fault, path=path))  # type: ignore[no-any-return]
-    return replace(fault, path=path, file=str(model.path), line=line, column=column)
+    path = written_path(fault, imported.data)
+    if added is not None and added.holds(path):
+        return added.placed(replace(fault, path=path))
+    in_model = placed_in_model(fault, imported.data, imported.model)
+    if added is None or in_model.line:
+        return in_model
+    return added.placed(replace(fault, path=path))
 
 
 def _complete(data: object) -> None:

@@ -121,7 +121,7 @@ def _answer(request: bytes, parameters: LiveParameters, graph: str) -> dict[str,
         return {"error": str(error), "report": error.report.as_json()}
     except AloftError as error:
         return {"error": str(error)}
-    except (ValueError, KeyError, TypeError) as error:
+    except (ValueError, KeyError, TypeError, RecursionError) as error:
         return {"error": f"not a request: {error}"}
 
 

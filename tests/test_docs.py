@@ -8,8 +8,10 @@ from typing import Any
 
 import pytest
 
+import aloft
 from aloft.cli.blocks import all_references
 from aloft.cli.markdown import reference_page
+from aloft.runtime.loading import LoadError
 
 ROOT = Path(__file__).parent.parent
 FILE = re.compile(r"<!-- file: (\S+) -->\n```\w+\n(.*?)```", re.DOTALL)
@@ -76,6 +78,32 @@ def test_the_whole_graph_in_the_documentation_runs(tmp_path: Path) -> None:
     # a proportional controller follows a slow sine with a lag of 1 / gain
     error = result.signal("error.y.value")
     assert 0.1 < abs(error[-100:]).max() < 1.0
+
+
+def test_a_task_of_the_users_own_is_used_by_the_whole_body_controller(tmp_path: Path) -> None:
+    """The files of docs/whole_body.md beside the shipped graphs, and the mistakes it speaks of."""
+    (tmp_path / "graphs").symlink_to(ROOT / "graphs")
+    text = (ROOT / "docs" / "whole_body.md").read_text()
+    for name, content in FILE.findall(text):
+        (tmp_path / name).write_text(content)
+    loaded = aloft.load(tmp_path / "symmetric_jump.yaml")
+    result = loaded.run(duration=0.1, log=False)
+    assert result.metrics["qp_failures"] == 0
+    other = aloft.load(ROOT / "graphs" / "jump.yaml").run(duration=0.1, log=False)
+    assert result.run_hash != other.run_hash
+    graph = YAML.findall(text)[0].replace("jump.yaml", "graphs/jump.yaml")
+    (tmp_path / "listed.yaml").write_text(graph)
+    assert aloft.load(tmp_path / "listed.yaml").run(duration=0.02, log=False).run_hash
+    entry = (tmp_path / "symmetric_jump.yaml").read_text()
+    for wrong, right, message in (
+        ('SymmetricJoint"', 'SymmetricJoints"', "module 'symmetric' has no class"),
+        ("{mass: 3}", "{weight: 3}", "gain 'mass'.*its gains are first, second, weight"),
+        ("- Torso\n", "- TorsoOrientation\n", "no task called 'Torso'; did you mean TorsoOrien"),
+    ):
+        assert right in entry
+        (tmp_path / "wrong.yaml").write_text(entry.replace(right, wrong))
+        with pytest.raises(LoadError, match=message):
+            aloft.load(tmp_path / "wrong.yaml")
 
 
 def test_the_reference_of_blocks_is_up_to_date() -> None:

@@ -30,6 +30,7 @@ ROOMS = ("mathematics", "blocks", "hal")
 HOT = [path for room in ROOMS for path in sorted((ROOT / room).rglob("*.py"))]
 PLAIN = {"Array", "Flags", "Indices", "float", "int", "bool"}
 NOT_HOT = {
+    "blocks.jumping.landing_heuristic.foot_sides": "of the description, when a graph is loaded",
     "hal.simulated.random_streams._signed": "of exact integers, when a run is restored",
     "hal.simulated.scenes.step": "makes a scene, when a run is loaded",
     "hal.simulated.scenes.platform": "makes a scene, when a run is loaded",
@@ -57,11 +58,11 @@ UNUSED = {
         LIMB.links, LIMB.tip, MIDDLE, np.zeros((5, 6)), np.zeros((4, 3)),
     ),
     "aloft.robots.limb.limb_jacobian": (LIMB.links, np.ones((5, 6)), POSE, np.zeros((6, 5))),
-    "aloft.robots.limb_inverse.aim": (POSE[0], POSE[1:], np.zeros((4, 3))),
-    "aloft.robots.limb_inverse.foot_error": (
+    "aloft.robots.limb_error.aim": (POSE[0], POSE[1:], np.zeros((4, 3))),
+    "aloft.robots.limb_error.foot_error": (
         LIMB.tip, POSE, TARGET, np.array([1.0, 0.9, 0.3]), np.zeros(6),
     ),
-    "aloft.robots.limb_inverse.weigh_rows": (
+    "aloft.robots.limb_error.weigh_rows": (
         LIMB.tip, POSE, TARGET, np.array([1.0, 0.9, 0.3]), np.ones((6, 5)),
     ),
     "aloft.robots.limb_inverse.approach": (*CHAIN, 3, limb_scratch(5), MIDDLE),
@@ -71,11 +72,11 @@ UNUSED = {
     "aloft.robots.limb_inverse.limb_velocity": (
         *CHAIN, MIDDLE, np.ones(6), 3e-4, limb_scratch(5), np.zeros(5),
     ),
-    "aloft.robots.limb_inverse.turning": (LIMB.tip, POSE, TARGET, 0.002, 10.0, np.zeros(3)),
+    "aloft.robots.limb_error.turning": (LIMB.tip, POSE, TARGET, 0.002, 10.0, np.zeros(3)),
     "aloft.robots.limb_inverse._stuck": (LIMB.limits, 1, 0.3, 1.0),
-    "aloft.robots.limb_inverse._along": (POSE, LIMB.tip),
-    "aloft.robots.limb_inverse._product": (POSE, TARGET, 1, 2),
-    "aloft.robots.limb_inverse._unit": (0.1, 0.2, 0.3, 1.0, 0.0, 0.0),
+    "aloft.robots.limb_error._along": (POSE, LIMB.tip),
+    "aloft.robots.limb_error._product": (POSE, TARGET, 1, 2),
+    "aloft.robots.limb_error._unit": (0.1, 0.2, 0.3, 1.0, 0.0, 0.0),
     "aloft.robots.five_joint_reach.slide": (
         LEG.hip, LEG.plane, LEG.signs, LEG.limits, np.add(LEG.hip, [0.25, 0.02, -0.3]), np.eye(3), 0.005,
         0.1, np.zeros(3), np.zeros(5),

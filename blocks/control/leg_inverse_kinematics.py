@@ -21,14 +21,13 @@ from ...robots.five_joint_leg import (
 )
 from ...robots.five_joint_reach import keep_along, line_rate, pitched_line, slide, slow_stretch
 from ...robots.limb import FootKind, Limb, chain_to, read_limb
+from ...robots.limb_error import aim, turning
 from ...robots.limb_inverse import (
     REACHED,
-    aim,
     approach,
     limb_scratch,
     limb_velocity,
     reach,
-    turning,
 )
 from ...runtime.language.block import Block, Input, Misfit, Output, State
 from ...runtime.language.parameters import Parameters, live_parameter, parameter

@@ -172,7 +172,7 @@ class WholeBodyController(Block):
         """Tasks that can be found, each with gains that it has."""
         assert isinstance(params, cls.Params)
         try:
-            for chosen in choose_tasks(params.tasks, context.folder):
+            for chosen in choose_tasks(params.tasks, (context.graph_folder, context.folder)):
                 for kind in PHASE_KINDS:
                     chosen.gains(kind, getattr(params, kind))
         except TaskChoiceError as error:
@@ -212,7 +212,9 @@ class WholeBodyController(Block):
     def _build_tasks(self, robot: RobotDescription, n: int) -> None:
         """The chosen tasks, each with its part of the rows."""
         situation = Situation(robot, self.terms, self.target, self.phase, self.joints)
-        self._chosen: tuple[ChosenTask, ...] = choose_tasks(self.params.tasks, self.context.folder)
+        self._chosen: tuple[ChosenTask, ...] = choose_tasks(
+            self.params.tasks, (self.context.graph_folder, self.context.folder)
+        )
         counts = [
             chosen.kind.row_count(robot, chosen.gains("stand", self.params.stand))
             for chosen in self._chosen

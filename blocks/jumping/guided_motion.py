@@ -25,6 +25,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...robots.ball_feet import ball_feet
 from ...robots.description import RobotDescription
 from ...robots.limb import FootKind, foot_shape
 from ...robots.pinocchio_model import PinocchioModel
@@ -45,7 +46,9 @@ class Motion:
     """What the body is to do at one instant.
 
     ``rotation`` is, axis by axis, the angular momentum about the centre of mass [N m s, world]
-    where ``by_momentum`` says so, else the torso's rate [rad/s, body frame].
+    where ``by_momentum`` says so, else the base's rate [rad/s, body frame]. ``foot_velocity`` is
+    that of the feet on the ground, so zero for feet that stand, or of the sole centres when
+    ``flying``.
     """
 
     com: Array
@@ -55,6 +58,7 @@ class Motion:
     rotation_rate: Array
     by_momentum: tuple[bool, bool, bool]
     foot_velocity: Array
+    flying: bool = False
 
 
 def missing_joints(robot: RobotDescription) -> int:
@@ -91,6 +95,7 @@ class GuidedBody:
         self._stance = robot.standing_position.copy()
         self._stance[list(self._held)] = list(self._held.values())
         self._choice = np.zeros(n)
+        self._balls = {ball.foot: ball for ball in ball_feet(robot)}
 
     def standing(self, joints: Array) -> Array:
         """The configuration with these joint angles, upright, the soles' middle at the origin.
@@ -105,9 +110,16 @@ class GuidedBody:
         return q
 
     def feet(self, q: Array) -> Array:
-        """The sole centres (n_feet, 3)."""
+        """The sole centres (n_feet, 3); of a ball foot its lowest point."""
         self.pinocchio.framesForwardKinematics(self.model, self.data, q)
-        return np.array([self.data.oMf[frame].translation for frame in self.soles])
+        return np.array([self._sole(foot) for foot in range(len(self.soles))])
+
+    def _sole(self, foot: int) -> Array:
+        ball, place = self._balls.get(foot), self.data.oMf[self.soles[foot]]
+        if ball is None:
+            return np.array(place.translation)
+        joint = self.data.oMi[self.model.frames[self.soles[foot]].parentJoint]
+        return np.asarray(joint.act(ball.centre) - [0.0, 0.0, ball.radius])
 
     def com(self, q: Array) -> Array:
         """The centre of mass (3,)."""
@@ -142,7 +154,7 @@ class GuidedBody:
             jacobian = pin.getFrameJacobian(
                 self.model, self.data, frame, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
             )
-            matrix[row : row + 3] = jacobian[0:3]
+            matrix[row : row + 3] = self._place_rows(foot, jacobian, motion.flying)
             matrix[row + 3 : end] = self._turning_rows(foot, jacobian[3:6])
             wanted[row : row + 3] = motion.foot_velocity[foot]
             wanted[row + 3 : end] = 0.0
@@ -152,6 +164,21 @@ class GuidedBody:
         choice[6:] = _RETURN_RATE * (self._stance - q[7:])
         found = np.linalg.lstsq(matrix, wanted - matrix @ choice)[0]
         return np.asarray(choice + found)
+
+    def _place_rows(self, foot: int, jacobian: Array, flying: bool) -> Array:
+        """The rows (3, n) of a foot's velocity; jacobian: of its sole's frame, (6, n)."""
+        ball = self._balls.get(foot)
+        if ball is None:
+            return jacobian[0:3]
+        # A ball rolls: on the ground the material at its lowest point stands still, while that
+        # point moves along with the ball's centre, which is what is guided in flight.
+        place = self.data.oMf[self.soles[foot]].translation
+        lever = self._sole(foot) - place
+        if flying:
+            lever[2] += ball.radius
+        x, y, z = lever
+        skew = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+        return np.asarray(jacobian[0:3] - skew @ jacobian[3:6])
 
     def _turning_rows(self, foot: int, turning: Array) -> Array:
         """Of the rows (3, n) of a foot's turning in the world those that it holds."""

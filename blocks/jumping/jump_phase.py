@@ -13,8 +13,18 @@ from ...runtime.language.block import Block, Input, Output, State
 from ...runtime.language.parameters import Parameters, live_parameter
 from ...runtime.language.signals import Field, Signal
 from ..signals import ContactState, DynamicsTerms, JumpReference, Phase, PhaseState
-
-_THRUST = int(Phase.THRUST)
+from .phase_table import (
+    IN_PHASE,
+    LIFT_OFF,
+    NOW,
+    REMAINING,
+    TABLE,
+    TOUCHDOWN,
+    UNLOADED,
+    Condition,
+    find_conditions,
+    next_phase,
+)
 
 
 class PhaseMemory(Signal):
@@ -42,25 +52,27 @@ class JumpPhase(Block):
     FLIGHT        at the first contact after ``touchdown_share`` of the predicted flight
     LANDING       ``landing_time`` after touchdown; where the plan has another flight, with the
                   planned thrust, and THRUST follows again
+    RECOVER       never; it follows the last LANDING
     FAULT         never; entered from any other phase on the conditions below
     ============  =====================================================================
 
-    RECOVER follows the last LANDING and stays. FAULT: no point has had contact for ``lost_contact`` while
-    the robot should stand, or the flight has lasted that much longer than predicted at its start
-    by the plan.
+    The table that the block works from is ``phase_table.TRANSITIONS``. FAULT follows where no point
+    has had contact for ``lost_contact`` while the robot should stand, or where the flight has
+    lasted that much longer than the plan predicted at its start.
 
-    Stance: before lift-off the points that carry load in the plan, so that heels may rise while
-    the toes still push; where the plan has none of them, those of the tick before; in flight none; after touchdown every point that had
-    contact within the last ``contact_hold``, and those of the same foot that are less than
-    ``flat_height`` above the lowest of these; if that leaves none, those of the tick before. A
+    The stance points, of any number of feet and points: before lift-off those that carry load in
+    the plan, so that heels may rise while the toes still push; where the plan has none of them,
+    those of the tick before. In flight there are none. After touchdown they are every point that
+    had contact within the last ``contact_hold``, and those of the same foot that are less than
+    ``flat_height`` above the lowest of these; if that leaves none, those of the tick before. (A
     controller that may push with a heel a hair above the ground brings it down by doing so; one
-    that may not lets the robot teeter on its toes.
+    that may not lets the robot teeter on its toes.)
 
     The time to touchdown is the ballistic fall of the measured centre of mass to the height it is
     planned to touch down at: z + v s - g s^2 / 2 = z_td.
 
-    Does not judge tilt, torques or sensors (``SafetyMonitor`` does), and goes back for nothing but
-    another planned flight.
+    The block does not judge tilt, torques or sensors (``SafetyMonitor`` does), and it never goes
+    back to an earlier phase except for another planned flight.
     """
 
     class Params(Parameters):
@@ -96,6 +108,15 @@ class JumpPhase(Block):
 
     def setup(self) -> None:
         self._foot_of_point = np.array(self.robot.foot_of_contact())
+        self._table, self._holds = TABLE, np.zeros(len(Condition), bool)
+        self._times = np.zeros(6)
+        self.on_parameters()
+
+    def on_parameters(self) -> None:
+        p = self.params
+        self._limits = np.array([
+            p.late_lift_off, p.early_lift_off, p.touchdown_share, p.landing_time, p.lost_contact,
+        ])  # fmt: skip
 
     def start(self) -> None:
         self.memory.touchdown[()] = -1.0
@@ -120,11 +141,12 @@ class JumpPhase(Block):
                 ),
             )  # fmt: skip
         before = int(memory.phase)
-        phase = next_phase(
-            before, int(self.reference.phase), now - float(memory.began), now, lift_off,
-            touchdown_time, remaining, shortest, p.late_lift_off, p.early_lift_off,
-            p.touchdown_share, p.landing_time, p.lost_contact, another,
-        )  # fmt: skip
+        times = self._times
+        times[NOW], times[IN_PHASE] = now, now - float(memory.began)
+        times[LIFT_OFF], times[TOUCHDOWN] = lift_off, touchdown_time
+        times[REMAINING], times[UNLOADED] = remaining, shortest
+        find_conditions(times, self._limits, int(self.reference.phase), another, self._holds)
+        phase = next_phase(self._table, before, self._holds)
         if phase != before:
             memory.phase[()] = phase
             memory.began[()] = now
@@ -165,56 +187,6 @@ def time_to_height(height: float, velocity: float, goal: float) -> float:
     """The time [s] until a falling body comes down to ``goal``; its apex where it is below that."""
     square = velocity * velocity + 2.0 * GRAVITY * (height - goal)
     return max(0.0, (velocity + math.sqrt(max(square, 0.0))) / GRAVITY)
-
-
-@kernel
-def next_phase(
-    phase: int,
-    planned: int,
-    time_in_phase: float,
-    now: float,
-    lift_off_time: float,
-    touchdown_time: float,
-    remaining: float,
-    unloaded: float,
-    late_lift_off: float,
-    early_lift_off: float,
-    touchdown_share: float,
-    landing_time: float,
-    lost_contact: float,
-    another: bool,
-) -> int:
-    """The phase that follows; see the block's text.
-
-    Args:
-        unloaded: how long no point has had contact [s].
-        lift_off_time, touchdown_time: planned, of the next flight, the one under way or the last.
-        remaining: predicted time to touchdown [s].
-        another: whether the plan has a flight behind that one.
-    """
-    if phase == Phase.FAULT:
-        return Phase.FAULT
-    if phase == Phase.FLIGHT:
-        if unloaded == 0.0 and time_in_phase >= touchdown_share * (time_in_phase + remaining):
-            return Phase.LANDING
-        if time_in_phase > touchdown_time - lift_off_time + lost_contact:
-            return Phase.FAULT
-        return Phase.FLIGHT
-    if unloaded > lost_contact:
-        return Phase.FAULT
-    if phase >= Phase.LANDING:
-        if another and phase == Phase.LANDING:
-            return Phase.THRUST if planned == Phase.THRUST else Phase.LANDING
-        if phase == Phase.LANDING and time_in_phase >= landing_time:
-            return Phase.RECOVER
-        return phase
-    if now >= lift_off_time:
-        waiting = unloaded == 0.0 and now < lift_off_time + late_lift_off
-        return Phase.THRUST if waiting else Phase.FLIGHT
-    second_half = phase == Phase.THRUST and now + time_in_phase >= lift_off_time
-    if second_half and unloaded >= early_lift_off:
-        return Phase.FLIGHT
-    return max(phase, min(planned, _THRUST))
 
 
 @kernel

@@ -18,9 +18,6 @@ if TYPE_CHECKING:
     from ...planner.task.task import JumpTask
     from ...robots.description import RobotDescription
 
-SHIPPED = Path(__file__).parents[2] / "graphs"
-"""Where tasks are looked for that are not beside the graph."""
-
 
 class JumpPlan(Block):
     """The motion of a jump that the kino-dynamic planner found (section III): what to follow.
@@ -30,21 +27,21 @@ class JumpPlan(Block):
     library under the task's hash: the shipped plans need no solver. Where there is none it is
     solved while the graph loads, from the nearest plan of the library, and kept.
 
-    Every plan, also a kept one, first passes the validity check (``planner/checking/validity``) with
-    exact dynamics. With ``check: reported`` one that fails it is followed all the same, to compare
-    the formulations ``paper`` and ``srbm``, whose plans always fail: then the run's cautions say so
-    with every test that failed, and the metrics have ``plan_valid`` and ``plan_tests_failed``. Of
-    those formulations the reference has the centre of mass and momentum that the plan believes in.
-    ``formulation`` plans the same task in another one, without what only ``full`` has: impacts,
-    margins and limits of the motors.
+    Every plan, also a kept one, first passes the validity check
+    (``planner/checking/validity``) with exact dynamics. With ``check: reported`` a plan that fails
+    it is followed all the same, to compare the formulations ``paper`` and ``srbm``, whose plans
+    always fail: then the run's cautions say so with every test that failed, and the metrics have
+    ``plan_valid`` and ``plan_tests_failed``. For those formulations the reference has the centre of
+    mass and momentum that the plan believes in. ``formulation`` plans the same task in another one,
+    without what only ``full`` has: impacts, margins and limits of the motors.
 
-    At the start the robot stands still for ``stand_time``; at the end it stays
-    where the plan ended. Between the plan's knots the reference is read from a table of 2 ms steps
-    (``planner/library/reference_table``), what is fed forward ``lead`` ahead of time.
+    At the start the robot stands still for ``stand_time``; at the end it stays where the plan
+    ended. Between the plan's knots the reference is read from a table of 2 ms steps
+    (``planner/library/reference_table``); what is fed forward is read ``lead`` ahead of time.
 
-    It follows time alone and knows nothing of what the robot really does. Raises ``BlockError`` at
-    load where the task cannot be read or is for another robot, cannot be planned, or its plan is
-    not valid and must be; the message says which constraint or which test.
+    The block follows time alone and knows nothing of what the robot really does. It raises
+    ``BlockError`` at load where the task cannot be read or is for another robot, where it cannot be
+    planned, or where its plan must be valid and is not; the message says which constraint or test.
     """
 
     class Params(Parameters):
@@ -130,21 +127,14 @@ class JumpPlan(Block):
         return task.model_copy(update={"formulation": chosen, "impact": impact})
 
     def _named_task(self) -> JumpTask:
+        from ...planner.library.shipped import find_task
         from ...planner.task.task import TaskError, make_task, read_task
 
         wanted = self.params.task
         try:
             if not isinstance(wanted, str):
                 return make_task({"name": self.context.path, **wanted})
-            places = [folder / wanted for folder in (self.context.folder, Path(), SHIPPED)]
-            found = [place for place in places if place.is_file()]
-            if not found:
-                there = sorted(path.stem for path in (SHIPPED / "tasks").glob("*.yaml"))
-                raise BlockError(
-                    f"there is no task {wanted!r} beside the graph or among the shipped ones: "
-                    + ", ".join(f"tasks/{name}.yaml" for name in there)
-                )
-            return read_task(found[0])
+            return read_task(find_task(wanted, self.context.folder, Path()))
         except TaskError as error:
             raise BlockError(str(error)) from error
 

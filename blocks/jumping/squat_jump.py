@@ -224,6 +224,7 @@ class _Jump:
         motion.com_acceleration = fall
         motion.by_momentum = (True, True, True)
         motion.rotation = np.array([0.0, momentum, 0.0])
+        motion.flying = True
         motion.foot_velocity = np.tile(motion.com_velocity, (self.feet.shape[0], 1))
         if t < self.task.settle_time:
             motion.foot_velocity += [[leg.velocity(t) for leg in foot] for foot in self.legs]

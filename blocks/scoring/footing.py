@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from math import cos, sin
+from math import atan2, cos, hypot, sin
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...mathematics.constants import GRAVITY
-from ...mathematics.rotations import yaw
+from ...mathematics.rotations import rotate, yaw
+from ...robots.ball_feet import ball_feet
 from ...robots.description import RobotDescription
-from ...robots.limb import place_limb, read_limb
+from ...robots.link_poses import standing_heights
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -38,8 +39,10 @@ class Footing:
             [k for k, foot in enumerate(foot_of_contact) if foot == number]
             for number in range(len(robot.feet))
         ]
+        self._balls = [(ball, read_limb(robot, ball.foot)) for ball in ball_feet(robot)]
+        self._pose, self._axis = np.zeros((4, 3)), np.zeros(3)
         self.weight = robot.total_mass * GRAVITY
-        self.standing_height = standing_height(robot)
+        self.standing_height = -float(standing_heights(robot).min())
 
     @property
     def fall_height(self) -> float:
@@ -79,6 +82,28 @@ class Footing:
                 mean = sum(middle[k].item(axis) for k in range(count)) / count
                 direction[number, axis] = middle[number].item(axis) - mean
 
+    def unroll(self, joints: Array, orientation: Array, middle: Array) -> None:
+        """Take from where ball feet are how far they have rolled there.
+
+        A ball that rolls without sliding moves by its radius times the angle by which its foot
+        leans, the way it leans. What is left is where it would stand upright: that moves only if
+        the foot slides.
+
+        Args:
+            joints: positions of the joints [rad or m], (n_joints,).
+            orientation: of the base, quaternion x, y, z, w.
+            middle: the middle of every foot's points (n_feet, 2), changed.
+        """
+        for ball, limb in self._balls:
+            angles = joints[list(limb.joints)]
+            place_limb(limb.links, limb.tip, angles, np.zeros((len(angles), 6)), self._pose)
+            rotate(orientation, self._pose[1:, 2], self._axis)
+            x, y, z = self._axis.tolist()
+            leaning = hypot(x, y)
+            way = ball.radius * atan2(leaning, z) / leaning if leaning > 1e-12 else ball.radius
+            middle[ball.foot, 0] -= way * x
+            middle[ball.foot, 1] -= way * y
+
     def points_missing(self, touched: Flags) -> int:
         """How many more points would have to carry load for every sole to be flat on the ground.
 
@@ -94,17 +119,3 @@ class Footing:
         """The least loaded foot's share of the weight; ``force`` on each point [N, world]."""
         loads = [sum(force[k].item(2) for k in indices) for indices in self.points_of_foot]
         return float(min(loads)) / self.weight
-
-
-def standing_height(robot: RobotDescription) -> float:
-    """How high the base's origin is above the lowest contact point in the standing pose [m]."""
-    lowest = 0.0
-    names = [foot.name for foot in robot.feet]
-    for contact in robot.contacts:
-        number = names.index(contact.foot)
-        limb, pose = read_limb(robot, number), np.zeros((4, 3))
-        angles = robot.standing_position[list(limb.joints)]
-        place_limb(limb.links, limb.tip, angles, np.zeros((len(angles), 6)), pose)
-        lever = np.array(contact.position) - np.array(robot.feet[number].sole)
-        lowest = min(lowest, float((pose[0] + pose[1:] @ lever)[2]))
-    return -lowest

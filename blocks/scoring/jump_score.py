@@ -84,6 +84,7 @@ class JumpScore(Block):
         self._footing.measure(
             truth.contact_position, truth.base_orientation, record.foot, record.direction
         )
+        self._footing.unroll(truth.joint_position, truth.base_orientation, record.foot)
         if self._planned:
             self._follow_reference(time, first)
         if first:

@@ -89,6 +89,7 @@ class StandScore(Block):
         self._footing.measure(
             truth.contact_position, truth.base_orientation, record.foot, record.direction
         )
+        self._footing.unroll(truth.joint_position, truth.base_orientation, record.foot)
         if record.ticks == 0:
             begin(record, truth)
             record.lowest_height[()] = height

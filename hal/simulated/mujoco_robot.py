@@ -12,6 +12,7 @@ from ...blocks.signals import ExternalForce, RobotTruth
 from ...robots.description import RobotDescription
 from ...runtime.language.block import Context, Input, Metric, Misfit, Output, State
 from ...runtime.language.parameters import Parameters
+from ...runtime.language.terrain import Ground, Terrain
 from ..robot import Robot
 from .base import BASES
 from .drives import Drives
@@ -119,6 +120,17 @@ class MujocoRobot(Robot):
                 found=f"{params.timestep} s",
                 fix=f"timestep: {_nearest_step(context.period, params.timestep):.10g} s",
             )
+
+    @classmethod
+    def terrain(cls, params: Parameters) -> Terrain | None:
+        """The scene's floor and boxes."""
+        assert isinstance(params, SimulatorParameters)
+        scene = params.build_scene()
+        boxes = (
+            Ground((box.x[0], box.y[0], box.bottom), (box.x[1], box.y[1], box.top))
+            for box in scene.boxes
+        )
+        return Terrain(scene.floor, tuple(boxes))
 
     @classmethod
     def local_dimensions(

@@ -33,7 +33,8 @@ class Push(Block):
     ``force * (cos(angle) cos(elevation), sin(angle) cos(elevation), sin(elevation))``, so 0 is
     forward, 90 deg to the left, 180 deg backward. The push lasts a whole number of ticks except
     that the force of the last one is scaled, so that the impulse is ``force * duration`` exactly.
-    A force of zero never pushes.
+    A force of zero never pushes. With ``speed_change`` the force is what changes the speed of the
+    robot's centre of mass by as much, so that the same push can be asked of robots of any mass.
 
     The paper's test is 70 N for 0.01 s, 0.03 s after lift-off; it does not say where. The default
     is the torso's centre of mass, 0.12 m above the whole robot's, so the push also turns it.
@@ -41,6 +42,9 @@ class Push(Block):
 
     class Params(Parameters):
         force: float = live_parameter(70.0, unit="N", ge=0, text="magnitude; zero: no push")
+        speed_change: float | None = live_parameter(
+            None, unit="m/s", ge=0, text="of the centre of mass, in place of `force`"
+        )
         angle: float = live_parameter(0.0, unit="rad", text="direction, from forward to the left")
         elevation: float = live_parameter(0.0, unit="rad", text="direction, above the horizontal")
         duration: float = live_parameter(0.01, unit="s", gt=0, text="how long it lasts")
@@ -79,9 +83,11 @@ class Push(Block):
     def on_parameters(self) -> None:
         """Work out the force."""
         params = self.params
-        flat = math.cos(params.elevation)
+        flat, force = math.cos(params.elevation), params.force
+        if params.speed_change is not None:
+            force = self.robot.total_mass * params.speed_change / params.duration
         direction = [flat * math.cos(params.angle), flat * math.sin(params.angle)]
-        self._force = params.force * np.array([*direction, math.sin(params.elevation)])
+        self._force = force * np.array([*direction, math.sin(params.elevation)])
 
     def step(self) -> None:
         """Wait for the trigger, then for the delay, then push."""

@@ -46,6 +46,7 @@ from numpy.typing import NDArray
 from ...robots.description import RobotDescription
 from ...runtime.language.layout import Layout
 from ...runtime.language.signals import Slot
+from ...runtime.language.terrain import Ground, Terrain
 
 FORMAT = 2
 """The number of this format; a reader refuses any other."""
@@ -57,10 +58,19 @@ EXACT, BUS, STATE, NOTE, SPAN = "exact", "bus", "state", "note", "span"
 
 @dataclass(frozen=True)
 class RecordedField:
-    """One field of the bus or of the state, without the code it was declared in.
+    """One field of the bus or of the state, without the code that declared it.
 
-    ``dimensions`` are the shape as declared (``n_joints``), ``shape`` in numbers; ``values`` names
-    the numbers of an int64 field; ``constant`` is true for an unwired input.
+    Attributes:
+        name: ``block.port.field``.
+        dtype: ``float64``, ``int64`` or ``bool``.
+        start: where it begins in its section of the buffer.
+        shape: its shape in numbers.
+        dimensions: its shape as declared (``n_joints``).
+        unit, frame, text: as declared.
+        values: the names of the numbers of an int64 field.
+        constant: whether it belongs to an unwired input.
+        signals: the name of the signal's class, and those of the signals that it derives from;
+            empty in recordings of versions before 0.2.
     """
 
     name: str
@@ -73,6 +83,7 @@ class RecordedField:
     text: str = ""
     values: Mapping[int, str] = field(default_factory=dict)
     constant: bool = False
+    signals: tuple[str, ...] = ()
 
     @property
     def field_name(self) -> str:
@@ -83,8 +94,9 @@ class RecordedField:
     def from_json(cls, data: Mapping[str, Any]) -> Self:
         """The field that ``dataclasses.asdict`` made plain."""
         values = {int(number): name for number, name in data["values"].items()}
-        shape, dimensions = tuple(data["shape"]), tuple(data["dimensions"])
-        return cls(**{**data, "values": values, "shape": shape, "dimensions": dimensions})
+        lists = ("shape", "dimensions", "signals")
+        tuples = {name: tuple(data[name]) for name in lists if name in data}
+        return cls(**{**data, "values": values, **tuples})
 
 
 @dataclass(frozen=True)
@@ -146,6 +158,7 @@ class Header:
         bus_start: the bytes of the bus before the first tick.
         robot: the robot's description, if the graph has one.
         source: the graph file, as the run was told.
+        terrain: the ground of the simulated world, if there is one.
     """
 
     name: str
@@ -166,6 +179,7 @@ class Header:
     order: tuple[str, ...] = ()
     robot: RobotDescription | None = None
     source: str = ""
+    terrain: Terrain | None = None
     format: int = FORMAT
 
     @property
@@ -192,7 +206,16 @@ class Header:
         data["bus_start"] = b64decode(data["bus_start"])
         data["blocks"] = tuple(RecordedBlock(**block) for block in data["blocks"])
         data["order"] = tuple(data["order"])
+        data["terrain"] = _terrain(data.get("terrain"))
         return cls(**data)
+
+
+def _terrain(data: Mapping[str, Any] | None) -> Terrain | None:
+    """Back from plain data; recordings before version 0.2 have none."""
+    if data is None:
+        return None
+    blocks = tuple(Ground(tuple(b["least"]), tuple(b["most"])) for b in data["blocks"])
+    return Terrain(data["floor"], blocks)
 
 
 @dataclass(frozen=True)

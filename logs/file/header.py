@@ -8,8 +8,9 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 from ...runtime.language.layout import Layout
-from ...runtime.language.signals import Field
+from ...runtime.language.signals import Field, Signal
 from ...runtime.language.stages import BlockSpec, CheckedGraph
+from ...runtime.language.terrain import Terrain
 from ...runtime.running.memory import BoundGraph
 from .format import Header, RecordedBlock, RecordedField, RecordedLayout
 
@@ -64,8 +65,14 @@ def make_header(
         blocks=tuple(_block(spec) for spec in graph.blocks),
         order=graph.order,
         robot=graph.robot,
+        terrain=next((found for spec in graph.blocks if (found := terrain_of(spec))), None),
         source=graph.file or next((spec.where.file for spec in graph.blocks if spec.where), ""),
     )
+
+
+def terrain_of(spec: BlockSpec) -> Terrain | None:
+    """The ground that a block knows of."""
+    return spec.block_type.terrain(spec.params)
 
 
 def _block(spec: BlockSpec) -> RecordedBlock:
@@ -80,32 +87,36 @@ def _parameters(graph: CheckedGraph) -> Iterator[tuple[str, float | str]]:
                 yield f"{spec.path}.{name}", value
 
 
-def _outputs(graph: CheckedGraph) -> Iterator[tuple[str, tuple[Field, bool]]]:
+Declared = tuple[type[Signal], Field, bool]
+"""The signal that a field belongs to, the field, and whether it is constant."""
+
+
+def _outputs(graph: CheckedGraph) -> Iterator[tuple[str, Declared]]:
     for spec in graph.blocks:
         for port, output in spec.block_type.outputs.items():
             for name, field in output.signal.fields.items():
-                yield f"{spec.path}.{port}.{name}", (field, False)
+                yield f"{spec.path}.{port}.{name}", (output.signal, field, False)
 
 
-def _constants(graph: CheckedGraph) -> Iterator[tuple[str, tuple[Field, bool]]]:
+def _constants(graph: CheckedGraph) -> Iterator[tuple[str, Declared]]:
     for spec in graph.blocks:
         for port, source in spec.block_type.inputs.items():
             if port not in spec.wires:
                 for name, field in source.signal.fields.items():
-                    yield f"{spec.path}.{port}.{name}", (field, True)
+                    yield f"{spec.path}.{port}.{name}", (source.signal, field, True)
 
 
-def _states(graph: CheckedGraph) -> Iterator[tuple[str, tuple[Field, bool]]]:
+def _states(graph: CheckedGraph) -> Iterator[tuple[str, Declared]]:
     for spec in graph.blocks:
         for port, state in spec.block_type.states.items():
             for name, field in state.signal.fields.items():
-                yield f"{spec.path}.{port}.{name}", (field, False)
+                yield f"{spec.path}.{port}.{name}", (state.signal, field, False)
 
 
-def _recorded(layout: Layout, declared: Mapping[str, tuple[Field, bool]]) -> RecordedLayout:
+def _recorded(layout: Layout, declared: Mapping[str, Declared]) -> RecordedLayout:
     fields = []
     for name, slot in layout.slots.items():
-        field, constant = declared[name]
+        signal, field, constant = declared[name]
         fields.append(
             RecordedField(
                 name=name,
@@ -118,9 +129,17 @@ def _recorded(layout: Layout, declared: Mapping[str, tuple[Field, bool]]) -> Rec
                 text=field.text,
                 values={int(v): v.name.lower() for v in field.values or ()},
                 constant=constant,
+                signals=_names(signal),
             )
         )
     return RecordedLayout(tuple(fields), dict(layout.lengths), dict(layout.offsets), layout.size)
+
+
+def _names(signal: type[Signal]) -> tuple[str, ...]:
+    """The names of the signal's class and of the signals that it derives from, nearest first."""
+    return tuple(
+        kind.__name__ for kind in signal.__mro__ if issubclass(kind, Signal) and kind is not Signal
+    )
 
 
 def versions() -> dict[str, str]:

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from ...robots.description import RobotDescription
 from ...robots.kinematics import link_poses
-from ..viewing.robot_shapes import capsules, shapes_of
-from ..viewing.scene_contacts import FORCE_SCALE
+from ..viewing.robot_shapes import capsules, eye_controls, shapes_of
+from ..viewing.scene_contacts import force_scale
 from ..viewing.scene_part import Colors
 
 Array = NDArray[np.float64]
@@ -99,7 +99,7 @@ def motion_blueprint(motion: RecordedMotion) -> Any:
     scene = rrb.Spatial3DView(
         origin="world",
         name="Robot",
-        eye_controls=rrb.EyeControls3D(position=(1.1, -1.1, 0.6), look_target=(0.0, 0.0, 0.3)),
+        eye_controls=eye_controls(motion.robot, 1.5),
         line_grid=rrb.LineGrid3D(visible=True, spacing=0.1),
     )
     plots = [rrb.TimeSeriesView(origin=series_entity(title), name=title) for title in motion.series]
@@ -134,7 +134,7 @@ def _write_world(stream: Any, motion: RecordedMotion) -> None:
         position, rotation = poses.of(link.name)
         transforms = rr.Transform3D.columns(translation=position, mat3x3=rotation)
         stream.send_columns(entity, times, transforms)
-    forces, count = motion.contact_force * FORCE_SCALE, len(robot.contacts)
+    forces, count = motion.contact_force * force_scale(robot), len(robot.contacts)
     stream.log("world/contact_forces", rr.Arrows3D.from_fields(colors=[COLORS.force]), static=True)
     arrows = rr.Arrows3D.columns(
         origins=motion.contact_position.reshape(-1, 3), vectors=forces.reshape(-1, 3)

@@ -29,6 +29,7 @@ from ..file.format import (
 from ..file.time_columns import time_columns
 from ..viewing.block_times import times_table
 from ..viewing.limits import limits_of
+from ..viewing.plot_views import EVERY_VALUE
 from ..viewing.scene import Scene
 from ..viewing.scene_part import Colors
 from ..viewing.scene_ports import scene_ports
@@ -93,13 +94,20 @@ class RunStream:
         text = rr.TextDocument(self.header.graph, media_type="text/plain")
         stream.log(f"{self._root}{GRAPH}", text, static=True)
         for field in self._fields:
-            if names := element_names(field, robot):
-                lines = rr.SeriesLines(names=names, colors=axis_colors(field))
-                stream.log(self._entity(SIGNALS, field), lines, static=True)
+            names = element_names(field, robot)
+            lines = rr.SeriesLines(
+                names=names or None,
+                colors=axis_colors(field) if names else None,
+                aggregation_policy=EVERY_VALUE,
+            )
+            stream.log(self._entity(SIGNALS, field), lines, static=True)
         for field, limits in self._limits:
             grey = np.full(len(limits), LIMIT_COLOR, np.uint32)
             lines = rr.SeriesLines(
-                names=[name for name, _ in limits], colors=grey, widths=[1.0] * len(limits)
+                names=[name for name, _ in limits],
+                colors=grey,
+                widths=[1.0] * len(limits),
+                aggregation_policy=EVERY_VALUE,
             )
             stream.log(self._entity(LIMITS, field), lines, static=True)
         for lane in self._lanes:

@@ -1,5 +1,8 @@
-"""What a run shows when it is opened, made from the graph: the robot in 3D and its states on the
-left; on the right the main signals, and behind them every block's, the times and the graph."""
+"""The layout in which the viewer shows a run, made from the graph.
+
+The robot in 3D and its states are on the left. On the right are tabs: the main signals, each block's
+signals, the blocks' times and the graph.
+"""
 
 from __future__ import annotations
 
@@ -8,11 +11,12 @@ from typing import Any
 
 from ..file.format import EVENTS, GRAPH, TIMES, WORLD, Header
 from .plot_views import Shown, block_tabs, main_plots
+from .robot_shapes import eye_controls
 from .scene_ports import scene_ports
 from .state_lanes import Lane, lanes_of
 
 LANES = ("active", "solved")
-"""The truth values that have lanes in the first picture; named numbers such as phases all have."""
+"""The truth values that have lanes beside those of the named numbers, such as phases."""
 HIDDEN_LANES = ("mode",)
 
 
@@ -42,7 +46,7 @@ def recording_blueprint(
         ),
         active_tab=0,
     )
-    left = rrb.Vertical(scene_view(shown), below, row_shares=[3, 2]) if ports else below
+    left = rrb.Vertical(scene_view(header, shown), below, row_shares=[3, 2]) if ports else below
     panel = {"play_state": "following"} if live else {"play_state": "playing", "loop_mode": "all"}
     return rrb.Blueprint(
         rrb.Horizontal(left, right, column_shares=[2, 3]),
@@ -52,21 +56,21 @@ def recording_blueprint(
     )
 
 
-def scene_view(shown: Sequence[Shown]) -> Any:
-    """The robot, or the robots, in 3D; the eye stands to the right and in front of it."""
+def scene_view(header: Header, shown: Sequence[Shown]) -> Any:
+    """The robot in 3D; of a comparison both robots."""
     import rerun.blueprint as rrb
 
     return rrb.Spatial3DView(
         origin=WORLD if not shown[0].root else "/",
         contents=[f"/{run.root}{WORLD}/**" for run in shown],
         name="Robot",
-        eye_controls=rrb.EyeControls3D(position=(0.6, -0.8, 0.4), look_target=(0.0, 0.0, 0.25)),
+        eye_controls=eye_controls(header.robot),
         line_grid=rrb.LineGrid3D(visible=True, spacing=0.1),
     )
 
 
 def main_lanes(header: Header) -> list[Lane]:
-    """The lanes of the first picture."""
+    """The lanes that are shown at first."""
     return [
         lane
         for field in header.bus.fields
@@ -77,7 +81,7 @@ def main_lanes(header: Header) -> list[Lane]:
 
 
 def states_view(header: Header, shown: Sequence[Shown]) -> Any:
-    """Phases, contacts and whether the problem was solved, a lane each."""
+    """One lane each for phases, contacts and whether the quadratic program was solved."""
     import rerun.blueprint as rrb
 
     lanes = [

@@ -1,50 +1,64 @@
-"""What bounds a field, as far as the robot's description says: drawn as lines into its plot."""
+"""The limits of a field by the robot's description, which are drawn as lines into its plot."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 
+from ...robots.description import RobotDescription
 from ..file.format import Header, RecordedField
 
 
 def limits_of(field: RecordedField, header: Header) -> list[tuple[str, float]]:
-    """The bounds of a field's elements, each with its name; equal ones once.
+    """The limits of a field's elements, each with its name; equal ones are given once.
 
-    Joint angles have the joints' limits; motor torques and speeds those of the actuators that the
-    graph says the robot has; joint torques what these motors give at most through the transmission.
+    Joint angles have the joints' limits, where these have any. Motor torques and speeds have the
+    limits of the actuator profile in use. Joint torques have what these motors give at most
+    through the transmission.
     """
     robot = header.robot
-    if robot is None or "n_joints" not in field.dimensions:
+    if robot is None or "n_joints" not in field.dimensions or not robot.joints:
         return []
-    if field.unit == "rad" and len(robot.joints):
-        named = [
+    if field.unit == "rad":
+        return _once(
             (f"{joint.name} {side}", value)
             for joint in robot.joints
             for side, value in zip(("least", "most"), joint.limits or (), strict=False)
-        ]
-        return _once(named)
-    names = {str(value) for value in header.parameters.values()}
-    profile = next((p for name, p in robot.profiles.items() if name in names), None)
-    if profile is None:
-        return []
-    motor = "motor" in field.field_name
-    if field.unit == "N m" and motor:
-        return _both("peak torque", [profile.peak_torque])
+        )
+    motors, of_motor = _robot_in_use(header, robot).motors, "motor" in field.field_name
+    if field.unit == "N m" and of_motor:
+        return _both("peak torque", motors.peak_torque.tolist())
     if field.unit == "N m":
-        peaks = np.abs(robot.joint_to_motor.T).sum(axis=1) * profile.peak_torque
-        return _both("peak torque", sorted(set(peaks.tolist())))
-    if field.unit == "rad/s" and motor:
-        return _both("no-load speed", [profile.no_load_speed])
+        peaks = np.abs(robot.joint_to_motor.T) @ motors.peak_torque
+        return _both("peak torque", peaks.tolist())
+    if field.unit == "rad/s" and of_motor:
+        return _both("no-load speed", motors.no_load_speed.tolist())
     return []
 
 
+def _robot_in_use(header: Header, robot: RobotDescription) -> RobotDescription:
+    """The robot with the actuator profile of the run.
+
+    In recordings of versions before 0.2 a parameter of some block names the profile.
+    """
+    texts = {str(value) for value in header.parameters.values()}
+    earlier = [name for name in robot.profiles if name in texts]
+    return robot.with_profile(earlier[0]) if earlier and not robot.profile else robot
+
+
 def _both(name: str, values: list[float]) -> list[tuple[str, float]]:
-    return [(f"{sign}{name}", factor * v) for v in values for sign, factor in (("+", 1), ("-", -1))]
+    """Each value with both signs."""
+    signed = (
+        (f"{sign}{name}", factor * v) for v in values for sign, factor in (("+", 1), ("-", -1))
+    )
+    return _once(signed)
 
 
-def _once(named: list[tuple[str, float]]) -> list[tuple[str, float]]:
-    """Each value once, with the name it had first."""
-    found: dict[float, str] = {}
+def _once(named: Iterable[tuple[str, float]]) -> list[tuple[str, float]]:
+    """Each value once, with the name it had first. What is not finite limits nothing."""
+    found: dict[float, tuple[str, float]] = {}
     for name, value in named:
-        found.setdefault(round(value, 9), name)
-    return [(name, value) for value, name in found.items()]
+        if np.isfinite(value):
+            found.setdefault(round(value, 9), (name, value))
+    return list(found.values())

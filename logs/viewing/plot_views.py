@@ -24,6 +24,10 @@ OTHER = np.array([0xFFA726FF, 0xC0CA33FF, 0x26C6DAFF], np.uint32)
 DARK = np.array([0x8E3B38FF, 0x3E6B40FF, 0x2B628EFF], np.uint32)
 """x, y and z of a plan, below the true values."""
 
+EVERY_VALUE = "Off"
+"""How Rerun sums up neighbouring values in a plot: not at all, as a mean over a touchdown halves the
+peak of a force, and shows one in the flight before it."""
+
 
 @dataclass(frozen=True)
 class Shown:
@@ -80,7 +84,7 @@ def _series(header: Header, line: Line, label: str, *, other: bool) -> Any:
     if line.field.shape == (3,):
         colors = OTHER if other else AXES if line.colors is None else line.colors
     widths = [1.0 if other or line.label in ("estimated", "planned") else 2.0] * len(names)
-    return rr.SeriesLines(names=names, colors=colors, widths=widths)
+    return rr.SeriesLines(names=names, colors=colors, widths=widths, aggregation_policy=EVERY_VALUE)
 
 
 def main_plots(header: Header, ports: ScenePorts | None, shown: Sequence[Shown]) -> list[Any]:
@@ -89,13 +93,14 @@ def main_plots(header: Header, ports: ScenePorts | None, shown: Sequence[Shown])
     fields = {field.name: field for field in header.bus.fields if not field.constant}
     if ports is None:
         return [field_plot(header, field, shown) for field in list(fields.values())[:MOST_PLOTS]]
-    base = ports.pose.base_position
+    pose = ports.pose.block
     velocity = next(
         (n for end in ("base_linear_velocity", "linear_velocity")
-         if (n := f"{block_of(base)}.{end}") in fields),
+         if (n := f"{pose}.{end}") in fields),
         "",
     )  # fmt: skip
-    estimate = ports.estimate.base_position if ports.estimate else ""
+    base = ports.pose.base_position or ""
+    estimate = (ports.estimate.base_position or "") if ports.estimate else ""
     overlays = (
         ("centre of mass", ports.com or "", "", f"{ports.plan}.com"),
         ("base", base, estimate, ""),
@@ -108,7 +113,7 @@ def main_plots(header: Header, ports: ScenePorts | None, shown: Sequence[Shown])
         if lines:
             lines.sort(key=lambda line: line.label != "")  # the true one first: it names the unit
             plots.append(plot(header, name, [_named(line) for line in lines], shown))
-    names = [f"{block_of(base)}.{field}" for field in MAIN_FIELDS]
+    names = [f"{pose}.{field}" for field in MAIN_FIELDS]
     plots += [field_plot(header, fields[name], shown) for name in names if name in fields]
     return plots
 

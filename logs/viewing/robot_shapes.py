@@ -1,4 +1,4 @@
-"""A robot's links as Rerun draws them: solid capsules, or their wires for a second robot."""
+"""The links of a robot as Rerun draws them: solid capsules, or outlines for a second robot."""
 
 from __future__ import annotations
 
@@ -9,20 +9,49 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...robots.description import Link, RobotDescription, Shape
+from ...robots.kinematics import link_poses
 
 Array = NDArray[np.float64]
 
 
 def shapes_of(robot: RobotDescription, link: Link) -> list[Shape]:
-    """What to draw for a link: its collision shapes, or else bones to the joints it carries."""
+    """What is drawn for a link: its collision shapes, or else bones from its origin.
+
+    The bones go to the joints that the link carries and to its contact points.
+    """
     if link.shapes:
         return list(link.shapes)
+    feet = [foot.name for foot in robot.feet if foot.link == link.name]
     ends = [joint.origin for joint in robot.joints if joint.parent == link.name]
-    return [Shape(start=(0.0, 0.0, 0.0), end=end, radius=0.01) for end in ends]
+    ends += [contact.position for contact in robot.contacts if contact.foot in feet]
+    radius = 0.025 * reach_of(robot)
+    return [Shape(start=(0.0, 0.0, 0.0), end=end, radius=radius) for end in ends]
+
+
+def reach_of(robot: RobotDescription) -> float:
+    """The largest distance of a link's origin from the base's in the standing pose [m].
+
+    It is the measure of how large things are drawn; 0.1 m for a robot of one link.
+    """
+    base, turn = np.zeros((1, 3)), np.array([[0.0, 0.0, 0.0, 1.0]])
+    poses = link_poses(robot, base, turn, robot.standing_position[None])
+    return max(0.1, float(np.linalg.norm(poses.position[0], axis=1).max()))
+
+
+def eye_controls(robot: RobotDescription | None, distance: float = 1.0) -> Any:
+    """An eye to the right and in front of a standing robot, ``distance`` times the usual way off."""
+    import rerun.blueprint as rrb
+
+    size = 2.5 * (reach_of(robot) if robot is not None else 0.4)
+    position = tuple(distance * size * part for part in (0.6, -0.8, 0.4))
+    return rrb.EyeControls3D(position=position, look_target=(0.0, 0.0, 0.25 * size))
 
 
 def capsules(shapes: Sequence[Shape], color: int, *, wires: bool = False) -> Any:
-    """Rerun's capsules, which reach from their origin along +z, turned to lie on ``shapes``."""
+    """Rerun's capsules for ``shapes``, in the link's frame; with ``wires`` only their outlines.
+
+    A capsule of Rerun's reaches from its origin along +z, so each is turned.
+    """
     import rerun as rr
 
     starts = np.array([shape.start for shape in shapes]).reshape(-1, 3)
@@ -33,8 +62,10 @@ def capsules(shapes: Sequence[Shape], color: int, *, wires: bool = False) -> Any
         radii=[shape.radius for shape in shapes],
         translations=starts,
         quaternions=np.array([quaternion_from_z(span) for span in spans]).reshape(-1, 4),
-        colors=[color] * len(shapes),
-        line_radii=[0.0006] * len(shapes),
+        # an array of 32-bit colours: a list of four numbers could be one colour's red, green, blue
+        # and alpha
+        colors=np.full(len(shapes), color, np.uint32),
+        line_radii=np.full(len(shapes), 0.0006),
         fill_mode="majorwireframe" if wires else "solid",
     )
 

@@ -15,10 +15,11 @@ from .scene_part import Colors, Moments
 from .scene_ports import ScenePorts
 from .scene_push import PushPart
 from .scene_robot import RobotPart
+from .scene_terrain import TerrainPart
 
 PICTURE_RATE = 100.0
 """Pictures a second [Hz]: more than an eye sees, a fifth of the bytes."""
-PARTS = (RobotPart, ContactPart, MassCentrePart, PlanPart, FootTargetPart, PushPart)
+PARTS = (TerrainPart, RobotPart, ContactPart, MassCentrePart, PlanPart, FootTargetPart, PushPart)
 
 
 class Scene:

@@ -7,15 +7,23 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from ...robots.description import RobotDescription
+from .robot_shapes import reach_of
 from .scene_part import Array, Moments, ScenePart
 
-FORCE_SCALE = 0.002
-"""Length of an arrow [m] for each newton: the weight of BRUCE is 10 cm."""
+ARROW = 0.02
+"""The length of a force arrow [m] for each m/s^2 that the force gives the whole robot, for each
+metre of the robot's reach: the arrow of its weight is a fifth of its reach."""
 CONE_HEIGHT = 0.06
 """Height [m] at which a friction cone is cut: less than an arrow of the usual load."""
 CONE_SIDES = 16
 ABOVE_GROUND = 0.001
-"""Lines on the ground are drawn this far [m] above it, not to be swallowed by the grid."""
+"""Lines on the ground are drawn this far above it [m], so that the grid does not hide them."""
+
+
+def force_scale(robot: RobotDescription) -> float:
+    """The length of a force arrow for each newton [m/N]: small robots have small forces."""
+    return ARROW * reach_of(robot) / robot.total_mass
 
 
 class ContactPart(ScenePart):
@@ -38,7 +46,7 @@ class ContactPart(ScenePart):
         self.log("support_polygon", polygon)
 
     def write(self, moments: Moments) -> None:
-        """Write the forces and what follows from them."""
+        """Write the forces, the cones and the polygon."""
         import rerun as rr
 
         if self.ports.contact_position is None or self.ports.contact_force is None:
@@ -46,7 +54,8 @@ class ContactPart(ScenePart):
         position = moments[self.ports.contact_position]
         force = moments[self.ports.contact_force]
         arrows = rr.Arrows3D.columns(
-            origins=position.reshape(-1, 3), vectors=(force * FORCE_SCALE).reshape(-1, 3)
+            origins=position.reshape(-1, 3),
+            vectors=(force * force_scale(self.robot)).reshape(-1, 3),
         )
         counts = np.full(len(position), position.shape[1])
         self.send("contact_forces", moments, arrows.partition(counts))

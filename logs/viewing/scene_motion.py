@@ -22,7 +22,7 @@ class MassCentrePart(ScenePart):
             self.log("com_projection", line)
 
     def write(self, moments: Moments) -> None:
-        """Write where it is."""
+        """Write where the centre of mass is."""
         import rerun as rr
 
         if self.ports.com is None:
@@ -43,10 +43,10 @@ class MassCentrePart(ScenePart):
 
 
 class PlanPart(ScenePart):
-    """``plan/com`` and ``plan/<foot>``: the reference, placed where the robot stood at first.
+    """``plan/com`` and ``plan/<foot>``: the planned motion, placed where the robot stood at first.
 
-    A plan counts from where the robot stood; here, where the middle of its contact points was in
-    the first tick that was written.
+    The positions of a plan are relative to where the robot stands before. Here that is the middle
+    of its contact points in the first tick that is written.
     """
 
     _start: Array | None = None
@@ -87,8 +87,7 @@ class PlanPart(ScenePart):
                 planned = moments.batch.signal(f"{self.ports.plan}.foot_position")[0]
                 feet = self.robot.foot_of_contact()
                 middles = [
-                    contacts[[foot == k for foot in feet]].mean(axis=0)
-                    for k in range(len(self.robot.feet))
+                    contacts[[foot == k for foot in feet]].mean(axis=0) for k in sorted({*feet})
                 ]
                 self._start = np.mean(middles, axis=0) - planned.mean(axis=0)
         return self._start
@@ -104,7 +103,7 @@ class FootTargetPart(ScenePart):
                 self.log(f"foot_targets/{foot.name}", foot_outline(self, k, self.colors.target))
 
     def write(self, moments: Moments) -> None:
-        """Write where they are wanted."""
+        """Write where the controller wants the feet."""
         import rerun as rr
 
         if self.ports.feet is None:
@@ -120,8 +119,10 @@ class FootTargetPart(ScenePart):
 
 
 def foot_outline(part: ScenePart, foot: int, color: int) -> object:
-    """The outline of a sole in its own frame: a box around its contact points, as wide at least
-    as one of them."""
+    """The outline of a sole in its own frame: a box around its contact points and their radius.
+
+    The outline of a point foot is a square as wide as the foot.
+    """
     import rerun as rr
 
     robot = part.robot

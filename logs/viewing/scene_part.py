@@ -1,4 +1,4 @@
-"""What the parts of the 3D scene have in common: where they write to, and the instants drawn."""
+"""What the parts of the 3D scene share: where they write to, and the instants that are drawn."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Colors:
-    """What belongs to one run is drawn in its colours, as 0xRRGGBBAA."""
+    """The colours in which one run is drawn, as 0xRRGGBBAA."""
 
     robot: int = 0x90A4AEFF
     estimate: int = 0x42A5F5FF
@@ -37,7 +37,13 @@ OTHER_RUN = Colors(robot=0xD7A86EFF, estimate=0xFFCC80FF, force=0xB71C1CFF, com=
 
 @dataclass(frozen=True)
 class Moments:
-    """The instants of a batch that are drawn: ``due`` of its ticks, with their ``times``."""
+    """The instants of a batch that are drawn.
+
+    Attributes:
+        batch: the ticks and their signals.
+        due: which of the batch's ticks are drawn, (n,).
+        times: their times, as Rerun's columns.
+    """
 
     batch: RecordedRows
     due: NDArray[np.int64]
@@ -51,9 +57,11 @@ class Moments:
         return self.batch.signal(name)[self.due]
 
     def poses(self, robot: RobotDescription, source: PoseSource) -> LinkPoses:
-        """Where the links are at these instants."""
-        base, orientation = self[source.base_position], self[source.base_orientation]
-        return link_poses(robot, base, orientation, self[source.joint_position])
+        """Where the links are at these instants. A fixed base is at the origin."""
+        base, turn = np.zeros((len(self), 3)), np.tile([0.0, 0.0, 0.0, 1.0], (len(self), 1))
+        if source.base_position is not None and source.base_orientation is not None:
+            base, turn = self[source.base_position], self[source.base_orientation]
+        return link_poses(robot, base, turn, self[source.joint_position])
 
 
 class ScenePart:

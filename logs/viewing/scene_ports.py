@@ -1,5 +1,10 @@
-"""What of a graph can be drawn in 3D. A recording does not say which signal a port carries, so
-ports are known by their fields' names: whoever calls his ``com`` and ``contact_force`` is drawn."""
+"""Which signals of a graph are drawn in 3D.
+
+A port is drawn by the type of its signal: a ``RobotTruth`` poses the solid robot, an
+``ExternalForce`` is an arrow, and so on. A signal of a project's own is drawn too if it derives from
+one of these types, or if it has the same fields. Recordings of versions before 0.2 keep no types,
+so all their ports are found by their fields.
+"""
 
 from __future__ import annotations
 
@@ -8,33 +13,70 @@ from dataclasses import dataclass
 
 from ..file.format import Header, RecordedField
 
-POSE_FIELDS = ("base_position", "base_orientation", "joint_position")
+
+@dataclass(frozen=True)
+class Role:
+    """What a port is drawn as: the name of its signal's type, and fields that tell a similar type.
+
+    A field ``name:dimension`` must also have that dimension. A port with one of the fields in
+    ``lacks`` has not this role.
+    """
+
+    signal: str
+    fields: tuple[str, ...]
+    lacks: tuple[str, ...] = ()
+
+
+TRUTH = Role("RobotTruth", ("base_position", "base_orientation", "joint_position"))
+LOADS = Role("RobotTruth", ("contact_position", "contact_force"))
+GROUND = Role("RobotTruth", ("ground_height",))
+BASE = Role("BaseState", ("position", "orientation", "linear_velocity"))
+JOINTS = Role("JointState", ("position:n_joints", "velocity", "torque"), lacks=("stiffness",))
+TERMS = Role("DynamicsTerms", ("com", "contact_position"))
+FORCES = Role("WholeBodyCommand", ("force:n_contacts",))
+PLAN = Role("JumpReference", ("com", "foot_position", "foot_yaw"))
+FEET = Role("FootTarget", ("position:n_feet", "rotation:n_feet"))
+PUSH = Role("ExternalForce", ("force", "point"))
+ROLES = (TRUTH, LOADS, GROUND, BASE, JOINTS, TERMS, FORCES, PLAN, FEET, PUSH)
+OTHERS = (
+    "ContactState", "ContactSwitches", "EstimatorHealth", "ImuReading", "JointCommand",
+    "JointTarget", "PhaseState", "WholeBodyTarget",
+)  # fmt: skip
+"""Signals of the common vocabulary that have no role: similar fields do not give them one."""
 
 
 @dataclass(frozen=True)
 class PoseSource:
-    """The full names of the fields that say where every link is."""
+    """The full names of the fields that say where every link is.
 
-    base_position: str
-    base_orientation: str
+    The names for the base are ``None`` for a robot whose base is fixed: it is at the origin.
+    """
+
+    base_position: str | None
+    base_orientation: str | None
     joint_position: str
+
+    @property
+    def block(self) -> str:
+        """The port that poses the robot, ``block.port``: the base's, or the joints'."""
+        return block_of(self.base_position or self.joint_position)
 
 
 @dataclass(frozen=True)
 class ScenePorts:
-    """Full names, as ``block.port.field`` or ``block.port``; ``None`` where the graph has none.
+    """What is drawn, by full names ``block.port.field`` or ``block.port``; ``None`` for nothing.
 
     Attributes:
-        pose: of the robot that is drawn solid: the true one, or else the estimated one.
-        estimate: of the robot that is drawn beside it, where ``pose`` is the true one.
+        pose: poses the robot that is drawn solid: the true one, or else the estimated one.
+        estimate: poses the robot that is drawn as wires beside it, where ``pose`` is the true one.
         com: centre of mass [m].
         contact_position: contact points [m], (n_contacts, 3).
-        contact_force: the forces that act on them [N]: true ones, or else the commanded ones.
-        ground_height: of the ground below each contact point [m].
+        contact_force: the forces on them [N], true ones or else commanded ones.
+        ground_height: height of the ground below each contact point [m].
         plan: a port with the planned ``com``, ``foot_position`` and ``foot_yaw``.
         feet: a port with the feet's target ``position`` and ``rotation``, seen from the base.
         push: a port with a ``force`` from outside and the ``point`` it acts at.
-        friction: the coefficient that the block counts with which commands the forces.
+        friction: the friction coefficient of the block that commands the forces.
     """
 
     pose: PoseSource
@@ -49,6 +91,9 @@ class ScenePorts:
     friction: float | None = None
 
 
+Ports = Mapping[str, Mapping[str, RecordedField]]
+
+
 def ports_of(header: Header) -> dict[str, dict[str, RecordedField]]:
     """Every output as ``block.port``, with its fields by their own names, in file order."""
     ports: dict[str, dict[str, RecordedField]] = {}
@@ -58,66 +103,77 @@ def ports_of(header: Header) -> dict[str, dict[str, RecordedField]]:
     return ports
 
 
-def port_with(ports: Mapping[str, Mapping[str, RecordedField]], *fields: str) -> str | None:
-    """The first port that has all these fields; ``name:dimension`` also asks for a dimension."""
-    wanted = [field.partition(":")[::2] for field in fields]
-    return next(
-        (
-            port
-            for port, known in ports.items()
-            if all(
-                name in known and (not size or size in known[name].dimensions)
-                for name, size in wanted
-            )
-        ),
-        None,
+def port_of(ports: Ports, role: Role) -> str | None:
+    """The first port whose signal is of the role's type, or else the first one that is like it."""
+    known = {role.signal for role in ROLES} | set(OTHERS)
+    like = None
+    for port, fields in ports.items():
+        types = next(iter(fields.values())).signals
+        if not _has(fields, role):
+            continue
+        if role.signal in types:
+            return port
+        if like is None and known.isdisjoint(types):
+            like = port
+    return like
+
+
+def _has(fields: Mapping[str, RecordedField], role: Role) -> bool:
+    """Whether a port has all fields of a role and none that it lacks."""
+    wanted = [field.partition(":")[::2] for field in role.fields]
+    return not any(name in fields for name in role.lacks) and all(
+        name in fields and (not size or size in fields[name].dimensions) for name, size in wanted
     )
 
 
 def port_with_pose(header: Header) -> str | None:
-    """The first output, as ``block.port``, whose signal says where every link is."""
-    return port_with(ports_of(header), *POSE_FIELDS) if header.robot is not None else None
+    """The first output, as ``block.port``, whose signal says where every link truly is."""
+    return port_of(ports_of(header), TRUTH) if header.robot is not None else None
 
 
 def scene_ports(header: Header) -> ScenePorts | None:
-    """What can be drawn; ``None`` if nothing says where the robot is."""
-    if header.robot is None:
+    """What can be drawn of a graph; ``None`` where nothing says where the robot is."""
+    robot = header.robot
+    if robot is None:
         return None
     ports = ports_of(header)
-    truth = port_with_pose(header)
-    base = port_with(ports, "position", "orientation", "linear_velocity")
-    # measured joints: a command has gains, too
-    measured = {port: fields for port, fields in ports.items() if "stiffness" not in fields}
-    joints = port_with(measured, "position:n_joints", "velocity", "torque")
+    truth, base, joints = (port_of(ports, role) for role in (TRUTH, BASE, JOINTS))
     estimate = None
     if base is not None and joints is not None:
         estimate = PoseSource(f"{base}.position", f"{base}.orientation", f"{joints}.position")
-    pose = PoseSource(*(f"{truth}.{name}" for name in POSE_FIELDS)) if truth else estimate
+    elif joints is not None and robot.base_joint == "fixed":
+        estimate = PoseSource(None, None, f"{joints}.position")
+    pose = PoseSource(*(f"{truth}.{name}" for name in TRUTH.fields)) if truth else estimate
     if pose is None:
         return None
-    loads = port_with(ports, "contact_position", "contact_force")
-    terms = port_with(ports, "com", "contact_position")
-    command = port_with(ports, "force:n_contacts")
-    if loads is not None:
-        position, force = f"{loads}.contact_position", f"{loads}.contact_force"
-    elif terms is not None and command is not None:
-        position, force = f"{terms}.contact_position", f"{command}.force"
-    else:
-        position = force = ""
+    terms, command = port_of(ports, TERMS), port_of(ports, FORCES)
     has_com = truth if truth is not None and "com" in ports[truth] else terms
-    ground = port_with(ports, "ground_height")
+    position, force = _contacts(ports, terms, command) if robot.contacts else (None, None)
+    ground = port_of(ports, GROUND) if robot.contacts else None
     return ScenePorts(
         pose=pose,
-        estimate=estimate if truth else None,
+        estimate=estimate if truth and base else None,
         com=f"{has_com}.com" if has_com else None,
-        contact_position=position or None,
-        contact_force=force or None,
+        contact_position=position,
+        contact_force=force,
         ground_height=f"{ground}.ground_height" if ground else None,
-        plan=port_with(ports, "com", "foot_position", "foot_yaw"),
-        feet=port_with(ports, "position:n_feet", "rotation:n_feet"),
-        push=port_with(ports, "force", "point"),
+        plan=port_of(ports, PLAN) if robot.feet else None,
+        feet=port_of(ports, FEET) if robot.feet else None,
+        push=port_of(ports, PUSH),
         friction=_number(header, f"{block_of(command)}.friction") if command else None,
     )
+
+
+def _contacts(
+    ports: Ports, terms: str | None, command: str | None
+) -> tuple[str, str] | tuple[None, None]:
+    """The contact points and the forces on them: true ones, or else computed and commanded ones."""
+    loads = port_of(ports, LOADS)
+    if loads is not None:
+        return f"{loads}.contact_position", f"{loads}.contact_force"
+    if terms is not None and command is not None:
+        return f"{terms}.contact_position", f"{command}.force"
+    return None, None
 
 
 def block_of(port: str) -> str:

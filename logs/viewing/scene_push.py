@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from .scene_contacts import FORCE_SCALE
+from .scene_contacts import force_scale
 from .scene_part import Moments, ScenePart
 
 
 class PushPart(ScenePart):
-    """``push``: of length zero but during the push; points are posed as the solid robot is."""
+    """``push``: an arrow at the robot's named point, of length zero except during the push."""
 
     def write_static(self) -> None:
         """Write the colour."""
@@ -25,7 +25,7 @@ class PushPart(ScenePart):
         names = list(self.robot.points)
         if self.ports.push is None or not names:
             return
-        force = moments[f"{self.ports.push}.force"] * FORCE_SCALE
+        force = moments[f"{self.ports.push}.force"] * force_scale(self.robot)
         point = np.clip(moments[f"{self.ports.push}.point"], 0, len(names) - 1)
         poses = moments.poses(self.robot, self.ports.pose)
         ends = np.zeros((len(names), len(moments), 3))

@@ -18,8 +18,9 @@ from ..solving.refinement import ROUNDS, curable
 from ..task.errors import PlanError
 from ..task.plan import JumpPlan, PlanFileError, read_plan, write_plan
 from ..task.task import JumpTask, TaskError, make_task
+from .shipped import shipped_graphs
 
-SHIPPED = Path(__file__).parents[2] / "graphs" / "plans"
+SHIPPED = shipped_graphs() / "plans"
 """The plans that come with aloft; ``make plans`` makes them anew."""
 
 INVALID = "invalid"

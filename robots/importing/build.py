@@ -64,10 +64,9 @@ class Built:
     frames: Mapping[str, Frame]
 
 
-def tidy(values: Any) -> list[float]:
-    """Plain numbers without the rounding errors of a rotation."""
-    numbers = np.round(np.asarray(values, dtype=float), 13)
-    return [float(value) for value in np.where(np.abs(numbers) < 1e-11, 0.0, numbers)]
+def tidy(values: Any, digits: int = 11) -> list[float]:
+    """Plain numbers without rounding errors, so that every machine reads the same robot."""
+    return [float(value) for value in np.round(np.asarray(values, dtype=float), digits) + 0.0]
 
 
 def build(model: RawModel, welded: Collection[str] = (), base_joint: str = "") -> Built:
@@ -175,9 +174,9 @@ def _error(model: RawModel, message: str, expected: str = "", found: str = "") -
 
 
 def _axis(axis: Array) -> list[float]:
-    """A unit vector to the last digit, without the rounding errors of a rotation."""
-    straight = np.where(np.abs(axis - np.round(axis)) < 1e-10, np.round(axis), axis) + 0.0
-    return [float(value) for value in straight / np.linalg.norm(straight)]
+    """A unit vector; what is nearly a coordinate axis is one."""
+    straight = np.where(np.abs(axis - np.round(axis)) < 1e-10, np.round(axis), axis)
+    return tidy(straight / np.linalg.norm(straight), 12)
 
 
 def _link_data(link: BuiltLink) -> dict[str, Any]:
@@ -185,13 +184,13 @@ def _link_data(link: BuiltLink) -> dict[str, Any]:
     tensor = whole.inertia
     pairs = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
     shapes = [
-        {"start": tidy(c.start), "end": tidy(c.end), "radius": round(c.radius, 9)}
+        {"start": tidy(c.start, 6), "end": tidy(c.end, 6), "radius": round(c.radius, 6)}
         for c in link.capsules
     ]
     return {
         "name": link.name,
-        "mass": float(whole.mass),
-        "com": [float(value) for value in whole.com],
-        "inertia": [float(tensor[pair]) for pair in pairs],
+        "mass": float(f"{whole.mass:.11g}"),
+        "com": tidy(whole.com),
+        "inertia": [float(f"{tensor[pair]:.11g}") for pair in pairs],
         "shapes": shapes,
     }

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-SHORTEST = 0.002
-"""The least length of a capsule between the centres of its ends, relative to its radius."""
+SHORTEST = 1e-4
+"""The least length of a capsule between the centres of its ends [m]: a ball is that long."""
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,7 @@ class Capsule:
 def along(axis: int, half_length: float, radius: float) -> Capsule:
     """A capsule about the origin along the coordinate axis of that number."""
     end = np.zeros(3)
-    end[axis] = max(half_length, 0.5 * SHORTEST * radius)
+    end[axis] = max(half_length, 0.5 * SHORTEST)
     return Capsule(-end, end, radius)
 
 
@@ -80,14 +80,12 @@ def of_box(sizes: Array) -> list[Capsule]:
 
 
 def of_points(points: Array) -> list[Capsule]:
-    """One capsule for a mesh with these corners (n, 3), along its longest principal direction."""
+    """The capsules for a mesh with these corners (n, 3): of the box about it that lies along its
+    principal directions."""
     corners = np.unique(points, axis=0)
     _, directions = np.linalg.eigh(np.cov((corners - corners.mean(axis=0)).T))
     turn = directions * np.sign(directions[np.abs(directions).argmax(axis=0), range(3)])
     places = corners @ turn
     low, high = places.min(axis=0), places.max(axis=0)
-    sizes = np.maximum(0.5 * (high - low), 1e-4)
-    long, middle, short = (int(k) for k in np.argsort(-sizes, kind="stable"))
-    radius = float(min(np.sqrt(sizes[middle] * sizes[short]), sizes[long]))
-    capsule = along(long, float(sizes[long]) - radius, radius)
-    return [capsule.moved(turn, turn @ (0.5 * (low + high)))]
+    sizes = np.maximum(0.5 * (high - low), 1e-3)
+    return [capsule.moved(turn, turn @ (0.5 * (low + high))) for capsule in of_box(sizes)]

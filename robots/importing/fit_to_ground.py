@@ -74,7 +74,8 @@ def _above(shape: Shape, rotation: Array, room: float) -> Shape | None:
         return shape
     if heights[high] <= room:
         return None
+    # The end stays a little apart from the other: a capsule has a length.
     share = (room - heights[low]) / (heights[high] - heights[low])
-    ends[low] += share * (ends[high] - ends[low])
-    start, end = (tuple(float(v) for v in np.round(end, 9)) for end in ends)
+    ends[low] += min(share, 0.99) * (ends[high] - ends[low])
+    start, end = (tuple(float(v) for v in np.round(end, 6)) for end in ends)
     return Shape.model_validate({"start": start, "end": end, "radius": shape.radius})

@@ -37,6 +37,7 @@ from ...robots.description import RobotDescription
 from .errors import BlockError, DeclarationError
 from .parameters import Parameters
 from .signals import Signal
+from .terrain import Terrain
 
 S = TypeVar("S", bound=Signal)
 Metric = float | int | bool | str
@@ -150,7 +151,9 @@ class Context:
 
     ``period_ticks`` and ``offset_ticks`` say in which base ticks the block runs; ``dimensions``
     holds every resolved dimension the block can see; ``wired`` names its wired inputs;
-    ``folder`` is where the graph file lies, to which files that a parameter names are relative.
+    ``folder`` is where the file lies that declares the block, to which files that a parameter names
+    are relative; ``graph_folder`` is where the graph lies that was loaded, beside which a user
+    keeps modules.
     """
 
     path: str
@@ -161,6 +164,7 @@ class Context:
     robot: RobotDescription | None = None
     wired: tuple[str, ...] = ()
     folder: Path = Path()
+    graph_folder: Path = Path()
 
     @property
     def period(self) -> float:
@@ -277,6 +281,11 @@ class Block:
     ) -> Mapping[str, int]:
         """Further dimensions that only state fields use; may build models, so it runs at bind."""
         return {}
+
+    @classmethod
+    def terrain(cls, params: Parameters) -> Terrain | None:
+        """The ground that the block knows of with these parameters; recordings draw it."""
+        return None
 
     @classmethod
     def example_parameters(cls) -> Mapping[str, Any]:

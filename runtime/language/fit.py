@@ -39,7 +39,8 @@ def has(robot: RobotDescription, need: Need) -> bool:
 
 def fix_without_robot() -> str:
     """What to write in a graph that needs a robot and names none."""
-    return " or ".join(f"robot: {name}" for name in robot_names())
+    first, *others = robot_names()
+    return f"robot: {first}" + (f"  # or {', '.join(others)}" if others else "")
 
 
 def unmet_needs(block_type: type[Block], robot: RobotDescription | None) -> tuple[Misfit, ...]:

@@ -79,7 +79,7 @@ def _convert(value: Any, unit: str) -> Any:
 class Parameters(BaseModel):
     """The base of every block's parameters: unknown keys are errors, values cannot be changed."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, defer_build=True)
 
     @model_validator(mode="before")
     @classmethod

@@ -1,7 +1,8 @@
 """What graphs of earlier versions say otherwise: errors that give the new form, and old graphs read.
 
-Since version 0.2 some blocks have other names, and the actuator profile is said once for the graph
-(``actuators: relaxed``) instead of at every block that uses it.
+Since version 0.2 some blocks have other names, the actuator profile is said once for the graph
+(``actuators: relaxed``) instead of at every block that uses it, and the paper's estimator, which was
+the other ``law`` of ``blocks.StateEstimator``, is ``blocks.ComplementaryFilter``.
 """
 
 from __future__ import annotations
@@ -24,11 +25,16 @@ PROFILE_PARAMETERS: Mapping[str, str] = {
 block first."""
 
 
-def fix_of_profile(use: str, parameter: str, value: Node) -> str:
-    """What to write for a parameter that named an actuator profile; empty for any other."""
-    if PROFILE_PARAMETERS.get(use) != parameter:
-        return ""
-    return f"said once for the graph since 0.2, beside 'robot': actuators: {text_of(plain(value))}"
+def fix_of_parameter(use: str, parameter: str, value: Node) -> str:
+    """What to write for a parameter that a block had before version 0.2; empty for any other."""
+    text = text_of(plain(value))
+    if PROFILE_PARAMETERS.get(use) == parameter:
+        return f"said once for the graph since 0.2, beside 'robot': actuators: {text}"
+    if (use, parameter) == ("blocks.StateEstimator", "law"):
+        if text == "complementary":
+            return "use: blocks.ComplementaryFilter, a block of its own since 0.2"
+        return f"leave it out: since 0.2 {use} is the weighted law only"
+    return ""
 
 
 def in_present_form(text: str) -> str:
@@ -43,8 +49,9 @@ def in_present_form(text: str) -> str:
         return text
     blocks = [block for block in data["blocks"].values() if isinstance(block, dict)]
     profiles = _take_profiles(blocks)
+    laws = [_take_law(block) for block in blocks]
     moved = [block for block in blocks if block.get("use") in MOVED]
-    if not moved and not profiles:
+    if not moved and not profiles and not any(laws):
         return text
     for block in moved:
         block["use"] = MOVED[block["use"]]
@@ -62,6 +69,19 @@ def _take_profiles(blocks: list[Any]) -> list[str]:
             if block.get("use") == use and isinstance(given, dict) and parameter in given:
                 found.append(str(given.pop(parameter)))
     return found
+
+
+def _take_law(block: dict[str, Any]) -> bool:
+    """Give an estimator with the paper's law its present name; whether it named a law."""
+    given = block.get("with")
+    if block.get("use") != "blocks.StateEstimator" or not isinstance(given, dict):
+        return False
+    law = given.pop("law", None)
+    if law == "complementary":
+        block["use"] = "blocks.ComplementaryFilter"
+        weighted = ("gate", "gate_growth", "support", "level_ground", "slow_rate")
+        block["with"] = {key: value for key, value in given.items() if key not in weighted}
+    return law is not None
 
 
 def _behind(data: Mapping[str, Any], key: str, new_key: str, value: Any) -> dict[str, Any]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 from ...robots.description import find_robot
@@ -11,7 +12,8 @@ from ...robots.shipped import robot_names
 from ..language.block import Block
 from ..language.errors import UnknownBlockError
 from ..language.fit import fix_without_robot
-from ..language.registry import BlockImportError, find_block, nearest_names
+from ..language.importing import BlockImportError, UnknownModuleError
+from ..language.registry import find_block, nearest_names
 from ..language.schedule import ScheduleBlock, find_loops, order_blocks
 from ..language.signals import Signal
 from ..language.stages import BlockSpec, CheckedGraph, Position, Wire
@@ -91,12 +93,12 @@ def _draft(flat: FlatBlock, graph: FlatGraph, settings: Settings, problems: Prob
 def _find(flat: FlatBlock, graph: FlatGraph, problems: Problems) -> type[Block] | None:
     """The block's class, seen from its own file, then from the graph's."""
     folders = dict.fromkeys([flat.folder, graph.folder])
-    message = ""
+    unknown: UnknownBlockError | None = None
     for folder in folders:
         try:
             return find_block(flat.use, folder)
         except UnknownBlockError as error:
-            message = message or str(error)
+            unknown = unknown or error
         except BlockImportError as error:
             problems.add(
                 Code.BLOCK_IMPORT,
@@ -109,15 +111,25 @@ def _find(flat: FlatBlock, graph: FlatGraph, problems: Problems) -> type[Block] 
     near = nearest_names(flat.use, flat.folder)
     problems.add(
         Code.UNKNOWN_BLOCK,
-        message,
+        str(unknown),
         flat.use_where,
         at=flat.path,
-        expected="a block of `aloft blocks`, module:Class, or a file.yaml",
+        expected=_places_of_modules(flat, graph)
+        if isinstance(unknown, UnknownModuleError)
+        else "a block of `aloft blocks`, module:Class, or a file.yaml",
         found=flat.use,
         nearest=near,
         fix=f"use: {near[0]}" if near else "",
     )
     return None
+
+
+def _places_of_modules(flat: FlatBlock, graph: FlatGraph) -> str:
+    """Where the module of a ``module:Class`` may lie."""
+    file = f"{flat.use.partition(':')[0].replace('.', '/')}.py"
+    folders = dict.fromkeys(str(folder) for folder in (flat.folder, graph.folder, Path()))
+    shown = " or ".join("the current folder" if f == "." else f for f in folders)
+    return f"{file} in {shown}, or a module that Python finds"
 
 
 def _check_dimensions(draft: Draft, settings: Settings, problems: Problems) -> bool:

@@ -35,6 +35,7 @@ def check_fit(draft: Draft, settings: Settings, problems: Problems) -> Mapping[s
         robot=settings.robot,
         wired=tuple(flat.wires),
         folder=flat.folder,
+        graph_folder=settings.folder,
     )
     misfits = find_misfits(draft.block_type, draft.params, context)
     for misfit in misfits:

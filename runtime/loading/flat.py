@@ -12,6 +12,8 @@ from ..language.stages import HasSource, Position
 from .nodes import Entry, MapNode, Node, plain, text_of
 
 _WIDTH = 100
+ROBOT_FILES = (".yaml", ".yml", ".urdf", ".xml", ".mjcf")
+"""What the name of a robot ends with that is a file, relative to the graph."""
 
 
 @dataclass(frozen=True)
@@ -102,7 +104,7 @@ class FlatGraph:
                 lines.append(f"{entry.key}: {text_of(plain(entry.value))}")
         if self.robot is not None:
             robot = plain(self.robot.value)
-            if isinstance(robot, str) and robot.endswith((".yaml", ".yml")):
+            if isinstance(robot, str) and robot.endswith(ROBOT_FILES):
                 robot = Path(os.path.relpath(self.robot_folder / robot, self.folder)).as_posix()
             lines.append(f"robot: {text_of(robot)}")
         if self.actuators is not None:

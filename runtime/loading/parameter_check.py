@@ -16,7 +16,7 @@ from ..language.per_joint import BY_POSITION, by_name
 from ..language.registry import block_name
 from ..language.stages import Position
 from ..language.units import parse_quantity
-from .earlier_versions import fix_of_profile
+from .earlier_versions import fix_of_parameter
 from .flat import FlatBlock
 from .nodes import Entry, ListNode, MapNode, Node, ScalarNode, kind, plain, text_of
 from .problems import Code, Problems, instead, listing, nearest
@@ -127,7 +127,7 @@ def _report(
         if kind_of == "extra_forbidden" and entry is not None:
             legal = _siblings(model, error["loc"])
             near = nearest(entry.key, legal)
-            fix = fix_of_profile(block_name(block_type), entry.key, entry.value)
+            fix = fix_of_parameter(block_name(block_type), entry.key, entry.value)
             mistakes[Code.UNKNOWN_PARAMETER, place] = _Mistake(
                 Code.UNKNOWN_PARAMETER, place, entry.key_where, None, entry.key,
                 [listing(legal)], [], () if fix else near, fix or _right_name(entry, near),

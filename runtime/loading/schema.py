@@ -74,7 +74,10 @@ def graph_schema(blocks: Mapping[str, type[Block]] | None = None) -> Schema:
                 "anyOf": [{"type": "number", "exclusiveMinimum": 0}, {"type": "string"}],
                 "description": "how long the graph runs: 4 s",
             },
-            "robot": {"type": "string", "description": "name of a robot, or its YAML file"},
+            "robot": {
+                "type": "string",
+                "description": "name of a robot, or its YAML, URDF or MJCF file",
+            },
             "actuators": {
                 "type": "string",
                 "description": "the robot's actuator profile in use; by default its first",

@@ -5,17 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
-import yaml
-from pydantic import ValidationError
-
-from ...robots.description import RobotDescription, find_robot
-from ...robots.shipped import robot_names
+from ...robots.description import RobotDescription
 from ..language.errors import UnitError
 from ..language.stages import ClockSpec, Position
 from ..language.units import parse_quantity
 from .flat import FlatGraph
+from .graph_robot import read_robot
 from .nodes import Entry, Node, ScalarNode, kind, plain
 from .problems import Code, Problems, listing, nearest
 from .written import CLOCK_KEYS, unknown_key
@@ -37,6 +35,8 @@ class Settings:
     """False where a robot is named but could not be read."""
     dimensions: Mapping[str, int] = field(default_factory=dict)
     clock: ClockSpec = field(default_factory=ClockSpec)
+    folder: Path = Path()
+    """Where the graph's file lies."""
 
 
 def read_settings(graph: FlatGraph, problems: Problems) -> Settings:
@@ -57,17 +57,15 @@ def read_settings(graph: FlatGraph, problems: Problems) -> Settings:
         duration = read_quantity(graph.duration.value, "duration", "s", problems)
         if duration is not None and rate is not None:
             ticks = max(1, round(duration * rate))
-    robot = _read_robot(graph, problems) if graph.robot is not None else None
-    known = robot is not None or graph.robot is None
-    if graph.actuators is not None and known:
-        robot = _with_actuators(robot, graph.actuators, problems)
+    robot = read_robot(graph, problems)
     return Settings(
         rate,
         ticks,
         robot,
-        known,
+        robot is not None or graph.robot is None,
         _read_dimensions(graph, robot, problems),
         _read_clock(graph, problems),
+        graph.folder,
     )
 
 
@@ -95,69 +93,6 @@ def read_quantity(node: Node, what: str, unit: str, problems: Problems) -> float
         found=kind(node),
     )
     return None
-
-
-def _read_robot(graph: FlatGraph, problems: Problems) -> RobotDescription | None:
-    assert graph.robot is not None
-    node = graph.robot.value
-    name = node.value if isinstance(node, ScalarNode) else None
-    message = ""
-    if not isinstance(name, str):
-        message = f"robot cannot be {kind(node)}"
-    else:
-        try:
-            return find_robot(name, graph.robot_folder)
-        except LookupError as error:
-            message = str(error)
-        except ValidationError as error:
-            first = error.errors()[0]
-            place = ".".join(map(str, first["loc"]))
-            message = f"robot {name} is described wrongly: {place}: {first['msg']}"
-        except (yaml.YAMLError, OSError, UnicodeDecodeError, ValueError) as error:
-            message = f"robot {name} cannot be read: {' '.join(str(error).split())}"
-    problems.add(
-        Code.ROBOT,
-        message,
-        node.where,
-        at="robot",
-        expected="the name of a robot of ours, or a YAML file relative to the graph",
-        found=kind(node),
-    )
-    return None
-
-
-def _with_actuators(
-    robot: RobotDescription | None, entry: Entry, problems: Problems
-) -> RobotDescription | None:
-    """The robot with the actuator profile that the graph names in use."""
-    node = entry.value
-    name = node.value if isinstance(node, ScalarNode) else None
-    if robot is None:
-        problems.add(
-            Code.ROBOT,
-            "the graph chooses an actuator profile, and names no robot that has it",
-            entry.key_where,
-            at="actuators",
-            fix="remove 'actuators', or name the robot: "
-            + " or ".join(f"robot: {known}" for known in robot_names()),
-        )
-        return None
-    if isinstance(name, str) and name in robot.profiles:
-        return robot.with_profile(name)
-    similar = nearest(name, robot.profiles) if isinstance(name, str) else ()
-    problems.add(
-        Code.ROBOT,
-        f"{robot.name} has no actuator profile {name!r}"
-        if isinstance(name, str)
-        else f"actuators cannot be {kind(node)}",
-        node.where,
-        at="actuators",
-        expected=f"an actuator profile of {robot.name}: {listing(robot.profiles)}",
-        found=kind(node),
-        nearest=similar,
-        fix=f"actuators: {(*similar, *robot.profiles)[0]}",
-    )
-    return robot
 
 
 def _read_dimensions(

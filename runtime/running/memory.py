@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -179,6 +180,7 @@ class BoundGraph:
                 robot=graph.robot,
                 wired=tuple(spec.wires),
                 folder=spec.folder,
+                graph_folder=Path(graph.file).parent,
             )
             with blame(spec, "setup"):
                 block = spec.block_type(spec.params, context)

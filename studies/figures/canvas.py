@@ -53,6 +53,9 @@ def draw_columns(title: str, notes: Sequence[str], columns: Sequence[Column]) ->
         draw_panels(pairs)
         for place, column in enumerate(columns):
             if column.header:
-                first = grid[0, place]
-                first.set_title(f"{column.header}\n{first.get_title(loc='left')}")
+                # two lines above the title of the first panel
+                grid[0, place].annotate(
+                    column.header, (0.0, 1.0), (0.0, 20.0), xycoords="axes fraction",
+                    textcoords="offset points", fontsize=10, fontweight="bold",
+                )  # fmt: skip
         return image(figure)

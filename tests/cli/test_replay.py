@@ -121,5 +121,8 @@ def test_what_is_refused(recording: Path, folder: Path, call_json: CallJson) -> 
     assert "has no class 'Gian'" in reason(name, "--swap", "gain=gains:Gian")
     assert "1 problem" in reason(name, "--set", "gain.gain=high")
     assert "tick 300 is not in the recording" in reason(name, "--from", "300")
+    assert "--from 70 --until 60 is no stretch of the run: the end must lie behind" in reason(
+        name, "--from", "70", "--until", "60"
+    )
     (folder / "other.rrd").write_bytes(b"RRF2 nothing")
     assert "other.rrd cannot be read" in reason("other.rrd")

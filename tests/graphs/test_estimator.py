@@ -24,7 +24,7 @@ def test_a_jump_driven_by_the_invariant_filter() -> None:
 
 
 def test_an_onlooker_is_wrong_without_a_fall() -> None:
-    settings = {"estimator.law": "complementary", "robot.seed": 5}
+    settings = {"estimator.use": "blocks.ComplementaryFilter", "robot.seed": 5}
     path = GRAPH.with_name("estimator_watching.yaml")
     result = aloft.load(path, settings).run(log=False)
     assert result.success, result.reason

@@ -13,15 +13,13 @@ from hypothesis.extra.numpy import arrays
 from aloft.robots import five_joint_leg
 from aloft.robots.description import find_robot
 from aloft.robots.limb import FootKind, place_limb, read_limb
+from aloft.robots.limb_error import aim, foot_error, turning
 from aloft.robots.limb_inverse import (
     REACHED,
-    aim,
     approach,
-    foot_error,
     limb_scratch,
     limb_velocity,
     reach,
-    turning,
 )
 
 from .limbed_robots import LIGHT_QUADRUPED, SEVEN_JOINTS, humanoid, quadruped, slider

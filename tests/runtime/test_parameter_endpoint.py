@@ -63,6 +63,7 @@ def test_nonsense_is_answered_and_the_next_request_still_is(
     assert send(path, b"[1]\n")["error"].startswith("not a request")
     assert send(path, b'{"verb": "reboot"}\n')["error"] == "there is no verb 'reboot'"
     assert send(path, b"")["error"].startswith("not a request")
+    assert send(path, b"[" * 60_000 + b"\n")["error"].startswith("not a request")
     with pytest.raises(EndpointError, match=r"gain\.gain cannot be high"):
         set_parameters(path, ["gain.gain=high"])
     assert set_parameters(path, ["gain.gain=3"])

@@ -11,7 +11,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from ....runtime.language.errors import AloftError
+from ....runtime.language.errors import AloftError, UnknownBlockError
 from ....runtime.language.parameters import Parameters
 from ....runtime.language.registry import find_class
 from .angular_momentum import AngularMomentum
@@ -60,12 +60,12 @@ class ChosenTask:
 
 
 def choose_tasks(
-    entries: Sequence[str | TaskChoice], folder: Path | None = None
+    entries: Sequence[str | TaskChoice], folders: Sequence[Path] = ()
 ) -> tuple[ChosenTask, ...]:
     """The tasks of a list, in its order.
 
     Args:
-        folder: where the graph lies; files in it can be imported as modules.
+        folders: where modules of the user's may lie, the first choice first.
 
     Raises:
         TaskChoiceError: there is no such task, or it is not a task.
@@ -73,11 +73,11 @@ def choose_tasks(
     chosen = []
     for item in entries:
         entry = item if isinstance(item, TaskChoice) else TaskChoice(task=item)
-        chosen.append(ChosenTask(_find_task(entry.task, folder), entry))
+        chosen.append(ChosenTask(_find_task(entry.task, folders), entry))
     return tuple(chosen)
 
 
-def _find_task(name: str, folder: Path | None) -> type[Task[Any]]:
+def _find_task(name: str, folders: Sequence[Path]) -> type[Task[Any]]:
     if name in OWN_TASKS:
         return OWN_TASKS[name]
     if ":" not in name:
@@ -87,10 +87,17 @@ def _find_task(name: str, folder: Path | None) -> type[Task[Any]]:
             f"there is no task called {name!r}; {hint}There are {', '.join(OWN_TASKS)}, and a task "
             "of your own is named module:Class"
         )
-    try:
-        found = find_class(name, folder)
-    except AloftError as error:
-        raise TaskChoiceError(f"task {name}: {error}") from error
+    found, failure = None, ""
+    for folder in dict.fromkeys(folders) or (None,):
+        try:
+            found = find_class(name, folder)
+            break
+        except UnknownBlockError as error:
+            failure = failure or str(error)
+        except AloftError as error:
+            raise TaskChoiceError(f"task {name}: {error}") from error
+    if found is None:
+        raise TaskChoiceError(f"task {name}: {failure}")
     if not (isinstance(found, type) and issubclass(found, Task)):
         raise TaskChoiceError(f"task {name}: {name.partition(':')[2]} does not derive from Task")
     if inspect.isabstract(found):

@@ -202,3 +202,12 @@ def test_joints_of_no_leg_follow_the_plan_while_all_legs_swing():
     alone = BlockBench(JointPD, GAINS, robot=one_leg, wired=["wbc", "legs", "phase", "joints"])
     command = settle(alone, Phase.FLIGHT, False)
     assert np.array_equal(command.position[:5], ROBOT.standing_position[:5])
+
+
+def test_the_robots_own_friction_is_made_up_for():
+    bench = make(friction_share=0.5)
+    bench.set("wbc", torque=0.0)
+    bench.set("joints", velocity=np.full(10, 10.0))
+    motors = ROBOT.motors
+    wanted = 0.5 * (motors.friction + 10.0 * motors.damping)
+    assert settle(bench, Phase.STAND, True).torque == pytest.approx(wanted)

@@ -317,3 +317,21 @@ def test_feet_that_press_harder_are_taken_to_slide():
 def test_needs_a_robot():
     with pytest.raises(BlockError, match="it needs a robot, and the graph names none"):
         BlockBench(InvariantKalmanFilter, dimensions=dict(ROBOT.dimensions))
+
+
+@pytest.mark.parametrize("count", [2, 1])
+def test_point_feet_stand(count):
+    """BRUCE on its toes, or on one toe alone: nothing is divided by zero, nothing drifts."""
+    toes = [contact for contact in ROBOT.contacts if contact.name.endswith("toe")][:count]
+    names = [contact.foot for contact in toes]
+    feet = tuple(foot for foot in ROBOT.feet if foot.name in names)
+    robot = ROBOT.changed(contacts=tuple(toes), feet=feet)
+    bench = BlockBench(InvariantKalmanFilter, robot=robot)
+    bench.set("joints", position=ROBOT.standing_position)
+    bench.set("imu", specific_force=[0.0, 0.0, 9.81])
+    bench.set("contacts", active=True)
+    bench.step(200)
+    base = bench.get("base")
+    assert bench.get("health").trusted.all()
+    assert np.abs(base.linear_velocity).max() < 1e-3
+    assert np.linalg.norm(base.orientation[:3]) < 5e-3

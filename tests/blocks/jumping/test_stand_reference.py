@@ -21,12 +21,16 @@ TIMES = (0.2, 0.4, 0.1, 0.4)
 def test_any_robot_squats_over_the_middle_of_its_feet_and_rises_again(robot):
     table = plan_stand(robot, 0.05, TIMES)
     columns, height = table.columns, table.columns["com"][:, 2]
-    assert np.abs(columns["foot_position"] - columns["foot_position"][0]).max() < 1e-9
+    moved = np.abs(columns["foot_position"] - columns["foot_position"][0]).max()
+    if robot.name == "quadruped":
+        assert 1e-4 < moved < 0.005  # balls of 5 mm radius roll
+    else:
+        assert moved < 1e-9
     assert np.abs(columns["orientation"] - [0.0, 0.0, 0.0, 1.0]).max() < 1e-9
     assert height.min() == pytest.approx(height[0] - 0.05, abs=1e-9)
     assert height[-1] == pytest.approx(height[0], abs=1e-9)
     middle = columns["foot_position"][0].mean(axis=0)
-    assert columns["com"][-1, :2] == pytest.approx(middle[:2], abs=1e-9)
+    assert columns["com"][-1, :2] == pytest.approx(middle[:2], abs=1e-9)  # as it was planned
     names = [joint.name for joint in robot.joints]
     for name, angle in robot.held.items():
         assert columns["joint_position"][:, names.index(name)] == pytest.approx(angle, abs=1e-12)

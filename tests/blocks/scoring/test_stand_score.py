@@ -166,3 +166,21 @@ def test_point_feet_turn_as_their_pattern_does():
     points[:, :2] = points[:, :2] @ turn.T + [1.0, 2.0]
     footing.measure(points, upright, middle, after)
     assert after == pytest.approx(before @ turn.T, abs=1e-12)
+
+
+def test_a_ball_that_rolls_does_not_slide():
+    """Ball feet roll as the body squats; their places but for the rolling stay."""
+    robot = ROBOTS["quadruped"]
+    footing, upright = Footing(robot), np.array([0.0, 0.0, 0.0, 1.0])
+    lean = robot.standing_position.copy()
+    places = []
+    for turn in (0.0, 0.1):
+        pitch = np.array([0.0, math.sin(0.5 * turn), 0.0, math.cos(0.5 * turn)])
+        middle = np.zeros((4, 2))
+        footing.unroll(lean, pitch, middle)
+        places.append(middle.copy())
+    # Turning the whole robot by 0.1 rad about y rolls every ball by its radius times that.
+    radius = robot.contacts[0].radius
+    assert places[1] - places[0] == pytest.approx(np.tile([-0.1 * radius, 0.0], (4, 1)), abs=1e-4)
+    footing.unroll(lean, upright, middle := np.ones((4, 2)))
+    assert middle == pytest.approx(1.0 + places[0])

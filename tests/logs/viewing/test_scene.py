@@ -1,17 +1,18 @@
 """The scene and the layout: geometry, what is drawn of a graph, limits and lanes."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from aloft import load
-from aloft.logs.file.format import RecordedField
+from aloft.logs.file.format import Header, RecordedField
 from aloft.logs.file.header import header_of
 from aloft.logs.viewing.block_times import times_table
 from aloft.logs.viewing.blueprint import main_lanes
 from aloft.logs.viewing.limits import limits_of
 from aloft.logs.viewing.scene_contacts import cone_lines, convex_hull
-from aloft.logs.viewing.scene_ports import scene_ports
+from aloft.logs.viewing.scene_ports import OTHERS, PUSH, ROLES, PoseSource, port_of, scene_ports
 from aloft.logs.viewing.state_lanes import lanes_of
 from aloft.robots.description import find_robot
 from aloft.runtime.running.memory import BoundGraph
@@ -62,6 +63,83 @@ def test_all_of_the_jump_is_found() -> None:
     angles = {value for _, value in limits_of(fields["robot.joints.position"], header)}
     assert angles == {round(v, 9) for v in find_robot("bruce").joint_limits.flatten().tolist()}
     assert limits_of(fields["robot.truth.com"], header) == []
+
+
+def test_every_role_is_a_signal_of_the_vocabulary() -> None:
+    from aloft.blocks import signals
+    from aloft.runtime.language.signals import Signal
+
+    for role in ROLES:
+        fields = getattr(signals, role.signal).fields
+        assert {name.partition(":")[0] for name in role.fields} <= set(fields)
+        assert not set(role.lacks) & set(fields)
+    types = {n for n in signals.__all__ if issubclass(getattr(signals, n), Signal)}
+    assert types == {role.signal for role in ROLES} | set(OTHERS)
+
+
+def field(name: str, *signals: str, shape: tuple[int | str, ...] = (3,)) -> RecordedField:
+    return RecordedField(name, "float64", 0, (3,), shape, signals=signals)
+
+
+def test_a_ports_type_comes_before_its_fields() -> None:
+    fields = [
+        field("a.push.force", "JointCommand"), field("a.push.point", "JointCommand"),
+        field("b.kick.force", "Kick"), field("b.kick.point", "Kick"),
+        field("c.push.force", "Shove", "ExternalForce"),
+        field("c.push.point", "Shove", "ExternalForce"),
+    ]  # fmt: skip
+
+    def found(*chosen: RecordedField) -> str | None:
+        ports: dict[str, dict[str, RecordedField]] = {}
+        for each in chosen:
+            ports.setdefault(each.name.rpartition(".")[0], {})[each.field_name] = each
+        return port_of(ports, PUSH)
+
+    assert found(*fields) == "c.push", "it derives from the type"
+    assert found(*fields[:4]) == "b.kick", "a type of one's own with the same fields"
+    assert found(*fields[:2]) is None, "a signal of the vocabulary is what it is"
+    old = [field(each.name) for each in fields[:2]]
+    assert found(*old) == "a.push", "old recordings keep no types"
+
+
+def test_a_recording_made_before_signals_had_names_is_read() -> None:
+    data = {
+        "name": "a.b.c", "dtype": "float64", "start": 0, "shape": [3], "dimensions": ["n_feet"],
+        "unit": "m", "frame": None, "text": "", "values": {}, "constant": False,
+    }  # fmt: skip
+    assert RecordedField.from_json(data).signals == ()
+    header = header_of(BoundGraph(load(GRAPH).checked))
+    again = Header.from_json(header.to_json())
+    assert again.bus == header.bus
+    (truth,) = [f for f in again.bus.fields if f.name == "robot.truth.com"]
+    assert truth.signals == ("RobotTruth",)
+
+
+def test_a_joint_without_limits_has_no_lines() -> None:
+    robot = find_robot("bruce")
+    free = [joint.model_copy(update={"limits": None}) for joint in robot.joints]
+    header = replace(
+        header_of(BoundGraph(load(GRAPH).checked)), robot=robot.changed(joints=tuple(free))
+    )
+    fields = {field.name: field for field in header.bus.fields}
+    assert limits_of(fields["robot.joints.position"], header) == []
+    assert len(limits_of(fields["robot.truth.motor_speed"], header)) == 2
+
+
+def test_a_fixed_base_is_posed_by_its_joints() -> None:
+    header = header_of(BoundGraph(load(GRAPH).checked))
+    robot = header.robot
+    assert robot is not None
+    joints = tuple(f for f in header.bus.fields if f.name.startswith("robot.joints."))
+    arm = replace(
+        header,
+        robot=robot.changed(base_joint="fixed", feet=(), contacts=()),
+        bus=replace(header.bus, fields=joints),
+    )
+    ports = scene_ports(arm)
+    assert ports is not None and ports.pose == PoseSource(None, None, "robot.joints.position")
+    assert ports.contact_force is None and ports.estimate is None
+    assert scene_ports(replace(arm, robot=robot)) is None, "a floating base has to be known"
 
 
 def test_a_problem_that_was_not_solved_is_red() -> None:

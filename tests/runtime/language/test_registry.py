@@ -10,8 +10,8 @@ from aloft.blocks.general.gain import Gain
 from aloft.runtime.language import registry
 from aloft.runtime.language.block import Block
 from aloft.runtime.language.errors import UnknownBlockError
+from aloft.runtime.language.importing import BlockImportError, UnknownModuleError
 from aloft.runtime.language.registry import (
-    BlockImportError,
     all_blocks,
     block_name,
     find_block,
@@ -61,8 +61,8 @@ def test_names_and_blocks_agree() -> None:
 
 
 def test_listing_names_imports_no_block(monkeypatch: pytest.MonkeyPatch) -> None:
-    registry._scan.cache_clear()
-    monkeypatch.setattr(registry, "_import", lambda name: pytest.fail(f"imported {name}"))
+    registry._own_blocks.cache_clear()
+    monkeypatch.setattr(registry, "import_module", lambda name: pytest.fail(f"imported {name}"))
     assert "blocks.JointPD" in known_names()
 
 
@@ -176,3 +176,37 @@ def test_blocks_of_other_packages(monkeypatch: pytest.MonkeyPatch) -> None:
         assert nearest_names("theirs.Gan")[0] == "theirs.Gain"
     finally:
         registry._entry_points.cache_clear()
+
+
+def test_a_module_in_the_current_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """From a project's root, a graph in a folder of its own may name the project's packages."""
+    (tmp_path / "graphs").mkdir()
+    (tmp_path / "my_cart").mkdir()
+    (tmp_path / "my_cart" / "plant.py").write_text(BLOCK.format(mark="current"))
+    with pytest.raises(UnknownModuleError):
+        find_block("my_cart.plant:Mine", tmp_path / "graphs")
+    monkeypatch.chdir(tmp_path)
+    assert find_block("my_cart.plant:Mine", tmp_path / "graphs").mark == "current"  # type: ignore[attr-defined]
+
+
+def test_a_file_beside_the_graph_wins_over_the_current_folder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "graphs").mkdir()
+    (tmp_path / "my_fourth_part.py").write_text(BLOCK.format(mark="current"))
+    (tmp_path / "graphs" / "my_fourth_part.py").write_text(BLOCK.format(mark="beside"))
+    monkeypatch.chdir(tmp_path)
+    assert find_block("my_fourth_part:Mine", tmp_path / "graphs").mark == "beside"  # type: ignore[attr-defined]
+
+
+def test_what_is_proposed_for_a_block_of_ones_own(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert nearest_names("cartpole.plant:Plant", tmp_path) == ()  # not blocks.JumpPlan
+    assert nearest_names("parts:JointPd", tmp_path) == ("blocks.JointPD",)
+    (tmp_path / "cart").mkdir()
+    (tmp_path / "cart" / "plant.py").write_text(BLOCK.replace("Mine", "Plant"))
+    (tmp_path / "cart" / "broken.py").write_text("class Plant(Block:")
+    assert nearest_names("cartpole.plant:Plant", tmp_path) == ("cart.plant:Plant",)
+    assert nearest_names("Plant", tmp_path) == ("cart.plant:Plant",)

@@ -65,3 +65,30 @@ def test_texts_that_look_like_references_survive() -> None:
     assert in_present_form(text) == (
         'blocks:\n  a: {use: blocks.Gain, with: {name: $$cost, other: "on"}}\n'
     )
+
+
+ESTIMATOR = """\
+rate: 500
+robot: bruce
+blocks:
+  estimator:
+    use: blocks.StateEstimator
+    with: {law: %s, velocity_gain: 0.1, gate: 0.08}
+    in: {imu: {value: {}}, joints: {value: {}}, contacts: {value: {}}}
+"""
+
+
+@pytest.mark.parametrize(
+    ("law", "use", "fix"),
+    [
+        ("complementary", "blocks.ComplementaryFilter", "use: blocks.ComplementaryFilter, a block"),
+        ("weighted", "blocks.StateEstimator", "leave it out: since 0.2 blocks.StateEstimator is"),
+    ],
+)
+def test_the_two_laws_of_the_estimator_are_two_blocks(law: str, use: str, fix: str) -> None:
+    text = ESTIMATOR % law
+    graph = load_text(in_present_form(text), Path("old.yaml"))
+    assert block_name(graph.block("estimator").block_type) == use
+    assert graph.block("estimator").params.model_dump()["velocity_gain"] == 0.1
+    with pytest.raises(LoadError, match=fix):
+        load_text(text, Path("old.yaml"))

@@ -1,0 +1,118 @@
+"""The phases of a jump as a table: from which phase, on which condition, to which other."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...mathematics.kernel import kernel
+from ..signals import Phase
+
+Array = NDArray[np.float64]
+
+
+class Condition(IntEnum):
+    """What may hold in a tick and lead to another phase."""
+
+    PLAN_SQUATS = 0
+    """The plan is in its squat or beyond."""
+    PLAN_THRUSTS = 1
+    """The plan is in its thrust or beyond."""
+    LIFT_OFF_DUE = 2
+    """The planned lift-off is over, and all points have left the ground or waited long enough."""
+    LEFT_EARLY = 3
+    """In the second half of the thrust no point has had contact for a while."""
+    TOUCHED_DOWN = 4
+    """A point has contact after the least share of the predicted flight."""
+    OVERDUE = 5
+    """The flight lasts much longer than planned."""
+    RESTED = 6
+    """The landing has lasted long enough, and no other flight is planned."""
+    THRUSTS_AGAIN = 7
+    """Another flight is planned, and the plan is in its thrust."""
+    LOST_CONTACT = 8
+    """No point has had contact for too long."""
+
+
+class Transition(NamedTuple):
+    """From ``phase`` to ``to`` when the condition ``when`` holds."""
+
+    phase: Phase
+    when: Condition
+    to: Phase
+
+
+TRANSITIONS = (
+    Transition(Phase.STAND, Condition.LOST_CONTACT, Phase.FAULT),
+    Transition(Phase.STAND, Condition.LIFT_OFF_DUE, Phase.FLIGHT),
+    Transition(Phase.STAND, Condition.PLAN_THRUSTS, Phase.THRUST),
+    Transition(Phase.STAND, Condition.PLAN_SQUATS, Phase.SQUAT),
+    Transition(Phase.SQUAT, Condition.LOST_CONTACT, Phase.FAULT),
+    Transition(Phase.SQUAT, Condition.LIFT_OFF_DUE, Phase.FLIGHT),
+    Transition(Phase.SQUAT, Condition.PLAN_THRUSTS, Phase.THRUST),
+    Transition(Phase.THRUST, Condition.LOST_CONTACT, Phase.FAULT),
+    Transition(Phase.THRUST, Condition.LIFT_OFF_DUE, Phase.FLIGHT),
+    Transition(Phase.THRUST, Condition.LEFT_EARLY, Phase.FLIGHT),
+    Transition(Phase.FLIGHT, Condition.TOUCHED_DOWN, Phase.LANDING),
+    Transition(Phase.FLIGHT, Condition.OVERDUE, Phase.FAULT),
+    Transition(Phase.LANDING, Condition.LOST_CONTACT, Phase.FAULT),
+    Transition(Phase.LANDING, Condition.THRUSTS_AGAIN, Phase.THRUST),
+    Transition(Phase.LANDING, Condition.RESTED, Phase.RECOVER),
+    Transition(Phase.RECOVER, Condition.LOST_CONTACT, Phase.FAULT),
+)
+"""All transitions. Of those of one phase the first whose condition holds is taken; a phase that
+none leads out of, such as FAULT, stays."""
+
+TABLE = np.array([[int(value) for value in row] for row in TRANSITIONS])
+"""The transitions as an array (n, 3), for the kernel."""
+
+NOW, IN_PHASE, LIFT_OFF, TOUCHDOWN, REMAINING, UNLOADED = range(6)
+"""Elements of ``times`` [s]: the plan's time; how long the phase has lasted; the planned lift-off
+and touchdown of the next flight, the one under way or the last; the predicted time to touchdown;
+and how long no point has had contact."""
+
+LATE_LIFT_OFF, EARLY_LIFT_OFF, TOUCHDOWN_SHARE, LANDING_TIME, LOST_CONTACT = range(5)
+"""Elements of ``limits``: the parameters of ``JumpPhase`` of these names."""
+
+
+@kernel
+def find_conditions(
+    times: Array, limits: Array, planned: int, another: bool, holds: NDArray[np.bool_]
+) -> None:
+    """Which conditions hold in this tick.
+
+    Args:
+        times, limits: see ``NOW`` and ``LATE_LIFT_OFF``.
+        planned: the phase that the plan is in.
+        another: whether the plan has a flight behind the one that ``times`` is about.
+        holds: out, one element for each ``Condition``.
+    """
+    now, in_phase = float(times[NOW]), float(times[IN_PHASE])
+    lift_off, unloaded = float(times[LIFT_OFF]), float(times[UNLOADED])
+    flight = float(times[TOUCHDOWN]) - lift_off
+    due = now >= lift_off
+    waiting = unloaded == 0.0 and now < lift_off + float(limits[LATE_LIFT_OFF])
+    share = float(limits[TOUCHDOWN_SHARE]) * (in_phase + float(times[REMAINING]))
+    holds[Condition.PLAN_SQUATS] = planned >= Phase.SQUAT
+    holds[Condition.PLAN_THRUSTS] = planned >= Phase.THRUST or due
+    holds[Condition.LIFT_OFF_DUE] = due and not waiting
+    holds[Condition.LEFT_EARLY] = (
+        now + in_phase >= lift_off and not due and unloaded >= limits[EARLY_LIFT_OFF]
+    )
+    holds[Condition.TOUCHED_DOWN] = unloaded == 0.0 and in_phase >= share
+    holds[Condition.OVERDUE] = in_phase > flight + float(limits[LOST_CONTACT])
+    holds[Condition.RESTED] = not another and in_phase >= limits[LANDING_TIME]
+    holds[Condition.THRUSTS_AGAIN] = another and planned == Phase.THRUST
+    holds[Condition.LOST_CONTACT] = unloaded > limits[LOST_CONTACT]
+
+
+@kernel
+def next_phase(table: NDArray[np.int64], phase: int, holds: NDArray[np.bool_]) -> int:
+    """The phase that follows by the first row (phase, condition, to) of the table that applies."""
+    for row in range(table.shape[0]):
+        if int(table[row, 0]) == phase and holds[int(table[row, 1])]:
+            return int(table[row, 2])
+    return phase

@@ -1,0 +1,220 @@
+"""``aloft robot``: look at a robot, import one from URDF or MJCF, write one as URDF."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from ..runtime.language.errors import AloftError, ExitCode
+from .output import console, errors_reported, print_error, print_json, say, table
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from ..robots.reading import ReadRobot
+
+robot = typer.Typer(
+    name="robot",
+    help="Look at a robot, import one from URDF or MJCF, write one as URDF.",
+    no_args_is_help=True,
+    rich_markup_mode=None,
+)
+
+Name = Annotated[str, typer.Argument(help="A robot of ours, or a YAML, URDF or MJCF file.")]
+ModelFile = Annotated[Path, typer.Argument(help="The URDF or MJCF file.")]
+AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
+
+
+@robot.command("show")
+def show(
+    name: Name,
+    as_json: AsJson = False,
+    picture: Annotated[
+        Path | None, typer.Option(help="Draw it as it stands to this .png or .svg file.")
+    ] = None,
+) -> None:
+    """Print the tree, masses, limits, motors, feet and sensors of a robot, and what is missing."""
+    from ..robots.report import report
+
+    with _faults_reported(as_json):
+        found = _read(name)
+        about = report(found)
+        if picture is not None:
+            _draw(found, picture)
+    if as_json:
+        print_json({"success": True, **about, "picture": str(picture) if picture else None})
+    else:
+        _print_robot(console(), about)
+        if picture is not None:
+            say(console(), f"drawn to {picture}")
+
+
+@robot.command("import")
+def import_(
+    file: ModelFile,
+    out: Annotated[
+        Path | None, typer.Option("--out", "-o", help="The YAML to write; the file's stem.")
+    ] = None,
+    force: Annotated[bool, typer.Option(help="Write over a YAML that is there.")] = False,
+    as_json: AsJson = False,
+) -> None:
+    """Write the short YAML beside a URDF or MJCF file, filled with what can be found or guessed."""
+    with _faults_reported(as_json):
+        target, text, notes = _imported(file, out, force)
+        try:
+            target.write_text(text, encoding="utf-8")
+        except OSError as error:
+            raise AloftError(f"{target} cannot be written: {error.strerror}") from error
+    if as_json:
+        print_json({"success": True, "written": str(target), "notes": notes})
+        return
+    screen = console()
+    say(screen, f"wrote {target}: look at each part, then `aloft robot show {target}`")
+    for note in notes:
+        say(screen, f"  - {note}")
+
+
+@robot.command("export")
+def export(
+    name: Name,
+    out: Annotated[
+        Path | None, typer.Option("--out", "-o", help="The file to write; standard output.")
+    ] = None,
+    urdf: Annotated[bool, typer.Option("--urdf", help="As a URDF, which is the default.")] = True,
+) -> None:
+    """Write a robot as a URDF: links, joints, capsules, contact points, effort and speed limits."""
+    with _faults_reported(False):
+        from ..robots.urdf_export import urdf_of
+
+        text = urdf_of(_read(name).description)
+        if out is not None:
+            try:
+                out.write_text(text, encoding="utf-8")
+            except OSError as error:
+                raise AloftError(f"{out} cannot be written: {error.strerror}") from error
+    if out is None:
+        typer.echo(text, nl=False)
+
+
+@contextmanager
+def _faults_reported(as_json: bool) -> Iterator[None]:
+    """As ``errors_reported``; a robot's faults are printed one by one, or listed in the JSON."""
+    from ..robots.validation import RobotError
+
+    with errors_reported(as_json):
+        try:
+            yield
+        except LookupError as error:
+            raise AloftError(str(error.args[0])) from error
+        except RobotError as error:
+            if not as_json:
+                print_error(str(error))
+                raise typer.Exit(ExitCode.BAD_INPUT) from error
+            faults = [
+                {
+                    "file": fault.file or error.file, "line": fault.line, "column": fault.column,
+                    "path": list(fault.path), "message": fault.message,
+                    "expected": fault.expected, "found": fault.found, "fix": fault.fix,
+                }
+                for fault in error.faults
+            ]  # fmt: skip
+            headline = str(error).splitlines()[-1]
+            print_json({"success": False, "reason": headline, "faults": faults})
+            raise typer.Exit(ExitCode.BAD_INPUT) from error
+
+
+def _read(name: str) -> ReadRobot:
+    from ..robots.reading import path_of, read
+
+    return read(path_of(name))
+
+
+def _draw(found: ReadRobot, picture: Path) -> None:
+    from ..robots.drawing import draw_robot
+
+    try:
+        draw_robot(found.description, picture)
+    except (OSError, ValueError) as error:
+        raise AloftError(f"no picture: {error}") from error
+
+
+def _imported(file: Path, out: Path | None, force: bool) -> tuple[Path, str, list[str]]:
+    """Where the YAML goes, its text and its notes. Raises ``RobotError`` for a file that is wrong
+    and ``AloftError`` for one that must not be written."""
+    from ..robots.importing.new_yaml import new_yaml
+    from ..robots.reading import MODEL_FILES
+
+    if file.suffix not in MODEL_FILES:
+        kinds = ", ".join(MODEL_FILES)
+        raise AloftError(f"{file} is no URDF or MJCF file: its name ends in none of {kinds}")
+    if not file.is_file():
+        raise AloftError(f"there is no file {file}")
+    target = out or file.with_suffix(".yaml")
+    if target.exists() and not force:
+        raise AloftError(f"{target} is there already; --force writes over it")
+    text, notes = new_yaml(file, target)
+    return target, text, notes
+
+
+def _print_robot(out: Console, about: dict[str, Any]) -> None:
+    say(out, f"{about['name']}: {about['text']}" if about["text"] else about["name"])
+    say(out, f"  {about['file']}" + (f" on {about['model_file']}" if about["model_file"] else ""))
+    sizes = about["dimensions"]
+    say(
+        out,
+        f"  {about['mass_kg']:.5g} kg, {about['base_joint']} base (link {about['base']}), "
+        f"{sizes['n_joints']} joints, {sizes['n_feet']} feet, {sizes['n_contacts']} contact points",
+    )
+    rows = [_link_row(link) for link in about["links"]]
+    columns = ("link", ">kg", "joint", "kind", "axis", "limits", ">stands at", ">shapes")
+    out.print(table("", columns, rows))
+    rows = [
+        (
+            row["motor"] + _of_joints(row),
+            *(f"{row[key]:.5g}" for key in ("peak_torque", "corner_speed", "no_load_speed",
+                                           "continuous_torque", "rotor_inertia", "friction",
+                                           "damping")),
+        )
+        for row in about["motors"]
+    ]  # fmt: skip
+    columns = ("motor", ">peak N m", ">to rad/s", ">zero at rad/s", ">lasting N m",
+               ">rotor kg m^2", ">friction N m", ">damping N m s")  # fmt: skip
+    if rows:
+        out.print(table(f"motors, profile {about['profile']}", columns, rows))
+    if about["feet"]:
+        feet = [(f["foot"], f["kind"], f["link"], ", ".join(f["contacts"])) for f in about["feet"]]
+        out.print(table("feet", ("foot", "kind", "link", "contact points"), feet))
+    sensors = about["sensors"]
+    imu = "an IMU" if sensors["imu"] else "no IMU"
+    say(out, f"sensors: {sensors['encoders']} encoders, {imu}, {sensors['switches']} switches")
+    if about["points"]:
+        say(out, f"points to push at: {', '.join(about['points'])}")
+    for note in about["missing"]:
+        say(out, f"note: {note}")
+
+
+def _of_joints(row: dict[str, Any]) -> str:
+    """The joints that a motor moves, where its name does not say it."""
+    return "" if row["joints"] == [row["motor"]] else f" ({', '.join(row['joints'])})"
+
+
+def _link_row(link: dict[str, Any]) -> tuple[str, ...]:
+    axis = " ".join(f"{value:.3g}" for value in link["axis"])
+    limits = "none" if link["joint"] else ""
+    if link["limits"]:
+        limits = f"{link['limits'][0]:.4g} to {link['limits'][1]:.4g}"
+    stands = "" if link["stands_at"] is None else f"{link['stands_at']:.4g}"
+    return (
+        "  " * link["depth"] + link["link"],
+        f"{link['mass_kg']:.4g}",
+        link["joint"],
+        link["kind"],
+        axis,
+        limits,
+        stands + (" held" if link["held"] else ""),
+        str(link["shapes"]),
+    )

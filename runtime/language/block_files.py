@@ -1,0 +1,130 @@
+"""Finds blocks in files of Python by reading them, without importing any."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+
+_PORTS = ("Input", "Output")
+_MACHINE = ("step", "emit")
+_MOST_FILES = 300
+"""How many files of a user's folder are read at most, only to propose names."""
+
+
+@dataclass(frozen=True)
+class WrittenClass:
+    """A class as its source shows it."""
+
+    name: str
+    bases: tuple[str, ...]
+    """The last names of what it derives from: ``Block`` for ``aloft.Block``."""
+    has_ports: bool
+    has_machine: bool
+    """Whether it defines ``step`` or ``emit``."""
+    is_abstract: bool
+    """Whether one of its methods is abstract."""
+
+
+def classes_in(path: Path) -> tuple[WrittenClass, ...]:
+    """The classes at the top level of a file; none where it cannot be read or is no Python."""
+    try:
+        text = path.read_text(encoding="utf-8", errors="replace")
+        if "class " not in text:
+            return ()
+        tree = ast.parse(text)
+    except (OSError, SyntaxError, ValueError, RecursionError):
+        return ()
+    return tuple(_written(node) for node in tree.body if isinstance(node, ast.ClassDef))
+
+
+def blocks_in_packages(root: Path, packages: Iterable[str]) -> Mapping[str, Path]:
+    """The blocks that graphs can use as ``package.Class``, with their files, sorted by name.
+
+    A class is a block if it derives from ``Block``, however far away. It can be used if it, or one
+    of those it derives from, has a port and a machine's method, it leaves nothing abstract, and its
+    name does not begin with an underscore.
+    """
+    classes = [
+        (package, path, written)
+        for package in packages
+        for path in files_of(root / package)
+        for written in classes_in(path)
+    ]
+    found: dict[str, Path] = {}
+    known: dict[str, tuple[bool, bool]] = {"Block": (False, False)}  # with ports, with a machine
+    while True:
+        new = [
+            each
+            for each in classes
+            if each[2].name not in known and any(base in known for base in each[2].bases)
+        ]
+        if not new:
+            return dict(sorted(found.items()))
+        for package, path, written in new:
+            inherited = [known[base] for base in written.bases if base in known]
+            ports = written.has_ports or any(base[0] for base in inherited)
+            machine = written.has_machine or any(base[1] for base in inherited)
+            known[written.name] = (ports, machine)
+            usable = ports and machine and not written.is_abstract
+            if usable and not written.name.startswith("_"):
+                found.setdefault(f"{package}.{written.name}", path)
+
+
+def blocks_in_folder(folder: Path) -> Iterator[str]:
+    """Blocks in a user's folder and the packages in it, as ``package.module:Class``.
+
+    Only classes whose base is called as a block are found, which is enough to propose a name.
+    """
+    for path in _some_files(folder):
+        parts = path.relative_to(folder).with_suffix("").parts
+        module = ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+        for written in classes_in(path):
+            if module and any(base.endswith("Block") for base in written.bases):
+                yield f"{module}:{written.name}"
+
+
+@lru_cache(maxsize=16)
+def files_of(folder: Path) -> tuple[Path, ...]:
+    """All files of Python below a folder that does not change while we run, sorted."""
+    return tuple(sorted(folder.rglob("*.py")))
+
+
+def _some_files(folder: Path) -> Iterator[Path]:
+    """The files of Python in a folder and down to two folders below, up to a number."""
+    count = 0
+    for pattern in ("*.py", "*/*.py", "*/*/*.py"):
+        for path in sorted(folder.glob(pattern)):
+            if any(part.startswith(".") for part in path.relative_to(folder).parts):
+                continue  # environments and caches
+            count += 1
+            if count > _MOST_FILES:
+                return
+            yield path
+
+
+def _written(node: ast.ClassDef) -> WrittenClass:
+    functions = [item for item in node.body if isinstance(item, ast.FunctionDef)]
+    values = [item.value for item in node.body if isinstance(item, (ast.Assign, ast.AnnAssign))]
+    return WrittenClass(
+        node.name,
+        tuple(filter(None, map(_last_name, node.bases))),
+        any(isinstance(value, ast.Call) and _last_name(value.func) in _PORTS for value in values),
+        any(function.name in _MACHINE for function in functions),
+        any(
+            _last_name(decorator) == "abstractmethod"
+            for function in functions
+            for decorator in function.decorator_list
+        ),
+    )
+
+
+def _last_name(node: ast.expr) -> str:
+    """``Block`` for ``aloft.Block``, ``Robot`` for ``Robot[Arm]``."""
+    if isinstance(node, ast.Subscript):
+        return _last_name(node.value)
+    if isinstance(node, ast.Attribute):
+        return node.attr
+    return node.id if isinstance(node, ast.Name) else ""

@@ -1,0 +1,122 @@
+"""Imports modules that hold blocks: installed ones, and files of a user beside a graph."""
+
+from __future__ import annotations
+
+import importlib
+import importlib.util
+import sys
+import traceback
+from collections.abc import Iterable
+from pathlib import Path
+from types import ModuleType
+
+from .errors import AloftError, UnknownBlockError
+
+
+class BlockImportError(AloftError):
+    """A block's module or class cannot be used; the message is one line, ``where`` its origin."""
+
+    def __init__(self, message: str, where: str = "") -> None:
+        super().__init__(message)
+        self.where = where
+
+
+class UnknownModuleError(UnknownBlockError):
+    """There is no module of that name."""
+
+
+def user_module(module_name: str, folders: Iterable[Path]) -> ModuleType:
+    """A module from a file in the first of some folders that has it, else from anywhere.
+
+    Raises:
+        UnknownBlockError: there is no such module, or the name cannot be one.
+        BlockImportError: it fails when it is imported.
+    """
+    if not module_name or not all(part.isidentifier() for part in module_name.split(".")):
+        raise UnknownBlockError(f"{module_name!r} is not the name of a module")
+    for folder in dict.fromkeys(folder.resolve() for folder in folders):
+        file = _file_of(module_name, folder)
+        if file is not None:
+            return _from_file(module_name, file, folder)
+    return import_module(module_name)
+
+
+def import_module(module_name: str) -> ModuleType:
+    """An installed module.
+
+    Raises:
+        UnknownModuleError: there is none of that name.
+        BlockImportError: it fails when it is imported.
+    """
+    try:
+        return importlib.import_module(module_name)
+    except (Exception, SystemExit) as error:  # whatever a user's module may raise
+        raise _import_error(module_name, error) from error
+
+
+def _file_of(module_name: str, folder: Path) -> Path | None:
+    base = folder.joinpath(*module_name.split("."))
+    files = (base.with_name(f"{base.name}.py"), base / "__init__.py")
+    return next((file for file in files if file.is_file()), None)
+
+
+def _from_file(module_name: str, file: Path, folder: Path) -> ModuleType:
+    """The module in a file, under its own name where no other module has taken that."""
+    present = sys.modules.get(module_name)
+    if present is None:
+        # At the end, so that a file beside a graph never hides an installed package from others.
+        if str(folder) not in sys.path:
+            sys.path.append(str(folder))
+            importlib.invalidate_caches()
+        if _is_importable(module_name.partition(".")[0], folder):
+            return import_module(module_name)
+    if present is not None and _same_file(present, file):
+        return present
+    return _import_file(f"{module_name}@{file.parent}", file)
+
+
+def _is_importable(top: str, folder: Path) -> bool:
+    """Whether importing ``top`` gives the module or package in that folder, and no other."""
+    try:
+        spec = importlib.util.find_spec(top)
+    except ValueError:  # a module without a spec, such as __main__
+        return False
+    if spec is None:
+        return False
+    places = [*(spec.submodule_search_locations or ()), spec.origin or ""]
+    ours = (folder / top, folder / f"{top}.py")
+    return any(Path(place).resolve() in ours for place in places if place)
+
+
+def _same_file(module: ModuleType, file: Path) -> bool:
+    origin = getattr(module, "__file__", None)
+    return origin is not None and Path(origin).resolve() == file
+
+
+def _import_file(key: str, file: Path) -> ModuleType:
+    """A file whose module name is taken by another file, under a name of its own."""
+    if key in sys.modules:
+        return sys.modules[key]
+    spec = importlib.util.spec_from_file_location(key, file)
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[key] = module
+    try:
+        spec.loader.exec_module(module)
+    except (Exception, SystemExit) as error:
+        del sys.modules[key]
+        raise _import_error(file.stem, error) from error
+    return module
+
+
+def _import_error(module_name: str, error: BaseException) -> AloftError:
+    """What to raise for a module that failed: it is not there, or it is broken."""
+    last = traceback.format_exception_only(error)[-1].strip()
+    if isinstance(error, SyntaxError):
+        return BlockImportError(last, f"{error.filename}:{error.lineno}:{error.offset}")
+    if isinstance(error, ModuleNotFoundError) and f"{module_name}.".startswith(f"{error.name}."):
+        return UnknownModuleError(f"there is no module {module_name!r}")
+    frames = traceback.extract_tb(error.__traceback__)
+    outside = [f for f in frames if "importlib" not in f.filename and f.filename != __file__]
+    where = f"{outside[-1].filename}:{outside[-1].lineno}" if outside else ""
+    return BlockImportError(last, where)

@@ -1,0 +1,99 @@
+"""A robot written as a URDF has the same dynamics in Pinocchio's own reader and comes back whole."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from aloft.robots.description import RobotDescription, find_robot
+from aloft.robots.pinocchio_model import build_pinocchio_model
+from aloft.robots.urdf_export import urdf_of
+
+from .example_robots import needs_robots
+from .validation.wrong_robots import hopper
+
+NAMES = ["bruce", *(pytest.param(name, marks=needs_robots) for name in ("go2", "talos"))]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_dynamics_are_equal_in_pinocchio(name: str) -> None:
+    robot = find_robot(name)
+    ours = build_pinocchio_model(robot).model
+    theirs = pin.buildModelFromXML(urdf_of(robot), pin.JointModelFreeFlyer())
+    ours.armature = theirs.armature = np.zeros(ours.nv)
+    order = [ours.getJointId(joint) for joint in theirs.names[2:]]
+    columns = [*range(6), *(ours.joints[k].idx_v for k in order)]
+    random = np.random.default_rng(3)
+    for _ in range(5):
+        base = random.normal(size=7)
+        base[3:] /= np.linalg.norm(base[3:])
+        angles, v = random.normal(size=len(order)), random.normal(size=ours.nv)
+        q = np.concatenate([base, angles])
+        their_q = np.concatenate([base, q[[column + 1 for column in columns[6:]]]])
+        mine, data = ours.createData(), theirs.createData()
+        mass = pin.crba(ours, mine, q)[np.ix_(columns, columns)]
+        np.testing.assert_allclose(mass, pin.crba(theirs, data, their_q), rtol=0, atol=1e-12)
+        bias = pin.nonLinearEffects(ours, mine, q, v)[columns]
+        their_bias = pin.nonLinearEffects(theirs, data, their_q, v[columns])
+        np.testing.assert_allclose(bias, their_bias, rtol=0, atol=1e-10)
+        pin.framesForwardKinematics(ours, mine, q)
+        pin.framesForwardKinematics(theirs, data, their_q)
+        for contact in robot.contacts:
+            point = mine.oMf[ours.getFrameId(contact.name, pin.FrameType.OP_FRAME)].translation
+            their = data.oMf[theirs.getFrameId(contact.name, pin.FrameType.BODY)].translation
+            np.testing.assert_allclose(point, their, rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_it_comes_back_through_our_own_reader(name: str, tmp_path: Path) -> None:
+    robot = find_robot(name)
+    (tmp_path / "back.urdf").write_text(urdf_of(robot))
+    back = find_robot("back.urdf", tmp_path)
+    assert [joint.name for joint in back.joints] == [joint.name for joint in robot.joints]
+    for mine, theirs in zip(robot.joints, back.joints, strict=True):
+        assert (mine.parent, mine.child, mine.kind) == (theirs.parent, theirs.child, theirs.kind)
+        assert theirs.axis == pytest.approx(mine.axis, abs=1e-12)
+        assert theirs.origin == pytest.approx(mine.origin, abs=1e-11)
+        assert theirs.limits == pytest.approx(mine.limits)
+    for mine, theirs in zip(robot.links, back.links, strict=True):
+        assert theirs.mass == mine.mass
+        assert theirs.inertia == pytest.approx(mine.inertia, abs=1e-14)
+
+
+def test_limits_of_coupled_motors() -> None:
+    robot = find_robot("bruce")
+    root = ElementTree.fromstring(urdf_of(robot))
+    limits = {joint.get("name"): joint.find("limit") for joint in root.findall("joint")}
+    hip, knee = limits["right_hip_pitch"], limits["right_knee"]
+    assert hip is not None and knee is not None
+    assert (hip.get("effort"), hip.get("velocity")) == ("21.0", "30.0")  # two motors
+    assert (knee.get("lower"), knee.get("upper")) == ("-2.1", "-0.02")
+
+
+@pytest.mark.parametrize(("base", "velocities"), [("fixed", 0), ("planar", 3)])
+def test_other_bases_and_joints(base: str, velocities: int) -> None:
+    data = hopper() | {"base_joint": base}
+    data["joints"][0] |= {"kind": "slide", "axis": [0.6, 0.0, 0.8], "limits": None}
+    data["joints"][1]["limits"] = None
+    robot = RobotDescription.model_validate(data)
+    ours = build_pinocchio_model(robot).model
+    theirs = pin.buildModelFromXML(urdf_of(robot))
+    assert ours.nv == theirs.nv == velocities + 2
+    ours.armature = np.zeros(ours.nv)
+    random = np.random.default_rng(0)
+    q = random.normal(size=ours.nq)
+    full = np.zeros(theirs.nq)
+    for k in range(1, theirs.njoints):
+        joint, value = theirs.joints[k], q[theirs.joints[k].idx_v]
+        full[joint.idx_q : joint.idx_q + joint.nq] = (
+            [value] if joint.nq == 1 else [np.cos(value), np.sin(value)]
+        )
+    mass = pin.crba(ours, ours.createData(), q)
+    np.testing.assert_allclose(mass, pin.crba(theirs, theirs.createData(), full), atol=1e-12)
+    gravity = pin.computeGeneralizedGravity(ours, ours.createData(), q)
+    their = pin.computeGeneralizedGravity(theirs, theirs.createData(), full)
+    np.testing.assert_allclose(gravity, their, atol=1e-12)
