@@ -113,15 +113,18 @@ def add_soft_stops(measured: Array, stops: SoftStops, out: Feedback) -> None:
 
 @kernel
 def add_friction(
-    velocity: Array, friction: Array, speed: float, scratch: Array, torque: Array
+    velocity: Array, friction: Array, damping: Array, speed: float, scratch: Array, torque: Array
 ) -> None:
-    """Add the ``friction`` [N m] (n,) of joints that move, in the direction of their velocity.
+    """Add what the friction of joints that move takes away, in the direction of their velocity.
 
-    friction tanh(velocity / speed): most of it from ``speed`` [rad/s] on, none at rest.
+    friction tanh(velocity / speed) + damping velocity: most of the ``friction`` [N m] from ``speed``
+    [rad/s] on, none at rest; ``damping`` [N m s/rad] in proportion.
     """
     np.divide(velocity, speed, scratch)
     np.tanh(scratch, scratch)
     np.multiply(scratch, friction, scratch)
+    np.add(torque, scratch, torque)
+    np.multiply(velocity, damping, scratch)
     np.add(torque, scratch, torque)
 
 

@@ -115,7 +115,8 @@ def _read_model(path: Path, added: Path | None, text: PlacedYaml | None) -> Read
 
     content = text.data if text is not None and text.data is not None else {}
     if not isinstance(content, Mapping):
-        raise RobotError(str(added), [RobotFault((), "this adds nothing to a robot", "a mapping")])
+        fault = RobotFault((), "this adds nothing to a robot", "a mapping")
+        raise RobotError(str(added), [text.placed(fault) if text else fault])
     imported = import_robot(path, content)
     faults = [*(text.faults if text else ()), *imported.faults]
     # A fault of the YAML's own keys also shows in what is made of them: once is enough.

@@ -11,6 +11,7 @@ import pytest
 import aloft
 from aloft.cli.blocks import all_references
 from aloft.cli.markdown import reference_page
+from aloft.robots.description import find_robot
 from aloft.runtime.loading import LoadError
 
 ROOT = Path(__file__).parent.parent
@@ -104,6 +105,32 @@ def test_a_task_of_the_users_own_is_used_by_the_whole_body_controller(tmp_path: 
         (tmp_path / "wrong.yaml").write_text(entry.replace(right, wrong))
         with pytest.raises(LoadError, match=message):
             aloft.load(tmp_path / "wrong.yaml")
+
+
+def test_a_block_says_what_it_needs_of_a_robot(tmp_path: Path) -> None:
+    """The block of docs/block_needs.md, with a wrong joint and with the right one."""
+    text = (ROOT / "docs" / "block_needs.md").read_text()
+    ((name, content),) = FILE.findall(text)
+    (tmp_path / name).write_text(content)
+    graph = (
+        f"include: [{ROOT / 'graphs' / 'jump.yaml'}]\nblocks:\n  margin:\n"
+        '    use: "joint_margin:JointMargin"\n    in: {joints: robot.joints}\n\n'
+        "    with: {joint: left_kneee}\n"
+    )
+    path = tmp_path / "margin.yaml"
+    path.write_text(graph)
+    with pytest.raises(LoadError) as caught:
+        aloft.load(path)
+    report = str(caught.value)
+    (answer,) = re.findall(r"```text\n(.*?)\n```", text, re.DOTALL)
+    assert answer in report and "left_knee" in report
+    path.write_text(graph.replace("kneee", "knee"))
+    result = aloft.load(path).run(duration=0.02, log=False)
+    robot = find_robot("bruce")
+    knee = [joint.name for joint in robot.joints].index("left_knee")
+    angle = result.signal("robot.joints.position")[-1, knee]
+    low, high = robot.joint_limits[knee]
+    assert result.signal("margin.margin.value")[-1] == min(angle - low, high - angle)
 
 
 def test_the_reference_of_blocks_is_up_to_date() -> None:

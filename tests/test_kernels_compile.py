@@ -97,7 +97,8 @@ UNUSED = {
         0.002, 0.02, np.ones(10), Motion(np.ones(10), np.ones(10)), Motion(np.ones(10), np.ones(10)),
     ),
     "aloft.mathematics.joint_feedback.add_friction": (
-        np.linspace(-1.0, 1.0, 10), np.full(10, 0.07), 0.3, np.zeros(10), np.ones(10),
+        np.linspace(-1.0, 1.0, 10), np.full(10, 0.07), np.full(10, 0.01), 0.3, np.zeros(10),
+        np.ones(10),
     ),
     "aloft.mathematics.joint_feedback.add_soft_stops": (
         np.linspace(-1.0, 1.0, 5),

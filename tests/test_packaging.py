@@ -1,6 +1,5 @@
 """What is shipped: every sub-package, every data file, and a command line that starts at once."""
 
-import shutil
 import subprocess
 import sys
 import tomllib
@@ -28,19 +27,6 @@ def sub_packages() -> set[str]:
 def test_every_sub_package_is_listed() -> None:
     assert set(LISTED) == sub_packages()
     assert len(LISTED) == len(set(LISTED))
-
-
-@pytest.fixture(scope="module")
-def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A wheel built from a copy of the tracked files, so nothing here is touched."""
-    folder = tmp_path_factory.mktemp("wheel")
-    source = folder / "some-folder"
-    ignored = shutil.ignore_patterns(".*", *(NOT_SHIPPED - {"tests", "docs"}), "__pycache__")
-    shutil.copytree(ROOT, source, ignore=ignored)
-    code = f"from setuptools import build_meta; build_meta.build_wheel({str(folder)!r})"
-    subprocess.run([sys.executable, "-c", code], cwd=source, check=True, capture_output=True)
-    (built,) = folder.glob("*.whl")
-    return built
 
 
 def test_the_wheel_holds_all_code_and_data(wheel: Path) -> None:

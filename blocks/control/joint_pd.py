@@ -65,8 +65,9 @@ class JointPD(Block):
     only the damping acts, towards zero velocity; ``acceleration`` the whole-body controller's
     accelerations integrated twice, pulled back to the measured joints with time constant ``leak``;
     ``legs``, the paper's, the inverse kinematics of the planned feet seen from the centre of mass.
-    ``friction`` adds that torque in the direction each joint moves, and ``friction_share`` a share of
-    what the description says of the joints' friction and damping.
+
+    **Friction.** ``friction_share`` of the friction and damping of the robot's motors is made up for,
+    in the direction each joint moves, and ``friction`` besides.
 
     **Soft stops.** A joint nearer than ``stop_margin`` to its limit, on the ground or in the air, is
     also held back: by ``stop_gain`` times its flight stiffness towards that margin and, growing from
@@ -110,10 +111,10 @@ class JointPD(Block):
             0.0, ge=0.0, le=20.0, text="gains of the soft stops, in those of flight; zero: none"
         )
         friction: PerJoint = live_parameter(
-            PerJoint(0.0), unit="N m", ge=0.0, text="joint friction to compensate"
+            PerJoint(0.0), unit="N m", ge=0.0, text="further joint friction to compensate"
         )
         friction_share: float = live_parameter(
-            0.0, ge=0.0, le=1.0, text="share of the robot's own friction and damping made up for"
+            0.0, ge=0.0, le=1.0, text="share of the motors' friction and damping to compensate"
         )
         friction_speed: float = live_parameter(
             0.3, unit="rad/s", gt=0.0, text="joint speed at which most of it is compensated"
@@ -165,9 +166,10 @@ class JointPD(Block):
         for joint, _ in self._held:
             stance.stiffness[joint] = flight.stiffness[joint]
             stance.damping[joint] = flight.damping[joint]
-        self._friction = p.friction.resolve(robot) + p.friction_share * robot.motors.friction
-        self._drag = p.friction_share * robot.motors.damping
-        self._has_friction = bool(self._friction.any() or self._drag.any())
+        motors = robot.motors
+        self._friction = p.friction.resolve(robot) + p.friction_share * motors.friction
+        self._damping = p.friction_share * motors.damping
+        self._has_friction = bool(self._friction.any() or self._damping.any())
         self._stops = SoftStops(
             robot.joint_limits, p.stop_margin, p.stop_gain, flight.stiffness, flight.damping
         )
@@ -185,10 +187,9 @@ class JointPD(Block):
             command.torque += self._part
         if self._has_friction:
             add_friction(
-                self.joints.velocity, self._friction, p.friction_speed, self._part, command.torque
-            )
-            np.multiply(self.joints.velocity, self._drag, out=self._part)
-            command.torque += self._part
+                self.joints.velocity, self._friction, self._damping, p.friction_speed, self._part,
+                command.torque,
+            )  # fmt: skip
         blend_feedback(self._airborne, self._flight, self._stance, self._measured, self._out)
         if p.stop_gain > 0.0:
             add_soft_stops(self.joints.position, self._stops, self._out)

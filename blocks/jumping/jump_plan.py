@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from difflib import get_close_matches
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from ...planner.library.jump_table import JumpTableReader
-from ...runtime.language.block import Block, Metric, Output
+from ...runtime.language.block import Block, Context, Metric, Misfit, Output
 from ...runtime.language.errors import BlockError
 from ...runtime.language.parameters import Parameters, parameter
 from ..signals import JumpReference
@@ -73,17 +74,63 @@ class JumpPlan(Block):
     params: Params
     reference = Output(JumpReference, text="the plan at the present instant")
 
+    @classmethod
+    def requires_of_graph(cls, params: Parameters, context: Context) -> Iterable[Misfit]:
+        """A task that can be read, for the graph's robot and with its actuator profile."""
+        from ...planner.library.shipped import shipped_graphs
+        from ...planner.task.task import TaskError
+
+        assert isinstance(params, cls.Params) and context.robot is not None
+        robot = context.robot
+        try:
+            task = read_or_make_task(params.task, context)
+        except TaskError as error:
+            for line in str(error).splitlines():
+                place, _, rest = line.partition(": ")
+                key = rest.partition(": ")[0] if place == "task" else ""
+                yield Misfit(
+                    f"the task cannot be used: {rest if key else line}",
+                    parameter=f"task.{key}" if key else "task",
+                )
+            return
+        except LookupError as error:
+            there = sorted(
+                f"tasks/{path.name}" for path in (shipped_graphs() / "tasks").glob("*.yaml")
+            )
+            near = get_close_matches(str(params.task), there, 3)
+            yield Misfit(
+                str(error.args[0]),
+                parameter="task",
+                expected="a task's file, relative to the graph, or one of the "
+                f"{len(there)} that ship, such as tasks/in_situ.yaml",
+                found=str(params.task),
+                nearest=tuple(near),
+                fix=f"task: {near[0]}" if near else "",
+            )
+            return
+        if task.robot != robot.name:
+            yield Misfit(
+                f"the task {task.name!r} is for {task.robot}, but the graph's robot is "
+                f"{robot.name}",
+                parameter="task",
+                expected=f"a task for {robot.name}",
+                found=f"a task for {task.robot}",
+                fix=f"robot: {task.robot}, as a key of the graph",
+            )
+        elif task.profile and task.profile != robot.motors.profile:
+            yield Misfit(
+                f"the task {task.name!r} is planned with the actuators {task.profile}, but the "
+                f"graph runs with {robot.motors.profile}",
+                parameter="task",
+                expected="one actuator profile for the plan and the graph",
+                found=f"profile: {task.profile} in the task",
+                fix=f"actuators: {task.profile}, as a key of the graph",
+            )
+
     def setup(self) -> None:
-        robot = self.context.robot
-        if robot is None:
-            raise BlockError("JumpPlan needs a robot: name one, e.g. robot: bruce")
         from ...planner.library.reference_table import reference_table
 
-        task = self._task()
-        if task.robot != robot.name:
-            raise BlockError(
-                f"the task {task.name!r} is for {task.robot}, but the graph's robot is {robot.name}"
-            )
+        robot, task = self.robot, self._task()
         plan = self._plan(task, robot)
         self._report = self._look_at(plan)
         self._reader = JumpTableReader(reference_table(plan, robot, self.params.stand_time))
@@ -119,24 +166,12 @@ class JumpPlan(Block):
         return report
 
     def _task(self) -> JumpTask:
-        task = self._named_task()
+        task = read_or_make_task(self.params.task, self.context)
         chosen = self.params.formulation
         if chosen is None:
             return task
         impact = task.impact and chosen == "full"
         return task.model_copy(update={"formulation": chosen, "impact": impact})
-
-    def _named_task(self) -> JumpTask:
-        from ...planner.library.shipped import find_task
-        from ...planner.task.task import TaskError, make_task, read_task
-
-        wanted = self.params.task
-        try:
-            if not isinstance(wanted, str):
-                return make_task({"name": self.context.path, **wanted})
-            return read_task(find_task(wanted, self.context.folder, Path()))
-        except TaskError as error:
-            raise BlockError(str(error)) from error
 
     def _plan(self, task: JumpTask, robot: RobotDescription) -> Plan:
         from ...planner.library.library import PlanLibrary
@@ -156,3 +191,23 @@ class JumpPlan(Block):
         except TaskError as error:
             raise BlockError(str(error)) from error
         return plan
+
+
+def read_or_make_task(wanted: str | Mapping[str, Any], context: Context) -> JumpTask:
+    """The task that a graph names or spells out.
+
+    Raises:
+        LookupError: there is no file of that name beside the graph or among the shipped tasks.
+        TaskError: it cannot be read as a task.
+    """
+    from ...planner.library.shipped import shipped_graphs
+    from ...planner.task.task import make_task, read_task
+
+    if not isinstance(wanted, str):
+        robot = {"robot": context.robot.name} if context.robot is not None else {}
+        return make_task({"name": context.path, **robot, **wanted})
+    places = [folder / wanted for folder in (context.folder, Path(), shipped_graphs())]
+    found = next((place for place in places if place.is_file()), None)
+    if found is None:
+        raise LookupError(f"there is no task {wanted!r} beside the graph or among the shipped ones")
+    return read_task(found)

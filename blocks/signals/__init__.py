@@ -21,6 +21,7 @@ from .control import (
     EstimatorHealth,
     FootTarget,
     JointTarget,
+    JointTorque,
     WholeBodyCommand,
     WholeBodyTarget,
 )
@@ -48,6 +49,7 @@ __all__ = [
     "JointCommand",
     "JointState",
     "JointTarget",
+    "JointTorque",
     "JumpReference",
     "Phase",
     "PhaseState",

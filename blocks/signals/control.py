@@ -105,3 +105,9 @@ class JointTarget(Signal):
     position = Field("n_joints", unit="rad", text="joint angles")
     velocity = Field("n_joints", unit="rad/s", text="joint velocities")
     reachable = Field("n_feet", dtype="bool", text="whether the leg reaches the foot's target")
+
+
+class JointTorque(Signal):
+    """Torques of the joints; for a slide it is a force [N]."""
+
+    torque = Field("n_joints", unit="N m", text="joint torques")

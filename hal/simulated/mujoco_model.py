@@ -187,10 +187,13 @@ def _add_robot(spec: MjSpec, robot: RobotDescription, variation: Variation) -> N
         com = np.array(link.com)
         if name == robot.base:
             com = com + variation.base_com_offset
-        body = parent.add_body(
-            name=body_name(name), pos=position, mass=link.mass * variation.mass, ipos=com,
-            fullinertia=np.array(link.inertia) * variation.mass, explicitinertial=True,
-        )  # fmt: skip
+        inertial: dict[str, Any] = {
+            "mass": link.mass * variation.mass, "ipos": com, "explicitinertial": True,
+            "fullinertia": np.array(link.inertia) * variation.mass,
+        }  # fmt: skip
+        # A base that is bolted to the world may have no mass.
+        inertial = inertial if link.mass > 0.0 else {}
+        body = parent.add_body(name=body_name(name), pos=position, **inertial)
         bodies[name] = body
         # A limb's geoms carry the limb's bit and accept those of limbs before it: every pair once.
         bits = {"contype": 0, "conaffinity": GROUND_BIT}

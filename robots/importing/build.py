@@ -153,7 +153,7 @@ def _base_of(model: RawModel, wanted: str) -> tuple[str, str, list[str]]:
     if len(roots) == 1 and _is_planar(roots[0]):
         released = [joint.name for joint in roots[0].joints]
         return roots[0].name, wanted or "planar", released
-    if len(roots) == 1 and not roots[0].joints and model.is_urdf:
+    if len(roots) == 1 and not roots[0].joints and not model.names_world:
         return roots[0].name, wanted or "floating", []
     return GROUND, wanted or "fixed", []
 

@@ -60,8 +60,12 @@ def import_robot(path: Path, added: Mapping[str, Any]) -> Imported:
         "profiles": overlay.profiles(rated_profile(built.raw_joints, model.is_urdf, notes)),
         "points": overlay.points(built),
     }
+    if "points" not in added and data["base_joint"] == "floating":
+        base = next(link for link in built.links if link["name"] == built.base)
+        data["points"] = {"torso_com": [built.base, list(base["com"])]}
     known = {name: angle for name, angle in model.pose.items() if name in names}
     data["standing"] = known
+    data["sensors"] = {"imu": data["base_joint"] != "fixed", "switches": bool(contacts)}
     for key in ("profile", "sensors", "standing", "held"):
         if key in added:
             data[key] = added[key]

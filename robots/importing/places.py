@@ -15,8 +15,13 @@ TAGS = {"links": ("link", "body"), "joints": ("joint", "joint")}
 
 
 def written_path(fault: RobotFault, data: Mapping[str, Any]) -> tuple[str | int, ...]:
-    """The path of a fault as a short YAML has it: links and joints by name."""
+    """The path of a fault as a short YAML has it: links and joints by name, contacts by foot."""
     path = fault.path
+    if len(path) > 1 and path[0] == "contacts" and isinstance(path[1], int):
+        # Contact points of a short YAML are in its feet.
+        feet = [foot["name"] for foot in data["feet"]]
+        foot = data["contacts"][path[1]]["foot"]
+        return ("feet", feet.index(foot)) if foot in feet else path
     if len(path) > 1 and path[0] in TAGS and isinstance(path[1], int):
         return (path[0], str(data[path[0]][path[1]]["name"]), *path[2:])
     return path

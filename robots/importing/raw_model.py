@@ -60,6 +60,7 @@ class RawModel:
         bodies: the bodies by name.
         world: what the file calls the body that does not move; bodies without a joint may hang
             on it.
+        names_world: whether the file itself has a link for the world, as it must in MJCF.
         pose: joint angles of the file's key frame ``home``, ``stand`` or its first; empty for none.
         mimics: joints that the file ties to another one.
         notes: what could not be taken over, one sentence each.
@@ -70,6 +71,7 @@ class RawModel:
     is_urdf: bool
     bodies: Mapping[str, RawBody]
     world: str
+    names_world: bool
     pose: Mapping[str, float] = field(default_factory=dict)
     mimics: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()

@@ -51,12 +51,11 @@ def read_model(path: Path) -> RawModel:
         raise file.error(f"MuJoCo cannot compile this: {_one_line(error)}") from error
     data = mujoco.MjData(model)
     data.qpos[:] = 0.0
+    free, ball = int(mujoco.mjtJoint.mjJNT_FREE), int(mujoco.mjtJoint.mjJNT_BALL)
     for k in range(model.njnt):
         kind, start = int(model.jnt_type[k]), int(model.jnt_qposadr[k])
-        if kind == mujoco.mjtJoint.mjJNT_FREE:
-            data.qpos[start + 3] = 1.0
-        elif kind == mujoco.mjtJoint.mjJNT_BALL:
-            data.qpos[start] = 1.0
+        if kind in (free, ball):
+            data.qpos[start + (3 if kind == free else 0)] = 1.0
     mujoco.mj_kinematics(model, data)
     limits = urdf_joints(file) if file.is_urdf else {}
     mimics = tuple(name for name, joint in limits.items() if joint.mimics)
@@ -80,9 +79,11 @@ def read_model(path: Path) -> RawModel:
         )
     name = spec.modelname or path.stem
     pose = _key_frame(model)
+    names_world = not file.is_urdf or file.has("link", names[0])
     return RawModel(
-        name, path, file.is_urdf, bodies, names[0], pose, mimics, tuple(dict.fromkeys(notes))
-    )
+        name, path, file.is_urdf, bodies, names[0], names_world, pose, mimics,
+        tuple(dict.fromkeys(notes)),
+    )  # fmt: skip
 
 
 def _one_line(error: Exception) -> str:
@@ -181,10 +182,10 @@ def _joint(model: Any, data: Any, j: int, urdf: dict[str, UrdfJoint]) -> RawJoin
     import mujoco
 
     kinds = {
-        mujoco.mjtJoint.mjJNT_HINGE: "hinge",
-        mujoco.mjtJoint.mjJNT_SLIDE: "slide",
-        mujoco.mjtJoint.mjJNT_FREE: "free",
-        mujoco.mjtJoint.mjJNT_BALL: "ball",
+        int(mujoco.mjtJoint.mjJNT_HINGE): "hinge",
+        int(mujoco.mjtJoint.mjJNT_SLIDE): "slide",
+        int(mujoco.mjtJoint.mjJNT_FREE): "free",
+        int(mujoco.mjtJoint.mjJNT_BALL): "ball",
     }
     name, dof = model.joint(j).name, int(model.jnt_dofadr[j])
     lower, upper = (float(value) for value in model.jnt_range[j])
@@ -194,7 +195,7 @@ def _joint(model: Any, data: Any, j: int, urdf: dict[str, UrdfJoint]) -> RawJoin
         effort, speed = urdf[name].effort, urdf[name].speed
     return RawJoint(
         name,
-        kinds[mujoco.mjtJoint(int(model.jnt_type[j]))],
+        kinds[int(model.jnt_type[j])],
         _tidy(data.xaxis[j]),
         np.array(data.xanchor[j]),
         (lower, upper) if model.jnt_limited[j] else None,
@@ -211,14 +212,12 @@ def _motor_torque(model: Any, j: int) -> float:
     import mujoco
 
     found = 0.0
+    on_joint = (int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT))
     for k in range(model.nu):
-        on_joint = model.actuator_trntype[k] in (
-            mujoco.mjtTrn.mjTRN_JOINT, mujoco.mjtTrn.mjTRN_JOINTINPARENT,
-        )  # fmt: skip
-        if not on_joint or model.actuator_trnid[k][0] != j:
+        if int(model.actuator_trntype[k]) not in on_joint or model.actuator_trnid[k][0] != j:
             continue
         gear, gain = abs(float(model.actuator_gear[k][0])), abs(float(model.actuator_gainprm[k][0]))
-        is_motor = model.actuator_biastype[k] == mujoco.mjtBias.mjBIAS_NONE
+        is_motor = int(model.actuator_biastype[k]) == int(mujoco.mjtBias.mjBIAS_NONE)
         if model.actuator_forcelimited[k]:
             torque = gear * float(np.max(np.abs(model.actuator_forcerange[k])))
         elif is_motor and model.actuator_ctrllimited[k]:
@@ -287,9 +286,9 @@ def _key_frame(model: Any) -> dict[str, float]:
     if not names:
         return {}
     key = next((names.index(name) for name in ("home", "stand", "standing") if name in names), 0)
-    simple = (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE)
+    simple = (int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE))
     return {
         model.joint(j).name: float(model.key_qpos[key][model.jnt_qposadr[j]])
         for j in range(model.njnt)
-        if model.jnt_type[j] in simple
+        if int(model.jnt_type[j]) in simple
     }

@@ -16,21 +16,29 @@ so much is rounding in published files."""
 
 
 def check_bodies(draft: Draft) -> None:
-    """Report masses, centres, inertias and shapes that no body can have."""
+    """Report masses, centres, inertias and shapes that no body can have.
+
+    The base of a robot that is bolted to the world needs no mass: nothing moves it.
+    """
+    bolted = draft.data.get("base") if draft.data.get("base_joint") == "fixed" else None
     for k, link in draft.parts("links", Link):
         path: Path = ("links", k)
-        if not (math.isfinite(link.mass) and link.mass > 0.0):
+        empty = link.mass == 0.0 and not any(link.inertia)
+        if empty and link.name == bolted:
+            pass
+        elif not (math.isfinite(link.mass) and link.mass > 0.0):
             draft.add(
                 (*path, "mass"), f"link {link.name} has a mass of {number(link.mass)} kg",
                 "a positive number of kg", number(link.mass),
-                "mass: 0.1" if link.mass != 0.0 else "merge the link into its neighbour",
+                "mass: 0.1",
             )  # fmt: skip
         if not all(map(math.isfinite, link.com)):
             draft.add(
                 (*path, "com"), f"link {link.name} has no centre of mass",
                 "three finite numbers of m", vector(link.com),
             )  # fmt: skip
-        _check_inertia(draft, (*path, "inertia"), link)
+        if not empty:
+            _check_inertia(draft, (*path, "inertia"), link)
         for i, shape in enumerate(link.shapes):
             values = (*shape.start, *shape.end, shape.radius)
             if not all(map(math.isfinite, values)) or shape.radius <= 0.0:

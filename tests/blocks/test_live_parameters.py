@@ -68,6 +68,11 @@ def standing(rate: float, force: float = 9.81) -> Callable[[int], Inputs]:
     }
 
 
+def landed(tick: int) -> Inputs:
+    """On the ground, off it for a moment, and on it again for good."""
+    return {**standing(0.01)(tick), "contacts": {"active": not 40 <= tick < 45}}
+
+
 def flying(tick: int) -> Inputs:
     """A flight of 0.3 s from the first tick on."""
     now = 0.002 * tick
@@ -140,12 +145,13 @@ SCENES: Mapping[str, list[Scene]] = {
     "blocks.JumpPhase": [
         Scene({"landing_time": 0.05, "lost_contact": 0.04}, jumping(lost)) for lost in (40, 55)
     ],
+    "blocks.ComplementaryFilter": [Scene(), Scene({}, standing(0.01)), Scene({}, standing(0.07))],
     "blocks.StateEstimator": [
         Scene(),
-        Scene({"law": "complementary"}, standing(0.01)),
         Scene({}, standing(0.07)),
         Scene({}, standing(1.3)),
         Scene({}, standing(0.01, 2.5)),
+        Scene({"level_ground": False}, landed),
     ],
     "hal.Push": [Scene({"trigger": "start", "delay": 0.02, "duration": 0.05})],
 }

@@ -40,8 +40,9 @@ def test_a_blend_is_the_weighted_sum_of_both_torques():
 
 def test_friction_has_the_sign_of_the_velocity():
     out = np.ones(3)
-    add_friction(np.array([10.0, 0.0, -10.0]), np.array([0.1, 0.2, 0.3]), 0.3, np.zeros(3), out)
-    assert out == pytest.approx([1.1, 1.0, 0.7])
+    friction, damping = np.array([0.1, 0.2, 0.3]), np.array([0.0, 0.1, 0.01])
+    add_friction(np.array([10.0, 0.0, -10.0]), friction, damping, 0.3, np.zeros(3), out)
+    assert out == pytest.approx([1.1, 1.0, 0.6])
 
 
 def test_integrated_targets_are_ahead_by_a_steady_acceleration():

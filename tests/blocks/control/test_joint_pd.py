@@ -138,6 +138,16 @@ def test_friction_pushes_the_way_the_joint_moves():
     assert command.torque == pytest.approx(np.r_[np.full(5, 0.07), np.full(5, -0.07)])
 
 
+def test_a_share_of_the_motors_own_friction_is_made_up_for():
+    bench = make(friction_share=0.5)
+    bench.set("wbc", torque=0.0)
+    bench.set("joints", velocity=np.full(10, 10.0))
+    motors = ROBOT.motors
+    wanted = 0.5 * (motors.friction + 10.0 * motors.damping)
+    assert wanted.any()
+    assert settle(bench, Phase.STAND, True).torque == pytest.approx(wanted)
+
+
 def test_a_soft_stop_pushes_back_from_a_limit_and_brakes():
     """The left knee stands 20 mrad from its upper limit and moves on at 2 rad/s."""
     knee = 3
@@ -202,12 +212,3 @@ def test_joints_of_no_leg_follow_the_plan_while_all_legs_swing():
     alone = BlockBench(JointPD, GAINS, robot=one_leg, wired=["wbc", "legs", "phase", "joints"])
     command = settle(alone, Phase.FLIGHT, False)
     assert np.array_equal(command.position[:5], ROBOT.standing_position[:5])
-
-
-def test_the_robots_own_friction_is_made_up_for():
-    bench = make(friction_share=0.5)
-    bench.set("wbc", torque=0.0)
-    bench.set("joints", velocity=np.full(10, 10.0))
-    motors = ROBOT.motors
-    wanted = 0.5 * (motors.friction + 10.0 * motors.damping)
-    assert settle(bench, Phase.STAND, True).torque == pytest.approx(wanted)

@@ -84,9 +84,12 @@ def test_a_robot_from_a_file_beside_the_graph(tmp_path: Path) -> None:
 def test_a_broken_robot_is_a_problem(tmp_path: Path, text: str) -> None:
     (tmp_path / "mine.yaml").write_text(text)
     (tmp_path / "graph.yaml").write_text(f"rate: 1\nrobot: mine.yaml\nblocks:\n{CONSTANT}")
-    (problem,) = check(tmp_path / "graph.yaml").problems
-    assert (problem.code, problem.where.line) == ("robot", 2)
-    assert "mine.yaml" in problem.message
+    problems = check(tmp_path / "graph.yaml").problems
+    assert problems
+    for problem in problems:
+        assert problem.code == "robot"
+        assert problem.where.file == str(tmp_path / "mine.yaml")
+        assert problem.other_where is not None and problem.other_where.line == 2
 
 
 def test_a_delayed_wire_becomes_a_block_of_its_own() -> None:

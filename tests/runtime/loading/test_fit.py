@@ -35,7 +35,7 @@ def test_what_a_robot_has() -> None:
 
 
 def test_all_shipped_robots_are_in_the_fix() -> None:
-    assert "robot: bruce" in fix_without_robot()
+    assert all(name in fix_without_robot() for name in ("bruce", "go2"))
 
 
 def test_a_block_learns_the_period_and_the_folder() -> None:

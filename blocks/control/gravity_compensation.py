@@ -1,0 +1,59 @@
+"""The torque that holds a robot on a fixed base up against gravity."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+
+from ...robots.description import RobotDescription
+from ...robots.pinocchio_model import build_pinocchio_model
+from ...runtime.language.block import Block, Input, Misfit, Output
+from ...runtime.language.parameters import Parameters
+from ..signals import JointState, JointTorque
+
+
+class GravityCompensation(Block):
+    """The joint torques g(q) that gravity would have to be answered with at the measured joint
+    positions, by Pinocchio: with them the robot stays where it is, or goes on as it moves.
+
+    For a slide it is the force along its axis. Joints without a motor have their torque, too, and
+    their drives cannot give it. It does not compensate friction, and nothing that the robot
+    carries; add that as a link to its description.
+
+    Only for a fixed base: what holds up a robot that moves freely depends on where its feet stand,
+    which is the whole-body controller's business.
+    """
+
+    needs = ("robot",)
+
+    joints = Input(JointState, text="measured joint positions")
+    torque = Output(JointTorque, text="torques that hold the robot still")
+
+    @classmethod
+    def requires(cls, params: Parameters, robot: RobotDescription | None) -> Iterable[Misfit]:
+        """A fixed base."""
+        if robot is not None and robot.base_joint != "fixed":
+            yield Misfit(
+                f"it needs a robot on a fixed base; {robot.name} has a {robot.base_joint} one",
+                fix="use: blocks.WholeBodyController",
+            )
+
+    def setup(self) -> None:
+        """Build the model."""
+        import pinocchio
+
+        self._model: Any = build_pinocchio_model(self.robot).model
+        self._data: Any = self._model.createData()
+        self._evaluate: Any = pinocchio.computeAllTerms
+        self._position = np.array(pinocchio.neutral(self._model))
+        self._still = np.zeros(self._model.nv)
+        self._gravity = self._data.nle  # Pinocchio's own memory, written in every evaluation
+
+    def step(self) -> None:
+        """Evaluate the model at rest in the measured position."""
+        self._position[:] = self.joints.position
+        # The function for gravity alone returns it as a new array.
+        self._evaluate(self._model, self._data, self._position, self._still)
+        self.torque.torque[:] = self._gravity

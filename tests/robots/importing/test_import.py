@@ -1,0 +1,147 @@
+"""URDF and MJCF files become descriptions: bases, joints, motors, shapes, poses."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+import pytest
+import yaml
+
+from aloft.hal.simulated.mujoco_model import build_mujoco_model
+from aloft.robots.description import RobotDescription, find_robot
+from aloft.robots.reading import read
+
+from .model_files import ARM, CART_POLE, ONE_LEG, PLANAR, SPHERICAL_HIP
+
+
+def robot_of(folder: Path, content: str, added: dict[str, Any] | None = None) -> RobotDescription:
+    """The robot of a model file, with what a YAML beside it adds."""
+    name = "robot.urdf" if "<robot" in content else "robot.xml"
+    (folder / name).write_text(content)
+    if added is not None:
+        (folder / "robot.yaml").write_text(yaml.safe_dump(added))
+    return find_robot(name, folder)
+
+
+@pytest.mark.parametrize("content", [CART_POLE, ONE_LEG, PLANAR])
+def test_dynamics_are_those_of_the_mjcf_file(content: str, tmp_path: Path) -> None:
+    robot = robot_of(tmp_path, content)
+    theirs, ours = mujoco.MjModel.from_xml_string(content), build_mujoco_model(robot)
+    assert theirs.nv == ours.nv == robot.dimensions["n_velocities"]
+    count, random = len(robot.joints), np.random.default_rng(0)
+    for _ in range(3):
+        datas = mujoco.MjData(theirs), mujoco.MjData(ours)
+        position, velocity = random.normal(size=count), random.normal(size=ours.nv)
+        masses = []
+        for model, data in zip((theirs, ours), datas, strict=True):
+            data.qpos[-count:], data.qvel[:] = position, velocity
+            mujoco.mj_forward(model, data)
+            masses.append(np.zeros((ours.nv, ours.nv)))
+            mujoco.mj_fullM(model, data, masses[-1])
+        np.testing.assert_allclose(masses[1], masses[0], rtol=0, atol=1e-9)
+        np.testing.assert_allclose(datas[1].qfrc_bias, datas[0].qfrc_bias, rtol=0, atol=1e-9)
+
+
+def test_a_cart_pole(tmp_path: Path) -> None:
+    robot = robot_of(tmp_path, CART_POLE)
+    assert (robot.name, robot.base, robot.base_joint) == ("cartpole", "ground", "fixed")
+    assert [(j.name, j.kind, j.limits) for j in robot.joints] == [
+        ("slider", "slide", (-1.0, 1.0)),
+        ("hinge", "hinge", None),
+    ]
+    assert robot.total_mass == pytest.approx(1.2)
+    # The hinge has no motor.
+    assert robot.motors.peak_torque.tolist() == [10.0, 0.0]
+    assert robot.motors.damping.tolist() == [0.1, 0.0]
+    assert not robot.sensors.imu and not robot.sensors.switches
+
+
+def test_a_leg_with_motors_a_key_frame_and_a_reference(tmp_path: Path) -> None:
+    foot = {"name": "foot", "at": "foot", "radius": 0.035}
+    robot = robot_of(tmp_path, ONE_LEG, {"feet": [foot], "standing": {"hip": 0.2, "knee": 0.3}})
+    assert robot.base_joint == "floating" and [link.name for link in robot.links] == [
+        "torso", "leg", "shank",
+    ]  # fmt: skip
+    assert robot.motors.peak_torque.tolist() == [50.0, 40.0]
+    assert robot.motors.rotor_inertia.tolist() == [0.01, 0.0]
+    assert robot.motors.friction.tolist() == [0.0, 0.3]
+    assert robot.joints[0].origin == pytest.approx((0.0, 0.0, -0.08))
+    # The knee's zero is not where the file draws it; 20 degrees are taken off.
+    assert robot.joints[1].limits == pytest.approx((0.0, np.radians(120.0)))
+    centre = np.add(robot.contacts[0].position, (0.0, 0.0, 0.035))
+    assert centre == pytest.approx((0.0, 0.0, -0.4))
+    assert read(tmp_path / "robot.xml").description.standing == {"hip": 0.2, "knee": 0.3}
+
+
+def test_the_key_frame_is_the_pose_where_nobody_says_another(tmp_path: Path) -> None:
+    assert robot_of(tmp_path, ONE_LEG).standing == {"hip": 0.2, "knee": 0.3}
+
+
+def test_a_planar_base(tmp_path: Path) -> None:
+    robot = robot_of(tmp_path, PLANAR)
+    assert robot.base_joint == "planar" and [joint.name for joint in robot.joints] == ["hip"]
+
+
+def test_several_joints_at_one_body_become_links_with_little_mass(tmp_path: Path) -> None:
+    robot = robot_of(tmp_path, SPHERICAL_HIP)
+    assert [(j.parent, j.child) for j in robot.joints] == [("torso", "leg_1"), ("leg_1", "leg")]
+    assert [link.mass for link in robot.links] == pytest.approx([5.0, 0.001, 0.999])
+
+
+def test_an_arm_bolted_to_the_world(tmp_path: Path) -> None:
+    robot = robot_of(tmp_path, ARM)
+    assert (robot.base, robot.base_joint, robot.links[0].mass) == ("ground", "fixed", 1.0)
+    shoulder, elbow = robot.joints
+    # The mount turns everything by a right angle, so the axis along y points along -x.
+    assert shoulder.axis == (-1.0, 0.0, 0.0) and shoulder.origin == (0.0, 0.0, 1.0)
+    assert shoulder.limits is None and elbow.limits == (-2.0, 2.0)
+    assert robot.motors.peak_torque.tolist()[1] == 20.0
+    assert robot.motors.no_load_speed.tolist()[1] == 5.0
+    assert (robot.motors.friction[1], robot.motors.damping[1]) == (0.2, 0.1)
+    capsule = robot.links[2].shapes[0]
+    assert capsule.radius == 0.03
+    assert sorted((capsule.start[2], capsule.end[2])) == pytest.approx([0.03, 0.37])
+    notes = read(tmp_path / "robot.urdf").notes
+    assert (
+        "link upper: the mesh package://nowhere/upper.stl is not there, so it has no shape" in notes
+    )
+    assert "no effort limit of shoulder: 100 N m is assumed" in notes
+
+
+def test_a_world_that_is_commented_out_holds_nothing(tmp_path: Path) -> None:
+    mount = ARM[ARM.index('  <joint name="mount"') : ARM.index('  <link name="upper"')]
+    free = ARM.replace('  <link name="world"/>\n', "").replace(mount, "")
+    robot = robot_of(tmp_path, free.replace("<link", '<!-- <link name="world"/> -->\n  <link', 1))
+    assert (robot.base, robot.base_joint) == ("base", "floating")
+
+
+def test_welded_joints_and_a_floating_base_by_yaml(tmp_path: Path) -> None:
+    robot = robot_of(tmp_path, ARM, {"weld": ["elb*"], "name": "stiff"})
+    assert [joint.name for joint in robot.joints] == ["shoulder"] and robot.name == "stiff"
+    assert robot.total_mass == pytest.approx(3.0)
+
+
+def test_the_yaml_overrides_the_file(tmp_path: Path) -> None:
+    added = {
+        "links": {"lower": {"mass": 2.0, "shapes": []}},
+        "joints": {"elbow": {"limits": [-1, 1]}},
+        "profiles": {"strong": {"peak_torque": 50, "motors": {"elbow": {"friction": 1.0}}}},
+        "points": {"tip": ["lower", [0, 0, 0.4]]},
+        "sensors": {"imu": True},
+    }
+    robot = robot_of(tmp_path, ARM, added)
+    assert robot.link("lower").mass == 2.0 and not robot.link("lower").shapes
+    assert robot.joints[1].limits == (-1.0, 1.0)
+    assert robot.motors.profile == "strong" and robot.motors.peak_torque.tolist() == [50.0, 50.0]
+    assert robot.motors.no_load_speed.tolist()[1] == 5.0 and robot.motors.friction[1] == 1.0
+    assert robot.points["tip"] == ("lower", (0.0, 0.0, 0.4)) and robot.sensors.imu
+
+
+def test_a_yaml_that_names_its_file(tmp_path: Path) -> None:
+    (tmp_path / "models").mkdir()
+    (tmp_path / "models" / "arm.urdf").write_text(ARM)
+    (tmp_path / "mine.yaml").write_text("file: models/arm.urdf\nname: mine\n")
+    assert find_robot("mine.yaml", tmp_path).name == "mine"

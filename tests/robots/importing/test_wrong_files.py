@@ -1,0 +1,213 @@
+"""Files that are no robots, and YAMLs that do not fit their file: exact reports."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from aloft.robots.description import RobotError, find_robot
+
+from .model_files import ARM, INERTIAL
+
+TWO_FREE = """<mujoco><worldbody>
+<body name="a"><freejoint/><geom size=".1" mass="1"/></body>
+<body name="b" pos="1 0 0"><freejoint/><geom size=".1" mass="1"/></body></worldbody></mujoco>"""
+BALL = """<mujoco><worldbody><body name="a"><joint name="b" type="ball"/>
+<geom size=".1" mass="1"/></body></worldbody></mujoco>"""
+UNKNOWN_LINK = """<robot name="x">
+<link name="a"/><link name="b"/>
+<joint name="j" type="hinge"><parent link="a"/><child link="c"/><axis xyz="0 0 0"/></joint></robot>"""
+TWO_ROOTS = '<robot name="x">\n<link name="a"/>\n<link name="b"/>\n</robot>'
+RING = """<robot name="x"><link name="a"/><link name="b"/>
+<joint name="j" type="fixed"><parent link="a"/><child link="b"/></joint>
+<joint name="k" type="fixed"><parent link="b"/><child link="a"/></joint></robot>"""
+BAD_JOINT = f"""<robot name="x">
+<link name="a">{INERTIAL}</link>
+<link name="b">{INERTIAL}</link>
+<joint name="j" type="revolute"><parent link="a"/><child link="b"/><axis xyz="0 0 0"/>
+<limit lower="1" upper="-1" effort="1" velocity="1"/></joint></robot>"""
+
+MODELS = [
+    ("x.urdf", "<foo/>", [
+        "x.urdf: this is neither a URDF nor an MJCF file",
+        "    expected   the root element <robot> of a URDF or <mujoco> of an MJCF file",
+        "    found      <foo>",
+    ]),
+    ("x.xml", "hello", ["x.xml:1:1: this is no XML: syntax error"]),
+    ("x.urdf", '<robot name="x"/>', [
+        "x.urdf: the URDF has no links", "    expected   at least one <link>", "    found      none",
+    ]),
+    ("x.xml", TWO_FREE, [
+        "x.xml: bodies a, b move freely: that is more than one robot", "    expected   one",
+        "    found      a, b",
+    ]),
+    ("x.xml", BALL, [
+        "x.xml: joints b are no hinges or slides, which a robot's are", "    expected   one axis each",
+    ]),
+    ("x.xml", "<mujoco><worldbody/></mujoco>", [
+        "x.xml: the file holds no body besides the world", "    expected   at least one",
+        "    found      none",
+    ]),
+    ("x.xml", "<mujoco><worldbdy/></mujoco>", [
+        ("x.xml: MuJoCo cannot read this: XML Error: Schema violation: unrecognized element Element "
+        "'worldbdy', line 1"),
+    ]),
+    ("x.urdf", UNKNOWN_LINK, [
+        "x.urdf:3:1: joint j has no type that a URDF knows",
+        "    expected   revolute, continuous, prismatic, fixed, floating, planar",
+        "    found      'hinge'",
+        "x.urdf:3:1: the child of joint j is 'c', and there is no such link",
+        "    expected   a, b",
+        "    found      'c'",
+    ]),
+    ("x.urdf", TWO_ROOTS, [
+        "x.urdf:2:1: the links make no single tree: 2 have no parent",
+        "    expected   one link that no joint carries",
+        "    found      a, b",
+    ]),
+    ("x.urdf", RING, [
+        "x.urdf:1:17: the links make no single tree: 0 have no parent",
+        "    expected   one link that no joint carries",
+        "    found      none",
+    ]),
+    ("x.urdf", BAD_JOINT, [
+        "x.urdf:6:1: the axis of joint j is no direction",
+        "    expected   three numbers that are not all zero",
+        "    found      '0 0 0'",
+        "x.urdf:6:1: the limits of joint j leave it no room or are reversed",
+        "    expected   lower < upper",
+        "    found      lower 1, upper -1",
+    ]),
+    ("x.urdf", ARM.replace('<mass value="1"/>', '<mass value="-1"/>'), [
+        "x.urdf: link ground has a mass of -1 kg",
+        "    expected   a positive number of kg",
+        "    found      -1",
+        "    fix        mass: 0.1",
+        "x.urdf:8:3: link upper has a mass of -1 kg",
+        "    expected   a positive number of kg",
+        "    found      -1",
+        "    fix        mass: 0.1",
+        "x.urdf:15:3: link lower has a mass of -1 kg",
+        "    expected   a positive number of kg",
+        "    found      -1",
+        "    fix        mass: 0.1",
+    ]),
+    ("x.urdf", ARM.replace(INERTIAL + "\n    <collision><origin", "\n    <collision><origin"), [
+        "x.urdf:15:3: link lower has a mass of 0 kg",
+        "    expected   a positive number of kg",
+        "    found      0",
+        "    fix        mass: 0.1",
+    ]),
+]  # fmt: skip
+
+YAMLS = [
+    ("feets: []", [
+        "x.yaml:1:8: the robot has no key 'feets'",
+        ("    expected   file, weld, name, text, base, base_joint, links, joints, feet, contacts, "
+        "transmission, profiles, profile, sensors, standing, held, points"),
+        "    found      'feets'",
+        "    fix        feet: []",
+    ]),
+    ("links: {loer: {mass: 1}}", [
+        "x.yaml:1:15: the file has no link loer",
+        "    expected   ground, upper, lower",
+        "    found      loer",
+        "    fix        lower",
+    ]),
+    ("joints: [elbow]", [
+        "x.yaml:1:9: joints cannot be ['elbow']",
+        "    expected   a mapping from the names in the file to what differs: joints: {NAME: ...}",
+        "    found      ['elbow']",
+    ]),
+    ("joints: {elbow: {limits: [2, 1]}}", [
+        "x.yaml:1:26: the limits of joint elbow are reversed",
+        "    expected   [lower, upper] with lower < upper",
+        "    found      [2, 1]",
+        "    fix        limits: [1, 2]",
+    ]),
+    ("links: {lower: {inertia: [1, 0.1, 0.1, 0, 0, 0]}}", [
+        ("x.yaml:1:26: link lower has an inertia that no body has: a principal moment is larger than "
+        "the sum of the others"),
+        "    expected   principal moments of which each is at most the sum of the others",
+        "    found      [1, 0.1, 0.1, 0, 0, 0], with principal moments [0.1, 0.1, 1]",
+    ]),
+    ("weld: [wrist]", [
+        "x.yaml:1:8: weld: the file has no joint wrist",
+        "    expected   shoulder, elbow",
+        "    found      wrist",
+    ]),
+    ("feet: [{name: tip, at: lowr, radius: 0.01}]", [
+        "x.yaml:1:24: the file has no link 'lowr'",
+        "    expected   ground, base, upper, lower",
+        "    found      'lowr'",
+        "    fix        lower",
+    ]),
+    ("feet: [{name: tip, at: lower, ball: [0, 0], radius: 0.01}]", [
+        "x.yaml:1:37: a point cannot be [0, 0]",
+        "    expected   [x, y, z] in m",
+        "    found      [0, 0]",
+    ]),
+    ("feet: [{name: tip, at: lower, radius: -0.01}]", [
+        "x.yaml:1:8: contact tip has a radius of -0.01 m",
+        "    expected   a positive number of m: the rubber there is round",
+        "    found      -0.01",
+        "    fix        radius: 0.005",
+    ]),
+    ("standing: {elbow: 3}", [
+        "x.yaml:1:19: standing: joint elbow is outside its limits",
+        "    expected   a value in [-2, 2]",
+        "    found      3",
+        "    fix        elbow: 2",
+    ]),
+    ("base_joint: hanging", [
+        "x.yaml:1:13: the robot: base_joint cannot be 'hanging'",
+        "    expected   'floating', 'planar' or 'fixed'",
+        "    found      'hanging'",
+    ]),
+    ("- elbow", ["x.yaml:1:1: this adds nothing to a robot", "    expected   a mapping"]),
+]  # fmt: skip
+
+
+def report(folder: Path, name: str) -> list[str]:
+    with pytest.raises(RobotError) as error:
+        find_robot(name, folder)
+    return str(error.value).replace(f"{folder}/", "").splitlines()[:-1]
+
+
+@pytest.mark.parametrize(("name", "content", "lines"), MODELS)
+def test_a_model_file_that_is_wrong(
+    name: str, content: str, lines: list[str], tmp_path: Path
+) -> None:
+    (tmp_path / name).write_text(content)
+    assert report(tmp_path, name) == lines
+
+
+@pytest.mark.parametrize(("content", "lines"), YAMLS)
+def test_a_yaml_that_does_not_fit(content: str, lines: list[str], tmp_path: Path) -> None:
+    (tmp_path / "x.urdf").write_text(ARM)
+    (tmp_path / "x.yaml").write_text(content)
+    assert report(tmp_path, "x.urdf") == lines
+
+
+def test_a_package_that_is_not_installed(tmp_path: Path) -> None:
+    (tmp_path / "x.yaml").write_text("file: package://some-robots/x.urdf\n")
+    assert report(tmp_path, "x.yaml") == [
+        (
+            "x.yaml:1:7: there is no file package://some-robots/x.urdf: no folder some-robots is above "
+            "this file, and no installed Python package brings it"
+        ),
+        (
+            "    expected   the path of a URDF or MJCF file, from this file's folder or as "
+            "package://NAME/PATH"
+        ),
+        "    found      package://some-robots/x.urdf",
+        "    fix        pip install some-robots",
+    ]
+
+
+def test_a_file_that_is_not_there(tmp_path: Path) -> None:
+    (tmp_path / "x.yaml").write_text("file: nowhere.urdf\n")
+    assert report(tmp_path, "x.yaml")[0] == "x.yaml:1:7: there is no file nowhere.urdf"
+    with pytest.raises(LookupError, match=r"no robot description at .*nowhere\.urdf"):
+        find_robot("nowhere.urdf", tmp_path)
