@@ -12,7 +12,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from ...robots.description import RobotDescription
+from ...robots.description import RobotDescription, find_robot
+from ...robots.shipped import robot_names
 from ..language.per_joint import by_name
 from ..language.registry import MOVED
 from .document import read_value
@@ -66,7 +67,8 @@ def in_present_form(text: str, version: str = "", robot: RobotDescription | None
     Args:
         text: the graph; one that cannot be read comes back as it is.
         version: the version of aloft that kept it, where that is known.
-        robot: the graph's robot, whose joints gains by position were for.
+        robot: the graph's robot, whose joints gains by position were for; by default one of ours
+            of the name in the graph.
     """
     problems = Problems()
     node = read_value(text, "a kept graph", problems)
@@ -80,6 +82,7 @@ def in_present_form(text: str, version: str = "", robot: RobotDescription | None
         block["use"] = MOVED.get(str(block.get("use")), block.get("use"))
         if not isinstance(block.get("with"), dict):
             block["with"] = {}
+    robot = robot or _robot_of(data)
     profiles = list(_take_profiles(blocks))
     for block in blocks:
         _split_estimators(block)
@@ -94,11 +97,20 @@ def in_present_form(text: str, version: str = "", robot: RobotDescription | None
     return _text(data)
 
 
+def _robot_of(data: Mapping[str, Any]) -> RobotDescription | None:
+    """The robot that a graph names, if it is one of ours."""
+    name = data.get("robot")
+    return find_robot(name) if name in robot_names() else None
+
+
 def _is_early(block: Mapping[str, Any]) -> bool:
     """Whether a block has a name or a parameter that means nothing since version 0.2."""
     use, given = str(block.get("use")), block.get("with")
     early = {"blocks.StateEstimator": "law", **PROFILE_PARAMETERS}
-    return use in MOVED or (isinstance(given, dict) and early.get(use) in given)
+    if not isinstance(given, dict):
+        return use in MOVED
+    by_position = any(isinstance(given.get(k), list) for k in GAINS_BY_POSITION.get(use, ()))
+    return use in MOVED or early.get(use) in given or by_position
 
 
 def _take_profiles(blocks: list[Any]) -> Iterator[str]:
