@@ -25,6 +25,20 @@ PROFILE_PARAMETERS: Mapping[str, str] = {
 block first."""
 
 
+LEG_JOINTS = ("*_hip_yaw", "*_hip_pitch", "*_hip_roll", "*_knee", "*_ankle")
+"""The joints of a leg that lists of gains were for before version 0.2, in their order."""
+JOINT_GAINS = ("flight_stiffness", "flight_damping", "stance_stiffness", "stance_damping")
+EARLIER_DEFAULTS: Mapping[str, Mapping[str, Any]] = {
+    "blocks.JointPD": {
+        "flight_stiffness": [40.0, 60.0, 60.0, 60.0, 15.0],
+        "flight_damping": [1.0, 1.5, 1.5, 1.2, 0.3],
+    },
+    "blocks.SafetyMonitor": {"damping": 0.5},
+}
+"""What blocks did by default before version 0.2, when there was one robot. Its numbers are now in
+the graphs of that robot."""
+
+
 def fix_of_parameter(use: str, parameter: str, value: Node) -> str:
     """What to write for a parameter that a block had before version 0.2; empty for any other."""
     text = text_of(plain(value))
@@ -37,10 +51,14 @@ def fix_of_parameter(use: str, parameter: str, value: Node) -> str:
     return ""
 
 
-def in_present_form(text: str) -> str:
+def in_present_form(text: str, version: str = "") -> str:
     """The flattened graph that an earlier version has kept, as this version would have written it.
 
     A graph that is of this version already, or that cannot be read, comes back as it is.
+
+    Args:
+        version: of aloft, that kept it; empty where nobody knows. What version 0.1 did by default
+            is then said in the graph.
     """
     problems = Problems()
     node = read_value(text, "a kept graph", problems)
@@ -51,7 +69,8 @@ def in_present_form(text: str) -> str:
     profiles = _take_profiles(blocks)
     laws = [_take_law(block) for block in blocks]
     moved = [block for block in blocks if block.get("use") in MOVED]
-    if not moved and not profiles and not any(laws):
+    lists = [_name_joints(block, defaults=version.startswith("0.1.")) for block in blocks]
+    if not moved and not profiles and not any(laws) and not any(lists):
         return text
     for block in moved:
         block["use"] = MOVED[block["use"]]
@@ -69,6 +88,25 @@ def _take_profiles(blocks: list[Any]) -> list[str]:
             if block.get("use") == use and isinstance(given, dict) and parameter in given:
                 found.append(str(given.pop(parameter)))
     return found
+
+
+def _name_joints(block: dict[str, Any], *, defaults: bool) -> bool:
+    """Give gains in a list to the joints they were for, and say the ``defaults`` of version 0.1;
+    whether anything changed."""
+    use = str(block.get("use"))
+    given = block.get("with")
+    parameters = dict(given) if isinstance(given, dict) else {}
+    if defaults:
+        parameters = {**EARLIER_DEFAULTS.get(use, {}), **parameters}
+    if use == "blocks.JointPD":
+        for name in JOINT_GAINS:
+            values = parameters.get(name)
+            if isinstance(values, list) and len(values) == len(LEG_JOINTS):
+                parameters[name] = dict(zip(LEG_JOINTS, values, strict=True))
+    if parameters == (given or {}):
+        return False
+    block["with"] = parameters
+    return True
 
 
 def _take_law(block: dict[str, Any]) -> bool:

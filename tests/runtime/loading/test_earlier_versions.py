@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import pytest
+import yaml
 
 from aloft.runtime.language.registry import block_name
 from aloft.runtime.loading import LoadError, load_text
@@ -92,3 +93,23 @@ def test_the_two_laws_of_the_estimator_are_two_blocks(law: str, use: str, fix: s
     assert graph.block("estimator").params.model_dump()["velocity_gain"] == 0.1
     with pytest.raises(LoadError, match=fix):
         load_text(text, Path("old.yaml"))
+
+
+JOINT_PD = "blocks:\n  pd: {use: blocks.JointPD%s}\n"
+
+
+def test_gains_in_a_list_go_to_their_joints() -> None:
+    text = in_present_form(JOINT_PD % ", with: {flight_damping: [1, 2, 3, 4, 5]}")
+    damping = "'*_hip_yaw': 1, '*_hip_pitch': 2, '*_hip_roll': 3, '*_knee': 4, '*_ankle': 5"
+    assert yaml.safe_load(text)["blocks"]["pd"]["with"] == {
+        "flight_damping": yaml.safe_load(f"{{{damping}}}")
+    }
+
+
+def test_what_version_0_1_did_by_default_is_said() -> None:
+    given = JOINT_PD % ", with: {flight_damping: 0.7}"
+    told = yaml.safe_load(in_present_form(given, "0.1.0"))["blocks"]["pd"]["with"]
+    assert told["flight_damping"] == 0.7
+    assert told["flight_stiffness"]["*_ankle"] == 15
+    assert in_present_form(given, "0.2.0") is given
+    assert in_present_form(given) is given
