@@ -118,8 +118,10 @@ def plan_tasks(
         rows.append(plan_task(task, library, anew, out, nearest, screen))
     failed = [row["task"] for row in rows if not row["success"]]
     if prune and not failed:
-        for path in PlanLibrary(find_robot(tasks[0].robot), keep).prune(tasks):
-            say(screen, f"removed: {path}")
+        for name in dict.fromkeys(task.robot for task in tasks):
+            own = [task for task in tasks if task.robot == name]
+            for path in PlanLibrary(find_robot(name), keep).prune(own):
+                say(screen, f"removed: {path}")
     reason = f"not planned: {', '.join(failed)}" if failed else f"{len(rows)} planned and valid"
     if len(rows) > 1:
         screen.print(summary(rows))

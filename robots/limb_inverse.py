@@ -34,7 +34,7 @@ from .limb_error import foot_error, weigh_rows
 
 Array = NDArray[np.float64]
 
-FOUND = 1e-24
+FOUND = 1e-22
 """A squared error [m^2] below which no further step is taken."""
 REACHED = 1e-18
 """A squared error [m^2] below which the target counts as reached: a nanometre."""
@@ -95,22 +95,24 @@ def approach(
                 value = 0.0
                 for i in range(points):
                     value += float(rows[i, j]) * float(error[i])
+                if _stuck(limits, j, float(angles[j]), value):
+                    # Without its column the joint stays where it is.
+                    value = 0.0
+                    for i in range(points):
+                        rows[i, j] = 0.0
                 gradient[j] = value
-                if not _stuck(limits, j, float(angles[j]), value):
-                    slope += value * value
+                slope += value * value
             if slope <= _STILL * square:
                 break
         damping = ease * square + _FLOOR
         for j in range(n):
-            free = not _stuck(limits, j, float(angles[j]), float(gradient[j]))
-            step[j] = gradient[j] if free else 0.0
+            step[j] = gradient[j]
             for k in range(j + 1):
                 value = 0.0
-                if free and not _stuck(limits, k, float(angles[k]), float(gradient[k])):
-                    for i in range(points):
-                        value += float(rows[i, j]) * float(rows[i, k])
+                for i in range(points):
+                    value += float(rows[i, j]) * float(rows[i, k])
                 normal[j, k] = value
-            normal[j, j] += damping if free else 1.0
+            normal[j, j] += damping
         solve_positive(normal, step)
         promised = 0.0
         for j in range(n):
@@ -216,7 +218,6 @@ def limb_velocity(
     anchors, pose = work[:n, :6], work[n : n + 4, :3]
     rows, normal = work[n + 4 : n + 10, :n], work[n + 10 : 2 * n + 10, :n]
     task = work[2 * n + 10, :6]
-    free = work[2 * n + 11, :n]
     place_limb(links, tip, angles, anchors, pose)
     limb_jacobian(links, anchors, pose, rows)
     # The twist is weighted as the rows are: as if it were one more column of the Jacobian.
@@ -228,26 +229,27 @@ def limb_velocity(
     x, y, z = float(column[0, 0]), float(column[1, 0]), float(column[2, 0])
     task[0], task[1], task[2], task[3], task[4], task[5] = x, y, z, tx, ty, tz
     weigh_rows(tip, pose, target, weights, rows)
-    for j in range(n):
-        free[j] = 1.0
+    points = 3 if tip[6] == 0.0 else 6
     for _ in range(n + 1):
         for j in range(n):
             value = 0.0
-            for i in range(6):
+            for i in range(points):
                 value += float(rows[i, j]) * float(task[i])
-            speeds[j] = float(free[j]) * value
+            speeds[j] = value
             for k in range(j + 1):
                 value = 0.0
-                if free[j] > 0.0 and free[k] > 0.0:
-                    for i in range(6):
-                        value += float(rows[i, j]) * float(rows[i, k])
+                for i in range(points):
+                    value += float(rows[i, j]) * float(rows[i, k])
                 normal[j, k] = value
-            normal[j, j] += damping * damping if free[j] > 0.0 else 1.0
+            normal[j, j] += damping * damping
         solve_positive(normal, speeds)
         again = False
         for j in range(n):
-            if free[j] > 0.0 and _stuck(limits, j, float(angles[j]), float(speeds[j])):
-                free[j], again = 0.0, True
+            speed = float(speeds[j])
+            if speed != 0.0 and _stuck(limits, j, float(angles[j]), speed):
+                again = True
+                for i in range(points):
+                    rows[i, j] = 0.0
         if not again:
             break
 

@@ -13,10 +13,14 @@ from ...mathematics.kernel import kernel
 from ...mathematics.rotations import tilt
 from ...runtime.language.block import Block, Input, Metric, Output, State
 from ...runtime.language.parameters import Parameters, live_parameter, parameter
+from ...runtime.language.per_joint import PerJoint
 from ...runtime.language.signals import Field, Signal
 from ..signals import BaseState, CommandMode, JointCommand, JointState, WholeBodyCommand
 
 Array = NDArray[np.float64]
+
+_DAMPED_SPEED = 20.0
+"""Joint speed [rad/s] at which the default damping asks for the motors' peak torque."""
 
 
 class Fault(IntEnum):
@@ -62,16 +66,17 @@ class SafetyMonitor(Block):
     ``safety_fault`` and ``safety_fault_time_s``. It is a fault when
 
     * the base leans more than ``tilt_limit`` for ``tilt_hold``;
-    * a joint is more than ``limit_margin`` beyond its limits, or faster than ``speed_limit``, for
-      ``joint_hold``;
+    * a joint is more than ``limit_margin`` beyond its limits, or faster than its ``speed_limit``,
+      for ``joint_hold``; a joint without limits is never beyond them;
     * joint readings have not changed by a single bit for ``stale_ticks`` ticks (zero: never;
       a simulator without noise may stand that still);
-    * a state or a command is not finite, or beyond 10 m/s, 100 rad/s or ``torque_limit``;
+    * a state or a command is not finite, or beyond 10 m/s, 100 rad/s or its ``torque_limit``;
     * the whole-body controller has not solved for ``unsolved_ticks`` ticks in a row.
 
     Damping commands zero torque and stiffness, the measured angle, zero velocity and ``damping``,
-    all finite whatever came in. Every tick is judged, also after a fault. Does not know of
-    temperature, voltage or deadlines, and does not stop the run: who scores does.
+    all finite whatever came in. Every tick is judged, also after a fault. Limits and damping are
+    given by joint name or pattern, and follow from the robot's motors where they are not. It does
+    not know of temperature, voltage or deadlines, and it does not stop the run: the score does.
     """
 
     class Params(Parameters):
@@ -80,17 +85,25 @@ class SafetyMonitor(Block):
         limit_margin: float = parameter(
             0.05, unit="rad", ge=0.0, text="how far a joint may be beyond its limits"
         )
-        speed_limit: float = parameter(60.0, unit="rad/s", gt=0.0, text="fastest joint")
+        speed_limit: PerJoint | None = parameter(
+            None, unit="rad/s", gt=0.0, text="fastest joint; none: twice what its motors reach"
+        )
         joint_hold: float = parameter(
             0.02, unit="s", ge=0.0, text="for how long a joint may be further or faster"
         )
-        torque_limit: float = parameter(
-            200.0, unit="N m", gt=0.0, text="a joint torque beyond this is a mistake, not a command"
+        torque_limit: PerJoint | None = parameter(
+            None,
+            unit="N m",
+            gt=0.0,
+            text="a joint torque beyond this is a mistake; none: ten times the motors' peak",
         )
         stale_ticks: int = parameter(0, ge=0, text="equal joint readings in a row; zero: any")
         unsolved_ticks: int = parameter(25, ge=0, text="ticks in a row without a solution")
-        damping: float = live_parameter(
-            0.5, unit="N m s/rad", ge=0.0, text="of every joint, when damped"
+        damping: PerJoint | None = live_parameter(
+            None,
+            unit="N m s/rad",
+            ge=0.0,
+            text="of the joints after a fault; none: the motors' peak torque at 20 rad/s",
         )
 
     needs = ("robot",)
@@ -104,18 +117,32 @@ class SafetyMonitor(Block):
     state = State(SafetyState, text="timers and the fault")
 
     def setup(self) -> None:
-        robot = self.robot
-        margin = self.params.limit_margin
-        self._lower = robot.joint_limits[:, 0] - margin
-        self._upper = robot.joint_limits[:, 1] + margin
+        robot, p = self.robot, self.params
+        n = len(robot.joints)
+        self._lower = robot.joint_limits[:, 0] - p.limit_margin
+        self._upper = robot.joint_limits[:, 1] + p.limit_margin
+        motors, matrix = robot.motors, robot.joint_to_motor
+        self._peak = np.abs(matrix).T @ motors.peak_torque
+        fastest = np.abs(np.linalg.inv(matrix)) @ motors.no_load_speed
+        given = p.speed_limit, p.torque_limit
+        self._speed_limit = 2.0 * fastest if given[0] is None else given[0].resolve(robot)
+        torque_limit = 10.0 * self._peak if given[1] is None else given[1].resolve(robot)
+        self._damping = np.zeros(n)
+        self.on_parameters()
         self._tilt_ticks = round(self.params.tilt_hold / self.period)
         self._joint_ticks = round(self.params.joint_hold / self.period)
         self._commands = (
-            (self.desired.torque, self.params.torque_limit),
-            (self.desired.position, 100.0),
-            (self.desired.velocity, 1000.0),
-            (self.desired.stiffness, 10000.0),
-            (self.desired.damping, 1000.0),
+            (self.desired.torque, torque_limit),
+            (self.desired.position, np.full(n, 100.0)),
+            (self.desired.velocity, np.full(n, 1000.0)),
+            (self.desired.stiffness, np.full(n, 10000.0)),
+            (self.desired.damping, np.full(n, 1000.0)),
+        )
+
+    def on_parameters(self) -> None:
+        given = self.params.damping
+        self._damping[:] = (
+            self._peak / _DAMPED_SPEED if given is None else given.resolve(self.robot)
         )
 
     def step(self) -> None:
@@ -136,7 +163,7 @@ class SafetyMonitor(Block):
         command.torque.fill(0.0)
         command.velocity.fill(0.0)
         command.stiffness.fill(0.0)
-        command.damping.fill(self.params.damping)
+        command.damping[...] = self._damping
         for joint in range(command.position.shape[0]):
             angle = float(self.joints.position[joint])
             command.position[joint] = angle if math.isfinite(angle) else 0.0
@@ -152,8 +179,8 @@ class SafetyMonitor(Block):
     def _judge(self) -> Fault:
         """The fault of this tick, the gravest first; all timers move on."""
         state, params, joints, base = self.state, self.params, self.joints, self.base
-        for values, limit in self._commands:
-            if not within(values, limit):
+        for values, limits in self._commands:
+            if not within_each(values, limits):
                 return Fault.ABSURD_COMMAND
         plausible = (
             within(joints.position, 100.0)
@@ -169,7 +196,7 @@ class SafetyMonitor(Block):
         leans = tilt(base.orientation) > params.tilt_limit
         state.tilted[()] = int(state.tilted[()]) + 1 if leans else 0
         beyond = count_beyond(joints.position, self._lower, self._upper, state.beyond)
-        fast = count_faster(joints.velocity, params.speed_limit, state.fast)
+        fast = count_faster(joints.velocity, self._speed_limit, state.fast)
         changed = not state.started[()]
         for joint in range(joints.position.shape[0]):
             position, velocity = joints.position[joint], joints.velocity[joint]
@@ -205,6 +232,15 @@ def within(values: Array, limit: float) -> bool:
 
 
 @kernel
+def within_each(values: Array, limits: Array) -> bool:
+    """Whether every value is finite and of no greater magnitude than its limit; NaN is not."""
+    inside = True
+    for i in range(values.shape[0]):
+        inside = inside and abs(float(values[i])) <= float(limits[i])
+    return inside
+
+
+@kernel
 def count_beyond(values: Array, lower: Array, upper: Array, counts: NDArray[np.int64]) -> int:
     """Count for each value how many times in a row it was out of bounds; the largest count."""
     largest = 0
@@ -216,10 +252,12 @@ def count_beyond(values: Array, lower: Array, upper: Array, counts: NDArray[np.i
 
 
 @kernel
-def count_faster(values: Array, limit: float, counts: NDArray[np.int64]) -> int:
-    """Count for each value how many times in a row its magnitude was above; the largest count."""
+def count_faster(values: Array, limits: Array, counts: NDArray[np.int64]) -> int:
+    """Count for each value how many times in a row its magnitude was above its limit; the largest
+    count."""
     largest = 0
     for i in range(values.shape[0]):
-        counts[i] = count = int(counts[i]) + 1 if abs(float(values[i])) > limit else 0
+        above = abs(float(values[i])) > float(limits[i])
+        counts[i] = count = int(counts[i]) + 1 if above else 0
         largest = max(largest, count)
     return largest

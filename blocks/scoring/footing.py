@@ -40,7 +40,11 @@ class Footing:
             [k for k, foot in enumerate(foot_of_contact) if foot == number]
             for number in range(len(robot.feet))
         ]
-        self._balls = [(ball, read_limb(robot, ball.foot)) for ball in ball_feet(robot)]
+        self._balls = [
+            (ball, limb, np.zeros(len(limb.joints)), np.zeros((len(limb.joints), 6)))
+            for ball in ball_feet(robot)
+            for limb in (read_limb(robot, ball.foot),)
+        ]
         self._pose, self._axis = np.zeros((4, 3)), np.zeros(3)
         self.weight = robot.total_mass * GRAVITY
         self.standing_height = -float(standing_heights(robot).min())
@@ -95,9 +99,10 @@ class Footing:
             orientation: of the base, quaternion x, y, z, w.
             middle: the middle of every foot's points (n_feet, 2), changed.
         """
-        for ball, limb in self._balls:
-            angles = joints[list(limb.joints)]
-            place_limb(limb.links, limb.tip, angles, np.zeros((len(angles), 6)), self._pose)
+        for ball, limb, angles, anchors in self._balls:
+            for k, joint in enumerate(limb.joints):
+                angles[k] = joints[joint]
+            place_limb(limb.links, limb.tip, angles, anchors, self._pose)
             rotate(orientation, self._pose[1:, 2], self._axis)
             x, y, z = self._axis.tolist()
             leaning = hypot(x, y)

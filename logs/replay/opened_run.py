@@ -53,7 +53,8 @@ class OpenedRun:
         """The recorded graph with further overrides. Raises ``LoadError``."""
         header = self.file.header
         name = Path(header.source).name or f"{header.name}.yaml"
-        return load_text(in_present_form(header.graph), self.folder / name, overrides)
+        text = in_present_form(header.graph, header.versions.get("aloft", ""), header.robot)
+        return load_text(text, self.folder / name, overrides)
 
     @cached_property
     def graph(self) -> CheckedGraph:

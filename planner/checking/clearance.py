@@ -6,6 +6,8 @@ step where the task has one. Everything is vectorised over instants.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -89,19 +91,36 @@ def legs(robot: RobotDescription) -> list[list[str]]:
     return found
 
 
+def leg_lack(robot: RobotDescription, poses: LinkPoses, wanted: float) -> Array | None:
+    """By how much [m] the links of different legs are closer than ``wanted``, or than at the first
+    instant where they stand closer than that, the worst at each instant (n,); ``None`` where no
+    two legs have shapes."""
+    lack: Array | None = None
+    for gap in _gaps(robot, poses):
+        found = np.minimum(wanted, gap[0]) - gap
+        lack = found if lack is None else np.maximum(lack, found)
+    return lack
+
+
 def leg_gap(robot: RobotDescription, poses: LinkPoses) -> Array:
     """The least distance [m] between links of different legs, (n,); negative where they overlap."""
+    nearest = np.full(len(poses.position), np.inf)
+    for gap in _gaps(robot, poses):
+        nearest = np.minimum(nearest, gap)
+    return nearest
+
+
+def _gaps(robot: RobotDescription, poses: LinkPoses) -> Iterator[Array]:
+    """The distances (n,) between all capsules of one leg and all of another."""
     chains = [
         [capsule for link in chain for capsule in capsule_ends(robot, poses, link)]
         for chain in legs(robot)
     ]
-    gap = np.full(len(poses.position), np.inf)
     for number, chain in enumerate(chains):
         for other in chains[number + 1 :]:
             for a, b, radius in chain:
                 for c, d, other_radius in other:
-                    gap = np.minimum(gap, segment_distance(a, b, c, d) - radius - other_radius)
-    return gap
+                    yield segment_distance(a, b, c, d) - radius - other_radius
 
 
 def segment_distance(a: Array, b: Array, c: Array, d: Array) -> Array:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...mathematics.constants import GRAVITY
+from ...robots.ball_feet import ball_feet
 from ...robots.description import Motors, RobotDescription
 from ...robots.kinematics import LinkPoses, link_poses, matrices_of_quaternions
 from ...robots.welding import welded
@@ -124,6 +125,19 @@ class Evidence:
         return np.asarray(
             points[:, :, 2] - ground_height(self.plan.task, points[:, :, 0], progress)
         )
+
+    @cached_property
+    def resting(self) -> Array:
+        """What keeps its place while a contact point stands on the ground [m], (n, n_contacts, 3):
+        the point itself; of a ball, which rolls, the way of the material where it touches."""
+        s = self.replay.samples
+        places = s.points.copy()
+        steps = np.diff(s.time)[:, None]
+        for ball in ball_feet(self.robot):
+            rate = s.point_velocity[:, ball.point, :2]
+            way = 0.5 * steps * (rate[1:] + rate[:-1])
+            places[1:, ball.point, :2] = places[0, ball.point, :2] + np.cumsum(way, axis=0)
+        return places
 
     @cached_property
     def rises(self) -> list[float]:

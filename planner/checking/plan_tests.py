@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ...blocks.signals import Phase
 from ..models.exact_dynamics import ExactDynamics
-from .clearance import body_heights, leg_gap
+from .clearance import body_heights, leg_lack
 from .evidence import DEGREE, MILLIMETRE, Evidence, Found, worst
 from .replay import held_joints
 
@@ -155,7 +155,7 @@ def contacts(e: Evidence) -> Iterator[Found]:
     slip = np.zeros(len(names))
     for place in range(len(plan.flights) + 1):
         for number in range(len(names)):
-            places = s.points[standing[:, number] & (e.place == place), number]
+            places = e.resting[standing[:, number] & (e.place == place), number]
             if len(places):
                 slip[number] = max(slip[number], float(np.ptp(places, axis=0).max()))
     yield Found("foot_slip", slip.max(), 3 * MILLIMETRE, "m", "how far a loaded point moves",
@@ -314,11 +314,11 @@ def clearances(e: Evidence) -> Iterator[Found]:
         sample = int(heights[link].argmin())
         yield Found("body_on_ground", -float(heights[link][sample]), 0.0, "m",
                     "how deep the body is in the ground", f"{link} {e.moment(sample)}")  # fmt: skip
-    gap = leg_gap(robot, e.poses)
-    if not np.isfinite(gap).all():
+    lacking = leg_lack(robot, e.poses, task.leg_clearance)
+    if lacking is None:
         return  # no two legs have shapes that could touch
-    sample = int(gap.argmin())
-    yield Found("leg_clearance", task.leg_clearance - float(gap[sample]), MILLIMETRE, "m",
+    sample = int(lacking.argmax())
+    yield Found("leg_clearance", float(lacking[sample]), MILLIMETRE, "m",
                 "what the legs lack of the gap asked for", e.moment(sample))  # fmt: skip
 
 

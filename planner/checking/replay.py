@@ -84,14 +84,13 @@ def replay(plan: JumpPlan, robot: RobotDescription) -> Replay:
     samples = _sample(plan, dynamics, [row for rows, _ in flown for row in rows])
     states = [dynamics.centroidal(q, v) for q, v in zip(plan.position, plan.velocity, strict=True)]
     placed = [dynamics.soles(q) for q in plan.position]
-    turns = np.array([turn for _, turn in placed])
     return Replay(
         samples, defect, gap, wrench, tuple(error for _, error in flown),
         np.array([s[0] for s in states]),
         np.array([s[1] for s in states]),
         np.array([s[2] for s in states]),
         np.array([soles for soles, _ in placed]),
-        np.unwrap(np.arctan2(turns[:, :, 1, 0], turns[:, :, 0, 0]), axis=0),
+        np.unwrap(np.array([heading for _, heading in placed]), axis=0),
         flights,
     )  # fmt: skip
 

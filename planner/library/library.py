@@ -174,12 +174,16 @@ class PlanLibrary:
                     continue
 
     def prune(self, tasks: Iterable[JumpTask]) -> list[Path]:
-        """Remove from this library's own folder every plan of a task that is none of these."""
-        wanted = {task.hash(self.robot) for task in tasks}
+        """Remove from this library's own folder every plan of a task that is none of these. Plans
+        for robots that none of these tasks names stay."""
+        wanted, robots = set[str](), set[str | None]([None])
+        for task in tasks:
+            wanted.add(task.hash(self.robot))
+            robots.add(task.robot)
         others = [
             path
             for path in sorted(self.folder.glob("*-*.npz"))
-            if path.stem.rpartition("-")[2] not in wanted
+            if path.stem.rpartition("-")[2] not in wanted and _robot_of(path) in robots
         ]
         for path in others:
             path.unlink(missing_ok=True)
@@ -215,6 +219,14 @@ class PlanLibrary:
         plan = solve_and_check(task, self.robot, near[0] if near else None, solve)
         self.add(plan)
         return plan, False
+
+
+def _robot_of(path: Path) -> str | None:
+    """The robot that a plan's file is for; ``None`` where the file cannot be read."""
+    try:
+        return read_plan(path).task.robot
+    except PlanFileError:
+        return None
 
 
 def solve_and_check(

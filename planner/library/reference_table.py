@@ -178,17 +178,8 @@ class _MiddleValues:
 def _row(dynamics: ExactDynamics, q: Array, v: Array, force: Array) -> dict[str, Array]:
     """The reference's fields in one state under those forces."""
     com, com_velocity, momentum = dynamics.centroidal(q, v)
-    pin, model, data = dynamics.pin, dynamics.model, dynamics.data
     points, _ = dynamics.contact_jacobians(q)
-    axes = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
-    soles, sole_velocities, yaws, pitches = [], [], [], []
-    for frame in dynamics.sole_frames:
-        place = data.oMf[frame]
-        soles.append(place.translation.copy())
-        sole_velocities.append(pin.getFrameJacobian(model, data, frame, axes)[:3] @ v)
-        ahead = place.rotation[:, 0]
-        yaws.append(math.atan2(ahead[1], ahead[0]))
-        pitches.append(math.atan2(-ahead[2], math.hypot(ahead[0], ahead[1])))
+    yaw, pitch = dynamics.foot_angles()
     return {
         "com": com,
         "com_velocity": com_velocity,
@@ -197,10 +188,10 @@ def _row(dynamics: ExactDynamics, q: Array, v: Array, force: Array) -> dict[str,
         "angular_velocity": v[3:6].copy(),
         "angular_momentum": momentum,
         "angular_momentum_rate": np.cross(points - com, force).sum(axis=0),
-        "foot_position": np.array(soles),
-        "foot_velocity": np.array(sole_velocities),
-        "foot_yaw": np.array(yaws),
-        "foot_pitch": np.array(pitches),
+        "foot_position": dynamics.sole_places(),
+        "foot_velocity": dynamics.sole_velocities(v),
+        "foot_yaw": yaw,
+        "foot_pitch": pitch,
         "joint_position": q[7:].copy(),
         "joint_velocity": v[6:].copy(),
     }

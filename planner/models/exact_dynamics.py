@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...robots.ball_feet import ball_feet
 from ...robots.description import RobotDescription
 from ...robots.pinocchio_model import build_pinocchio_model
 
@@ -58,6 +59,7 @@ class ExactDynamics:
         self.data = built.model.createData()
         self.contact_frames = built.contact_frames
         self.sole_frames = built.sole_frames
+        self.balls = ball_feet(robot)
         self.mass = robot.total_mass
         self._rotor_coupling = built.rotor_coupling
 
@@ -69,24 +71,72 @@ class ExactDynamics:
         pin.updateFramePlacements(self.model, self.data)
         axes = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
         rows = [
-            pin.getFrameJacobian(self.model, self.data, frame, axes)[:3]
+            np.array(pin.getFrameJacobian(self.model, self.data, frame, axes))
             for frame in self.contact_frames
         ]
-        return self._places(self.contact_frames), np.vstack(rows)
+        found = [row[:3] for row in rows]
+        points = self._contact_places()
+        for ball in self.balls:
+            # The material at the lowest point moves with the frame's origin and turns about it.
+            frame = self.data.oMf[self.contact_frames[ball.point]]
+            x, y, z = points[ball.point] - frame.translation
+            lever = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+            found[ball.point] = rows[ball.point][:3] - lever @ rows[ball.point][3:]
+        return points, np.vstack(found)
 
     def points(self, q: Array) -> Array:
-        """The contact points in the world [m], (n_contacts, 3)."""
+        """The contact points in the world [m], of balls the lowest points, (n_contacts, 3)."""
         self.pin.framesForwardKinematics(self.model, self.data, q)
-        return self._places(self.contact_frames)
+        return self._contact_places()
 
     def soles(self, q: Array) -> tuple[Array, Array]:
-        """The sole centres (n_feet, 3) and the feet's rotations to the world (n_feet, 3, 3)."""
+        """The sole centres [m] (n_feet, 3), of balls the lowest points, and the feet's headings
+        [rad] (n_feet,)."""
         self.pin.framesForwardKinematics(self.model, self.data, q)
-        turns = [self.data.oMf[frame].rotation.copy() for frame in self.sole_frames]
-        return self._places(self.sole_frames), np.array(turns)
+        return self.sole_places(), self.foot_angles()[0]
+
+    def sole_places(self) -> Array:
+        """The sole centres in the state that was evaluated last."""
+        places, points = self._places(self.sole_frames), self._contact_places()
+        for ball in self.balls:
+            places[ball.foot] = points[ball.point]
+        return places
+
+    def sole_velocities(self, v: Array) -> Array:
+        """The velocities of ``sole_places`` in the state that was evaluated last, (n_feet, 3)."""
+        pin, axes = self.pin, self.pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+        found = [
+            pin.getFrameJacobian(self.model, self.data, frame, axes) @ v
+            for frame in self.sole_frames
+        ]
+        rates = np.array([row[:3] for row in found])
+        for ball in self.balls:
+            # The lowest point moves as the centre does, which is above the sole at the zero pose.
+            up = self.data.oMf[self.sole_frames[ball.foot]].rotation[:, 2]
+            rates[ball.foot] += ball.radius * np.cross(found[ball.foot][3:], up)
+        return rates
+
+    def foot_angles(self) -> tuple[Array, Array]:
+        """Heading and pitch of the feet [rad], both (n_feet,), in the state that was evaluated
+        last. A ball has none of its own: it has the base's heading and no pitch."""
+        turns = np.array([self.data.oMf[frame].rotation for frame in self.sole_frames])
+        base = self.data.oMi[1].rotation
+        ahead = turns.reshape(-1, 3, 3)[:, :, 0]
+        yaw = np.arctan2(ahead[:, 1], ahead[:, 0])
+        pitch = np.arctan2(-ahead[:, 2], np.hypot(ahead[:, 0], ahead[:, 1]))
+        for ball in self.balls:
+            yaw[ball.foot], pitch[ball.foot] = np.arctan2(base[1, 0], base[0, 0]), 0.0
+        return yaw, pitch
+
+    def _contact_places(self) -> Array:
+        places = self._places(self.contact_frames)
+        for ball in self.balls:
+            turn = self.data.oMf[self.contact_frames[ball.point]].rotation
+            places[ball.point] += ball.radius * (turn[:, 2] - np.array([0.0, 0.0, 1.0]))
+        return places
 
     def _places(self, frames: tuple[int, ...]) -> Array:
-        return np.array([self.data.oMf[frame].translation for frame in frames])
+        return np.array([self.data.oMf[frame].translation for frame in frames]).reshape(-1, 3)
 
     def centroidal(self, q: Array, v: Array) -> tuple[Array, Array, Array]:
         """Centre of mass [m], its velocity [m/s] and the angular momentum about it [N m s]."""

@@ -48,7 +48,7 @@ def _model(text: str, symmetric: bool) -> tuple[SymbolicModel, StanceFinder]:
     robot, loads = part.robot, [load for load in part.loads if _matters(load)]
     pairs = mirrored_pairs(robot) if symmetric else None
     model = SymbolicModel(symmetrised(robot, pairs) if pairs else robot, loads)
-    return model, StanceFinder(model)
+    return model, StanceFinder(model, pairs or ())
 
 
 def _matters(load: HeldLoad) -> bool:

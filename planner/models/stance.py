@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ...robots.ball_feet import ball_feet
 from ...robots.description import RobotDescription
 from ..task.errors import PlanError
 from ..task.task import JumpTask
 from .symbolic_model import SymbolicModel
+from .symmetry import Pair, symmetrised_angles
 
 Array = NDArray[np.float64]
 
@@ -19,14 +22,18 @@ Array = NDArray[np.float64]
 @dataclass(frozen=True)
 class Stance:
     """A standing pose: ``coordinates`` (n_velocities), contact ``points`` (n_contacts, 3) and
-    ``com`` in the world, ``heading`` of the feet [rad]."""
+    ``com`` in the world, ``heading`` of the feet [rad], and the ``footholds`` (n_contacts, 3) that
+    stay while the robot moves above them; they differ from the points where balls roll."""
 
     coordinates: Array
     points: Array
     com: Array
     heading: float
+    footholds: Array
 
 
+LEANS = 4
+"""Steps of the search for the base's lean; each is exact for feet that do not roll."""
 UNEVEN = 5e-4
 """m; by how much the contact points of a stance may be above or below the ground."""
 
@@ -34,14 +41,17 @@ UNEVEN = 5e-4
 class StanceFinder:
     """Places a robot on the ground for given joint angles, with all contact points on it."""
 
-    def __init__(self, model: SymbolicModel) -> None:
+    def __init__(self, model: SymbolicModel, pairs: Sequence[Pair] = ()) -> None:
+        """``pairs`` of limbs get the same angles where they are to have almost the same ones."""
         import casadi as ca
 
-        self.model = model
+        self.model, self.pairs = model, tuple(pairs)
         q = ca.SX.sym("q", model.size)
         frames = model.frames(q)
         robot = model.robot
         soles = [model.point(frames, foot.link, foot.sole) for foot in robot.feet]
+        for ball in ball_feet(robot):
+            soles[ball.foot] = model.contact_points(q)[ball.point]
         self._points: Any = ca.Function(
             "stance",
             [q],
@@ -49,6 +59,7 @@ class StanceFinder:
                 ca.horzcat(*model.contact_points(q)),
                 model.com(q),
                 sum(soles) / len(soles),
+                ca.horzcat(*model.footholds(q)),
             ],
         )
 
@@ -67,19 +78,22 @@ class StanceFinder:
                 are none.
         """
         q = np.zeros(self.model.size)
-        q[6:] = joints
+        q[6:] = symmetrised_angles(self.pairs, joints)
         points = self._evaluate(q)[0]
         if not points.size:
             raise PlanError(
                 f"{self.model.robot.name} has no contact points to stand on", family="stance"
             )
-        q[3:5] = _lean(_normal(points.T))
+        for _ in range(LEANS):
+            # Balls touch elsewhere as the base leans, so one step is not quite enough for them.
+            turn = _rotation(q[3:5])
+            q[3:5] = _lean(turn.T @ _normal(self._evaluate(q)[0].T))
         if heading:  # turn the leaning pose as a whole: R = Rz(heading) R(lean)
             q[3:6] = _turned(q[3:5], heading)
-        points, _, soles = self._evaluate(q)
+        points, _, soles, _ = self._evaluate(q)
         q[:2] = np.array(at[:2]) - soles.ravel()[:2]
         q[2] = at[2] - points[2].mean()
-        points, com, _ = self._evaluate(q)
+        points, com, _, footholds = self._evaluate(q)
         heights = points[2] - at[2]
         if np.abs(heights).max() > UNEVEN:
             names = [contact.name for contact in self.model.robot.contacts]
@@ -89,7 +103,7 @@ class StanceFinder:
                 f"the best one by [mm] {found}; choose angles that put all feet on the ground",
                 family="stance",
             )
-        return Stance(q, points.T.copy(), com.ravel(), heading)
+        return Stance(q, points.T.copy(), com.ravel(), heading, footholds.T.copy())
 
 
 def stances_of(task: JumpTask, robot: RobotDescription, finder: StanceFinder
@@ -109,7 +123,7 @@ def stances_of(task: JumpTask, robot: RobotDescription, finder: StanceFinder
         )
         turned = stance.coordinates.copy()
         turned[3] += place.turned
-        found.append(Stance(turned, stance.points, stance.com, stance.heading))
+        found.append(replace(stance, coordinates=turned))
     return tuple(found)
 
 
@@ -128,14 +142,19 @@ def _lean(normal: Array) -> Array:
     return np.array([np.arctan2(-normal[0], np.hypot(normal[1], normal[2])), roll])
 
 
+def _rotation(lean: Array) -> Array:
+    """From body to world of a base with that pitch and roll."""
+    (cp, cr), (sp, sr) = np.cos(lean), np.sin(lean)
+    pitch = np.array([[cp, 0.0, sp], [0.0, 1.0, 0.0], [-sp, 0.0, cp]])
+    roll = np.array([[1.0, 0.0, 0.0], [0.0, cr, -sr], [0.0, sr, cr]])
+    return np.asarray(pitch @ roll)
+
+
 def _turned(lean: Array, heading: float) -> Array:
     """Pitch, roll, yaw of a base with that pitch and roll that is then turned by ``heading``."""
     ch, sh = np.cos(heading), np.sin(heading)
-    (cp, cr), (sp, sr) = np.cos(lean), np.sin(lean)
     turn = np.array([[ch, -sh, 0.0], [sh, ch, 0.0], [0.0, 0.0, 1.0]])
-    pitch = np.array([[cp, 0.0, sp], [0.0, 1.0, 0.0], [-sp, 0.0, cp]])
-    roll = np.array([[1.0, 0.0, 0.0], [0.0, cr, -sr], [0.0, sr, cr]])
-    rotation = turn @ pitch @ roll
+    rotation = turn @ _rotation(lean)
     return np.array(
         [
             np.arctan2(rotation[0, 2], rotation[2, 2]),

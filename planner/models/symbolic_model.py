@@ -17,7 +17,8 @@ from typing import Any
 import numpy as np
 
 from ...mathematics.constants import GRAVITY
-from ...robots.description import Joint, Link, RobotDescription
+from ...robots.ball_feet import ball_feet
+from ...robots.description import ContactPoint, Joint, Link, RobotDescription
 from ...robots.welding import HeldLoad
 from .symmetry import limbs_of
 
@@ -85,6 +86,7 @@ class SymbolicModel:
         self.n_joints = len(robot.joints)
         self.size = self.n_joints + 6
         self.rotors = robot.rotor_matrix
+        self._balls = {robot.contacts[ball.point].name: ball for ball in ball_feet(robot)}
         self.limbs, self.limb_of_link = limbs_of(robot)
         self._joint_of = {joint.child: index for index, joint in enumerate(robot.joints)}
 
@@ -113,14 +115,39 @@ class SymbolicModel:
         return origin + ca.mtimes(rotation, ca.DM(list(place)))
 
     def contact_points(self, q: Expression, limbs: Sequence[int] | None = None) -> list[Any]:
-        """World positions of the contact points on those limbs, in the description's order."""
+        """World positions of the contact points on those limbs, in the description's order; of a
+        ball the lowest point."""
+        return self._contacts(q, limbs, rolled=False)
+
+    def footholds(self, q: Expression, limbs: Sequence[int] | None = None) -> list[Any]:
+        """What stays in place while the contact points on those limbs stand on the ground.
+
+        A ball rolls without slipping, so its lowest point moves by the radius times the turn. What
+        stays is the place where it would touch if its link were not turned about x and y. That is
+        exact for a link that turns in one plane.
+        """
+        return self._contacts(q, limbs, rolled=True)
+
+    def _contacts(self, q: Expression, limbs: Sequence[int] | None, *, rolled: bool) -> list[Any]:
+        import casadi as ca
+
         frames = self.frames(q, limbs)
         link_of = {foot.name: foot.link for foot in self.robot.feet}
-        return [
-            self.point(frames, link_of[contact.foot], contact.position)
-            for contact in self.robot.contacts
-            if link_of[contact.foot] in frames
-        ]
+        found = []
+        for contact in self.robot.contacts:
+            link, ball = link_of[contact.foot], self._balls.get(contact.name)
+            if link not in frames:
+                continue
+            if ball is None:
+                found.append(self.point(frames, link, contact.position))
+                continue
+            centre = [float(value) for value in ball.centre]
+            lowest = self.point(frames, link, centre) - ca.DM([0.0, 0.0, ball.radius])
+            turn = frames[link][0]
+            about_y, about_x = ca.atan2(turn[0, 2], turn[2, 2]), ca.asin(-turn[1, 2])
+            way = ball.radius * ca.vertcat(about_y, -about_x, 0.0)
+            found.append(lowest - way if rolled else lowest)
+        return found
 
     def com(self, q: Expression) -> Expression:
         """The centre of mass in the world."""
@@ -213,7 +240,7 @@ class SymbolicModel:
                     continue
                 push[child] = ca.mtimes(back, push[parent])
                 if link_of[contact.foot] == child:
-                    place = ca.DM(list(contact.position))
+                    place = self._touching(contact, backs, down, child)
                     wrench = wrench - ca.vertcat(push[child], ca.cross(place, push[child]))
             needed[child] = wrench
         torques = [ca.SX(0)] * self.n_joints
@@ -234,6 +261,25 @@ class SymbolicModel:
         spun = ca.mtimes(ca.DM(self.rotors), a[6:])
         moved = [torques[i] + spun[i] if i in joints else torques[i] for i in range(self.n_joints)]
         return needed[base], limb_wrenches, ca.vertcat(*moved)
+
+    def _touching(
+        self, contact: ContactPoint, backs: dict[str, Any], down: Expression, link: str
+    ) -> Expression:
+        """Where the ground's force acts, in the frame of the foot's link: a ball's lowest point is
+        found by turning the vertical back from the world to the link."""
+        import casadi as ca
+
+        ball = self._balls.get(contact.name)
+        if ball is None:
+            return ca.DM(list(contact.position))
+        chain, above = list[str](), link
+        while above != self.robot.base:
+            chain.append(above)
+            above = self.robot.joints[self._joint_of[above]].parent
+        up = down[:, 2]
+        for name in reversed(chain):
+            up = ca.mtimes(backs[name], up)
+        return ca.DM(ball.centre) - ball.radius * up
 
     def held_torques(
         self, q: Expression, v: Expression, a: Expression, limbs: Sequence[int] | None = None

@@ -26,6 +26,9 @@ DIRECTION = 2e-3
 SHARE = 0.02
 """The same for masses and inertias, as a share."""
 
+ANGLE = 1e-3
+"""Angles of a pose that differ by less [rad] are meant to be the same."""
+
 PLACE = np.array([1.0, -1.0, 1.0])
 TENSOR = np.array([1.0, 1.0, 1.0, -1.0, 1.0, -1.0])
 
@@ -109,6 +112,18 @@ def symmetrised(robot: RobotDescription, pairs: Sequence[Pair]) -> RobotDescript
     }
     same = all(getattr(robot, name) == value for name, value in changed.items())
     return robot if same else robot.model_copy(update=changed)
+
+
+def symmetrised_angles(pairs: Sequence[Pair], angles: Array) -> Array:
+    """Joint angles (n_joints,) made the same left and right where they differ by little; others
+    are kept, so that a pose that is meant to be askew stays so."""
+    found = angles.copy()
+    for pair in pairs:
+        for i, j, sign in pair.joints:
+            if abs(angles[i] - sign * angles[j]) < ANGLE:
+                found[i] = 0.5 * (angles[i] + sign * angles[j])
+                found[j] = sign * found[i]
+    return found
 
 
 def _pair(

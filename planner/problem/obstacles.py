@@ -14,12 +14,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...robots.ball_feet import ball_feet
+from ...robots.description import RobotDescription
 from ..models.coordinates import Coordinates
 from ..models.symbolic_model import SymbolicModel
 from ..task.sequence import Hop
 from .layout import Stretch
 
 Indices = NDArray[np.int64]
+Vector3 = tuple[float, float, float]
 Point = tuple[str, tuple[str, tuple[float, float, float]], float]
 ROUNDING = 0.01
 """m; how long before the edge the rounded step has half its height."""
@@ -35,7 +38,8 @@ def obstacle_points(model: SymbolicModel, coordinates: Coordinates) -> list[Poin
     found: list[Point] = []
     for c in coordinates.contacts:
         contact = robot.contacts[c]
-        found.append(("foot", (link_of[contact.foot], contact.position), 0.0))
+        place, radius = touching_sphere(robot, c)
+        found.append(("foot", (link_of[contact.foot], place), radius))
     for link in robot.links:
         limb = model.limb_of_link[link.name]
         if link.name in link_of.values() or (limb >= 0 and limb not in coordinates.limbs):
@@ -48,6 +52,16 @@ def obstacle_points(model: SymbolicModel, coordinates: Coordinates) -> list[Poin
                 for place in (shape.start, middle, shape.end)
             ]
     return found
+
+
+def touching_sphere(robot: RobotDescription, contact: int) -> tuple[Vector3, float]:
+    """Centre [m, link frame] and radius [m] of what touches the ground at a contact point: the
+    point itself, without a radius, unless its foot is a ball."""
+    for ball in ball_feet(robot):
+        if ball.point == contact:
+            x, y, z = (float(value) for value in ball.centre)
+            return (x, y, z), ball.radius
+    return robot.contacts[contact].position, 0.0
 
 
 def heights_above_step(

@@ -317,7 +317,7 @@ class ProblemBuilder:
     def _fill_contact(self, k: int) -> None:
         stretch = self.of_knot[k]
         stance = self.stances[stretch.place]
-        places = stance.points[list(self.coordinates.contacts)].ravel()
+        places = stance.footholds[list(self.coordinates.contacts)].ravel()
         heading = [np.cos(stance.heading), np.sin(stance.heading)]
         self._set("contact", k, place=places, heading=heading)
         feet = self.pieces["contact"].rows // 2

@@ -43,7 +43,7 @@ from ..models.coordinates import (
     sagittal_coordinates,
 )
 from ..models.symbolic_model import SymbolicModel, base_rotation
-from .obstacles import heights_above_step
+from .obstacles import heights_above_step, touching_sphere
 
 DRIFT_RATE = 10.0
 """1/s, how fast the place error of a foot on the ground dies out."""
@@ -280,7 +280,7 @@ def _place_errors(model: SymbolicModel, coordinates: Coordinates, q: Any, place:
     the foot stands with."""
     import casadi as ca
 
-    points = model.contact_points(coordinates.expand(q), coordinates.limbs)
+    points = model.footholds(coordinates.expand(q), coordinates.limbs)
     errors = []
     for i in range(len(coordinates.contacts)):
         off = points[i] - place[3 * i : 3 * i + 3]
@@ -311,13 +311,14 @@ def _air_rows(model: SymbolicModel, coordinates: Coordinates, q: Any) -> list[An
 def body_points(model: SymbolicModel, coordinates: Coordinates
                 ) -> list[tuple[tuple[str, tuple[float, float, float]], float, float]]:  # fmt: skip
     """The points of the legs that must not touch anything in flight: (link, place), radius and +1
-    for a left leg, -1 for a right one. Contact points first, with no radius."""
+    for a left leg, -1 for a right one. Contact points first; only balls have a radius there."""
     robot = model.robot
     link_of = {foot.name: foot.link for foot in robot.feet}
     found = []
     for c in coordinates.contacts:
         contact = robot.contacts[c]
-        found.append(((link_of[contact.foot], contact.position), 0.0))
+        place, radius = touching_sphere(robot, c)
+        found.append(((link_of[contact.foot], place), radius))
     for limb in coordinates.limbs:
         for index in model.limbs[limb][-2:-1]:
             link = robot.link(robot.joints[index].child)

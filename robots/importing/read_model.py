@@ -79,7 +79,7 @@ def read_model(path: Path) -> RawModel:
         )
     name = spec.modelname or path.stem
     pose = _key_frame(model)
-    names_world = not file.is_urdf or file.place("link", names[0]) != (0, 0)
+    names_world = not file.is_urdf or file.has("link", names[0])
     return RawModel(
         name, path, file.is_urdf, bodies, names[0], names_world, pose, mimics,
         tuple(dict.fromkeys(notes)),

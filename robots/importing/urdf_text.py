@@ -31,8 +31,10 @@ class XmlFile:
         """Read the file. Raises ``RobotError`` where it is no URDF and no MJCF."""
         self.path = path
         try:
-            self.text = path.read_text(encoding="utf-8")
-            self.root = ElementTree.fromstring(self.text)
+            text = path.read_text(encoding="utf-8")
+            self.root = ElementTree.fromstring(text)
+            # What is commented out is blanked, so that it is neither found nor moves the rest.
+            self.text = re.sub(r"<!--.*?-->", _blanked, text, flags=re.DOTALL)
         except OSError as error:
             raise self.error(f"the file cannot be read: {error.strerror}") from error
         except UnicodeDecodeError as error:
@@ -58,6 +60,10 @@ class XmlFile:
         """An error of the file as a whole."""
         return RobotError(str(self.path), [RobotFault((), message, expected, found, fix)])
 
+    def has(self, tag: str, name: str) -> bool:
+        """Whether the root has an element of that tag and name."""
+        return any(element.get("name") == name for element in self.root.findall(tag))
+
     def place(self, tag: str, name: str) -> tuple[int, int]:
         """Line and column of the element of that tag and name; (0, 0) if it is not found."""
         pattern = rf"<{tag}\s(?:[^>]*?\s)?name\s*=\s*[\"']{re.escape(name)}[\"']"
@@ -66,6 +72,10 @@ class XmlFile:
             return 0, 0
         before = self.text[: found.start()]
         return before.count("\n") + 1, found.start() - before.rfind("\n")
+
+
+def _blanked(comment: re.Match[str]) -> str:
+    return re.sub(r"[^\n]", " ", comment.group())
 
 
 def urdf_joints(file: XmlFile) -> dict[str, UrdfJoint]:

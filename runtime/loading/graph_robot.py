@@ -39,8 +39,9 @@ def _find(entry: Entry, graph: FlatGraph, problems: Problems) -> RobotDescriptio
         except RobotError as error:
             _report_faults(error, node.where, problems)
             return None
-        except (OSError, ValueError) as error:  # such as a name that no file can have
-            message = f"robot {name} cannot be read: {' '.join(str(error).split())}"
+        except Exception as error:  # noqa: BLE001  such as a name that no file can have
+            reason = " ".join(str(error).split())
+            message = f"robot {name} cannot be read: {type(error).__name__}: {reason}"
     is_file = isinstance(name, str) and name.endswith(ROBOT_FILES)
     similar = get_close_matches(str(name), robot_names(), 3) if not is_file else []
     problems.add(

@@ -37,8 +37,9 @@ def blame(spec: BlockSpec, what: str) -> Iterator[None]:
         yield
     except Exception as error:
         place = f"{spec.where}: " if spec.where is not None else ""
-        raised = "" if isinstance(error, AloftError) else f" (at {place_of(error)})"
+        reason = describe(error)
+        if not isinstance(error, AloftError):
+            reason = f"{' '.join(reason.split())} (at {place_of(error)})"
         raise RunError(
-            f"{place}block '{spec.path}' failed in {what}: {describe(error)}{raised}",
-            block=spec.path,
+            f"{place}block '{spec.path}' failed in {what}: {reason}", block=spec.path
         ) from error

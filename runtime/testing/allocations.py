@@ -1,8 +1,19 @@
 """Counts every array that NumPy allocates, also those that live for one expression.
 
 Through NumPy's own hook for memory handlers (NEP 49): within a ``with`` our handler counts and then
-lets the default one do the work. Views cost nothing and are not counted.
-Only the present thread is counted.
+lets the default one do the work. Views cost nothing and are not counted. Only the present thread is
+counted.
+
+NumPy offers the hook to C only, so it is reached with ctypes through the table of functions that is
+part of NumPy's binary interface. What could be had without that sees less:
+
+* ``tracemalloc`` knows which arrays are alive when a snapshot is taken. An array that lives for one
+  expression, as in ``a + b * c``, is gone by then: after a hundred of them it counts none.
+* A subclass of ``ndarray`` sees only operations on its own instances: neither ``np.zeros(3)`` nor what
+  a library makes inside, and the blocks would not run as they do without it.
+
+Should a release of NumPy change what is relied on here, the counter says so when it is first used,
+and does not count wrongly.
 """
 
 from __future__ import annotations
@@ -14,7 +25,9 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from importlib import import_module
 from types import FrameType
-from typing import Any
+from typing import Any, ClassVar
+
+import numpy as np
 
 _SET_HANDLER, _GET_HANDLER, _DEFAULT_HANDLER = 304, 305, 306
 """Places in NumPy's table of C functions, which are fixed by its binary interface."""
@@ -31,6 +44,8 @@ _HeldCalloc = ctypes.PYFUNCTYPE(ctypes.c_void_p, ctypes.c_void_p, ctypes.c_size_
 
 class _Handler(ctypes.Structure):
     """NumPy's ``PyDataMem_Handler``, version 1."""
+
+    version_known: ClassVar[int] = 1
 
     _fields_ = [
         ("name", ctypes.c_char * 127),
@@ -92,6 +107,22 @@ class _Counter:
             ctypes.addressof(self._handler), ctypes.cast(self._name, ctypes.c_char_p), None
         )
         self.current: Allocations | None = None
+        if base.version != _Handler.version_known or not self._counts():
+            raise RuntimeError(
+                f"the counter of arrays does not work with NumPy {np.__version__}: its memory "
+                "handlers differ from those of NumPy 1.22 to 2"
+            )
+
+    def _counts(self) -> bool:
+        """Whether one array of a known size is counted as one."""
+        self.current = found = Allocations()
+        before = self.install()
+        try:
+            np.empty(999)
+        finally:
+            self.restore(before)
+            self.current = None
+        return (found.count, found.boxed, found.total_bytes) == (1, 0, 999 * 8)
 
     def _note(self, size: int, frame: FrameType | None) -> None:
         current = self.current
@@ -132,6 +163,9 @@ def count_array_allocations() -> Iterator[Allocations]:
     with count_array_allocations() as counted:
         block.step()
     assert counted.count == 0, counted.places
+
+    Raises:
+        RuntimeError: this release of NumPy has another interface; nothing is counted.
     """
     if not _counters:
         _counters.append(_Counter())

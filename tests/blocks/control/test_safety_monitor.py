@@ -32,7 +32,9 @@ def bench():
 
 
 def make(**params):
-    bench = BlockBench(SafetyMonitor, params, robot="bruce")
+    bench = BlockBench(
+        SafetyMonitor, {"damping": 0.5, "speed_limit": 60.0, **params}, robot="bruce"
+    )
     bench.set("desired", **COMMAND)
     bench.set("base", orientation=leaning(0.1), position=[0.0, 0.0, 0.38])
     bench.set("joints", position=ROBOT.standing_position)
@@ -100,6 +102,37 @@ def test_different_joints_in_turn_are_not_one_that_stays_beyond(bench):
         position[3 if tick % 2 else 8] = ROBOT.joint_limits[3, 0] - 0.06
         bench.set("joints", position=position)
         bench.step()
+    assert fault(bench) == Fault.NONE
+
+
+def test_limits_and_damping_follow_from_the_motors_or_are_given_by_joint():
+    bench = BlockBench(SafetyMonitor, robot="bruce")
+    peak = np.abs(ROBOT.joint_to_motor).T @ ROBOT.motors.peak_torque
+    bench.set("wbc", solved=True)
+    bench.set("base", orientation=leaning(0.0))
+    for torque, reason in ((9.9 * peak, Fault.NONE), (10.1 * peak, Fault.ABSURD_COMMAND)):
+        bench.set("desired", **{**COMMAND, "torque": torque})
+        bench.step()
+        assert fault(bench) == reason
+    assert bench.get("command").damping == pytest.approx(peak / 20.0)
+    patterns = {"*": 60.0, "*_knee": 5.0}
+    for joint, reason in ((2, Fault.NONE), (3, Fault.JOINT_SPEED)):
+        bench = make(speed_limit=patterns)
+        velocity = np.zeros(10)
+        velocity[joint] = 6.0
+        bench.set("joints", velocity=velocity)
+        bench.step(11)
+        assert fault(bench) == reason
+
+
+def test_a_joint_without_limits_is_never_beyond_them():
+    free = ROBOT.changed(joints=tuple(j.model_copy(update={"limits": None}) for j in ROBOT.joints))
+    bench = BlockBench(SafetyMonitor, robot=free)
+    bench.set("desired", **COMMAND)
+    bench.set("base", orientation=leaning(0.0))
+    bench.set("wbc", solved=True)
+    bench.set("joints", position=np.full(10, 50.0))
+    bench.step(100)
     assert fault(bench) == Fault.NONE
 
 

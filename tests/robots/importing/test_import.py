@@ -111,6 +111,13 @@ def test_an_arm_bolted_to_the_world(tmp_path: Path) -> None:
     assert "no effort limit of shoulder: 100 N m is assumed" in notes
 
 
+def test_a_world_that_is_commented_out_holds_nothing(tmp_path: Path) -> None:
+    mount = ARM[ARM.index('  <joint name="mount"') : ARM.index('  <link name="upper"')]
+    free = ARM.replace('  <link name="world"/>\n', "").replace(mount, "")
+    robot = robot_of(tmp_path, free.replace("<link", '<!-- <link name="world"/> -->\n  <link', 1))
+    assert (robot.base, robot.base_joint) == ("base", "floating")
+
+
 def test_welded_joints_and_a_floating_base_by_yaml(tmp_path: Path) -> None:
     robot = robot_of(tmp_path, ARM, {"weld": ["elb*"], "name": "stiff"})
     assert [joint.name for joint in robot.joints] == ["shoulder"] and robot.name == "stiff"

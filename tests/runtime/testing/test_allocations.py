@@ -5,6 +5,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from aloft.runtime.testing import allocations
 from aloft.runtime.testing.allocations import count_array_allocations
 
 VECTOR = np.ones(12)
@@ -74,3 +75,12 @@ def test_arrays_made_inside_live_on() -> None:
         arrays[0].resize(5000, refcheck=False)
     assert [int(array[-1]) for array in arrays[1:]] == list(range(1, 100))
     del arrays
+
+
+def test_another_interface_of_numpy_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A counter that does not count must not let every test of it pass."""
+    monkeypatch.setattr(allocations, "_counters", [])
+    monkeypatch.setattr(allocations._Counter, "_note", lambda self, size, frame: None)
+    wrong = pytest.raises(RuntimeError, match="the counter of arrays does not work with NumPy")
+    with wrong, count_array_allocations():
+        pass
