@@ -8,6 +8,7 @@ base only turned [m/s, body frame]. Nothing here allocates.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -160,14 +161,25 @@ def weigh(world_rates: Array, active: Flags, velocity: Array, gate: float, weigh
     return largest
 
 
+class StandingPoints(NamedTuple):
+    """Contact points, turned to the world.
+
+    ``places`` from the base's origin and their ``rates`` as the base turns and the joints move [m,
+    m/s], (n, 3); which are ``active`` and with what ``weights``, (n,); the ``anchors`` where they stand
+    [m, world], (n, 3), and which have one, ``anchored`` (n,).
+    """
+
+    places: Array
+    rates: Array
+    active: Flags
+    weights: Array
+    anchors: Array
+    anchored: Flags
+
+
 @kernel
 def stand_on(
-    world_points: Array,
-    world_rates: Array,
-    active: Flags,
-    weights: Array,
-    anchors: Array,
-    anchored: Flags,
+    points: StandingPoints,
     velocity_gain: float,
     position_gain: float,
     position: Array,
@@ -180,6 +192,8 @@ def stand_on(
     corrections are applied with the gains. What a point is not trusted with, it drags its anchor
     along, so a foot that has slipped is anchored where it came to rest.
     """
+    active, weights = points.active, points.weights
+    anchors, anchored = points.anchors, points.anchored
     total = 0.0
     for i in range(weights.shape[0]):
         total += float(weights[i])
@@ -190,12 +204,12 @@ def stand_on(
             if not active[i]:
                 continue
             weight = float(weights[i])
-            place = float(position[k]) + float(world_points[i, k])
+            place = float(position[k]) + float(points.places[i, k])
             if anchored[i]:
                 anchors[i, k] += (1.0 - weight) * (place - float(anchors[i, k]))
             else:
                 anchors[i, k] = place
-            still -= weight * (float(velocity[k]) + float(world_rates[i, k]))
+            still -= weight * (float(velocity[k]) + float(points.rates[i, k]))
             back += weight * (float(anchors[i, k]) - place)
         velocity[k] += velocity_gain * share * still
         position[k] += position_gain * share * back

@@ -3,7 +3,8 @@
 A kernel runs as plain Python and compiles as it stands, in Numba's nopython mode; so it keeps to
 what both know and do alike:
 
-* Arguments are arrays, floats, ints and bools by position; no defaults, keywords or objects.
+* Arguments are arrays, floats, ints, bools, and named tuples of these, by position; no defaults,
+  keywords or other objects. Arrays that belong together travel as one named tuple.
 * Results go into arrays of the caller, or are returned as numbers or a tuple of numbers. Nothing is
   allocated: scratch memory is an argument too.
 * It calls other kernels, ``math``, and NumPy's functions in the form that writes into a given array,

@@ -98,6 +98,11 @@ def test_a_task_of_the_users_own_is_used_by_the_whole_body_controller(tmp_path: 
     entry = (tmp_path / "symmetric_jump.yaml").read_text()
     for wrong, right, message in (
         ('SymmetricJoint"', 'SymmetricJoints"', "module 'symmetric' has no class"),
+        (
+            "first: left_wing",
+            "first: right_knee",
+            "symmetric:SymmetricJoints: bruce has no joint left",
+        ),
         ("{mass: 3}", "{weight: 3}", "gain 'mass'.*its gains are first, second, weight"),
         ("- Torso\n", "- TorsoOrientation\n", "no task called 'Torso'; did you mean TorsoOrien"),
     ):

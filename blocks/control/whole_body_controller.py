@@ -169,12 +169,17 @@ class WholeBodyController(Block):
 
     @classmethod
     def requires_of_graph(cls, params: Parameters, context: Context) -> Iterable[Misfit]:
-        """Tasks that can be found, each with gains that it has."""
+        """Tasks that can be found, each with gains that it has and that fit the robot."""
         assert isinstance(params, cls.Params)
         try:
             for chosen in choose_tasks(params.tasks, (context.graph_folder, context.folder)):
+                found: dict[str, None] = {}
                 for kind in PHASE_KINDS:
-                    chosen.gains(kind, getattr(params, kind))
+                    gains = chosen.gains(kind, getattr(params, kind))
+                    if context.robot is not None:
+                        found.update(dict.fromkeys(chosen.kind.misfits(context.robot, gains)))
+                for reason in found:
+                    yield Misfit(f"task {chosen.entry.task}: {reason}", parameter="tasks")
         except TaskChoiceError as error:
             yield Misfit(str(error), parameter="tasks")
 

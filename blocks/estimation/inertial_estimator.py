@@ -10,7 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...mathematics.constants import GRAVITY
-from ...mathematics.inertial_filter import misalignment, propagate, stand_on, turn, upright
+from ...mathematics.inertial_filter import (
+    StandingPoints,
+    misalignment,
+    propagate,
+    stand_on,
+    turn,
+    upright,
+)
 from ...mathematics.rotations import rotate
 from ...robots.contact_kinematics import ContactKinematics
 from ...runtime.language.block import Block, Input, Output, State
@@ -133,6 +140,11 @@ class InertialEstimator(Block):
         n = len(robot.contacts)
         self._world_points, self._world_rates = np.zeros((n, 3)), np.zeros((n, 3))
         self._weights = np.zeros(n)
+        estimate = self.estimate
+        self._points = StandingPoints(
+            self._world_points, self._world_rates, self.contacts.active, self._weights,
+            estimate.anchor, estimate.anchored,
+        )  # fmt: skip
         self._gyro, self._force = np.zeros(3), np.zeros(3)
         self._joint_rates = np.zeros(len(robot.joints))
         self._last_rate, self._error = np.zeros(3), np.zeros(3)
@@ -257,8 +269,7 @@ class InertialEstimator(Block):
         airborne = trusted * support < 0.25 or not active.any()
         estimate.flight_ticks[()] = int(estimate.flight_ticks[()]) + 1 if airborne else 0
         stand_on(
-            self._world_points, self._world_rates, active, self._weights, estimate.anchor,
-            estimate.anchored, support * params.velocity_gain, support * params.position_gain,
+            self._points, support * params.velocity_gain, support * params.position_gain,
             estimate.position, estimate.velocity,
         )  # fmt: skip
 

@@ -36,40 +36,58 @@ class InvariantFilterParameters(Parameters):
     noise; its biases and offsets are uniform, with these as their deviations.
     """
 
-    gyro_noise: float = parameter(0.02, unit="rad/s", gt=0, text="of a sample")
+    gyro_noise: float = parameter(0.02, unit="rad/s", gt=0, text="noise of a gyroscope sample")
     gyro_aliasing: float = parameter(
         0.29,
         ge=0,
-        text="further noise, as a share of what a rate changes from sample to sample",
+        text="further noise of a sample, as a share of the rate's change since the last sample",
     )
-    accelerometer_noise: float = parameter(0.1, unit="m/s^2", gt=0, text="of a sample")
-    gyro_bias: float = parameter(0.006, unit="rad/s", ge=0, text="of the bias at the start")
-    accelerometer_bias: float = parameter(0.06, unit="m/s^2", ge=0, text="of the bias at the start")
-    gyro_bias_walk: float = parameter(1e-4, unit="rad/s^2", ge=0, text="per root second")
-    accelerometer_bias_walk: float = parameter(1e-3, unit="m/s^3", ge=0, text="per root second")
-    encoder_offset: float = parameter(0.0017, unit="rad", ge=0, text="of the encoders' offsets")
+    accelerometer_noise: float = parameter(
+        0.1, unit="m/s^2", gt=0, text="noise of an accelerometer sample"
+    )
+    gyro_bias: float = parameter(
+        0.006, unit="rad/s", ge=0, text="uncertainty of the gyroscope's bias at the start"
+    )
+    accelerometer_bias: float = parameter(
+        0.06, unit="m/s^2", ge=0, text="uncertainty of the accelerometer's bias at the start"
+    )
+    gyro_bias_walk: float = parameter(
+        1e-4, unit="rad/s^2", ge=0, text="random walk of the gyroscope's bias, per root second"
+    )
+    accelerometer_bias_walk: float = parameter(
+        1e-3, unit="m/s^3", ge=0, text="random walk of the accelerometer's bias, per root second"
+    )
+    encoder_offset: float = parameter(
+        0.0017, unit="rad", ge=0, text="uncertainty of the encoders' offsets"
+    )
     kinematics_noise: float = parameter(
-        2e-4, unit="m", gt=0, text="of where leg kinematics see a point, per axis"
+        2e-4, unit="m", gt=0, text="noise of a contact point's place by leg kinematics, per axis"
     )
     contact_noise: float = parameter(
-        1e-4, unit="m", ge=0, text="how far a standing point creeps in a second, per axis"
+        1e-4, unit="m", ge=0, text="how far a contact point drifts by itself in a second, per axis"
     )
     slide_noise: float = parameter(
-        1e-3, unit="m", ge=0, text="how far a standing foot slides in a second, per axis"
+        1e-3, unit="m", ge=0, text="how far a foot slides as a whole in a second, per axis"
     )
     impact_slide: float = parameter(
         0.0,
         unit="s^2",
         ge=0,
-        text="by how much it slides more, by the specific force beyond gravity",
+        text="further sliding of a foot per specific force beyond gravity",
     )
-    gate: float = parameter(16.3, gt=0, text="a residual less likely than this is refused")
+    gate: float = parameter(
+        16.3, gt=0, text="largest normalised squared residual of a contact that is believed"
+    )
     support: float = parameter(
         4.0, unit="m/s^2", text="upward specific force below which no contact is believed"
     )
-    ground: Literal["level", "flat", "unknown"] = parameter("level", text="see above")
-    ground_noise: float = parameter(2e-4, unit="m", gt=0, text="of a point's height")
-    ground_time: float = parameter(0.2, unit="s", gt=0, text="how long its errors last")
+    ground: Literal["level", "flat", "unknown"] = parameter(
+        "level", text="whether contacts are at one height, at height zero, or anywhere"
+    )
+    ground_noise: float = parameter(2e-4, unit="m", gt=0, text="noise of a contact point's height")
+    ground_time: float = parameter(
+        0.2, unit="s", gt=0, text="how long errors of the ground's height last"
+    )
     gyro_range: float | None = parameter(
         None, unit="rad/s", gt=0, text="the gyroscope saturates here; none: never"
     )
@@ -80,5 +98,5 @@ class InvariantFilterParameters(Parameters):
         10.0, unit="rad/s", gt=0, text="how far off a saturated axis of the gyroscope may be"
     )
     saturated_force: float = parameter(
-        100.0, unit="m/s^2", gt=0, text="the same of the accelerometer"
+        100.0, unit="m/s^2", gt=0, text="how far off a saturated axis of the accelerometer may be"
     )

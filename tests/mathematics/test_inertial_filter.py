@@ -149,10 +149,9 @@ def test_weights_fall_with_speed_and_are_zero_without_contact():
 
 
 def stand(position, velocity, points, rates, weights, anchors, anchored, gain=0.1):
-    inertial.stand_on(
-        points, rates, np.ones(len(points), dtype=bool), weights, anchors, anchored, gain, gain,
-        position, velocity,
-    )  # fmt: skip
+    active = np.ones(len(points), dtype=bool)
+    standing = inertial.StandingPoints(points, rates, active, weights, anchors, anchored)
+    inertial.stand_on(standing, gain, gain, position, velocity)
 
 
 def test_standing_points_pull_velocity_and_position():
@@ -179,8 +178,9 @@ def test_an_untrusted_point_drags_its_anchor_and_pulls_nothing():
 
 def test_a_point_without_contact_loses_its_anchor():
     anchored = np.array([True, True])
-    inertial.stand_on(
+    standing = inertial.StandingPoints(
         np.zeros((2, 3)), np.zeros((2, 3)), np.array([True, False]), np.array([1.0, 0.0]),
-        np.zeros((2, 3)), anchored, 0.1, 0.1, np.zeros(3), np.zeros(3),
+        np.zeros((2, 3)), anchored,
     )  # fmt: skip
+    inertial.stand_on(standing, 0.1, 0.1, np.zeros(3), np.zeros(3))
     assert anchored.tolist() == [True, False]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from fnmatch import fnmatchcase
 from typing import NamedTuple
 
@@ -78,6 +79,14 @@ class Posture(Task[Feedback]):
     @classmethod
     def row_count(cls, robot: RobotDescription, gains: PostureChoice) -> int:
         return len(chosen_joints(robot, gains))
+
+    @classmethod
+    def misfits(cls, robot: RobotDescription, gains: PostureChoice) -> Iterable[str]:
+        names = [joint.name for joint in robot.joints]
+        weights = gains.posture_weight
+        for pattern in [*gains.joints, *(weights if isinstance(weights, dict) else ())]:
+            if not any(fnmatchcase(name, pattern) for name in names):
+                yield f"no joint of {robot.name} is called {pattern!r}; there are {', '.join(names)}"
 
     def prepare(self, gains: PostureChoice) -> Feedback:
         robot = self.situation.robot

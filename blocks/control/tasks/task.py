@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar, Generic, TypeVar
 
@@ -53,6 +53,14 @@ class Task(ABC, Generic[G]):
     @abstractmethod
     def row_count(cls, robot: RobotDescription, gains: Any) -> int:
         """How many rows the task has for that robot with these ``Gains``."""
+
+    @classmethod
+    def misfits(cls, robot: RobotDescription, gains: Any) -> Iterable[str]:
+        """What about that robot does not fit these ``Gains``, such as a joint that it does not have.
+
+        Asked at load, once for each kind of phase; the sentences become problems of the load report.
+        """
+        return ()
 
     def prepare(self, gains: Any) -> G:
         """What ``update`` gets for these ``Gains``; called when they are set, not in the tick."""

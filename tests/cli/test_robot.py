@@ -1,0 +1,183 @@
+"""``aloft robot``: what is printed of a robot, imports that write a YAML, and files that are wrong."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pinocchio
+import pytest
+import yaml
+from PIL import Image
+
+from aloft.robots.description import find_robot
+
+from ..robots.example_robots import needs_robots, urdf
+from ..robots.importing.model_files import ARM, CART_POLE, ONE_LEG
+from .conftest import run_for_json, run_here
+
+
+def test_show_prints_the_tree_the_motors_the_feet_and_the_sensors() -> None:
+    text = run_here("robot", "show", "bruce").stdout
+    lines = [line.rstrip() for line in text.splitlines()]
+    assert lines[0].startswith("bruce: Miniature biped of 0.66 m")
+    assert "  5.118 kg, floating base (link torso), 10 joints, 2 feet, 4 contact points" in lines
+    knee = next(line for line in lines if " right_knee " in line)
+    assert knee.split() == [
+        "right_calf", "0.113", "right_knee", "hinge", "0", "-1", "0", "-2.1", "to", "-0.02",
+        "-0.8", "1",
+    ]  # fmt: skip
+    assert knee.startswith("         right_calf")  # four links out from the torso
+    motor = next(line for line in lines if line.startswith(" right_hip_motor_a"))
+    assert motor.split() == [
+        "right_hip_motor_a", "(right_hip_pitch,", "right_hip_roll)", "10.5", "18", "30", "4",
+        "0.00182", "0.07", "0.01",
+    ]  # fmt: skip
+    foot = next(line for line in lines if line.startswith(" left_foot"))
+    assert foot.split() == ["left_foot", "line", "left_foot", "left_toe,", "left_heel"]
+    assert "sensors: 10 encoders, an IMU, 4 switches" in lines
+    assert not [line for line in lines if line.startswith("note:")]
+
+
+def test_show_for_programs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "cart.xml").write_text(CART_POLE)
+    monkeypatch.chdir(tmp_path)
+    about = run_for_json("robot", "show", "cart.xml")
+    assert about["success"] and about["name"] == "cartpole" and about["base_joint"] == "fixed"
+    assert [link["joint"] for link in about["links"]] == ["", "slider", "hinge"]
+    assert about["links"][1]["limits"] == [-1.0, 1.0] and about["links"][2]["limits"] is None
+    assert about["motors"][0]["peak_torque"] == 10.0 and about["feet"] == []
+    assert about["sensors"] == {"encoders": 2, "imu": False, "switches": 0}
+    assert about["missing"] == [
+        "no speed limit of slider: 20 rad/s is assumed",
+        "rotor inertia is zero; write rotor_inertia under profiles",
+    ]
+
+
+def test_what_is_missing_is_said_with_what_to_write(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "leg.xml").write_text(ONE_LEG)
+    monkeypatch.chdir(tmp_path)
+    notes = [n for n in run_here("robot", "show", "leg.xml").stdout.splitlines() if "note:" in n]
+    assert notes == [
+        "note: no speed limit of hip, knee: 20 rad/s is assumed",
+        (
+            "note: there are no feet, so the robot can be simulated but not stand or jump; write them "
+            "under feet: [{name: NAME, at: LINK, radius: METRES}], or let aloft robot import guess"
+        ),
+    ]
+
+
+@pytest.mark.parametrize("suffix", [".png", ".svg"])
+def test_it_is_drawn(suffix: str, tmp_path: Path) -> None:
+    path = tmp_path / f"bruce{suffix}"
+    assert f"drawn to {path}" in run_here("robot", "show", "bruce", "--picture", str(path)).stdout
+    first = path.read_bytes()
+    run_here("robot", "show", "bruce", "--picture", str(path))
+    assert path.read_bytes() == first
+    if suffix == ".png":
+        picture = Image.open(path).convert("RGB")
+        colours = picture.getcolors(picture.width * picture.height)
+        assert picture.width > 1000 and colours is not None and len(colours) > 50
+    else:
+        assert b"from the right" in first
+
+
+def test_a_picture_of_another_kind_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "bruce.gif"
+    errors = run_here("robot", "show", "bruce", "--picture", str(path), code=2).stderr
+    assert "no picture: a picture is a .png or .svg file, not bruce.gif" in errors
+
+
+def test_import_writes_what_it_finds_and_marks_what_it_guesses(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "leg.xml").write_text(ONE_LEG)
+    monkeypatch.chdir(tmp_path)
+    text = run_here("robot", "import", "leg.xml").stdout
+    assert "wrote leg.yaml: look at each part, then `aloft robot show leg.yaml`" in text
+    written = (tmp_path / "leg.yaml").read_text()
+    assert "# GUESSED: the ends of the limbs that reach lowest." in written
+    data = yaml.safe_load(written)
+    assert data["file"] == "leg.xml"
+    assert data["feet"] == [{"name": "foot", "at": "foot", "radius": 0.035}]
+    # The YAML beside the file and the file itself now give the same robot.
+    robot = find_robot("leg.yaml", tmp_path)
+    assert robot == find_robot("leg.xml", tmp_path) and len(robot.feet) == 1
+    errors = run_here("robot", "import", "leg.xml", code=2).stderr
+    assert "leg.yaml is there already; --force writes over it" in errors
+    run_here("robot", "import", "leg.xml", "--force")
+    assert run_for_json("robot", "import", "leg.xml", "-o", "b.yaml")["written"] == "b.yaml"
+    assert find_robot("b.yaml", tmp_path).feet == robot.feet
+
+
+@needs_robots
+def test_import_finds_flat_feet_and_a_standing_pose(tmp_path: Path) -> None:
+    out = tmp_path / "g1.yaml"
+    run_here("robot", "import", str(urdf("g1")), "-o", str(out))
+    data = yaml.safe_load(out.read_text())
+    assert [foot["at"] for foot in data["feet"]] == [
+        "left_ankle_roll_link",
+        "right_ankle_roll_link",
+    ]
+    assert sorted(map(tuple, data["feet"][0]["points"])) == [
+        (-0.05, -0.025, -0.035), (-0.05, 0.025, -0.035), (0.12, -0.03, -0.035),
+        (0.12, 0.03, -0.035),
+    ]  # fmt: skip
+    assert len(data["standing"]) == 29
+    about = run_for_json("robot", "show", str(out))
+    assert [foot["kind"] for foot in about["feet"]] == ["flat", "flat"]
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "message"),
+    [
+        ("x.urdf", "<html/>", "x.urdf: this is neither a URDF nor an MJCF file"),
+        ("x.urdf", "no XML", "x.urdf:1:1: this is no XML: syntax error"),
+        ("x.stl", "", "x.stl is no URDF or MJCF file: its name ends in none of .urdf, .xml, .mjcf"),
+        ("x.urdf", None, "there is no file x.urdf"),
+        (
+            "x.urdf",
+            ARM.replace('<mass value="1"/>', '<mass value="nan"/>', 2),
+            "x.urdf:8:3: link upper has a mass of nan kg",
+        ),
+    ],
+)
+def test_what_cannot_be_imported(
+    name: str, content: str | None, message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    if content is not None:
+        (tmp_path / name).write_text(content)
+    monkeypatch.chdir(tmp_path)
+    assert message in run_here("robot", "import", name, code=2).stderr
+    assert not (tmp_path / "x.yaml").exists()
+
+
+def test_an_unknown_robot() -> None:
+    errors = run_here("robot", "show", "brus", code=2).stderr
+    assert "no robot called 'brus'; there is a1, anymal_c, bolt, bruce, g1, go2, hyq," in errors
+
+
+def test_faults_for_programs(tmp_path: Path) -> None:
+    path = tmp_path / "x.yaml"
+    path.write_text("name: x\nbase: a\nlinks: [{name: a, mass: -1, com: [0, 0, 0],\n"
+                    "  inertia: [1, 1, 1, 0, 0, 0]}]\njoints: []\n"
+                    "profiles: {}\n")  # fmt: skip
+    report = run_for_json("robot", "show", str(path), code=2)
+    assert report["reason"] == f"{path}: 2 faults in the robot's description"
+    assert report["faults"][0] == {
+        "file": str(path), "line": 3, "column": 25, "path": ["links", 0, "mass"],
+        "message": "link a has a mass of -1 kg", "expected": "a positive number of kg",
+        "found": "-1", "fix": "mass: 0.1",
+    }  # fmt: skip
+
+
+def test_export_writes_a_urdf(tmp_path: Path) -> None:
+    path = tmp_path / "bruce.urdf"
+    run_here("robot", "export", "bruce", "--urdf", "-o", str(path))
+    assert path.read_text() == run_here("robot", "export", "bruce").stdout
+    model = pinocchio.buildModelFromUrdf(str(path), pinocchio.JointModelFreeFlyer())
+    assert model.nv == 16 and pinocchio.computeTotalMass(model) == pytest.approx(5.118)
+    missing = tmp_path / "no" / "bruce.urdf"
+    errors = run_here("robot", "export", "bruce", "-o", str(missing), code=2).stderr
+    assert f"{missing} cannot be written: No such file or directory" in errors
