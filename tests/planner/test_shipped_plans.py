@@ -8,7 +8,7 @@ from tests.robots.example_robots import INSTALLED
 from aloft.planner.checking.validity import check_plan
 from aloft.planner.library.library import SHIPPED, PlanLibrary
 from aloft.planner.task.plan import read_plan
-from aloft.planner.task.task import read_task
+from aloft.planner.task.read_task import read_task
 from aloft.robots.description import find_robot
 
 TASKS = sorted((SHIPPED.parent / "tasks").glob("*.yaml"))

@@ -8,7 +8,8 @@ import yaml
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from aloft.planner.task.task import JumpTask, TaskError, make_task, read_task
+from aloft.planner.task.read_task import read_task
+from aloft.planner.task.task import JumpTask, TaskError, make_task
 from aloft.studies.batch.plan_grid import read_grid
 
 
