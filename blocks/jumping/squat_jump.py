@@ -1,9 +1,10 @@
 """A squat jump as a motion of the whole body: squat, thrust, flight, landing, recovery.
 
-In the squat the torso's lean is prescribed. From the thrust on the pitching momentum is, so the
-torso's swing is what makes it so: a jump that leaves with the momentum it should, found by
-integration, where a torso held upright would leave with a spin and fall. (Roll and yaw stay
-prescribed while the feet stand: a thigh that is level has its hip's yaw and roll axes in line.)
+In the squat the lean of the torso is prescribed. From the thrust on the pitching momentum is
+prescribed instead, and the torso swings as that demands. The momentum at lift-off is found by
+integrating the motion, so that the torso lands as it should; a torso held upright in the thrust
+would leave the ground with a spin, and fall. Roll and yaw of the torso stay prescribed while the
+feet stand, because a thigh that is level has the yaw and roll axes of its hip in line.
 """
 
 from __future__ import annotations

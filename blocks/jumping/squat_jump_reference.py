@@ -18,6 +18,10 @@ from .squat_jump import SquatJumpTask, plan_squat_jump
 class SquatJumpReference(Block):
     """A squat, thrust, flight and landing of the whole body, planned from a few numbers.
 
+    It serves any robot whose feet stand level in its standing pose and that has joints enough to
+    move its centre of mass and base with all feet on the ground: bipeds with line or flat feet,
+    quadrupeds with point feet. The defaults are BRUCE's.
+
     The take-off speed is that of a ballistic rise, V^2 = 2 g (rise + lift_off_drop); the thrust
     goes from the squat's bottom to lift-off with, over u from 0 to 1 in its time T,
 
@@ -33,9 +37,10 @@ class SquatJumpReference(Block):
     are fed forward, are published ``lead`` ahead of time.
 
     The plan is made at load (about 0.2 s) and read by the time since the run began; after its end
-    it stands still. It knows nothing of what the robot really does, plans no lateral jump and no
-    twist, and leaves forces and torque limits to the controller. It needs legs of five joints.
-    ``setup`` raises ``BlockError`` where a joint would pass its limit or a motor its speed.
+    the reference stands still. The block knows nothing of what the robot really does, plans no
+    lateral jump and no twist, and leaves forces and torque limits to the controller. The load
+    report has a problem for a robot with too few joints; ``setup`` raises ``BlockError`` where a
+    joint would pass its limit or a motor its speed.
     """
 
     class Params(Parameters):

@@ -24,12 +24,12 @@ class JumpRecord(StandRecord):
     come."""
 
     unloaded_time = Field(unit="s", text="when all points were last found unloaded anew")
-    unloaded_speed = Field(unit="m/s", text="vertical speed of the com then")
-    unloaded_momentum = Field(3, unit="N m s", frame="world", text="k about the com then")
+    unloaded_speed = Field(unit="m/s", text="vertical speed of the com at that time")
+    unloaded_momentum = Field(3, unit="N m s", frame="world", text="k about the com at that time")
     lift_off_time = Field(unit="s", text="when the flight began")
-    lift_off_speed = Field(unit="m/s", text="vertical speed of the com then")
-    lift_off_momentum = Field(3, unit="N m s", frame="world", text="k about the com then")
-    touchdown_time = Field(unit="s", text="when it ended")
+    lift_off_speed = Field(unit="m/s", text="vertical speed of the com at that time")
+    lift_off_momentum = Field(3, unit="N m s", frame="world", text="k about the com at that time")
+    touchdown_time = Field(unit="s", text="when the flight ended")
     touchdown_speed = Field(unit="m/s", text="downward speed of the com just before")
     vertical_speed = Field(unit="m/s", text="vertical speed of the com in the tick before")
     squat_height = Field(unit="m", text="lowest height of the com before lift-off")
@@ -40,13 +40,13 @@ class JumpRecord(StandRecord):
     ground_high = Field(unit="m", text="highest ground under a contact point, when judged")
     planned_flight = Field(unit="s", text="flight time of the reference")
     planned_speed = Field(unit="m/s", text="vertical com speed of the reference at lift-off")
-    planned_speed_time = Field(unit="s", text="when it was read")
+    planned_speed_time = Field(unit="s", text="when that speed was read")
     planned_standing = Field(unit="m", text="com height of the reference at the start")
     planned_apex = Field(unit="m", text="greatest com height of the reference")
     planned_start = Field(("n_feet", 2), unit="m", text="feet of the reference at the start")
     planned_foot = Field(("n_feet", 2), unit="m", text="feet of the reference now")
-    planned_yaw_start = Field(unit="rad", text="mean heading of its feet at the start")
-    planned_yaw = Field(unit="rad", text="mean heading of its feet now")
+    planned_yaw_start = Field(unit="rad", text="mean heading of the reference's feet at the start")
+    planned_yaw = Field(unit="rad", text="mean heading of the reference's feet now")
 
 
 class JumpCriteria(StandCriteria):

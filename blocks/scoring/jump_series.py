@@ -17,23 +17,25 @@ EARLY_LIFT_OFF = 0.1
 
 
 class JumpSeries(Signal):
-    """The jumps of a row that are over; figures are of the worst of them."""
+    """The jumps of a row that are over. Every figure is that of the worst of them."""
 
-    made = Field(dtype="int64", text="jumps that have touched down")
-    landed_time = Field(unit="s", text="when the last of them did")
+    made = Field(dtype="int64", text="number of jumps that have touched down")
+    landed_time = Field(unit="s", text="when the last of them touched down")
     planned_lift_off = Field(unit="s", text="the planned lift-off of the jump under way or next")
-    flight_share = Field(unit="", text="least flight time by the planned one")
-    flight_jump = Field(dtype="int64", text="whose it is, from 1")
-    speed_error = Field(unit="", text="greatest error of the lift-off speed by the planned one")
-    speed_jump = Field(dtype="int64", text="whose it is")
-    rise_error = Field(unit="", text="greatest error of the apex by the planned rise")
-    rise_jump = Field(dtype="int64", text="whose it is")
-    place_error = Field(unit="m", text="feet from where they should land, forward or left")
-    place_now = Field(unit="m", text="that of the present landing")
-    place_jump = Field(dtype="int64", text="whose it is")
+    flight_share = Field(unit="", text="least share of the planned flight time")
+    flight_jump = Field(dtype="int64", text="number of that jump, from 1")
+    speed_error = Field(
+        unit="", text="greatest error of the lift-off speed, as a share of the planned one"
+    )
+    speed_jump = Field(dtype="int64", text="number of that jump")
+    rise_error = Field(unit="", text="greatest error of the apex, as a share of the planned rise")
+    rise_jump = Field(dtype="int64", text="number of that jump")
+    place_error = Field(unit="m", text="greatest distance of the feet from where they should land")
+    place_now = Field(unit="m", text="error of the present landing")
+    place_jump = Field(dtype="int64", text="number of that jump")
     turn_error = Field(unit="rad", text="greatest error of the feet's heading")
-    turn_now = Field(unit="rad", text="that of the present landing")
-    turn_jump = Field(dtype="int64", text="whose it is")
+    turn_now = Field(unit="rad", text="error of the present landing")
+    turn_jump = Field(dtype="int64", text="number of that jump")
 
 
 def goes_on(series: JumpSeries, limits: JumpCriteria) -> bool:

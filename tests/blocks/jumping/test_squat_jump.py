@@ -13,6 +13,8 @@ from aloft.robots.description import find_robot
 from aloft.robots.pinocchio_model import build_pinocchio_model
 from aloft.runtime.language.errors import BlockError
 
+from ...robots.limbed_robots import quadruped
+
 ROBOT = find_robot("bruce")
 BUILT = build_pinocchio_model(ROBOT)
 DEFAULTS = SquatJumpReference.Params()
@@ -138,3 +140,29 @@ def test_what_the_robot_cannot_do_is_refused(changes, part):
     with pytest.raises(BlockError) as error:
         plan(**changes)
     assert part in str(error.value)
+
+
+def test_a_quadruped_with_ball_feet_jumps_too():
+    robot = quadruped()
+    task = {
+        "rise": 0.06, "squat_depth": 0.06, "lift_off_drop": 0.01, "touchdown_drop": 0.01,
+        "landing_depth": 0.04, "lean": 0.0, "touchdown_pitch": 0.0, "distance": 0.05,
+    }  # fmt: skip
+    names = set(SquatJumpTask.__dataclass_fields__)
+    values = {k: v for k, v in DEFAULTS.model_dump().items() if k in names}
+    built = build_pinocchio_model(robot)
+    table = plan_squat_jump(built, robot, SquatJumpTask(**{**values, **task}))
+    columns = table.columns
+    height = columns["com"][:, 2]
+    assert height.max() == pytest.approx(height[0] + 0.06, abs=1e-4)
+    moved = columns["foot_position"][-1] - columns["foot_position"][0]
+    assert moved == pytest.approx(np.tile([0.05, 0.0, 0.0], (4, 1)), abs=0.006)  # the balls roll
+    flight = (table.time > table.lift_off_time) & (table.time < table.touchdown_time)
+    data = built.model.createData()
+    for row in np.flatnonzero(flight)[::10]:
+        q = pin.neutral(built.model)
+        q[3:7], q[7:] = columns["orientation"][row], columns["joint_position"][row]
+        v = np.zeros(built.model.nv)
+        v[3:6], v[6:] = columns["angular_velocity"][row], columns["joint_velocity"][row]
+        pin.computeCentroidalMomentum(built.model, data, q, v)
+        assert data.hg.angular == pytest.approx(columns["angular_momentum"][row], abs=1e-6)
