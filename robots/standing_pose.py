@@ -84,7 +84,8 @@ class _Search:
     def __init__(self, robot: RobotDescription, start: Mapping[str, float], height: float) -> None:
         self.robot = robot
         limits = robot.joint_limits
-        room = MARGIN * np.where(np.isfinite(limits).all(axis=1), limits[:, 1] - limits[:, 0], 0.0)
+        bounded = np.where(np.isfinite(limits).all(axis=1, keepdims=True), limits, 0.0)
+        room = MARGIN * (bounded[:, 1] - bounded[:, 0])
         self.lower, self.upper = limits[:, 0] + room, limits[:, 1] - room
         carrier = {joint.child: (k, joint.parent) for k, joint in enumerate(robot.joints)}
         legs = np.zeros(len(robot.joints), dtype=bool)
@@ -95,7 +96,7 @@ class _Search:
                 legs[index] = True
         held = np.array([joint.name in robot.held for joint in robot.joints], dtype=bool)
         self.free = np.flatnonzero(legs & ~held)
-        middle = np.where(np.isfinite(limits).all(axis=1), limits.mean(axis=1), 0.0)
+        middle = bounded.mean(axis=1)
         self.start = np.where(legs, np.clip(middle, -WIDEST, WIDEST), 0.0)
         given = {**start, **robot.held}
         for k, joint in enumerate(robot.joints):
