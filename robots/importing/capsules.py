@@ -82,10 +82,21 @@ def of_box(sizes: Array) -> list[Capsule]:
 def of_points(points: Array) -> list[Capsule]:
     """The capsules for a mesh with these corners (n, 3): of the box about it that lies along its
     principal directions."""
-    corners = np.unique(points, axis=0)
+    corners = _once(points)
     _, directions = np.linalg.eigh(np.cov((corners - corners.mean(axis=0)).T))
     turn = directions * np.sign(directions[np.abs(directions).argmax(axis=0), range(3)])
     places = corners @ turn
     low, high = places.min(axis=0), places.max(axis=0)
     sizes = np.maximum(0.5 * (high - low), 1e-3)
     return [capsule.moved(turn, turn @ (0.5 * (low + high))) for capsule in of_box(sizes)]
+
+
+def _once(points: Array) -> Array:
+    """The points (n, 3) without those that stand there again, as corners of triangles do.
+
+    They are told apart by a number made of their bits, which is much faster to sort than rows.
+    """
+    bits = np.ascontiguousarray(points + 0.0).view(np.uint64)
+    factors = np.array([0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9], np.uint64)
+    _, first = np.unique((bits * factors).sum(axis=1, dtype=np.uint64), return_index=True)
+    return points[first]
