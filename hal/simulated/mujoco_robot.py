@@ -136,8 +136,17 @@ class MujocoRobot(Robot):
     def local_dimensions(
         cls, params: Parameters, robot: RobotDescription | None
     ) -> Mapping[str, int]:
-        """None: the seed is not a size."""
-        return {}
+        """The number of named points that something may push at; the seed is no size."""
+        return {"n_points": len(robot.points) if robot is not None else 0}
+
+    @classmethod
+    def example_inputs(
+        cls, rng: np.random.Generator, dimensions: Mapping[str, int]
+    ) -> Mapping[str, Mapping[str, Any]]:
+        """A push at a point that the robot has, and none where it has no points."""
+        count = dimensions["n_points"]
+        force = rng.uniform(-1.0, 1.0, 3) if count else np.zeros(3)
+        return {"push": {"force": force, "point": rng.integers(max(1, count))}}
 
     @classmethod
     def state_dimensions(

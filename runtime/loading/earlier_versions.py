@@ -1,15 +1,20 @@
 """What graphs of earlier versions say otherwise: errors that give the new form, and old graphs read.
 
 Since version 0.2 some blocks have other names, the actuator profile is said once for the graph
-(``actuators: relaxed``) instead of at every block that uses it, and the paper's estimator, which was
-the other ``law`` of ``blocks.StateEstimator``, is ``blocks.ComplementaryFilter``.
+(``actuators: relaxed``) instead of at every block that uses it, gains of joints are given by name
+instead of by position, the paper's estimator, which was the other ``law`` of
+``blocks.StateEstimator``, is ``blocks.ComplementaryFilter``, and some defaults follow from the robot
+instead of being those of one robot.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
+from ...robots.description import RobotDescription, find_robot
+from ...robots.shipped import robot_names
+from ..language.per_joint import by_name
 from ..language.registry import MOVED
 from .document import read_value
 from .nodes import Node, plain, text_of
@@ -24,19 +29,22 @@ PROFILE_PARAMETERS: Mapping[str, str] = {
 """The parameter by which a block named its actuator profile before version 0.2, the most telling
 block first."""
 
+GAINS_BY_POSITION: Mapping[str, tuple[str, ...]] = {
+    "blocks.JointPD": ("flight_stiffness", "flight_damping", "stance_stiffness", "stance_damping"),
+}
+"""Parameters that were lists with one value for every joint of a leg."""
 
-LEG_JOINTS = ("*_hip_yaw", "*_hip_pitch", "*_hip_roll", "*_knee", "*_ankle")
-"""The joints of a leg that lists of gains were for before version 0.2, in their order."""
-JOINT_GAINS = ("flight_stiffness", "flight_damping", "stance_stiffness", "stance_damping")
 EARLIER_DEFAULTS: Mapping[str, Mapping[str, Any]] = {
     "blocks.JointPD": {
         "flight_stiffness": [40.0, 60.0, 60.0, 60.0, 15.0],
         "flight_damping": [1.0, 1.5, 1.5, 1.2, 0.3],
     },
-    "blocks.SafetyMonitor": {"damping": 0.5},
+    "blocks.SafetyMonitor": {"speed_limit": 60.0, "torque_limit": 200.0, "damping": 0.5},
+    "blocks.WholeBodyController": {"force_max": 400.0},
+    "blocks.JumpScore": {"load_share": 0.2, "fall_height": 0.12},
+    "hal.MujocoRobot": {"drive_damping": 0.5},
 }
-"""What blocks did by default before version 0.2, when there was one robot. Its numbers are now in
-the graphs of that robot."""
+"""Defaults of version 0.1 that have changed since."""
 
 
 def fix_of_parameter(use: str, parameter: str, value: Node) -> str:
@@ -51,14 +59,16 @@ def fix_of_parameter(use: str, parameter: str, value: Node) -> str:
     return ""
 
 
-def in_present_form(text: str, version: str = "") -> str:
+def in_present_form(text: str, version: str = "", robot: RobotDescription | None = None) -> str:
     """The flattened graph that an earlier version has kept, as this version would have written it.
 
-    A graph that is of this version already, or that cannot be read, comes back as it is.
+    Only a graph that version 0.1 kept changes, and one with names that mean nothing since.
 
     Args:
-        version: of aloft, that kept it; empty where nobody knows. What version 0.1 did by default
-            is then said in the graph.
+        text: the graph; one that cannot be read comes back as it is.
+        version: the version of aloft that kept it, where that is known.
+        robot: the graph's robot, whose joints gains by position were for; by default one of ours
+            of the name in the graph.
     """
     problems = Problems()
     node = read_value(text, "a kept graph", problems)
@@ -66,60 +76,59 @@ def in_present_form(text: str, version: str = "") -> str:
     if len(problems) or not isinstance(data, dict) or not isinstance(data.get("blocks"), dict):
         return text
     blocks = [block for block in data["blocks"].values() if isinstance(block, dict)]
-    profiles = _take_profiles(blocks)
-    laws = [_take_law(block) for block in blocks]
-    moved = [block for block in blocks if block.get("use") in MOVED]
-    lists = [_name_joints(block, defaults=version.startswith("0.1.")) for block in blocks]
-    if not moved and not profiles and not any(laws) and not any(lists):
+    if not version.startswith("0.1.") and not any(map(_is_early, blocks)):
         return text
-    for block in moved:
-        block["use"] = MOVED[block["use"]]
-    if profiles and "actuators" not in data:
+    for block in blocks:
+        block["use"] = MOVED.get(str(block.get("use")), block.get("use"))
+        if not isinstance(block.get("with"), dict):
+            block["with"] = {}
+    robot = robot or _robot_of(data)
+    profiles = list(_take_profiles(blocks))
+    for block in blocks:
+        _split_estimators(block)
+        given = block["with"]
+        for name, value in EARLIER_DEFAULTS.get(block["use"], {}).items():
+            given.setdefault(name, value)
+        for name in GAINS_BY_POSITION.get(block["use"], ()):
+            if robot is not None and isinstance(given.get(name), list):
+                given[name] = by_name(given[name], robot) or given[name]
+    if profiles:
         data = _behind(data, "robot", "actuators", profiles[0])
     return _text(data)
 
 
-def _take_profiles(blocks: list[Any]) -> list[str]:
+def _robot_of(data: Mapping[str, Any]) -> RobotDescription | None:
+    """The robot that a graph names, if it is one of ours."""
+    name = data.get("robot")
+    return find_robot(name) if name in robot_names() else None
+
+
+def _is_early(block: Mapping[str, Any]) -> bool:
+    """Whether a block has a name or a parameter that means nothing since version 0.2."""
+    use, given = str(block.get("use")), block.get("with")
+    early = {"blocks.StateEstimator": "law", **PROFILE_PARAMETERS}
+    if not isinstance(given, dict):
+        return use in MOVED
+    by_position = any(isinstance(given.get(k), list) for k in GAINS_BY_POSITION.get(use, ()))
+    return use in MOVED or early.get(use) in given or by_position
+
+
+def _take_profiles(blocks: list[Any]) -> Iterator[str]:
     """Remove the profiles that blocks name; those of the most telling block come first."""
-    found: list[str] = []
     for use, parameter in PROFILE_PARAMETERS.items():
         for block in blocks:
-            given = block.get("with")
-            if block.get("use") == use and isinstance(given, dict) and parameter in given:
-                found.append(str(given.pop(parameter)))
-    return found
+            if block["use"] == use and parameter in block["with"]:
+                yield str(block["with"].pop(parameter))
 
 
-def _name_joints(block: dict[str, Any], *, defaults: bool) -> bool:
-    """Give gains in a list to the joints they were for, and say the ``defaults`` of version 0.1;
-    whether anything changed."""
-    use = str(block.get("use"))
-    given = block.get("with")
-    parameters = dict(given) if isinstance(given, dict) else {}
-    if defaults:
-        parameters = {**EARLIER_DEFAULTS.get(use, {}), **parameters}
-    if use == "blocks.JointPD":
-        for name in JOINT_GAINS:
-            values = parameters.get(name)
-            if isinstance(values, list) and len(values) == len(LEG_JOINTS):
-                parameters[name] = dict(zip(LEG_JOINTS, values, strict=True))
-    if parameters == (given or {}):
-        return False
-    block["with"] = parameters
-    return True
-
-
-def _take_law(block: dict[str, Any]) -> bool:
-    """Give an estimator with the paper's law its present name; whether it named a law."""
-    given = block.get("with")
-    if block.get("use") != "blocks.StateEstimator" or not isinstance(given, dict):
-        return False
-    law = given.pop("law", None)
-    if law == "complementary":
+def _split_estimators(block: Any) -> None:
+    """Two estimators were one block, with a parameter ``law`` that chose between them."""
+    if block["use"] != "blocks.StateEstimator":
+        return
+    if block["with"].pop("law", "weighted") == "complementary":
         block["use"] = "blocks.ComplementaryFilter"
         weighted = ("gate", "gate_growth", "support", "level_ground", "slow_rate")
-        block["with"] = {key: value for key, value in given.items() if key not in weighted}
-    return law is not None
+        block["with"] = {k: value for k, value in block["with"].items() if k not in weighted}
 
 
 def _behind(data: Mapping[str, Any], key: str, new_key: str, value: Any) -> dict[str, Any]:

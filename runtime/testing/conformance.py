@@ -6,6 +6,11 @@ For a block of your own, one parametrised test::
     def test_conformance(case: str) -> None:
         check_block(MyBlock, {"gain": 2.0}, cases=[case])
 
+A block that works with robots is checked with each it fits::
+
+    if not misfits(MyBlock, robot="go2"):
+        check_block(MyBlock, robot="go2")
+
 Parameters and inputs come from ``Block.example_parameters`` and ``Block.example_inputs``, and where
 those say nothing inputs are random, finite and of order one.
 """
@@ -19,8 +24,10 @@ from typing import Any
 
 import numpy as np
 
-from ...robots.description import RobotDescription
-from ..language.block import Block
+from ...robots.description import find_robot
+from ...robots.robot_description import RobotDescription
+from ..language.block import Block, Clock, Context
+from ..language.fit import find_misfits
 from ..language.parameter_change import Adjustment
 from ..running.finite import FiniteCheck
 from ..running.live_parameters import LiveParameters
@@ -282,6 +289,28 @@ CASES: Mapping[str, Callable[[Subject], None]] = {
 def conformance_cases() -> tuple[str, ...]:
     """The names of all checks, to parametrise a test with."""
     return tuple(CASES)
+
+
+def misfits(
+    block_type: type[Block],
+    params: Mapping[str, Any] | None = None,
+    *,
+    robot: str | RobotDescription | None = None,
+    rate: float = 500.0,
+) -> tuple[str, ...]:
+    """Why the block cannot work with that robot, as a graph's load report would say it; empty where
+    it can. The arguments are those of ``check_block``."""
+    given = block_type.example_parameters() if params is None else params
+    ready = block_type.Params.model_validate(dict(given))
+    description = find_robot(robot) if isinstance(robot, str) else robot
+    sizes = {
+        **(description.dimensions if description else {}),
+        **block_type.local_dimensions(ready, description),
+    }
+    context = Context(
+        "block", Clock(1.0 / rate), 1, 0, sizes, description, tuple(block_type.inputs)
+    )
+    return tuple(misfit.message for misfit in find_misfits(block_type, ready, context))
 
 
 def check_block(

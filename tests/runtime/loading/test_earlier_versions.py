@@ -5,10 +5,12 @@ from pathlib import Path
 import pytest
 import yaml
 
+from aloft.robots.description import find_robot
 from aloft.runtime.language.registry import block_name
 from aloft.runtime.loading import LoadError, load_text
 from aloft.runtime.loading.earlier_versions import in_present_form
 
+BRUCE = find_robot("bruce")
 OLD = """\
 rate: 500
 duration: 3
@@ -35,7 +37,7 @@ blocks:
 
 
 def test_an_old_graph_loads() -> None:
-    graph = load_text(in_present_form(OLD), Path("old.yaml"))
+    graph = load_text(in_present_form(OLD, "0.1.0", BRUCE), Path("old.yaml"))
     assert graph.robot is not None and graph.robot.motors.profile == "relaxed"
     assert block_name(graph.block("wave").block_type) == "blocks.SineWave"
     assert graph.block("robot").params.model_dump()["seed"] == 3
@@ -54,16 +56,37 @@ def test_without_translation_the_report_says_what_to_write() -> None:
     assert "runtime.SineWave has been called blocks.SineWave since version 0.2" in text
 
 
+def test_gains_by_position_are_given_by_name() -> None:
+    text = """\
+rate: 500
+robot: bruce
+blocks:
+  joint_pd:
+    use: blocks.JointPD
+    with: {stance_damping: [1, 0, 1, 0, 0]}
+"""
+    new = in_present_form(text, "0.1.0", BRUCE)
+    assert '"*_hip_yaw": 1, "*_hip_pitch": 0, "*_hip_roll": 1, "*_knee": 0, "*_ankle": 0' in new
+    assert 'flight_stiffness: {"*_hip_yaw": 40.0, "*_hip_pitch": 60.0' in new  # then the default
+
+
+def test_earlier_defaults_do_not_replace_what_is_written() -> None:
+    text = "blocks:\n  a: {use: hal.MujocoRobot, with: {drive_damping: 2.0}}\n"
+    assert "drive_damping: 2.0" in in_present_form(text, "0.1.0")
+    assert "drive_damping: 0.5" in in_present_form(text.replace("drive_damping: 2.0", ""), "0.1.0")
+
+
 def test_a_text_of_the_present_stays_as_it_is() -> None:
-    text = in_present_form(OLD)
-    assert in_present_form(text) is text
-    assert in_present_form("rate: [") == "rate: ["
-    assert in_present_form("blocks: {a: {use: blocks.Constant}}  # as written").endswith("written")
+    new = in_present_form(OLD, "0.1.0", BRUCE)
+    assert in_present_form(new, "0.2.0", BRUCE) is new
+    assert in_present_form(OLD, "", BRUCE) == new  # its names say how old it is
+    assert in_present_form("rate: [", "0.1.0") == "rate: ["
+    assert in_present_form("- 1", "0.1.0") == "- 1"
 
 
 def test_texts_that_look_like_references_survive() -> None:
     text = "blocks:\n  a: {use: runtime.Gain, with: {name: $$cost, other: 'on'}}\n"
-    assert in_present_form(text) == (
+    assert in_present_form(text, "0.1.0") == (
         'blocks:\n  a: {use: blocks.Gain, with: {name: $$cost, other: "on"}}\n'
     )
 
@@ -88,22 +111,21 @@ blocks:
 )
 def test_the_two_laws_of_the_estimator_are_two_blocks(law: str, use: str, fix: str) -> None:
     text = ESTIMATOR % law
-    graph = load_text(in_present_form(text), Path("old.yaml"))
+    graph = load_text(in_present_form(text, "0.1.0", BRUCE), Path("old.yaml"))
     assert block_name(graph.block("estimator").block_type) == use
     assert graph.block("estimator").params.model_dump()["velocity_gain"] == 0.1
     with pytest.raises(LoadError, match=fix):
         load_text(text, Path("old.yaml"))
 
 
-JOINT_PD = "blocks:\n  pd: {use: blocks.JointPD%s}\n"
+JOINT_PD = "robot: bruce\nblocks:\n  pd: {use: blocks.JointPD%s}\n"
 
 
 def test_gains_in_a_list_go_to_their_joints() -> None:
     text = in_present_form(JOINT_PD % ", with: {flight_damping: [1, 2, 3, 4, 5]}")
     damping = "'*_hip_yaw': 1, '*_hip_pitch': 2, '*_hip_roll': 3, '*_knee': 4, '*_ankle': 5"
-    assert yaml.safe_load(text)["blocks"]["pd"]["with"] == {
-        "flight_damping": yaml.safe_load(f"{{{damping}}}")
-    }
+    told = yaml.safe_load(text)["blocks"]["pd"]["with"]
+    assert told["flight_damping"] == yaml.safe_load(f"{{{damping}}}")
 
 
 def test_what_version_0_1_did_by_default_is_said() -> None:
