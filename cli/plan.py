@@ -101,7 +101,7 @@ def plan_tasks(
     """
     from ..planner.library.library import PlanLibrary
     from ..planner.task.errors import TaskError
-    from ..planner.task.task import read_task
+    from ..planner.task.read_task import read_task
     from ..robots.description import find_robot
 
     tasks, wrong = [], []

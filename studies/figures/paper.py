@@ -150,7 +150,7 @@ def _plan(robot: RobotDescription) -> tuple[Picture, Mapping[str, Any]]:
     """The figure of a planned somersault as frames."""
     from ...hal.simulated.scenes import flat, platform
     from ...planner.library.library import SHIPPED, PlanLibrary
-    from ...planner.task.task import read_task
+    from ...planner.task.read_task import read_task
 
     task = read_task(SHIPPED.parent / "tasks" / f"{PLANNED}.yaml")
     plan = PlanLibrary(robot).find(task)
