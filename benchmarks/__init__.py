@@ -1,7 +1,7 @@
 """Speed as ratios to peers and hand-written loops, measured in one run.
 
-Absolute times depend on the machine and on who else uses it; ratios of cases that take turns in one
-process do so far less. Every row says what it is compared to and what the goal is.
+Absolute times depend on the machine and on its load. Ratios of cases that take turns in one process
+depend on these far less. Every row says what it is compared with, and what the goal is.
 """
 
 from __future__ import annotations

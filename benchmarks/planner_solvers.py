@@ -1,8 +1,8 @@
 """The planner's solver beside others on the same problem, in the same run.
 
 One problem object, one guess, each solver's CPU time on one core: fatrop, IPOPT, and SNOPT through
-Drake where Drake is installed. SNOPT is untuned (see ``snopt.OPTIONS``). It starts from the planner's
-cold guess and, as the paper's authors do, from the solution of a near task.
+Drake where Drake is installed. SNOPT is untuned (see ``snopt.OPTIONS``). It starts from the
+planner's cold guess and, as the paper's authors do, from the solution of a near task.
 """
 
 from __future__ import annotations

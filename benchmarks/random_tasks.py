@@ -1,7 +1,7 @@
-"""How often the planner succeeds on jumps that nobody chose: tasks drawn by seed.
+"""The planner's success on jumps that nobody chose: tasks that are drawn by a seed.
 
 The range, within reach of BRUCE's real actuators, uniform and independent unless said (signs are
-drawn too; all is for the ``koala`` profile at full effort, with no weight or time changed):
+drawn too; all is for the robot's first actuator profile at full effort, with no weight or time changed):
 
 ================  ===========  ==================  =======================================
 kind              rise         distance            besides
@@ -16,8 +16,8 @@ step up           12-15 cm     10-18 cm ahead      2-5 cm higher
 step down         8-12 cm      10-18 cm ahead      2-6 cm lower
 ================  ===========  ==================  =======================================
 
-Every kind is as likely as any other. A task counts as done if ``solve_and_check`` gives a plan, which
-is then valid.
+Every kind is as likely as any other. A task counts as done if ``solve_and_check`` gives a plan,
+which is then valid.
 """
 
 from __future__ import annotations
@@ -111,7 +111,7 @@ def random_rows(count: int = COUNT, seed: int = SEED) -> list[Row]:
 
 
 def plan_one(task: JumpTask, robot: RobotDescription) -> str:
-    """Why a task has no valid plan; empty where it has one."""
+    """Why a task has no valid plan; empty if it has one."""
     try:
         solve_and_check(task, robot)
     except InvalidPlanError as error:

@@ -10,7 +10,8 @@ from ..planner.checking.validity import InvalidPlanError, check_plan
 from ..planner.library.library import PlanLibrary, solve_and_check
 from ..planner.solving.bounded import cpu_time
 from ..planner.task.errors import PlanError
-from ..planner.task.task import make_task, read_task
+from ..planner.task.read_task import read_task
+from ..planner.task.task import make_task
 from ..robots.description import find_robot
 from .rows import Row
 

@@ -1,4 +1,4 @@
-"""What recording costs: the control thread for each tick, the disk for each minute, memory for ever.
+"""The cost of recording: control thread time for each tick, disk space for each minute, and memory.
 
 The graph is the whole jump's, without the score that would end it; so the bus is BRUCE's and the
 control thread has its real work. ``aloft bench recorder --seconds 600`` makes the run in real time

@@ -1,4 +1,4 @@
-"""What a benchmark gives back, and cases that take turns."""
+"""The rows that benchmarks return, and the measurement of cases that take turns."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class Row:
         return None if self.goal is None or measured is None else measured <= self.goal
 
     def to_json(self) -> dict[str, Any]:
-        """Plain data."""
+        """The row as plain data."""
         return {**asdict(self), "met": self.met}
 
 

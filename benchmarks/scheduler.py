@@ -1,4 +1,4 @@
-"""What the runtime costs: a chain of 20 small vector blocks against a hand-written loop."""
+"""The cost of the runtime: a chain of 20 small vector blocks beside a hand-written loop."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ def scheduler(rounds: int = 60) -> list[Row]:
 
 
 class _BoundedLog(MemoryLog):
-    """A log that starts over when a chunk is full, as a benchmark knows no end."""
+    """A log that starts again when a chunk is full, because a benchmark has no end."""
 
     def record(self, tick: int) -> None:
         if len(self.ticks) == self.CHUNK:
@@ -88,7 +88,7 @@ class _BoundedLog(MemoryLog):
 
 
 def _assert_same(cases: dict[str, Case], expected: list[Any], tickers: tuple[Ticker, ...]) -> None:
-    """Every case computes the same bits."""
+    """Raise unless every case computes the same bits."""
     for case in cases.values():
         case(COMPARED_TICKS)
     for ticker in tickers:
@@ -98,7 +98,7 @@ def _assert_same(cases: dict[str, Case], expected: list[Any], tickers: tuple[Tic
 
 
 def _allocations(ticker: Ticker) -> Row:
-    """Arrays that NumPy allocates a tick, with everything on."""
+    """The number of arrays that NumPy allocates in a tick, with all features on."""
     ticks = 2000
     with count_array_allocations() as counted:
         ticker.advance(ticks)

@@ -1,4 +1,4 @@
-"""The command line: ``aloft VERB``. One file a verb; heavy imports only inside the verbs."""
+"""The command line, ``aloft VERB``. Every verb has a file; heavy imports are inside the verbs only."""
 
 from .app import app, main
 

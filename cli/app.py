@@ -1,4 +1,4 @@
-"""The verbs put together, and the process around them: arguments in, an exit code out."""
+"""Puts the verbs together into one command, which ends with an exit code."""
 
 from __future__ import annotations
 

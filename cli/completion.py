@@ -6,14 +6,14 @@ import typer
 
 
 def block_names(incomplete: str) -> list[str]:
-    """The names of blocks that begin so."""
+    """The names of blocks that begin with a text."""
     from ..runtime.language.registry import known_names
 
     return [name for name in known_names() if name.startswith(incomplete)]
 
 
 def parameter_names(context: typer.Context, incomplete: str) -> list[str]:
-    """The parameters of the graph on the command line that begin so, as ``block.parameter=``."""
+    """The parameters, as ``block.parameter=``, of the graph on the command line that begin with a text."""
     from ..runtime.loading import LoadError, load
 
     # Arguments in front of an option that still waits for its value are not parsed yet.
@@ -32,7 +32,7 @@ def parameter_names(context: typer.Context, incomplete: str) -> list[str]:
 
 
 def benchmark_names(incomplete: str) -> list[str]:
-    """The names of benchmarks that begin so."""
+    """The names of benchmarks that begin with a text."""
     from ..benchmarks import BENCHMARKS
 
     return [name for name in BENCHMARKS if name.startswith(incomplete)]

@@ -1,4 +1,4 @@
-"""Where the sockets of running graphs are, and which graph is meant."""
+"""Finds the sockets of running graphs."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ SUFFIX = ".sock"
 
 
 def folder() -> Path:
-    """The folder of the sockets: the user's alone.
+    """The folder of the sockets, which only the user can read.
 
     Raises:
         AloftError: it cannot be made, or belongs to somebody else.

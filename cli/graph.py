@@ -1,4 +1,4 @@
-"""``aloft graph``: what a graph looks like once it is loaded."""
+"""``aloft graph``: prints a graph as it is after loading."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def graph(
 
 
 def print_table(out: Console, graph: CheckedGraph) -> None:
-    """Print one row a block, in the order of execution, and one line for each of its inputs."""
+    """Print one row for each block, in the order of execution, with one line for each of its inputs."""
     from ..runtime.loading.picture import table as rows_of
 
     robot = ""

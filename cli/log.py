@@ -1,4 +1,4 @@
-"""``aloft log``: look into recordings, export them, mend them."""
+"""``aloft log``: prints what is in recordings, exports them and repairs them."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
 
 @log.command("info")
 def info(file: File, as_json: AsJson = False) -> None:
-    """Print what ran, what came of it, and every signal with its unit."""
+    """Print what ran, its outcome, and every signal with its unit."""
     with errors_reported(as_json):
         run = read(file)
         about = summary(run)
@@ -86,7 +86,7 @@ def export(
 
 @log.command("repair")
 def repair(file: File, as_json: AsJson = False) -> None:
-    """Mend a recording that was cut off, in place: what is incomplete at its end is removed."""
+    """Repair a recording that was cut off, in place: the incomplete part at its end is removed."""
     from ..logs.file.repair import repair as mend
     from ..logs.recording.tail_repair import take_in_tail
 
@@ -127,7 +127,7 @@ def read(file: Path) -> RecordedRun:
 
 
 def summary(run: RecordedRun) -> dict[str, Any]:
-    """What there is to say of a recording, as plain data."""
+    """The summary of a recording as plain data."""
     header, outcome, ticks = run.header, run.outcome, run.ticks
     duration = len(ticks) / header.base_rate
     return {
@@ -160,7 +160,7 @@ def summary(run: RecordedRun) -> dict[str, Any]:
 
 
 def plain(value: Any) -> str:
-    """A value in a table's cell."""
+    """A value as the text of a table's cell."""
     if isinstance(value, dict):
         return ", ".join(f"{key} {entry}" for key, entry in value.items())
     if isinstance(value, list):

@@ -1,4 +1,4 @@
-"""What every verb prints: tables for people, one JSON object for machines, errors as either."""
+"""Prints what the verbs have to say: tables for people, one JSON object for programs, and errors."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def console(*, to_stderr: bool = False, quiet: bool = False) -> Console:
 
 
 def table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> Table:
-    """A table without boxes; columns whose name starts with ``>`` are set to the right."""
+    """A table without boxes. Columns whose name starts with ``>`` are aligned to the right."""
     from rich import box
     from rich.markup import escape
     from rich.table import Table
@@ -51,7 +51,7 @@ def table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> 
 
 
 def say(out: Console, text: str) -> None:
-    """Print a line as it is: no markup read, no words wrapped."""
+    """Print a line as it is, without markup and without wrapping."""
     out.print(text, markup=False, soft_wrap=True)
 
 
@@ -90,7 +90,7 @@ def print_error(message: str) -> None:
 
 
 def print_warning(message: str) -> None:
-    """Print what went wrong but ends nothing, on standard error."""
+    """Print a warning on standard error."""
     typer.secho("warning: ", fg=typer.colors.YELLOW, bold=True, nl=False, err=True)
     typer.echo(message, err=True)
 

@@ -32,11 +32,11 @@ def draw_paper(
     as_json: bool,
     study: Path = STUDY,
 ) -> ExitCode:
-    """Make the runs of ``study`` that are missing, draw all figures, write ``paper.json`` and
-    ``paper.md`` into ``out`` (docs).
+    """Make the missing runs of ``study``, draw all figures, and write the page about them.
 
-    The first seed's runs are what the pictures show and are made every time; all others are kept,
-    in ``results/paper`` or, with ``out``, in its folder ``runs``.
+    The pictures, ``paper.json`` and ``paper.md`` go into ``out``, by default ``docs``. The pictures
+    show the runs of the first seed, which are made every time. All other runs are kept in
+    ``results/paper`` or, with ``out``, in its folder ``runs``.
     """
     from ..studies.batch.seeds import parse_seeds
     from ..studies.execution import Run
@@ -81,7 +81,7 @@ def draw_paper(
 def traced(
     runs: Sequence[Run], seed: int, journal: Journal, workers: int, screen: Console
 ) -> dict[str, Trace]:
-    """The runs with that seed by their tasks, with their signals; their outcomes are kept.
+    """The runs with that seed and their signals, by task. Their outcomes are added to the journal.
 
     Raises:
         AloftError: one of them broke.

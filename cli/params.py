@@ -53,7 +53,7 @@ def get(
     run: Run = "",
     as_json: AsJson = False,
 ) -> None:
-    """Print what parameters are now."""
+    """Print the present values of parameters."""
     with errors_reported(as_json):
         _, found = ask_list(run)
         values = {name: value_of(name, found) for name in names}
@@ -70,7 +70,7 @@ def set_(
     run: Run = "",
     as_json: AsJson = False,
 ) -> None:
-    """Change parameters, all in the same tick; nothing changes if one of them is wrong."""
+    """Change parameters, all in the same tick. If one of them is wrong, none is changed."""
     from ..runtime.parameter_endpoint import set_parameters
     from .endpoints import find
 
@@ -109,7 +109,7 @@ def value_of(name: str, found: list[dict[str, Any]]) -> Any:
 
 
 def text_of(value: Any) -> str:
-    """A value as a graph file would have it."""
+    """A value as it is written in a graph file."""
     from ..runtime.loading.nodes import text_of
 
     return text_of(value)

@@ -1,4 +1,4 @@
-"""``aloft plan``: plan a jump, or a grid of them; table, picture and recording of what came out."""
+"""``aloft plan``: plans a jump or a grid of jumps, with a table, a picture and a recording of each."""
 
 from __future__ import annotations
 
@@ -94,14 +94,14 @@ def plan_tasks(
     screen: Console,
     as_json: bool,
 ) -> ExitCode:
-    """Plan each task file; all of them, even where one fails. All are read before any is planned.
+    """Plan each task file, also after one has failed. All files are read before anything is planned.
 
     Raises:
         TaskError: what is wrong with any of them.
     """
     from ..planner.library.library import PlanLibrary
     from ..planner.task.errors import TaskError
-    from ..planner.task.task import read_task
+    from ..planner.task.read_task import read_task
     from ..robots.description import find_robot
 
     tasks, wrong = [], []
@@ -134,7 +134,7 @@ def plan_task(
     task: JumpTask, library: PlanLibrary, anew: bool, out: Path | None, nearest: bool,
     screen: Console,
 ) -> dict[str, Any]:  # fmt: skip
-    """Plan one task; print it, picture it, and return its row."""
+    """Plan one task, print and draw the plan, and return its row."""
     from ..planner.checking.validity import InvalidPlanError
     from ..planner.solving.bounded import cpu_time
     from ..planner.task.errors import PlanError
@@ -166,7 +166,7 @@ def plan_task(
 
 
 def list_plans(keep: Path | None, screen: Console, as_json: bool) -> ExitCode:
-    """Every plan of the library: its task, what it does, and where it is."""
+    """Print every plan of the library: its task, what it does, and its file."""
     from ..planner.library.library import PlanLibrary
     from ..robots.description import find_robot
 
@@ -181,7 +181,7 @@ def list_plans(keep: Path | None, screen: Console, as_json: bool) -> ExitCode:
 def search_nearest(
     task: JumpTask, library: PlanLibrary, family: str, screen: Console
 ) -> dict[str, Any]:
-    """The nearest task that has a plan, which is kept; for the row of the one that has none."""
+    """Search the nearest task that has a plan, keep that plan, and return it for the failed task's row."""
     from ..planner.library.nearest_feasible import nearest_feasible
 
     with screen.status("searching the nearest task that can be planned") as status:
@@ -198,7 +198,7 @@ def search_nearest(
 
 
 def solver_with_progress(tell: Any) -> Any:
-    """The planner, which tells what it is compiling."""
+    """The planner, which prints what it is compiling."""
     from ..planner.solving.solve import solve_jump
 
     def make(task: JumpTask, robot: RobotDescription, warm_start: JumpPlan | None) -> JumpPlan:

@@ -28,7 +28,7 @@ def plan_grid(
     screen: Console,
     as_json: bool,
 ) -> ExitCode:
-    """Fill the library with a grid of tasks; stopped by a signal, say what is done."""
+    """Fill the library with a grid of tasks. If a signal stops it, print how much is done."""
     from ..planner.library.library import PlanLibrary
     from ..studies.batch.plan_grid import fill, read_grid, robot_of
     from .progress import progress_bar
@@ -81,7 +81,7 @@ def plan_grid(
 
 
 def compile_once(library: PlanLibrary, tasks: list[JumpTask], screen: Console) -> None:
-    """Compile before there are workers, which would else all compile the same."""
+    """Compile before the workers start; otherwise each of them would compile the same functions."""
     from ..planner.solving.solve import make_problem
     from ..planner.task.errors import PlanError
     from ..planner.task.task import TaskError

@@ -149,7 +149,7 @@ def failure_rows(rows: Sequence[GridRow]) -> list[tuple[str, str]]:
 
 
 def recorded_motion(plan: JumpPlan, robot: RobotDescription) -> RecordedMotion:
-    """The plan with its series, every 10 ms or so."""
+    """The plan as a motion with time series, with an instant about every 10 ms."""
     from ..logs.recording.motion_recording import RecordedMotion
     from ..planner.checking.evidence import Evidence
     from ..planner.checking.plan_tests import allowed_motor_torque

@@ -1,4 +1,4 @@
-"""How far a run is: a sink that counts ticks, and a bar that looks at the count now and then."""
+"""Shows the progress of a run: a sink counts ticks, and a bar reads the count now and then."""
 
 from __future__ import annotations
 
@@ -24,20 +24,20 @@ class TickCounter:
         self._task = task
 
     def open(self, bound: BoundGraph) -> None:
-        """Nothing to prepare."""
+        """No-op: there is nothing to prepare."""
 
     def record(self, tick: int) -> None:
-        """Move on, once in a while."""
+        """Move the bar now and then."""
         if tick % TICKS_A_STEP == 0:
             self._progress.update(self._task, completed=tick)
 
     def close(self) -> None:
-        """Nothing to finish."""
+        """No-op: there is nothing to finish."""
 
 
 @contextmanager
 def progress_bar(out: Console, text: str, total: int | None) -> Iterator[tuple[Progress, TaskID]]:
-    """A bar that goes away when it is done; nothing at all where nobody watches."""
+    """A progress bar that disappears at the end. It is not drawn if the output is no terminal."""
     from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
 
     columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn())

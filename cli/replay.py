@@ -1,4 +1,4 @@
-"""``aloft replay``: execute a recorded run again, and say where it differs."""
+"""``aloft replay``: executes a recorded run again, and prints where it differs."""
 
 from __future__ import annotations
 
@@ -103,7 +103,7 @@ def replay(
 
 
 def changed_blocks(opened: OpenedRun, swaps: list[str], sets: list[str]) -> dict[str, list[str]]:
-    """What is changed, as overrides by block. Raises ``AloftError``."""
+    """The changes as overrides, by block. Raises ``AloftError``."""
     from ..runtime.language.registry import find_block
 
     changed: dict[str, list[str]] = {}
@@ -217,7 +217,7 @@ def _units(done: Replayed) -> dict[str, str]:
 def as_data(
     recording: Path, done: Replayed, verdict: str, other: list[str], written: Path | None
 ) -> dict[str, Any]:
-    """The whole answer as plain data."""
+    """The whole result as plain data."""
     first = done.first
     return {
         "success": done.identical,

@@ -105,7 +105,7 @@ def run(
 
 
 def open_viewer(live: Live) -> Viewer | None:
-    """The viewer that shows the run; where there is none, the run is not shown."""
+    """Open the viewer that shows the run. Without a viewer the run is not shown."""
     from ..logs.viewing.viewer import ViewerError, start_viewer
     from .view import open_page
 
@@ -123,7 +123,7 @@ def open_viewer(live: Live) -> Viewer | None:
 
 
 def leave_viewer(viewer: Viewer, *, wait: bool) -> None:
-    """A window stays until somebody closes it; a page as long as somebody waits for it."""
+    """Leave the viewer open after the run: a window until it is closed, a page until Ctrl-C."""
     from .view import keep_open
 
     if viewer.kind != "web":
@@ -135,7 +135,7 @@ def leave_viewer(viewer: Viewer, *, wait: bool) -> None:
 
 
 def open_endpoint(graph: Graph, name: str) -> ParameterEndpoint | None:
-    """Where `aloft params` reaches the run; where nobody asked for it, it may fail."""
+    """Open the endpoint at which ``aloft params`` reaches the run. Unless it was asked for, it may fail."""
     from . import endpoints
 
     if name == "none" or not (name or graph.checked.clock.kind != "free"):
@@ -157,7 +157,7 @@ def run_once(
     sinks: Sequence[Sink] = (),
     viewer: Viewer | None = None,
 ) -> ExitCode:
-    """Run the graph, record and show it, print what came of it."""
+    """Run the graph, record and show it, and print the result."""
     from ..logs.recording.recorder import Recorder
     from .progress import TickCounter, progress_bar
     from .view import how_to_view
@@ -208,7 +208,7 @@ def print_result(out: Console, name: str, result: RunResult) -> None:
 
 
 def print_verdict(result: RunResult) -> None:
-    """Print whether the run succeeded and why, also when all else is quiet."""
+    """Print whether the run succeeded and why, also with ``--quiet``."""
     if result.success:
         typer.secho(f"success: {result.reason}", fg=typer.colors.GREEN)
     else:
@@ -218,7 +218,7 @@ def print_verdict(result: RunResult) -> None:
 def run_many(
     path: Path, overrides: list[str], seeds: list[int], out: Console, as_json: bool
 ) -> ExitCode:
-    """Run the graph once a seed, print a row each and how many succeeded."""
+    """Run the graph once with each seed; print a row for each, and how many succeeded."""
     from ..studies.batch.seeds import run_seeds
     from .progress import progress_bar
 
@@ -250,7 +250,7 @@ def run_many(
 
 
 def print_rows(out: Console, rows: list[SeedRow]) -> None:
-    """Print one line a seed, with the first few metrics that differ between them."""
+    """Print one line for each seed, with the first few metrics that differ between seeds."""
     values: dict[str, list[Any]] = {}
     for row in rows:
         for name, value in row.metrics.items():

@@ -94,7 +94,7 @@ def run_study(
     *,
     dry_run: bool = False,
 ) -> ExitCode:
-    """Make the study's runs; write and print what came of them."""
+    """Make the study's runs; write and print the results."""
     from ..studies.charts.plots import write_plots
     from ..studies.execution import Run
     from ..studies.expansion import cells as expand

@@ -1,4 +1,4 @@
-"""How a study's results are shown: as a table for people, as JSON for machines."""
+"""Shows the results of a study: as a table for people, as JSON for programs."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ MOST_ROWS = 60
 def study_json(
     study: Study, rows: Sequence[Row], seeds: Sequence[int], folder: Path
 ) -> dict[str, Any]:
-    """The result as one object."""
+    """The results as one JSON object."""
     from ..studies.fingerprint import code_fingerprint
     from ..studies.study import FIRST_REPORT_SEED
 
@@ -49,7 +49,7 @@ def study_json(
 
 
 def print_rows(screen: Console, study: Study, rows: Sequence[Row], seeds: Sequence[int]) -> None:
-    """Print one line a cell; axes on which nothing differs are left out."""
+    """Print one line for each cell. Axes with a single value are left out."""
     from ..studies.study import FIRST_REPORT_SEED
 
     tuning = sum(seed < FIRST_REPORT_SEED for seed in seeds)
@@ -86,7 +86,7 @@ def print_rows(screen: Console, study: Study, rows: Sequence[Row], seeds: Sequen
 
 
 def tuned_json(study: Study, best: Mapping[str, Draw], path: Path, broken: int) -> dict[str, Any]:
-    """What tuning found, as one object."""
+    """The result of tuning as one JSON object."""
     assert study.tuning is not None
     return {
         "success": True,

@@ -109,7 +109,7 @@ def sort_targets(
 def check(
     name: str, block_type: type[Block], params: dict[str, Any] | None, robot: str
 ) -> list[Row]:
-    """Every promise of a block, checked by itself."""
+    """The checks of one block, one for each thing that every block promises."""
     from ..runtime.testing.conformance import ConformanceError, check_block, conformance_cases
 
     rows = []
@@ -126,7 +126,7 @@ def check(
 
 
 def report(rows: list[Row], out: Console) -> bool:
-    """Print what is wrong and how many checks passed; whether all have."""
+    """Print what is wrong and how many checks passed. Returns whether all have."""
     wrong = [row for row in rows if row[2]]
     if wrong:
         out.print(table("", ("block", "check", "what is wrong"), wrong))
@@ -137,7 +137,7 @@ def report(rows: list[Row], out: Console) -> bool:
 
 
 def run_pytest(paths: list[str], as_json: bool) -> int:
-    """Run pytest on some paths, or in this folder; its exit code.
+    """Run pytest on some paths, or in this folder, and return its exit code.
 
     A folder without tests is no failure.
     """

@@ -1,4 +1,4 @@
-"""``aloft view``: look at a recording, or at two in one picture."""
+"""``aloft view``: shows a recording, or two recordings together."""
 
 from __future__ import annotations
 
@@ -83,7 +83,7 @@ def keep_open(viewer: Viewer) -> None:
 
 
 def open_page(page: str) -> None:
-    """Open a page in the browser of whoever sits in front of the screen."""
+    """Open a page in the user's browser."""
     import webbrowser
 
     if sys.stdout.isatty():
@@ -91,7 +91,7 @@ def open_page(page: str) -> None:
 
 
 def how_to_view(recording: Path) -> str:
-    """What to type to see a recording, as short as it can be said."""
+    """The shortest command that shows a recording."""
     program = Path(sys.argv[0])
     here = Path.cwd()
     name = program.relative_to(here) if program.is_relative_to(here) else program

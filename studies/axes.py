@@ -30,7 +30,7 @@ _SPACING = ("from", "to", "step")
 
 
 def read_axes(node: MapNode, problems: Problems) -> tuple[Axis, ...]:
-    """All axes, in order; what is wrong is noted and left out."""
+    """All axes in order. A wrong axis is noted as a problem and left out."""
     axes = []
     owners: dict[str, str] = {}
     for entry in node:
@@ -92,7 +92,7 @@ def _named(entry: Entry, cases: Entry, problems: Problems) -> Axis | None:
 
 
 def read_sets(entry: Entry, problems: Problems) -> tuple[Entry, ...] | None:
-    """The overrides in a mapping; nothing at all sets nothing."""
+    """The overrides in a mapping; there are none in an empty one."""
     if isinstance(entry.value, ScalarNode) and entry.value.value is None:
         return ()
     if not isinstance(entry.value, MapNode):

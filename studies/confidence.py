@@ -1,4 +1,4 @@
-"""How sure a success rate is."""
+"""The confidence interval of a success rate."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def wilson_interval(successes: int, n: int, z: float = Z_95) -> tuple[float, flo
     something also where all runs succeed: 40 of 40 give 0.912 to 1. Without runs it is (0, 1).
 
     Raises:
-        ValueError: there cannot be that many successes.
+        ValueError: there are fewer than no successes, or more of them than runs.
     """
     if not 0 <= successes <= n:
         raise ValueError(f"{successes} successes of {n} runs")

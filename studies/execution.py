@@ -1,4 +1,4 @@
-"""Makes the runs of a study that are not kept yet, on all processors or on a cluster."""
+"""Makes those runs of a study that are not in its journal, on all processors or on a cluster."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ class Run:
 
     @property
     def key(self) -> str:
-        """What the run is kept under."""
+        """The key under which the run is kept."""
         return f"{self.cell.key}-{self.seed}"
 
 
 def run_job(work: Job) -> Outcome:
-    """Make one run; called where the work is done.
+    """Make one run, in the process that does the work.
 
     A run that fails is an outcome, and so is a graph that cannot be set up.
 
@@ -52,10 +52,10 @@ def run_job(work: Job) -> Outcome:
 
 
 def outcome_of(result: RunResult, wall_time: float = 0.0) -> Outcome:
-    """What is kept of a run.
+    """The part of a run's result that is kept.
 
     Raises:
-        AloftError: a signal ended the run, so that it is none.
+        AloftError: a signal ended the run, so it has no outcome.
     """
     if result.exit_code in (ExitCode.INTERRUPTED, ExitCode.TERMINATED):
         raise AloftError(result.reason)
@@ -78,12 +78,11 @@ def make_runs(
     cluster: str = "",
     on_run: Callable[[Outcome], None] = lambda outcome: None,
 ) -> list[Run]:
-    """All runs with their outcomes, in their order, whoever made them and when.
+    """All runs with their outcomes, in the order of ``runs``.
 
-    Runs that the journal knows are not made again, and every other is kept as soon as it is there.
-    Runs with the same key are one; ``on_run`` hears of it once.
-    What is no outcome of the run itself, such as the death of its process, is an error here but
-    is not kept, so that the next time tries again.
+    Runs that are in the journal are not made again. Every other run is kept as soon as it is done.
+    Runs with the same key are made once, and ``on_run`` is called once for them. The death of a
+    run's process is an error here, but it is not kept, so the run is tried again the next time.
 
     Raises:
         AloftError: as ``runtime.jobs.job_results``.

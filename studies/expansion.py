@@ -1,8 +1,8 @@
 """A study's cells: every graph with every arm and every case of every axis, checked.
 
-What is set later wins: the study's ``set``, the task's, the axes' in their order, the arm's, and
-last what tuning found for the arm. ``include`` stands in front of the graph's own includes, as if
-the graph had named those files first: a trial, say.
+Overrides are applied in this order, and a later one wins: the study's ``set``, the task's, those of
+the axes in their order, the arm's, and at last what tuning found for the arm. The files of
+``include``, such as a trial, come before the graph's own includes.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ class Cell:
 
 @dataclass(frozen=True)
 class Job:
-    """What another process needs to make a cell's run."""
+    """What another process needs to make one run of a cell."""
 
     graph: str
     include: tuple[str, ...]
@@ -69,7 +69,7 @@ class Job:
 def cells(study: Study, tuned: Tuned | None = None, common: Sequence[Entry] = ()) -> Iterator[Cell]:
     """Every cell, by task, then by arm, then by the axes with the last one fastest.
 
-    ``common`` comes behind the study's ``set`` and in front of all else.
+    ``common`` is applied after the study's ``set`` and before all other overrides.
     """
     where = Position("the tuned parameters", 0, 0)
     for task, arm in itertools.product(study.tasks, study.arms):
@@ -104,7 +104,7 @@ def checked_cells(
     """The cells with their keys.
 
     Raises:
-        LoadError: some graph may not run so; the report has all problems of all cells, with the
+        LoadError: some graph may not run with its overrides; the report has all problems of all cells, with the
             study's own places where an override is wrong.
     """
     good: list[Cell] = []

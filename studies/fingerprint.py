@@ -1,4 +1,4 @@
-"""What beside its graph decides the outcome of a run: our code, our data, and the libraries."""
+"""The code, the data and the library versions that decide the outcome of a run, besides its graph."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ LIBRARIES = ("numpy", "mujoco-core", "mujoco", "pin", "daqp", "qpsolvers")
 @cache
 def code_fingerprint() -> str:
     """A hash of all code that may run in a graph, of the shipped plans, and of the versions of
-    what computes. Results that were made by other code are not taken for this one's."""
+    what computes. Results that were made by other code are therefore not used."""
     digest = hashlib.sha256()
     files = [p for folder in FOLDERS for p in (ROOT / folder).rglob("*") if p.suffix in SUFFIXES]
     for path in sorted([*files, *(ROOT / "graphs" / "plans").glob("*.npz")]):

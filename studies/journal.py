@@ -1,6 +1,6 @@
-"""Finished runs, kept one line each: what is written survives the death of the process.
+"""Keeps finished runs in a file, one line each, so that they survive the death of the process.
 
-The file is JSON lines, only ever appended to. A line that a kill cut off is not a run.
+The file holds lines of JSON and is only appended to. An incomplete last line is not a run.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from ..runtime.language.errors import AloftError
 
 @dataclass(frozen=True)
 class Outcome:
-    """What came of one run. ``error`` is empty unless something broke; a fall is no error."""
+    """The outcome of one run. ``error`` is empty unless something broke; a fall is not an error."""
 
     success: bool
     reason: str
@@ -28,7 +28,7 @@ class Outcome:
 
 
 class Journal:
-    """The runs in one file, by key; a context that adds to it.
+    """The runs in one file by their keys. It is a context manager, within which runs can be added.
 
     Raises:
         AloftError: another process adds to the same file, or it cannot be written.
@@ -68,7 +68,7 @@ class Journal:
         self.outcomes[key] = outcome
 
     def read_back(self) -> None:
-        """Know exactly what is kept, after a signal that may have come in the middle of ``add``."""
+        """Read the file again, after a signal that may have interrupted ``add``."""
         assert self._file is not None
         self._file.flush()
         self.outcomes.clear()

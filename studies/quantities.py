@@ -28,7 +28,7 @@ def quantity(value: Any) -> tuple[float, str] | None:
 
 
 def in_unit(value: Any, unit: str) -> float | None:
-    """The quantity as a number in ``unit``; a bare number is taken as is. ``None``: it is none."""
+    """The quantity as a number in ``unit``; a bare number is taken as is. ``None`` for no quantity."""
     found = quantity(value)
     if found is None:
         return None

@@ -1,4 +1,4 @@
-"""Reads where tuned parameters may lie, and draws from there.
+"""Reads the ranges of tuned parameters, and draws values from them.
 
 ::
 
@@ -25,7 +25,7 @@ EXPECTED = "[low, high], [[low, high], ...], {from:, to:, log: true} or {choices
 
 
 def read_range(entry: Entry, problems: Problems) -> Range | None:
-    """One parameter's range; ``None`` after a problem."""
+    """The range of one parameter; ``None`` if it is wrong, which is noted as a problem."""
     node = entry.value
     if isinstance(node, MapNode):
         choices = node.get("choices")
@@ -101,7 +101,7 @@ def draw(found: Range, generator: np.random.Generator) -> Any:
 
 
 def corners(found: Range) -> tuple[Any, ...]:
-    """The values at the ends of the range: whether a graph takes them is known before tuning."""
+    """The values at the ends of the range, with which every graph is checked before tuning."""
     if found.choices:
         return found.choices
     ends = [[written(pair[end], found.unit) for pair in found.bounds] for end in (0, 1)]

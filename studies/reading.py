@@ -1,4 +1,4 @@
-"""Reads a study's file: every mistake in it at once, as for graphs.
+"""Reads a study's file and reports every mistake in it at once, as for graphs.
 
 The keys: ``graph`` or ``graphs``, ``include``, ``seeds``, ``title``, ``set``, ``arms``, ``grid``,
 ``goals``, ``tune``, ``plots``; docs/studies.md explains them. What overrides mean to the graphs is
@@ -31,7 +31,7 @@ def read_study(path: Path) -> Study:
     """The study in a file.
 
     Raises:
-        LoadError: something is wrong with it; the text is the report of everything that is.
+        LoadError: something is wrong with the file; the text reports everything that is.
     """
     problems = Problems()
     tree = read_file(path, str(path), problems, ("a study file", "graph, seeds, grid"))
@@ -42,7 +42,7 @@ def read_study(path: Path) -> Study:
 
 
 def part_of(study: Study, texts: Sequence[str]) -> Filter:
-    """The cells that are meant by ``axis=value``; several values of one axis are alternatives.
+    """The filter that texts such as ``axis=value`` mean. Several values of one axis are alternatives.
 
     Raises:
         LoadError: there is no such axis, or it has no such value.
@@ -180,7 +180,7 @@ def _read_task(entry: Entry, path: Path, problems: Problems) -> Task | None:
 
 
 def _files(entry: Entry | None, path: Path, problems: Problems) -> list[tuple[Node, Path]]:
-    """The files that a key names, relative to the study's; those that are not there are noted."""
+    """The files that a key names, relative to the study's file. Missing files are noted as problems."""
     if entry is None:
         return []
     found = []

@@ -1,4 +1,4 @@
-"""Reads the sections of a study that speak of its axes: goals, tune and plots."""
+"""Reads the sections of a study that refer to its axes: goals, tune and plots."""
 
 from __future__ import annotations
 
@@ -103,7 +103,7 @@ class Labels:
 
 
 def read_goals(node: Node, labels: Labels, problems: Problems) -> tuple[Goal, ...]:
-    """One success rate for all, or a list of goals; where several fit, the last one counts."""
+    """Reads one success rate for all cells, or a list of goals. If several fit a cell, the last one counts."""
     if isinstance(node, ScalarNode):
         rate = _share(node, "goals", problems)
         return (Goal(rate),) if rate is not None else ()
@@ -158,7 +158,7 @@ def read_seeds(node: Node, what: str, problems: Problems) -> tuple[int, ...]:
 
 
 def read_tuning(node: MapNode, labels: Labels, problems: Problems) -> Tuning | None:
-    """The ``tune`` section but for its ranges."""
+    """Reads the section ``tune``, except its ranges."""
     for entry in node:
         if entry.key not in TUNE_KEYS:
             unknown_key(entry, TUNE_KEYS, "of 'tune'", problems)

@@ -1,4 +1,4 @@
-"""What a study is once its file has been read: plain data, with the place of every override.
+"""The data of a study whose file has been read, with the place of every override in the file.
 
 study -> cells (one graph with its overrides, see ``expansion``) -> runs (a cell and a seed).
 """
@@ -21,7 +21,7 @@ Coordinate = float | int | str | bool
 
 @dataclass(frozen=True)
 class Case:
-    """One value of an axis: its text, the value that goes into the table, and what it sets."""
+    """One value of an axis: its label, its value in the table, and the overrides that it sets."""
 
     label: str
     value: Coordinate
@@ -41,7 +41,7 @@ class Axis:
 
 @dataclass(frozen=True)
 class Range:
-    """Where a tuned parameter may lie.
+    """The range of a tuned parameter.
 
     ``bounds`` has (low, high) for every number of the value, uniform or, with ``log``, uniform in
     the logarithm; or ``choices`` are all that it may be.
@@ -58,7 +58,7 @@ class Range:
 
 @dataclass(frozen=True)
 class Arm:
-    """One of the ways that are compared, and which of its parameters may be tuned."""
+    """One of the variants that are compared, and its parameters that may be tuned."""
 
     name: str
     sets: tuple[Entry, ...] = ()
@@ -67,7 +67,7 @@ class Arm:
 
 @dataclass(frozen=True)
 class Task:
-    """One graph."""
+    """One graph of the study, with its name and its overrides."""
 
     name: str
     path: Path
@@ -82,7 +82,7 @@ class Filter:
     labels: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
     def takes(self, labels: Mapping[str, str]) -> bool:
-        """Whether a cell with these labels is meant."""
+        """Whether the filter includes a cell with these labels."""
         return all(labels[axis] in allowed for axis, allowed in self.labels.items())
 
 
@@ -126,7 +126,7 @@ class Plot:
 
 @dataclass(frozen=True)
 class Study:
-    """Everything that a study's file says."""
+    """The whole content of a study's file."""
 
     name: str
     path: Path

@@ -1,4 +1,4 @@
-"""What a study says: a success rate with its confidence for every cell, and whether it will do."""
+"""Sums up a study: for every cell a success rate with its interval, and whether the goal is met."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class Figures:
 
 @dataclass(frozen=True)
 class Row:
-    """The runs of one cell, together. ``goal`` and ``met`` are ``None`` where nothing is asked."""
+    """The runs of one cell, together. ``goal`` and ``met`` are ``None`` for a cell without a goal."""
 
     cell: Cell
     n: int
@@ -65,7 +65,7 @@ class Row:
 
 
 def summarise(study: Study, runs: Sequence[Run]) -> list[Row]:
-    """One row a cell, in the order of the study. The interval is Wilson's, at 95 %."""
+    """One row for each cell, in the order of the study, with Wilson's 95 % interval of its success rate."""
     by_cell: dict[int, list[Run]] = {}
     for run in runs:
         by_cell.setdefault(id(run.cell), []).append(run)
@@ -100,7 +100,7 @@ def _row(study: Study, runs: Sequence[Run]) -> Row:
 
 
 def figures_of(values: Sequence[float]) -> Figures:
-    """The figures of at least one value."""
+    """The median and the quantiles of at least one value."""
     ordered = sorted(values)
     return Figures(
         len(ordered),

@@ -1,4 +1,4 @@
-"""The tidy table: one row a run, in the order of the study, as Parquet."""
+"""The table of all runs, with one row for each run in the order of the study, as a Parquet file."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ def make_table(runs: Sequence[Run]) -> pyarrow.Table:
     """The table: ``task``, ``arm``, a column for every axis, ``seed``, ``tuning_seed`` (whether
     it is one), ``success``, ``reason``, ``error``, ``run_hash``, every metric, ``wall_time_s``.
 
-    A metric that a run does not have is null. The same runs make the same table, however they
-    were spread and interrupted, but for the last column.
+    A metric that a run does not have is null. The same runs give the same table, except its last
+    column, no matter which processes made them and how often the study was interrupted.
     """
     import pyarrow
 
@@ -47,7 +47,7 @@ def make_table(runs: Sequence[Run]) -> pyarrow.Table:
 
 
 def _array(values: list[Any]) -> pyarrow.Array:
-    """One type for all: truth values, whole numbers, numbers, else text."""
+    """The values as an array of one type: truth values, integers, numbers, or else texts."""
     import pyarrow
 
     there = [value for value in values if value is not None]
@@ -63,7 +63,7 @@ def _array(values: list[Any]) -> pyarrow.Array:
 
 
 def write_table(path: Path, table: pyarrow.Table) -> None:
-    """Write the table, as a whole or not at all. Raises ``AloftError``."""
+    """Write the table. After a failure there is no half-written file. Raises ``AloftError``."""
     from pyarrow import parquet
 
     partial = path.with_name(f".{path.name}.partial")

@@ -3,11 +3,12 @@
 Every arm gets the same number of draws, and every draw the same cells and seeds. Draw 0 is the arm
 as it is written, so tuning never ends below it; the others come from a generator that the study's
 ``tune.seed``, the arm's name and the number of the draw decide, so that neither the order of the
-runs nor another arm changes them. The best draw is the one with most successes; then the one whose
-mean of the metric ``least`` is least; then the first. An arm without ranges keeps what is written.
+runs nor another arm changes them. The best draw is the one with the most successes. Among equals it
+is the one with the least mean of the metric ``least``, and then the first one. An arm without
+ranges is not changed.
 
-What was found is a file beside the study's, which the study's runs take over, and which says what
-it was found for: a study that was changed since wants to be tuned again.
+The result is a file beside the study's file, from which the study's runs take the parameters. It
+holds a hash of what was searched: a study that was changed since has to be tuned again.
 """
 
 from __future__ import annotations
@@ -34,7 +35,7 @@ from .study import Arm, Study, Tuning
 
 @dataclass(frozen=True)
 class Draw:
-    """One set of parameters of an arm, and how its runs came out."""
+    """One set of parameters of an arm, and the results of its runs."""
 
     number: int
     values: Mapping[str, Any]
@@ -63,7 +64,7 @@ def tuning_cells(study: Study) -> list[Cell]:
 
 
 def extreme_cells(study: Study, chosen: Sequence[Cell]) -> list[Cell]:
-    """Cells with every range at its ends: whether these may run is known before anything does."""
+    """Cells with every range at its ends. They are checked before anything runs."""
     found = []
     for arm in study.arms:
         first = next((cell for cell in chosen if cell.arm == arm.name), None)
@@ -123,12 +124,12 @@ def _scored(found: Draw, runs: Sequence[Run], least: str) -> Draw:
 
 
 def tuned_path(study: Study) -> Path:
-    """The file beside the study's."""
+    """The path of the file with the tuned parameters, beside the study's file."""
     return study.path.with_name(f"{study.path.stem}.tuned.yaml")
 
 
 def definition(study: Study) -> str:
-    """A hash of all that the search was over: the cells, the ranges, the seeds and the draws."""
+    """A hash of everything that defines the search: the cells, the ranges, the seeds and the draws."""
     assert study.tuning is not None
     tuning = study.tuning
     searched: list[Any] = [list(tuning.seeds), tuning.draws, tuning.seed, tuning.least]
@@ -143,7 +144,7 @@ def definition(study: Study) -> str:
 
 
 def write_tuned(study: Study, best: Mapping[str, Draw]) -> Path:
-    """Write what was found. Raises ``AloftError``."""
+    """Write the best parameters of every arm. Raises ``AloftError``."""
     assert study.tuning is not None
     tuning = study.tuning
     lines = [
@@ -167,7 +168,7 @@ def write_tuned(study: Study, best: Mapping[str, Draw]) -> Path:
 
 
 def read_tuned(study: Study) -> Tuned:
-    """What tuning found for every arm; nothing for a study without a section ``tune``.
+    """The tuned parameters of every arm; empty for a study without a section ``tune``.
 
     Raises:
         AloftError: the study has not been tuned, or has been changed since.

@@ -130,7 +130,7 @@ def test_a_block_says_what_it_needs_of_a_robot(tmp_path: Path) -> None:
     (answer,) = re.findall(r"```text\n(.*?)\n```", text, re.DOTALL)
     assert answer in report and "left_knee" in report
     path.write_text(graph.replace("kneee", "knee"))
-    result = aloft.load(path).run(duration=0.02, log=False)
+    result = aloft.load(path).run(duration=0.02)
     robot = find_robot("bruce")
     knee = [joint.name for joint in robot.joints].index("left_knee")
     angle = result.signal("robot.joints.position")[-1, knee]

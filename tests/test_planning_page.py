@@ -8,7 +8,7 @@ import pytest
 
 from aloft.cli.task_page import BEGIN, END, task_tables
 from aloft.planner.library.library import SHIPPED
-from aloft.planner.task.task import read_task
+from aloft.planner.task.read_task import read_task
 from aloft.studies.batch.plan_grid import read_grid
 
 ROOT = Path(__file__).parent.parent

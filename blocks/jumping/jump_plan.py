@@ -201,7 +201,8 @@ def read_or_make_task(wanted: str | Mapping[str, Any], context: Context) -> Jump
         TaskError: it cannot be read as a task.
     """
     from ...planner.library.shipped import shipped_graphs
-    from ...planner.task.task import make_task, read_task
+    from ...planner.task.read_task import read_task
+    from ...planner.task.task import make_task
 
     if not isinstance(wanted, str):
         robot = {"robot": context.robot.name} if context.robot is not None else {}

@@ -79,7 +79,7 @@ class RobotTruth(Signal):
     contact_touched = Field("n_contacts", dtype="bool", text="loaded in any physics step")
     ground_height = Field("n_contacts", unit="m", frame="world", text="ground under each point")
     forbidden_contacts = Field(
-        dtype="int64", text="physics steps with any contact but toe or heel on the ground"
+        dtype="int64", text="physics steps with any contact but a contact point's on the ground"
     )
     joint_limit_violation = Field(unit="rad", text="largest violation of a joint limit")
     motor_torque = Field("n_joints", unit="N m", text="motor torque of largest magnitude")

@@ -35,7 +35,9 @@ class TickRecord(Signal):
     steps = Field(dtype="int64", text="physics steps recorded")
     load = Field(("n_contacts", 4), text="sum of contact counts and forces on the ground [N]")
     accelerometer = Field(3, unit="m/s^2", frame="body", text="sum of specific forces")
-    forbidden = Field(dtype="int64", text="steps with a contact other than toe or heel on ground")
+    forbidden = Field(
+        dtype="int64", text="steps with a contact other than a contact point's on the ground"
+    )
     violation = Field("n_joints", unit="rad", text="largest excess over a joint limit")
     joint_torque = Field("n_joints", unit="N m", text="joint torque of the last step")
     torque_high = Field("n_joints", unit="N m", text="highest motor torque")

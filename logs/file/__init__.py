@@ -1,1 +1,1 @@
-"""The file a recording is kept in: written, read, exported, mended."""
+"""The file that holds a recording: its format, how it is read, exported and repaired."""

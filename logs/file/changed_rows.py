@@ -1,8 +1,8 @@
-"""Which values of a signal must be written so that every tick can be read back, and drawn.
+"""Chooses the values of a signal that must be written so that every tick can be read back and drawn.
 
-A value that is, bit for bit, the one of the tick before and of the tick after is left out: whoever
-reads a tick takes the last value at or before it, and the line that a viewer draws through what is
-left is the same. A signal that changes in every tick is written whole; a constant is two values.
+A value is left out if it has the same bits as the values of the tick before and of the tick after.
+A reader takes the last value at or before a tick, and the line that a viewer draws is the same. A
+signal that changes in every tick is written whole; a constant is two values.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 
 class ChangedRows:
-    """Picks them for one signal, batch by batch, ticks in order."""
+    """Chooses the values of one signal, batch by batch. The ticks must come in order."""
 
     def __init__(self) -> None:
         self._tick: NDArray[np.int64] | None = None
@@ -40,7 +40,7 @@ class ChangedRows:
         return ticks, values
 
     def rest(self) -> tuple[NDArray[np.int64], NDArray[Any]] | None:
-        """The last tick and value, if they were left out: to be written when no more come."""
+        """The last tick and value, if they were left out. They are written when no more ticks come."""
         if not self._left_out or self._tick is None or self._value is None:
             return None
         self._left_out = False

@@ -21,7 +21,9 @@ class ExportError(AloftError):
 
 
 def export_csv(run: RecordedRun, path: Path, names: Sequence[str] = ()) -> None:
-    """One line a tick, one column a number. Floats have as many digits as tell them apart.
+    """Write one line for each tick and one column for each number.
+
+    Floats have as many digits as are needed to read back the same number.
 
     Raises:
         KeyError: no signal has such a name.
@@ -36,7 +38,9 @@ def export_csv(run: RecordedRun, path: Path, names: Sequence[str] = ()) -> None:
 
 
 def export_parquet(run: RecordedRun, path: Path, names: Sequence[str] = ()) -> None:
-    """One row a tick, one column a number, with its unit as metadata; and the graph's.
+    """Write one row for each tick and one column for each number.
+
+    Each column has its unit as metadata, and the table has the graph's name and text.
 
     Raises:
         KeyError: no signal has such a name.
@@ -59,7 +63,7 @@ def export_parquet(run: RecordedRun, path: Path, names: Sequence[str] = ()) -> N
 
 
 def export_mcap(run: RecordedRun, path: Path, names: Sequence[str] = ()) -> None:
-    """One channel a port with a JSON message a tick, as Foxglove and others read it.
+    """Write one channel for each port, with one JSON message for each tick, for Foxglove and others.
 
     Raises:
         ExportError: the library ``mcap`` is not installed.

@@ -1,4 +1,4 @@
-"""What is in a recording: the one place that says it, for who writes one and for who reads it.
+"""The content of a recording, defined in one place for the code that writes one and that reads one.
 
 A recording is a Rerun file (``.rrd``) with these entities; ``B/P/F`` stands for a block's path, an
 output and a field. All but the static ones are on the timelines ``t`` (exact nanoseconds) and
@@ -20,7 +20,7 @@ output and a field. All but the static ones are on the timelines ``t`` (exact na
                      changes, dropped ticks
 ``states/B/P/F``     each change of a number whose values have names, and of a truth value, for
                      the viewer; of several truth values each is in ``states/B/P/F/<its name>``
-``limits/B/P/F``     what bounds a field by the robot's description, for the viewer
+``limits/B/P/F``     the limits of a field by the robot's description, for the viewer
 ``events``           notes, changes of state, lift-off and touchdown as text, for the viewer
 ``world``            the robot in 3D, for the viewer; see ``scene``
 ``times``            the time each block took, as text, for the viewer; written last
@@ -92,7 +92,7 @@ class RecordedField:
 
     @classmethod
     def from_json(cls, data: Mapping[str, Any]) -> Self:
-        """The field that ``dataclasses.asdict`` made plain."""
+        """The field from the plain data that ``dataclasses.asdict`` made."""
         values = {int(number): name for number, name in data["values"].items()}
         lists = ("shape", "dimensions", "signals")
         tuples = {name: tuple(data[name]) for name in lists if name in data}
@@ -109,7 +109,7 @@ class RecordedLayout:
     size: int
 
     def layout(self) -> Layout:
-        """The same as the runtime has it."""
+        """The layout as the runtime uses it."""
         slots = {f.name: Slot(f.dtype, f.start, f.shape) for f in self.fields}
         return Layout(slots, dict(self.lengths), dict(self.offsets), self.size)
 
@@ -120,7 +120,7 @@ class RecordedLayout:
 
     @classmethod
     def from_json(cls, data: Mapping[str, Any]) -> Self:
-        """The layout that ``dataclasses.asdict`` made plain."""
+        """The layout from the plain data that ``dataclasses.asdict`` made."""
         fields = tuple(RecordedField.from_json(entry) for entry in data["fields"])
         return cls(fields, data["lengths"], data["offsets"], data["size"])
 
@@ -138,26 +138,26 @@ class RecordedBlock:
 
 @dataclass(frozen=True)
 class Header:
-    """All that is known before the first tick.
+    """Everything that is known before the first tick.
 
     Attributes:
-        name: the graph's.
+        name: the name of the graph.
         graph: the graph's text after flattening.
-        base_rate: ticks a second [Hz].
-        first_tick: zero, but for a run that began at a snapshot.
+        base_rate: the number of ticks in a second [Hz].
+        first_tick: zero, except for a run that began at a snapshot.
         clock: ``free``, ``paced`` or ``robot``.
-        ticks: how many the graph runs by itself, if it says so.
-        overrides: what was set beside the graph file.
+        ticks: the number of ticks that the graph runs, if it has a duration.
+        overrides: the overrides of the graph file, by what they set.
         seeds: the parameters called ``seed``, as ``block.seed``.
-        parameters: every other number or text the blocks were made with, as ``block.name``.
-        versions: of Python and of all that computes.
-        machine: what byte-equality depends on beside: processor, system, BLAS.
-        blocks: in file order.
-        order: their paths in the order of execution.
+        parameters: every other parameter that is a number or a text, as ``block.name``.
+        versions: the versions of Python and of every package that computes something.
+        machine: what else equal bytes depend on: processor, system and BLAS.
+        blocks: the blocks in the order of the file.
+        order: the blocks' paths in the order of execution.
         bus, state: the layouts of both buffers.
         bus_start: the bytes of the bus before the first tick.
         robot: the robot's description, if the graph has one.
-        source: the graph file, as the run was told.
+        source: the graph file as it was named for the run.
         terrain: the ground of the simulated world, if there is one.
     """
 
@@ -184,11 +184,11 @@ class Header:
 
     @property
     def schema_hashes(self) -> dict[str, str]:
-        """Of the bus and of the state."""
+        """The schema hashes of the bus and of the state."""
         return {"bus": self.bus.schema_hash(), "state": self.state.schema_hash()}
 
     def to_json(self) -> str:
-        """As text."""
+        """The header as JSON text."""
         data = asdict(self) | {"schema_hashes": self.schema_hashes}
         data["robot"] = self.robot and self.robot.model_dump(mode="json")
         data["bus_start"] = b64encode(self.bus_start).decode()
@@ -196,7 +196,7 @@ class Header:
 
     @classmethod
     def from_json(cls, text: str) -> Self:
-        """Back from text."""
+        """The header that ``to_json`` wrote."""
         data = json.loads(text)
         del data["schema_hashes"]
         robot = data["robot"]
@@ -220,7 +220,7 @@ def _terrain(data: Mapping[str, Any] | None) -> Terrain | None:
 
 @dataclass(frozen=True)
 class RecordedRows:
-    """Some ticks (n,) of a run and the bus after each, ``rows`` (n, bytes)."""
+    """Some ticks of a run, (n,), and the bytes of the bus after each of them, ``rows`` (n, bytes)."""
 
     header: Header
     ticks: NDArray[np.int64]

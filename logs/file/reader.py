@@ -48,12 +48,12 @@ from .tail import read_tail
 
 
 class RecordingError(AloftError):
-    """A file is no recording, or it is damaged; the message says what to do."""
+    """Raised for a file that is no recording or that is damaged. The message says what to do."""
 
 
 @dataclass(frozen=True)
 class RecordedRun:
-    """A recording, open for reading; what is large is read when it is first asked for.
+    """A recording that is open for reading. Large parts are read when they are first used.
 
     Attributes:
         path: the file.
@@ -86,7 +86,7 @@ class RecordedRun:
         return self._whole(known[name], self._batches(known[name]))
 
     def nearest(self, name: str) -> NoReturn:
-        """Raise the ``KeyError`` for a name that is none, with the nearest that are."""
+        """Raise the ``KeyError`` for an unknown signal; its message has the nearest names."""
         near = get_close_matches(name, self.signals(), 3, 0.0)
         raise KeyError(f"no signal {name!r}; the nearest are {', '.join(near)}")
 
@@ -100,7 +100,7 @@ class RecordedRun:
         return pandas.DataFrame(flat_columns(self, names)).set_index(TIME)
 
     def to_polars(self, *names: str) -> Any:
-        """The same as a polars ``DataFrame``. Raises ``ImportError`` without polars."""
+        """The same columns as a polars ``DataFrame``. Raises ``ImportError`` without polars."""
         import polars
 
         from .table import flat_columns
@@ -114,7 +114,7 @@ class RecordedRun:
         return np.unique(np.concatenate([tail, self.written_ticks()]))
 
     def written_ticks(self) -> NDArray[np.int64]:
-        """Those of ``ticks`` that the file itself has; the others are in its tail."""
+        """The ticks that are in the file itself; the other ticks are in its tail."""
         found = [np.zeros(0, np.int64)]
         for _, batch in _stream(self.path, f"/{RECORDED}"):
             for first, last in batch[f"aloft:{SPAN}"].to_pylist():
@@ -183,7 +183,7 @@ class RecordedRun:
 
     @property
     def dropped_ticks(self) -> int:
-        """How many ticks the run had that are not in the recording."""
+        """The number of ticks of the run that are not in the recording."""
         return sum(int(note.data["count"]) for note in self.notes if note.kind == "dropped")
 
     def _batches(self, field: RecordedField) -> Iterator[Any]:
@@ -191,7 +191,7 @@ class RecordedRun:
         return (batch for name, batch in _stream(self.path, entity) if name == entity)
 
     def _whole(self, field: RecordedField, batches: Iterable[Any]) -> NDArray[Any]:
-        """The value at each of ``ticks``, also where it was left out as it did not change."""
+        """The value at each of ``ticks``, also at those where an unchanged value was left out."""
         if not len(self.ticks):
             return np.zeros((0, *field.shape), field.dtype)
         tail_ticks, tail = self._tail

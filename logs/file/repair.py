@@ -1,8 +1,9 @@
-"""Mends a recording that was cut: the file is shortened to the last message that is all there.
+"""Repairs a recording that was cut off: the file is shortened to its last complete message.
 
-An ``.rrd`` file is a head of twelve bytes and messages, each a kind and a length of eight bytes each
-and so many bytes. A writer that is killed, or that finds the disk full, leaves the last message
-incomplete, with which no reader can cope. What stands before it can be read.
+An ``.rrd`` file has a head of twelve bytes and then messages. A message has its kind and its
+length, eight bytes each, and then that many bytes. A writer that is killed, or that finds the disk
+full, leaves the last message incomplete. No reader can read such a file, but all messages before
+the last one are intact.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ _LAST_KIND = 3
 
 
 class RepairError(AloftError):
-    """A file cannot be mended."""
+    """Raised for a file that cannot be repaired."""
 
 
 @dataclass(frozen=True)
@@ -43,12 +44,12 @@ class Repair:
 
     @property
     def removed(self) -> int:
-        """The bytes that were cut off."""
+        """The number of bytes that were removed."""
         return self.size_before - self.size
 
 
 def repair(path: str | PathLike[str]) -> Repair:
-    """Mend a file in place; a whole one stays as it is.
+    """Repair a file in place. A complete file is not changed.
 
     Raises:
         OSError: the file cannot be read or written.

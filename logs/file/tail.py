@@ -1,9 +1,9 @@
 """The newest ticks of a recording while it is written: a file beside it, ``jump.rrd.tail``.
 
-Each piece written to a Rerun file costs the writer memory until the file is closed, and the reader
-time. So ticks are written thousands at once, and until then they are here, where a killed process
-does not lose them: for each tick its number as int64, then the bytes of the bus. The file is emptied
-when its ticks are in the recording, and removed when the recording is whole.
+Every piece of a Rerun file costs the writer memory until the file is closed, and costs the reader
+time. Therefore thousands of ticks are written at once. Until then they are in the tail, so that a
+killed process does not lose them: for each tick its number as int64, then the bytes of the bus. The
+file is emptied when its ticks are in the recording, and removed when the recording is whole.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ def record_type(bus_size: int) -> np.dtype[Any]:
 
 
 class TailWriter:
-    """Writes the tail of the recording at ``path``; what was there is gone. Raises ``OSError``.
+    """Writes the tail of the recording at ``path``, replacing an older one. Raises ``OSError``.
 
     Attributes:
         count: how many ticks are in the file.
@@ -43,7 +43,7 @@ class TailWriter:
         """Hand ``records`` (n,) of ``record_type`` to the operating system.
 
         Raises:
-            OSError: it does not take them; those that it did are in ``count``.
+            OSError: it does not take all of them; ``count`` includes those that it took.
         """
         size = records.itemsize
         began = self.count * size
@@ -61,7 +61,7 @@ class TailWriter:
         assert self._file.tell() == began + records.nbytes
 
     def clear(self) -> None:
-        """Forget all: it is in the recording. Raises ``OSError``."""
+        """Empty the file, because its ticks are in the recording now. Raises ``OSError``."""
         if self.count:
             self.count = 0
             self._cut(0)
@@ -71,7 +71,7 @@ class TailWriter:
         self._file.truncate()
 
     def sync(self) -> None:
-        """Put what there is on the disk. Raises ``OSError``."""
+        """Force the file's content onto the disk. Raises ``OSError``."""
         os.fsync(self._file.fileno())
 
     def remove(self) -> None:

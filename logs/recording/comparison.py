@@ -1,7 +1,7 @@
-"""Two runs in one Rerun file, over one another in every view.
+"""Writes two runs into one Rerun file, which shows them together in every view.
 
-In the file: all that ``format`` says, but keyframes and properties, once below ``first`` and once
-below ``second``, on common timelines that begin with each run.
+The file has everything that ``format`` describes, except keyframes and properties: the first run
+below ``first`` and the second one below ``second``. Both runs begin at the same time.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from .run_stream import RunStream
 
 
 def write_comparison(path: str | PathLike[str], first: RecordedRun, second: RecordedRun) -> Path:
-    """Write both, replacing what is there. The layout is made from the first run's graph.
+    """Write both runs, replacing an older file. The layout is made from the first run's graph.
 
     Raises:
         RecordingError: a recording cannot be read.
@@ -50,7 +50,7 @@ def write_comparison(path: str | PathLike[str], first: RecordedRun, second: Reco
 
 
 def _labels(first: RecordedRun, second: RecordedRun) -> tuple[str, str]:
-    """What to call the runs: their files' names, with folders where these are equal."""
+    """The names of the runs: those of their files, with the folders if these are equal."""
     one, two = first.path.stem, second.path.stem
     if one != two:
         return one, two

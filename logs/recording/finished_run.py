@@ -1,4 +1,4 @@
-"""A finished run, kept in memory, as one Rerun file; ``format`` says what is in it."""
+"""Writes a finished run, which is kept in memory, into one Rerun file; see ``format``."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from .writer import RecordingWriter
 
 @dataclass(frozen=True)
 class Recording:
-    """A file that was written: where, how large, and how long it took [s]."""
+    """A recording that was written: its path, its size and how long the writing took [s]."""
 
     path: Path
     size: int

@@ -1,7 +1,7 @@
 """Shows a run to a viewer while it goes on, in a thread of the recorder's process.
 
-The viewer may be slow, hang or die: then the thread waits for it, and nobody waits for the thread.
-What it cannot take is left out, and the recording lacks nothing of it.
+The viewer may be slow, hang or die. Then only this thread waits for it. What the viewer is too slow
+for is not shown, but it is in the recording.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ class LiveFeed:
         self._thread.start()
 
     def rows(self, ticks: NDArray[np.int64], rows: NDArray[np.uint8]) -> None:
-        """Show the bus after each of these ticks; keeps the arrays."""
+        """Show the bus after each of these ticks. The arrays must not be changed afterwards."""
         self._put(lambda run: run.write_rows(ticks, rows))
 
     def note(self, note: Note) -> None:
@@ -59,7 +59,7 @@ class LiveFeed:
         self._put(lambda run: run.write_note(note))
 
     def finish(self, outcome: dict[str, Any] | None) -> None:
-        """Show how the run ended, and wait a little until all has arrived."""
+        """Show how the run ended, and wait a little until the viewer has everything."""
         if outcome is not None:
             self._put(lambda run: run.write_times(outcome))
         self._put(None)
@@ -104,7 +104,7 @@ class LiveFeed:
 
 
 def _raise_if_severed(stream: Any) -> None:
-    """Sending to a viewer that has gone is silent; only a flush says it."""
+    """Raise if the viewer has gone. Sending does not fail then, so only a flush can tell."""
     try:
         stream.flush(timeout_sec=1.0)
     except RuntimeError as error:
@@ -113,4 +113,4 @@ def _raise_if_severed(stream: Any) -> None:
 
 
 class ViewerGoneError(Exception):
-    """The viewer was closed, or died."""
+    """Raised when the viewer was closed or has died."""

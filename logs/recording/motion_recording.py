@@ -1,7 +1,7 @@
-"""A motion that nothing has run yet, such as a plan, as one Rerun file: the robot in 3D and series.
+"""Writes a motion that has not been run, such as a plan, into one Rerun file.
 
-In the file: ``world``, the robot posed at 100 Hz with contact forces and centre of mass, as in the
-recording of a run; and ``series/<title>``, each with its legend, on the timeline ``t``.
+The file has the robot in 3D at 100 Hz with contact forces and centre of mass (``world``), as in the
+recording of a run, and time series with legends (``series/<title>``), on the timeline ``t``.
 """
 
 from __future__ import annotations
@@ -26,10 +26,10 @@ COLORS = Colors()
 
 @dataclass(frozen=True)
 class RecordedMotion:
-    """What to show, at ``n`` instants.
+    """A motion at ``n`` instants.
 
     Attributes:
-        robot: whose motion it is.
+        robot: the robot that moves.
         time: increasing [s], (n,).
         base_position, base_orientation, joint_position: where the links are.
         com: centre of mass [m], (n, 3).
@@ -54,7 +54,7 @@ class RecordedMotion:
 
 
 def write_motion(path: str | Path, motion: RecordedMotion, name: str) -> Path:
-    """Write the file, replacing what is there.
+    """Write the file, replacing an older one.
 
     Raises:
         ImportError: Rerun is not installed.

@@ -1,11 +1,11 @@
-"""Records a run while it goes on: the control thread copies, another process writes.
+"""Records a run while it goes on. The control thread only copies; another process writes.
 
 ::
 
     result = aloft.load("graphs/jump.yaml").run(sinks=[Recorder("jump.rrd")], log=False)
 
-Each tick costs one copy of the bus into a ring of shared memory. Whatever happens on the other side
-(the disk is full, the process dies), the run goes on; ``warnings`` says what is missing.
+Each tick costs one copy of the bus into a ring of shared memory. The run goes on whatever happens
+to the writing process or to the disk; ``warnings`` says what is missing then.
 """
 
 from __future__ import annotations
@@ -83,7 +83,7 @@ class Recorder:
 
     @property
     def recording(self) -> Path | None:
-        """The file; ``None`` if there is none."""
+        """The file that is recorded; ``None`` if the run is only shown."""
         return self.path if self.link is not None else None
 
     def open(self, bound: BoundGraph) -> None:
@@ -127,7 +127,7 @@ class Recorder:
         return ""
 
     def record(self, tick: int) -> None:
-        """Copy the bus into the ring, and at times all that the graph remembers."""
+        """Copy the bus into the ring, and now and then the graph's whole memory as a keyframe."""
         if self.link is None:
             return
         if self._gap is not None or not self._write(ROW, tick, self._bus):
@@ -136,7 +136,7 @@ class Recorder:
             self._keep_keyframe(tick + 1)
 
     def _find_room(self, tick: int) -> None:
-        """Wait for room if that is the policy, else count the tick as dropped until there is."""
+        """Wait for room in the ring if that is the policy; otherwise count the tick as dropped."""
         if self._gap is None and self._waits and self._wait_for_room(tick):
             return
         if self._gap is not None and self._note_gap(tick) and self._write(ROW, tick, self._bus):
@@ -156,7 +156,7 @@ class Recorder:
         return False
 
     def _waiting_helps(self) -> bool:
-        """Whether to go on waiting for the process; says once that it takes long."""
+        """Whether to go on waiting for the process. It warns once that the process is slow."""
         assert self.link is not None
         stalled = self.link.stalled_for()
         if not self.link.lives() or stalled > recorder_link.GIVE_UP_TIME:
@@ -172,7 +172,7 @@ class Recorder:
         return True
 
     def _note_gap(self, tick: int) -> bool:
-        """Note which ticks were dropped; whether there was room for that."""
+        """Write a note of the dropped ticks. Returns whether there was room for it."""
         assert self._gap is not None
         first, last, count = self._gap
         text = f"{count} ticks were not recorded: {first} to {last}"
@@ -183,7 +183,7 @@ class Recorder:
         return True
 
     def _keep_keyframe(self, tick: int) -> None:
-        """Copy all that the graph remembers before ``tick``; left out where there is no room."""
+        """Copy the graph's whole memory before ``tick``, if there is room for it."""
         if self._gap is not None:
             return
         try:
@@ -207,10 +207,10 @@ class Recorder:
             self._write(NOTE, note.tick, _encoded(note))
 
     def close(self) -> None:
-        """Nothing to do: the end comes with the outcome."""
+        """No-op: the recording ends when the outcome is known, in ``finish``."""
 
     def finish(self, result: RunResult) -> list[str]:
-        """Have the outcome written and wait for the process to end; what went wrong."""
+        """Have the outcome written, and wait for the process to end. Returns what went wrong."""
         if self.link is None:
             return self.warnings
         if self._gap is not None:

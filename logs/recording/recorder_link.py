@@ -1,4 +1,4 @@
-"""What the process that runs a graph has of the recorder's process: the ring, and two pipes."""
+"""The side of the recorder that is in the graph's process: the ring, and two pipes to the writer."""
 
 from __future__ import annotations
 
@@ -83,21 +83,21 @@ class RecorderLink:
         return self._process.pid
 
     def lives(self) -> bool:
-        """Whether the process has not ended."""
+        """Whether the process is running."""
         return self._process.poll() is None
 
     def stalled_for(self) -> float:
-        """Seconds since the process has read on, or since ``stirs``."""
+        """The seconds since the process last read from the ring, or since ``stirs`` was called."""
         if self.ring.read_back != self._seen:
             self._seen, self._since = self.ring.read_back, time.monotonic()
         return time.monotonic() - self._since
 
     def stirs(self) -> None:
-        """Say that the process has had nothing to do until now, which ``stalled_for`` cannot know."""
+        """Restart the clock of ``stalled_for``, because the process had nothing to read until now."""
         self._since = time.monotonic()
 
     def wait_until_ready(self) -> bool:
-        """Wait until the process takes what is in the ring; whether it does."""
+        """Wait until the process reads from the ring. Returns whether it does."""
         end = time.monotonic() + START_TIME
         while b"\n" not in self._said and time.monotonic() < end:
             if not self._listen(0.1):
@@ -131,7 +131,7 @@ class RecorderLink:
         return None, f"the recorder {how}"
 
     def _listen(self, seconds: float) -> bool:
-        """Hear what the process says within that time; false once it will say no more."""
+        """Read the process's messages within that time. Returns false when no more can come."""
         if not select([self._output], [], [], seconds)[0]:
             return True
         part = os.read(self._output.fileno(), 65536)

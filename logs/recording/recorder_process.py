@@ -66,7 +66,8 @@ class Task:
 @dataclass
 class Report:
     """What was done: rows surely written, the file's size [bytes], the most memory used [bytes], and
-    what went wrong, if anything; then ``lost`` rows may not be in the file. ``live_problem`` says why
+    what went wrong, if anything; then ``lost`` rows may not be in the file. ``live_problem`` says
+    why
     the viewer did not show all of the run."""
 
     rows: int = 0
@@ -112,7 +113,7 @@ class RecorderProcess:
         self._writer.flush()
 
     def take(self) -> None:
-        """Take all records that there are, and flush if it is time."""
+        """Take all records out of the ring, and flush if it is time."""
         for record in self._ring.records():
             self._take_one(record)
         now = time.monotonic()
@@ -143,7 +144,7 @@ class RecorderProcess:
                 self.feed.note(note)
 
     def flush(self) -> None:
-        """Hand to the operating system all that was taken."""
+        """Hand everything that was taken from the ring to the operating system."""
         if time.monotonic() - self._written >= BATCH_TIME:
             self._write_batch()
         new = self._batch[self._flushed_rows : self._filled]
@@ -199,7 +200,7 @@ class RecorderProcess:
         return self.report
 
     def problems(self) -> list[str]:
-        """What has gone wrong up to now."""
+        """The problems so far."""
         found = []
         if self.report.problem:
             found.append(f"nothing more is recorded: {self.report.problem}")
@@ -244,7 +245,7 @@ class RecorderProcess:
         self._flushed_rows = self._filled
 
     def _rescue(self) -> None:
-        """Put into the tail what the file did not take, as far as there is room."""
+        """Write the ticks that the file did not take into the tail, as far as there is room."""
         if self._tail is not None:
             with suppress(OSError):
                 self._tail.append(self._batch[self._tail.count : self._filled])
@@ -258,7 +259,7 @@ class RecorderProcess:
             self._dirty = True
 
     def _guard(self, work: Callable[[], None]) -> None:
-        """Do some writing; where it fails, write no more, but go on emptying the ring."""
+        """Call a function that writes. After a failure nothing is written any more, but the ring is emptied."""
         try:
             work()
         except Exception as error:  # noqa: BLE001  # whatever it is, the robot goes on
@@ -271,7 +272,7 @@ class RecorderProcess:
 
 
 def _memory() -> int:
-    """The most memory this process has used [bytes]."""
+    """The largest amount of memory that this process has used [bytes]."""
     try:
         import resource
     except ImportError:  # not on Windows

@@ -46,7 +46,7 @@ def make_memory(capacity: int) -> int:
 
 
 class _Ring:
-    """What both sides share: the memory, mapped."""
+    """The mapped memory that both sides share."""
 
     def __init__(self, descriptor: int, capacity: int) -> None:
         if capacity % ALIGNMENT:
@@ -60,16 +60,16 @@ class _Ring:
 
     @property
     def written(self) -> int:
-        """The bytes that the writer has written, ever."""
+        """The number of bytes that the writer has written since the beginning."""
         return self._counters[0]
 
     @property
     def read_back(self) -> int:
-        """The bytes that the reader has done with, ever."""
+        """The number of bytes that the reader has finished with since the beginning."""
         return self._counters[8]
 
     def close(self) -> None:
-        """Give the mapping back; the memory goes when both sides have."""
+        """Unmap the memory. It is freed when both sides have done so."""
         self._counters.release()
         self._bytes.release()
         self._view.release()
@@ -82,7 +82,7 @@ def space_of(size: int) -> int:
 
 
 class RingWriter(_Ring):
-    """The side that writes."""
+    """The writing side of the ring."""
 
     def __init__(self, descriptor: int, capacity: int) -> None:
         super().__init__(descriptor, capacity)

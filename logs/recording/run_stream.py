@@ -1,4 +1,4 @@
-"""Writes a run to a Rerun stream, be it a file or a viewer that looks on; see ``format``."""
+"""Writes a run to a Rerun stream, which is a file or a live viewer; see ``format``."""
 
 from __future__ import annotations
 
@@ -43,12 +43,12 @@ class RunStream:
     """One run in a stream.
 
     Args:
-        stream: Rerun's; whoever opened it closes it.
+        stream: the Rerun stream. The caller opens and closes it.
         header: what is known before the first tick.
         root: a prefix of all entities, such as ``first/``, where a stream holds several runs.
-        rate: of the signals that are written [1/s]; by default those of every tick.
+        rate: how often signals are written [1/s]; by default in every tick.
         most: fields with more elements than this are left out; by default none is.
-        colors: of what belongs to this run.
+        colors: the colours in which this run is drawn.
         changes_only: leave signals out where they do not change; see ``changed_rows``. Then
             ``write_rest`` comes last.
         label: what the run is called in events, where a stream holds several.
@@ -87,7 +87,7 @@ class RunStream:
             self._scene = Scene(stream, header, ports, root, colors or Colors())
 
     def write_start(self) -> None:
-        """Write what does not change: the graph, legends, colours, shapes."""
+        """Write what does not change: the graph, legends, colours and shapes."""
         import rerun as rr
 
         stream, robot = self.stream, self.header.robot
@@ -129,7 +129,7 @@ class RunStream:
             self._scene.write(batch)
 
     def write_note(self, note: Note) -> None:
-        """Write a note, for machines and for people."""
+        """Write a note twice: as data, and as text for the viewer."""
         self.write_notes([note])
 
     def write_notes(self, notes: Sequence[Note]) -> None:

@@ -1,4 +1,4 @@
-"""Puts the tail of a recording that was cut off into the recording itself."""
+"""Appends the tail of a recording that was cut off to the recording."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from .writer import RecordingWriter
 
 
 def take_in_tail(path: str | PathLike[str]) -> int:
-    """Append the ticks that only the tail has to a recording that was mended, remove the tail.
+    """Append the ticks that only the tail has to a repaired recording, and remove the tail.
 
     Returns:
         How many ticks those are.

@@ -1,7 +1,7 @@
-"""Writes a recording bit by bit: rows, keyframes and notes as they come, the outcome at the end.
+"""Writes a recording piece by piece: rows, keyframes and notes as they come, the outcome at the end.
 
-``format`` says what is in the file. Every ``flush`` hands all that was written to the operating
-system: a process killed after it loses nothing of that.
+``format`` describes the file. Every ``flush`` hands what was written to the operating system, so a
+process that is killed afterwards does not lose it.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ FLUSH_TIMEOUT = 30.0
 
 
 class RecordingWriter:
-    """One file that is being written, replacing what was there.
+    """Writes one file, replacing an older one.
 
     Args:
         path: the file; its folder is made.
@@ -98,7 +98,7 @@ class RecordingWriter:
         )
 
     def write_note(self, note: Note) -> None:
-        """Write a note, for machines and for people."""
+        """Write a note twice: as data, and as text for the viewer."""
         self._run.write_notes([note])
 
     def write_notes(self, notes: Sequence[Note]) -> None:
@@ -106,7 +106,7 @@ class RecordingWriter:
         self._run.write_notes(notes)
 
     def write_outcome(self, outcome: dict[str, Any]) -> None:
-        """Write what came of the run, last of all."""
+        """Write the outcome of the run. It comes last."""
         import rerun as rr
 
         values = {"outcome": json.dumps(outcome), "run_hash": str(outcome.get("run_hash", ""))}

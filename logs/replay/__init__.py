@@ -1,1 +1,1 @@
-"""A recorded run executed again, and compared with what it was."""
+"""Executes a recorded run again and compares it with the recording."""

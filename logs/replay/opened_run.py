@@ -1,4 +1,4 @@
-"""A recording file as a run that can be replayed: its graph is loaded again from its own text."""
+"""Opens a recording so that it can be replayed: the graph is loaded from the text in the recording."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ from ..file.reader import RecordedRun, read
 
 @dataclass(frozen=True)
 class OpenedRun:
-    """A recording, and the graph that ran, with the code of today.
+    """A recording, and the graph that ran, made of the present code.
 
     Attributes:
         file: the recording.
-        folder: where the graph file lay, to which what the graph names is relative.
+        folder: the folder of the graph file, to which file names in the graph are relative.
     """
 
     file: RecordedRun
@@ -50,7 +50,7 @@ class OpenedRun:
         return cls(file, folder or _folder(Path(path), Path(file.header.source)))
 
     def load(self, overrides: Mapping[str, Any] | Sequence[str] = ()) -> CheckedGraph:
-        """The recorded graph, with something changed. Raises ``LoadError``."""
+        """The recorded graph with further overrides. Raises ``LoadError``."""
         header = self.file.header
         name = Path(header.source).name or f"{header.name}.yaml"
         text = in_present_form(header.graph, header.versions.get("aloft", ""), header.robot)
@@ -78,12 +78,12 @@ class OpenedRun:
 
     @property
     def keyframes(self) -> Sequence[int]:
-        """Ticks before which everything was kept."""
+        """The ticks before which the whole memory was kept."""
         return self.file.keyframes
 
     @property
     def changes(self) -> Sequence[ParameterChange]:
-        """Parameters changed while it ran."""
+        """The parameters that were changed during the run."""
         return self.file.parameter_changes
 
     @property
@@ -104,7 +104,7 @@ class OpenedRun:
         return self.file.snapshot(tick)
 
     def what_is_other_now(self) -> list[str]:
-        """What computed the run and is not the same here: versions, the processor."""
+        """The versions and the processor that computed the run and are different here."""
         header = self.file.header
         now = {**versions(), **machine()}
         then = {**header.versions, **header.machine}

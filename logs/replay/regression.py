@@ -1,4 +1,4 @@
-"""A stretch of a recorded run turned into a regression test of one of its blocks."""
+"""Turns a stretch of a recorded run into a regression test of one of its blocks."""
 
 from __future__ import annotations
 
@@ -29,9 +29,10 @@ _OURS = __name__.rpartition(".logs.")[0]
 
 @dataclass(frozen=True)
 class RegressionTest:
-    """What was written: the test, its data, and how many runs of the block are in it.
+    """The files that were written: the test and its data, and the number of the block's runs in it.
 
-    ``difference`` is what the block as it is now does otherwise than recorded, if it does.
+    ``difference`` says where the present block differs from the recording; it is empty if it does
+    not.
     """
 
     test: Path
@@ -41,7 +42,7 @@ class RegressionTest:
 
 
 class _Watch:
-    """Keeps what the block remembered before the first tick of the stretch."""
+    """Keeps the block's state before the first tick of the stretch."""
 
     def __init__(self, path: str, tick: int) -> None:
         self._path, self._tick = path, tick
@@ -71,15 +72,15 @@ def capture(
 ) -> tuple[Stretch, dict[str, Any], Difference | None]:
     """The block at ``path`` in the ticks from ``first`` up to, without, ``last``.
 
-    Its state is had by running it, fed from the recording, from the keyframe before.
+    The block's state is found by running the block on recorded inputs from the keyframe before.
 
     Returns:
-        The stretch, the parameters at its beginning, and what the block as it is now does
-        otherwise in it.
+        The stretch, the parameters at its beginning, and where the present block differs from the
+        recording in it.
 
     Raises:
-        ReplayError: there is no such block or tick, the block never runs there, or it does
-            something else than recorded before the stretch begins.
+        ReplayError: there is no such block or tick, the block never runs in the stretch, or it
+            differs from the recording before the stretch begins.
     """
     graph = recorded.graph
     spec = _spec(graph, path)
@@ -197,7 +198,7 @@ def write_test(
 
 
 def _is_ours(robot: RobotDescription) -> bool:
-    """Whether the name alone gives the same description."""
+    """Whether the robot's name alone gives the same description."""
     try:
         return find_robot(robot.name) == robot
     except LookupError:
@@ -211,7 +212,7 @@ def _names_files(parameters: Mapping[str, Any], folder: Path) -> bool:
 
 
 def _as_code(value: Any, indent: str = "") -> str:
-    """Plain data as Python that reads well: one entry of a mapping a line."""
+    """Plain data as readable Python, with each entry of a mapping on its own line."""
     if not isinstance(value, dict) or not value:
         return json.dumps(value) if isinstance(value, str) else repr(value)
     inner = f"{indent}    "

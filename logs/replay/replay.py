@@ -1,11 +1,13 @@
-"""A recorded run executed again, in whole or in part, and compared with what it was.
+"""Executes a recorded run again, as a whole or in part, and compares it with the recording.
 
-Three ways, which differ only in which blocks run; all others are fed from the recording:
+There are three kinds of replay. They differ in the blocks that run; the outputs of all other blocks
+are fed from the recording:
 
-* all of them: a simulation repeats itself from its seed;
-* all but those whose outputs come from outside the graph: a robot's run is repeated on what its
-  sensors said;
-* only some, changed ones: what would they have done in this situation? Nothing feeds back.
+* all blocks run: a simulation repeats itself from its seed;
+* all blocks run except those whose outputs come from outside the graph: the run of a real robot is
+  repeated on its recorded sensor readings;
+* only some changed blocks run. This shows what they would have done in the recorded situation; their
+  outputs do not act on the recorded run.
 """
 
 from __future__ import annotations
@@ -35,18 +37,18 @@ PIECE = 256
 
 
 class ReplayError(AloftError):
-    """A recording cannot be replayed as asked."""
+    """Raised if a recording cannot be replayed in the way that was asked for."""
 
 
 @dataclass(frozen=True)
 class Replayed:
-    """What came of a replay.
+    """The result of a replay.
 
     Attributes:
-        result: of the run.
+        result: the result of the run.
         signals: the fields of the blocks that ran, compared tick by tick.
         states: what these remember, compared at every keyframe.
-        first_tick: where it began.
+        first_tick: the tick with which the replay began.
         ran: the blocks that ran; all others were fed.
         notes: what could not be compared, and why.
         ticks, rows: of the replay, where they were to be kept; in ``bus``'s layout.
@@ -64,7 +66,7 @@ class Replayed:
 
     @property
     def first(self) -> Difference | None:
-        """What differs first; of one tick, the state it began with before its signals."""
+        """The first difference. Within one tick, the state at its beginning comes before its signals."""
         found = [d for d in (self.states.first, self.signals.first) if d is not None]
         return min(found, key=lambda d: d.tick) if found else None
 
@@ -98,7 +100,7 @@ def replay(
         last_tick: end before it; by default with the recording.
         keep: whether to keep the replayed rows.
         before_tick: called with the graph before every tick, and once after the last.
-        sinks: what else looks on.
+        sinks: further sinks of the run.
 
     Raises:
         ReplayError: there is no such block or no such tick, or ticks are missing.
@@ -135,7 +137,7 @@ def replay(
 
 
 def default_inputs(graph: CheckedGraph) -> Inputs:
-    """Whether a run can be repeated from its seed."""
+    """``seed`` if the run can be repeated from its seed, ``recorded`` otherwise."""
     real = any(spec.block_type.outside == "real" for spec in graph.blocks)
     return "recorded" if real else "seed"
 
@@ -167,7 +169,7 @@ def _start(recorded: Replayable, first_tick: int | None) -> int:
 
 
 def _expect_beginning(recorded: Replayable, start: int) -> None:
-    """What is not the beginning of a run needs a keyframe."""
+    """Raise if the replay does not begin with the run and there is no keyframe to begin with."""
     if start > 0 and start not in recorded.keyframes:
         raise ReplayError(
             f"the recording begins at tick {start}, and holds nothing of what the graph "
@@ -177,7 +179,7 @@ def _expect_beginning(recorded: Replayable, start: int) -> None:
 
 
 def _expect_no_gap(recorded: Replayable, fed: Sequence[str], start: int, end: int) -> None:
-    """Blocks can be fed only where every tick was recorded."""
+    """Raise if blocks are to be fed and some tick was not recorded."""
     ticks = recorded.ticks
     if int(ticks[0]) == start == 0 and len(ticks) == ticks[-1] + 1:
         return
@@ -192,7 +194,7 @@ def _expect_no_gap(recorded: Replayable, fed: Sequence[str], start: int, end: in
 
 
 class Follower:
-    """A sink that feeds what does not run, applies recorded parameter changes, and compares."""
+    """A sink that feeds the blocks that do not run, applies recorded changes of parameters, and compares."""
 
     def __init__(
         self, recorded: Replayable, bound: BoundGraph, first_tick: int, keep: bool,
@@ -230,7 +232,7 @@ class Follower:
         self._kept: list[tuple[NDArray[np.int64], NDArray[np.uint8]]] = []
 
     def _expect_state(self) -> None:
-        """All that this graph remembers must be in the keyframe it begins with."""
+        """Raise if the keyframe lacks some of this graph's state."""
         for note in self._state.notes:
             if not note.endswith(" is in the recording only"):
                 raise ReplayError(
@@ -239,7 +241,7 @@ class Follower:
                 )
 
     def open(self, bound: BoundGraph) -> None:
-        """Nothing to do: blocks have not started."""
+        """No-op: the blocks have not started yet."""
 
     def ready(self) -> None:
         """Restore the keyframe it begins with, and prepare the first tick."""
@@ -263,7 +265,7 @@ class Follower:
         self._prepare(tick + 1)
 
     def close(self) -> None:
-        """Compare what is left."""
+        """Compare the rest."""
         self._compare()
 
     def kept(self) -> tuple[NDArray[np.int64], NDArray[np.uint8]]:

@@ -1,4 +1,4 @@
-"""A replay beside the run it repeats, as one Rerun file.
+"""Writes a replay and the recorded run into one Rerun file.
 
 In the file, on the timelines ``t`` and ``tick``: ``recorded/<block>/<port>/<field>`` and
 ``replayed/<block>/<port>/<field>``, for every field of the blocks that ran; and a layout in which
@@ -25,7 +25,7 @@ MOST_PLOTS = 6
 
 
 def write_replay(path: str | PathLike[str], recorded: Replayable, replayed: Replayed) -> Path:
-    """Write both, replacing what is there.
+    """Write both runs, replacing an older file.
 
     Raises:
         ReplayError: the replay kept no rows.

@@ -1,4 +1,4 @@
-"""What a replay needs of a run that was kept, wherever it was kept."""
+"""What a replay needs of a run, which may be kept in memory or in a recording."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from ...runtime.running.run_result import RunResult
 
 
 class Replayable(Protocol):
-    """A run that was kept: in memory, or in a recording.
+    """A run that was kept in memory or in a recording.
 
     Attributes:
-        graph: what ran.
+        graph: the graph that ran.
         bus, state: the layouts of the rows and of the keyframes' state.
-        ticks: all ticks there are rows of, increasing.
+        ticks: all ticks that have rows, increasing.
         keyframes: ticks before which everything the graph remembers was kept, increasing.
         changes: parameters changed while it ran, in order.
         failed: whether a block failed in the tick after the last row.
@@ -92,7 +92,7 @@ class KeptRun:
 
 
 class Keyframes:
-    """A sink that takes a snapshot before every tick that ``every`` divides, but the first."""
+    """A sink that takes a snapshot before every tick that ``every`` divides, except the first."""
 
     def __init__(self, every: int) -> None:
         self.every = every
@@ -100,13 +100,13 @@ class Keyframes:
         self.layout: Layout | None = None
 
     def open(self, bound: BoundGraph) -> None:
-        """Forget what was there."""
+        """Forget the snapshots of an earlier run."""
         self._bound = bound
         self.layout = bound.memory.state.layout
         self.snapshots = {}
 
     def record(self, tick: int) -> None:
-        """Take one, if the next tick is to have one."""
+        """Take a snapshot, if the next tick is to have one."""
         if (tick + 1) % self.every == 0:
             taken = self._bound.snapshot()
             self.snapshots[tick + 1] = Snapshot(tick + 1, taken.bus, taken.state)
@@ -122,7 +122,7 @@ def nearest_keyframe(recorded: Replayable, tick: int) -> int | None:
 
 
 class RowCursor:
-    """Rows one after the other, read from the recording in pieces."""
+    """Gives rows one after the other, and reads them from the recording in pieces."""
 
     PIECE = 512
     """Ticks read at once."""

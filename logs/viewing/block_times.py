@@ -1,4 +1,4 @@
-"""The time each block of a run took, as a table to read."""
+"""The time that each block of a run took, as a table."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ COLUMNS = (
 
 
 def times_table(outcome: Mapping[str, Any]) -> str:
-    """Markdown of the ``blocks`` of an outcome (``RunResult.to_json``), in order of execution."""
+    """The table as Markdown, made from an outcome (``RunResult.to_json``), in the order of execution."""
     blocks: Mapping[str, Mapping[str, Any]] = outcome.get("blocks", {})
     lines = ["| block | " + " | ".join(title for title, *_ in COLUMNS) + " |"]
     lines.append("|---|" + "---:|" * len(COLUMNS))

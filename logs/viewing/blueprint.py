@@ -1,7 +1,7 @@
 """The layout in which the viewer shows a run, made from the graph.
 
-The robot in 3D and its states are on the left. On the right are tabs: the main signals, each block's
-signals, the blocks' times and the graph.
+The robot in 3D and its states are on the left. On the right are tabs: the main signals, each
+block's signals, the blocks' times and the graph.
 """
 
 from __future__ import annotations

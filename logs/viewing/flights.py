@@ -1,4 +1,4 @@
-"""When the robot left the ground and when it came back."""
+"""Finds the flights of a run: when the robot left the ground and when it came back."""
 
 from __future__ import annotations
 
@@ -10,8 +10,9 @@ SHORTEST_FLIGHT = 0.03
 
 
 class Flights:
-    """When the robot left the ground and when it came back; a time in the air shorter than
-    ``least`` ticks is a bounce and no event."""
+    """Finds when the robot left the ground and when it came back.
+
+    A time in the air that is shorter than ``least`` ticks is a bounce and no event."""
 
     def __init__(self, least: int) -> None:
         self._least = least

@@ -1,5 +1,8 @@
-"""Time series laid out from the graph: one view a field, called by its name and unit, with its
-limits; and views in which several fields, or the same field of two runs, lie over one another."""
+"""The plots of signals over time, laid out from the graph.
+
+A plot shows one field with its limits, several fields of one unit, or the same field of two runs.
+Its
+title has the name and the unit."""
 
 from __future__ import annotations
 
@@ -47,12 +50,12 @@ class Line:
 
 
 def field_plot(header: Header, field: RecordedField, shown: Sequence[Shown]) -> Any:
-    """One field by itself."""
+    """The plot of a single field."""
     return plot(header, field.name, [Line(field)], shown)
 
 
 def plot(header: Header, name: str, lines: Sequence[Line], shown: Sequence[Shown]) -> Any:
-    """Several fields of one unit in one view, of every run."""
+    """One plot of several fields of the same unit, for all runs."""
     import rerun.blueprint as rrb
 
     if len(shown) > 1 and len(lines) > 1:
@@ -76,7 +79,7 @@ def plot(header: Header, name: str, lines: Sequence[Line], shown: Sequence[Shown
 
 
 def _series(header: Header, line: Line, label: str, *, other: bool) -> Any:
-    """The legend of a field that is not alone in its plot."""
+    """The legend of a field that shares its plot with others."""
     import rerun as rr
 
     names = [f"{label} {name}" for name in element_names(line.field, header.robot)]
@@ -88,8 +91,11 @@ def _series(header: Header, line: Line, label: str, *, other: bool) -> Any:
 
 
 def main_plots(header: Header, ports: ScenePorts | None, shown: Sequence[Shown]) -> list[Any]:
-    """What to look at first: the robot's motion, true, estimated and planned, forces and motors;
-    of a graph without a robot its first fields."""
+    """The plots that are shown first.
+
+    They show the robot's true, estimated and planned motion, forces and motors. For a graph without
+    a
+    robot they show its first fields."""
     fields = {field.name: field for field in header.bus.fields if not field.constant}
     if ports is None:
         return [field_plot(header, field, shown) for field in list(fields.values())[:MOST_PLOTS]]

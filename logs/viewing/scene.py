@@ -1,4 +1,4 @@
-"""The robot in 3D, with all that the graph says about its contacts, its motion and its plan."""
+"""Draws the robot in 3D with its contacts, its motion and its plan."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class Scene:
         self._flights = Flights(max(1, round(SHORTEST_FLIGHT * header.base_rate)))
 
     def write_static(self) -> None:
-        """Write what does not move."""
+        """Write everything that does not move."""
         import rerun as rr
 
         self._stream.log(f"{self._root}world", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
@@ -43,7 +43,7 @@ class Scene:
             part.write_static()
 
     def write(self, batch: RecordedRows) -> None:
-        """Write the ticks of a batch that are due, and the flights that ended in it."""
+        """Write the instants of a batch that are drawn, and the flights that begin or end in it."""
         due = np.flatnonzero(batch.ticks % self._every == 0)
         if len(due):
             moments = Moments(batch, due, time_columns(self._header, batch.ticks[due]))

@@ -121,5 +121,5 @@ def convex_hull(points: Array) -> Array:
 
 
 def _turn(a: Sequence[float], b: Sequence[float], c: Sequence[float]) -> float:
-    """Positive where the way a, b, c turns to the left."""
+    """A number that is positive if the path a, b, c turns to the left."""
     return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])

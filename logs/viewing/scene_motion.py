@@ -1,4 +1,4 @@
-"""The centre of mass above the ground, and where it and the feet are planned and asked to be."""
+"""Draws the centre of mass, the plan for it and for the feet, and the controller's foot targets."""
 
 from __future__ import annotations
 

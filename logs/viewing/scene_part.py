@@ -65,7 +65,7 @@ class Moments:
 
 
 class ScenePart:
-    """One thing in the scene: ``write_static`` once, ``write`` for every batch."""
+    """One part of the scene. ``write_static`` is called once, ``write`` for every batch."""
 
     def __init__(
         self, stream: Any, header: Header, ports: ScenePorts, world: str, colors: Colors
@@ -79,13 +79,13 @@ class ScenePart:
         """Write what does not change: shapes, colours, sizes."""
 
     def write(self, moments: Moments) -> None:
-        """Write these instants."""
+        """Write the part at these instants."""
         raise NotImplementedError
 
     def log(self, name: str, what: Any) -> None:
-        """Write something static about an entity below ``world``."""
+        """Write something that does not change to an entity below ``world``."""
         self.stream.log(f"{self.world}/{name}", what, static=True)
 
     def send(self, name: str, moments: Moments, columns: Any) -> None:
-        """Write columns, a row an instant, to an entity below ``world``."""
+        """Write columns with one row for each instant to an entity below ``world``."""
         self.stream.send_columns(f"{self.world}/{name}", moments.times, columns)

@@ -1,9 +1,9 @@
 """Which signals of a graph are drawn in 3D.
 
 A port is drawn by the type of its signal: a ``RobotTruth`` poses the solid robot, an
-``ExternalForce`` is an arrow, and so on. A signal of a project's own is drawn too if it derives from
-one of these types, or if it has the same fields. Recordings of versions before 0.2 keep no types,
-so all their ports are found by their fields.
+``ExternalForce`` is an arrow, and so on. A signal of a project's own is drawn too if it derives
+from one of these types, or if it has the same fields. Recordings of versions before 0.2 keep no
+types, so all their ports are found by their fields.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ PUSH = Role("ExternalForce", ("force", "point"))
 ROLES = (TRUTH, LOADS, GROUND, BASE, JOINTS, TERMS, FORCES, PLAN, FEET, PUSH)
 OTHERS = (
     "ContactState", "ContactSwitches", "EstimatorHealth", "ImuReading", "JointCommand",
-    "JointTarget", "PhaseState", "WholeBodyTarget",
+    "JointTarget", "JointTorque", "PhaseState", "WholeBodyTarget",
 )  # fmt: skip
 """Signals of the common vocabulary that have no role: similar fields do not give them one."""
 

@@ -8,7 +8,7 @@ from .scene_ports import PoseSource
 
 
 class RobotPart(ScenePart):
-    """``robot/<link>`` and ``estimate/<link>``: shapes once, then a pose an instant."""
+    """``robot/<link>`` and ``estimate/<link>``: the shapes once, then one pose for each instant."""
 
     def write_static(self) -> None:
         """Write the links' shapes."""

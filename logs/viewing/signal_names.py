@@ -1,4 +1,4 @@
-"""What the single numbers of a field are called in legends: joints, contact points, axes."""
+"""Names for the elements of a field in legends: joints, contact points, axes."""
 
 from __future__ import annotations
 

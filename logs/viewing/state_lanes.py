@@ -1,5 +1,6 @@
-"""Changes of what has few values, a lane each in the viewer's state timeline: phases, contacts,
-whether a problem was solved."""
+"""The lanes of the viewer's state timeline: phases, contacts, whether a problem was solved.
+
+A lane shows when a field with few values changed."""
 
 from __future__ import annotations
 
@@ -35,7 +36,7 @@ class Lane:
 
 
 def lanes_of(field: RecordedField, robot: RobotDescription | None) -> list[Lane]:
-    """The lanes of a field: none for most fields."""
+    """The lanes of a field. Most fields have none."""
     entity = entity_of(STATES, field.name)
     if field.values and not field.shape:
         colors = tuple(PALETTE[k % len(PALETTE)] for k in range(len(field.values)))
@@ -58,7 +59,7 @@ def lanes_of(field: RecordedField, robot: RobotDescription | None) -> list[Lane]
 
 @dataclass(frozen=True)
 class Changes:
-    """When a lane changed, (n,) ticks, and to what."""
+    """The ticks in which a lane changed, (n,), and the labels of its new values."""
 
     lane: Lane
     ticks: NDArray[np.int64]
@@ -73,7 +74,7 @@ class LaneReader:
         self._last: dict[str, int] = {}
 
     def changes(self, batch: RecordedRows) -> Iterator[Changes]:
-        """What changed in this batch; the first batch begins with a change."""
+        """The changes in a batch. The first batch begins with a change in every lane."""
         for lane in self._lanes:
             values = batch.signal(lane.field.name)
             numbers = values.reshape(len(values), -1)[:, lane.element].astype(np.int64)

@@ -1,6 +1,6 @@
-"""The Rerun viewer as a process: in a window, in a browser, or without a screen for tests.
+"""Runs the Rerun viewer as a process: in a window, in a browser, or without a screen for tests.
 
-It listens on 127.0.0.1 only, on ports that were free.
+It listens on free ports of 127.0.0.1 only.
 """
 
 from __future__ import annotations
@@ -30,18 +30,18 @@ ViewerKind = Literal["window", "web", "headless"]
 
 
 class ViewerError(AloftError):
-    """There is no viewer, or it ended at once; the message says what to do."""
+    """Raised if there is no viewer or if it ended at once. The message says what to do."""
 
 
 @dataclass
 class Viewer:
-    """A viewer that runs.
+    """A running viewer.
 
     Attributes:
-        kind: where it shows what it shows.
-        process: it.
-        port: where it takes what is to be shown.
-        web_port: where the page is, of a viewer in a browser.
+        kind: whether it is a window, a page in a browser, or without a screen.
+        process: its process.
+        port: the port on which it receives data.
+        web_port: the port of its page, for a viewer in a browser.
     """
 
     kind: ViewerKind
@@ -51,25 +51,25 @@ class Viewer:
 
     @property
     def source(self) -> str:
-        """Where a stream is sent to."""
+        """The address to which a stream is sent."""
         return f"rerun+http://{ADDRESS}:{self.port}/proxy"
 
     @property
     def page(self) -> str:
-        """What to open in a browser."""
+        """The address to open in a browser."""
         source = f"rerun%2Bhttp://{ADDRESS}:{self.port}/proxy"
         return f"http://{ADDRESS}:{self.web_port}/?url={source}&renderer=webgl"
 
     def lives(self) -> bool:
-        """Whether it has not ended."""
+        """Whether the viewer is running."""
         return self.process.poll() is None
 
     def wait(self) -> int:
-        """Wait until it ends; its exit code."""
+        """Wait until the viewer ends, and return its exit code."""
         return self.process.wait()
 
     def stop(self) -> None:
-        """End it."""
+        """End the viewer."""
         self.process.terminate()
         try:
             self.process.wait(STOP_TIME)
@@ -154,7 +154,7 @@ def _listens(port: int) -> bool:
 
 
 def free_ports(count: int) -> list[int]:
-    """Ports on this machine that nobody listens on now."""
+    """Ports of this machine on which nothing listens at the moment."""
     sockets = [socket.socket() for _ in range(count)]
     try:
         for one in sockets:
@@ -166,7 +166,9 @@ def free_ports(count: int) -> list[int]:
 
 
 def find_program() -> Path:
-    """The viewer itself, not the script that starts it: that would leave it behind when stopped.
+    """The path of the viewer's own program.
+
+    It is not the script that starts it: stopping the script would leave the viewer running.
 
     Raises:
         ViewerError: Rerun is not installed.

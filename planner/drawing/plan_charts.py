@@ -130,7 +130,7 @@ def torque_share_lines(e: Evidence) -> tuple[str, list[Line]]:
 
 def speed_lines(e: Evidence) -> tuple[str, list[Line]]:
     """Motor speeds as shares of the speed without load."""
-    share = np.abs(e.motor_speed) / e.robot.profiles[e.plan.task.profile].no_load_speed
+    share = np.abs(e.motor_speed) / e.plan.task.equipped(e.robot).motors.no_load_speed
     return "motor speed [% of the no-load speed]", _motor_lines(e, 100.0 * share)
 
 

@@ -97,10 +97,10 @@ class StanceFinder:
         heights = points[2] - at[2]
         if np.abs(heights).max() > UNEVEN:
             names = [contact.name for contact in self.model.robot.contacts]
-            found = ", ".join(f"{n} {1e3 * h:+.1f}" for n, h in zip(names, heights, strict=True))
+            found = ", ".join(f"{n} {1e3 * h:+.1f} mm" for n, h in zip(names, heights, strict=True))
             raise PlanError(
                 "with these joint angles the contact points do not lie in one plane: they are off "
-                f"the best one by [mm] {found}; choose angles that put all feet on the ground",
+                f"the best one by {found}; choose angles that put all feet on the ground",
                 family="stance",
             )
         return Stance(q, points.T.copy(), com.ravel(), heading, footholds.T.copy())

@@ -272,13 +272,10 @@ class SymbolicModel:
         ball = self._balls.get(contact.name)
         if ball is None:
             return ca.DM(list(contact.position))
-        chain, above = list[str](), link
-        while above != self.robot.base:
-            chain.append(above)
-            above = self.robot.joints[self._joint_of[above]].parent
         up = down[:, 2]
-        for name in reversed(chain):
-            up = ca.mtimes(backs[name], up)
+        for name, back in backs.items():  # parents first
+            if self._carries(name, link):
+                up = ca.mtimes(back, up)
         return ca.DM(ball.centre) - ball.radius * up
 
     def held_torques(
@@ -293,8 +290,8 @@ class SymbolicModel:
         for load in self.loads:
             if load.link not in spins:
                 continue
-            spin, turn = spins[load.link], turns[load.link]
-            centre, arm = ca.DM(list(load.com)), ca.DM(list(load.com)) - ca.DM(list(load.origin))
+            spin, turn, centre = spins[load.link], turns[load.link], ca.DM(list(load.com))
+            arm = centre - ca.DM(list(load.origin))
             lifted = pulls[load.link] + ca.cross(turn, centre)
             force = load.mass * (lifted + ca.cross(spin, ca.cross(spin, centre)))
             tensor = ca.DM(_tensor(load))

@@ -11,20 +11,19 @@ import hashlib
 import json
 from collections.abc import Mapping
 from difflib import get_close_matches
-from pathlib import Path
 from typing import Any, Literal
 
 from pydantic import ValidationError, model_validator
 
-from ...robots.description import RobotDescription, find_robot
+from ...robots.description import RobotDescription
 from ...runtime.language.parameters import Parameters, parameter
 from .errors import TaskError
 from .margins import Margins
-from .placed_file import PlacedFile, read_placed
+from .placed_file import PlacedFile
 from .scaling import scaled_defaults
 from .sequence import FreeTimes, Hop, Place, Span, check_spans, places_of
 
-__all__ = ["JumpTask", "Knots", "TaskError", "Weights", "make_task", "read_task"]
+__all__ = ["JumpTask", "Knots", "TaskError", "Weights", "make_task"]
 
 
 PLAN_FORMAT = 1
@@ -331,27 +330,3 @@ def _explain(problem: Any) -> str:
     if not key or isinstance(problem["input"], Mapping):
         return message
     return f"{key}: {message}, found {problem['input']!r}"
-
-
-def read_task(path: str | Path) -> JumpTask:
-    """The task in a YAML file; its name is the file's where it has none.
-
-    Raises:
-        TaskError: the file cannot be read, a value is wrong, or what is asked for contradicts
-            itself or the robot; one line for each, with ``file:line:column``.
-    """
-    from .task_checks import contradictions
-
-    path = Path(path)
-    source = read_placed(path, "rise: 15 cm")
-    task = make_task({"name": path.stem, **source.values}, where=str(path), source=source)
-    try:
-        robot = find_robot(task.robot, path.parent)
-    except (LookupError, ValueError) as error:
-        raise TaskError(f"{source.place(['robot'])}: robot: {error.args[0]}") from error
-    wrong = contradictions(task, robot)
-    if wrong:
-        raise TaskError(
-            "\n".join(f"{source.place(key.split('.'))}: {key}: {text}" for key, text in wrong)
-        )
-    return task

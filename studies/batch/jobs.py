@@ -8,8 +8,8 @@ it is there. A caller that stores every result at once loses only the jobs that 
 everything was killed. It continues later by leaving out the jobs whose results it has.
 
 A job that fails does not stop the others. Any exception in a job, and the death of its process,
-become the text of its result's ``error``. A process that dies is replaced, and its job is tried once
-more.
+become the text of its result's ``error``. A process that dies is replaced, and its job is tried
+once more.
 """
 
 from __future__ import annotations

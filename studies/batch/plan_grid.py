@@ -1,4 +1,6 @@
-"""Filling a library with a grid of tasks, on all cores or on a cluster; losing nothing if killed.
+"""Fills a plan library with a grid of tasks, on all cores or on a cluster.
+
+A run that is killed loses only the plans under way.
 
 name: forward
 task: {rise: 12 cm}
@@ -34,7 +36,7 @@ MOST = 10_000
 
 @dataclass(frozen=True)
 class GridRow:
-    """One task of a grid and what came of it: ``kept`` (it was there already), ``planned``,
+    """One task of a grid and its result: ``kept`` (it was there already), ``planned``,
     ``failed`` (and why), or ``known`` to have failed before."""
 
     task: JumpTask
@@ -125,13 +127,14 @@ def fill(
     cluster: str | None = None,
     again: bool = False,
 ) -> Generator[GridRow, None, None]:
-    """Plan every task that has no plan yet; rows come in the order in which they are done.
+    """Plan every task that has no plan yet. The rows come in the order in which they are done.
 
-    ``workers`` and ``cluster`` are those of ``runtime.jobs``. Each task is planned from nothing,
-    so a plan's file has the same bytes whatever was planned before it, by whom and by how many. It
-    is kept at once when it is done, so a run that is killed loses only what it was working on. A
-    task that cannot be planned leaves a ``.failed`` file with the reason and is not tried
-    ``again`` unless that is asked for; one whose process died does not, and is tried next time.
+    ``workers`` and ``cluster`` are those of ``jobs.job_results``. Each task is planned without the
+    help of other plans, so a plan's file has the same bytes whatever was planned before, by any
+    number of workers. A plan is kept as soon as it is done, so a run that is killed loses only the
+    tasks under way. A task that cannot be planned leaves a ``.failed`` file with the reason and is
+    not tried ``again`` unless that is asked for; one whose process died does not, and is tried next
+    time.
     """
     remove_abandoned(library.folder)
     there, pending = library.hashes(), []
@@ -156,7 +159,7 @@ def fill(
 
 
 def _keep(library: PlanLibrary, task: JumpTask, plan: JumpPlan | None, reason: str) -> GridRow:
-    """Write down what came of a task."""
+    """Keep the plan of a task, or the reason why there is none."""
     mark = failure_mark(library, task)
     if plan is None:
         data = {"task": task.model_dump(mode="json"), "reason": reason}
@@ -168,12 +171,12 @@ def _keep(library: PlanLibrary, task: JumpTask, plan: JumpPlan | None, reason: s
 
 
 def failure_mark(library: PlanLibrary, task: JumpTask) -> Path:
-    """Where it is written that a task could not be planned."""
+    """The path of the file that says that a task could not be planned."""
     return library.folder / f"{task.hash(library.robot)}.failed"
 
 
 def read_failure(mark: Path) -> str | None:
-    """Why a task could not be planned; ``None`` where nothing is written, or not readably."""
+    """Why a task could not be planned; ``None`` if there is no such file or it cannot be read."""
     try:
         return str(json.loads(mark.read_text(encoding="utf-8"))["reason"])
     except (OSError, ValueError, KeyError, TypeError):
@@ -181,7 +184,7 @@ def read_failure(mark: Path) -> str | None:
 
 
 def plan_one(job: tuple[JumpTask, RobotDescription]) -> tuple[JumpPlan | None, str]:
-    """Plan one task in a worker: the plan, or nothing and why."""
+    """Plan one task in a worker. Returns the plan, or nothing and the reason."""
     try:
         return solve_and_check(*job), ""
     except AloftError as error:

@@ -1,9 +1,9 @@
-"""The pictures of a study: which runs go where, by kind; drawing is the charts' affair.
+"""The pictures of a study: chooses the runs of each picture; the chart modules draw them.
 
-``polar``: for every line and angle the largest radius up to which every success rate is at least
-``level``. ``lines``: the success rate, or a metric, over an axis. ``dots``: the same, one line a
-cell. Rates have Wilson's 95 % interval; metrics are medians with their 5 % and 95 % quantiles.
-Runs that differ only on axes that a picture does not show are taken together.
+``polar`` shows, for every line and angle, the largest radius up to which every success rate is at
+least ``level``. ``lines`` shows the success rate or a metric over an axis. ``dots`` shows the same
+with one row for each cell. Rates have Wilson's 95 % interval; metrics are medians with their 5 %
+and 95 % quantiles. Runs that differ only on axes that a picture does not show are taken together.
 """
 
 from __future__ import annotations
@@ -30,14 +30,14 @@ MOST_DOTS = 80
 
 @dataclass
 class Group:
-    """Runs that are taken together."""
+    """Runs that give one point of a picture together."""
 
     n: int = 0
     successes: int = 0
     values: list[float] = field(default_factory=list)
 
     def point(self, x: float, of_rate: bool) -> Point | None:
-        """The rate or the metric with its interval; ``None`` where no run has any."""
+        """The rate or the metric with its interval; ``None`` if no run has the metric."""
         if of_rate:
             low, high = wilson_interval(self.successes, self.n)
             return Point(x, self.successes / self.n, low, high)
@@ -83,7 +83,7 @@ def draw_plot(study: Study, plot: Plot, runs: Sequence[Run], rows: Sequence[Row]
 def write_plots(
     study: Study, runs: Sequence[Run], rows: Sequence[Row], folder: Path
 ) -> tuple[dict[str, Path], list[str]]:
-    """Draw all plots: their files by name, and why others could not be drawn."""
+    """Draw all plots. Returns the files by the plots' names, and why other plots could not be drawn."""
     written: dict[str, Path] = {}
     problems = []
     for plot in study.plots:
@@ -138,7 +138,7 @@ def reach(rates: dict[float, float], level: float) -> float:
 
 
 def _radians(axis: Axis) -> float:
-    """What an angle of the axis is multiplied with; bare numbers are degrees."""
+    """The factor from an angle of the axis to radians; bare numbers are degrees."""
     unit = parse_unit(axis.unit or "deg")
     rad = parse_unit("rad")
     return unit.factor_to(rad) if unit.same_dimension(rad) else math.radians(1.0)

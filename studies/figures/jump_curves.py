@@ -94,7 +94,7 @@ def draw_jump(trace: Trace, robot: RobotDescription) -> Image:
 
 
 def jump_numbers(trace: Trace) -> Mapping[str, float]:
-    """The figure's own figures, by names with units in them."""
+    """The numbers that belong to the figure, by names that contain the units."""
     com = trace.truth("com")[:, 2]
     flight = trace.flight
     numbers = {

@@ -35,7 +35,7 @@ BLOCK, BONE = (0.78, 0.74, 0.66), (0.33, 0.36, 0.40)
 
 
 class NoRendererError(AloftError):
-    """There is no way to draw without a screen."""
+    """Raised if nothing can be drawn without a screen."""
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ class View:
 
 
 class Offscreen:
-    """Draws a robot in a scene; a context that holds the renderer.
+    """Draws a robot in a scene. It is a context manager that holds the renderer.
 
     Raises:
         NoRendererError: the libraries for it are missing; the text says which to install.
@@ -103,7 +103,7 @@ class Offscreen:
 
 
 def _context(width: int, height: int) -> Any:
-    """An OpenGL context that is current."""
+    """A new OpenGL context, made current."""
     try:
         if sys.platform == "linux":
             from mujoco.egl import GLContext

@@ -1,6 +1,6 @@
-"""All figures of the paper from our runs and plans, with the numbers beside the paper's.
+"""Draws all figures of the paper from our runs and plans, with our numbers beside the paper's.
 
-``draw`` writes the pictures and gives what ``paper.json`` holds; ``page`` makes the page of that.
+``draw`` writes the pictures and returns the content of ``paper.json``, from which ``page`` is made.
 """
 
 from __future__ import annotations
@@ -46,14 +46,14 @@ KEPT = (
 
 
 def push_task(direction: str, arm: str) -> str:
-    """What the study calls a push."""
+    """The name of a push in the study."""
     return f"push {direction}, {arm}"
 
 
 def draw(
     traces: Mapping[str, Trace], rows: Sequence[Row], seeds: Sequence[int], out: Path
 ) -> dict[str, Any]:
-    """Draw everything into the folder ``out``; what cannot be drawn says why in ``reason``."""
+    """Draw all figures into the folder ``out``. A figure that cannot be drawn has the ``reason`` instead."""
     from PIL import Image
 
     robot = find_robot("bruce")
@@ -99,7 +99,7 @@ def draw(
 
 
 class NotThereError(NoRendererError):
-    """There is no plan to draw."""
+    """Raised if there is no plan to draw."""
 
 
 def _row_json(row: Row, trace: Trace) -> dict[str, Any]:
@@ -127,7 +127,7 @@ def _push(traces: Mapping[str, Trace]) -> tuple[Picture, Mapping[str, Any]]:
 def _frames(
     title: str, trace: Trace, row: Row, view: View, robot: RobotDescription
 ) -> tuple[Picture, Mapping[str, Any]]:
-    """Frames of a run."""
+    """The figure of a run as frames."""
     names = ("base_position", "base_orientation", "joint_position")
     motion = Motion(trace.time, *(trace.truth(name) for name in names))
     end = float(trace.time[-1])
@@ -147,10 +147,10 @@ def _frames(
 
 
 def _plan(robot: RobotDescription) -> tuple[Picture, Mapping[str, Any]]:
-    """Frames of a planned somersault."""
+    """The figure of a planned somersault as frames."""
     from ...hal.simulated.scenes import flat, platform
     from ...planner.library.library import SHIPPED, PlanLibrary
-    from ...planner.task.task import read_task
+    from ...planner.task.read_task import read_task
 
     task = read_task(SHIPPED.parent / "tasks" / f"{PLANNED}.yaml")
     plan = PlanLibrary(robot).find(task)
@@ -190,7 +190,7 @@ def scene_of(cell: Cell) -> Scene:
 
 
 def rounded(numbers: Mapping[str, Any]) -> dict[str, Any]:
-    """With four significant digits, so that files do not differ in noise."""
+    """The numbers with four significant digits, so that noise does not change files."""
     return {
         name: float(f"{value:.4g}") if isinstance(value, float) else value
         for name, value in numbers.items()

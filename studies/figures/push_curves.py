@@ -22,7 +22,7 @@ RIGHT, LEFT = 0, 1
 
 
 def draw_push(arms: Mapping[str, Sequence[Trace]]) -> Image:
-    """Both directions, +x first, with a curve for every arm; only the flight is shown."""
+    """The figure with both directions, +x first, and a curve for every arm. Only the flight is shown."""
     columns = []
     for number, header in enumerate(("(a) push along +x", "(b) push along +y")):
         traces = {arm: found[number] for arm, found in arms.items() if len(found) > number}
@@ -101,7 +101,7 @@ def _push(trace: Trace, flight: slice) -> list[Shade]:
 
 
 def push_numbers(trace: Trace, axis: int) -> Mapping[str, float]:
-    """What the push changed, and how far the feet went, by names with units in them."""
+    """What the push changed and how far the feet moved, by names that contain the units."""
     ticks = trace.flight
     pushed = np.flatnonzero(np.abs(trace.signals["push.push.force"]).any(axis=1))
     if ticks is None or not len(pushed):

@@ -1,4 +1,4 @@
-"""A motion as a strip of frames, each with its time and what happens then."""
+"""Draws a motion as a strip of frames, each with its time and what happens at it."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class Motion:
 
 @dataclass(frozen=True)
 class Moment:
-    """When a frame is, and what is written under it."""
+    """The time of a frame, and the text below it."""
 
     time: float
     text: str

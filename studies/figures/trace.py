@@ -1,4 +1,4 @@
-"""What a figure needs of a run: its outcome and some signals of every tick."""
+"""The part of a run that figures need: its outcome, and some signals at every tick."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ SHORTEST_FLIGHT = 0.02
 
 @dataclass(frozen=True)
 class Trace:
-    """A run: what came of it, and its signals by their names, (ticks, ...)."""
+    """A run: its outcome, and its signals by their names, (ticks, ...)."""
 
     task: str
     seed: int
@@ -82,7 +82,7 @@ class Trace:
 
 
 def make_trace(task_and_job: tuple[str, Job]) -> Trace:
-    """Make the run and keep what figures need of it; called where the work is done.
+    """Make a run and keep what figures need, in the process that does the work.
 
     Raises:
         AloftError: the run broke, or the process was told to stop.

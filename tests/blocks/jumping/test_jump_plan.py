@@ -8,7 +8,7 @@ import pytest
 from aloft.blocks.jumping.jump_plan import JumpPlan
 from aloft.blocks.signals import Phase
 from aloft.planner.library.library import SHIPPED, PlanLibrary
-from aloft.planner.task.task import read_task
+from aloft.planner.task.read_task import read_task
 from aloft.robots.description import find_robot
 from aloft.runtime.language.errors import AloftError
 from aloft.runtime.testing import BlockBench

@@ -10,7 +10,7 @@ from aloft.planner.checking.evidence import Evidence
 from aloft.planner.checking.replay import replay
 from aloft.planner.drawing.plan_charts import phases_of, plan_panels
 from aloft.planner.library.library import SHIPPED, PlanLibrary
-from aloft.planner.task.task import read_task
+from aloft.planner.task.read_task import read_task
 from aloft.plotting import Line, Panel
 from aloft.robots.description import find_robot
 

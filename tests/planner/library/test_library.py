@@ -11,7 +11,8 @@ from aloft.planner.checking.validity import InvalidPlanError
 from aloft.planner.library.library import SHIPPED, PlanLibrary, kept_name, task_distance
 from aloft.planner.task.errors import PlanError
 from aloft.planner.task.plan import JumpPlan
-from aloft.planner.task.task import JumpTask, make_task, read_task
+from aloft.planner.task.read_task import read_task
+from aloft.planner.task.task import JumpTask, make_task
 from aloft.robots.description import RobotDescription, find_robot
 
 ROBOT = find_robot("bruce")

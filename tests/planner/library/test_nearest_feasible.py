@@ -12,7 +12,8 @@ from aloft.planner.library.library import SHIPPED, PlanLibrary
 from aloft.planner.library.nearest_feasible import candidates, nearest_feasible, values_towards
 from aloft.planner.task.errors import PlanError
 from aloft.planner.task.plan import JumpPlan
-from aloft.planner.task.task import JumpTask, make_task, read_task
+from aloft.planner.task.read_task import read_task
+from aloft.planner.task.task import JumpTask, make_task
 from aloft.robots.description import RobotDescription, find_robot
 
 ROBOT = find_robot("bruce")

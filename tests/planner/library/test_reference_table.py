@@ -9,7 +9,7 @@ from aloft.planner.library.jump_table import JumpTable
 from aloft.planner.library.library import SHIPPED, PlanLibrary
 from aloft.planner.library.reference_table import reference_table
 from aloft.planner.task.plan import JumpPlan
-from aloft.planner.task.task import read_task
+from aloft.planner.task.read_task import read_task
 from aloft.robots.description import find_robot
 
 ROBOT = find_robot("bruce")

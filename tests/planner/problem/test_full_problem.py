@@ -16,7 +16,8 @@ from aloft.planner.problem.guess import ballistic_guess
 from aloft.planner.solving.solve import make_problem, solve_jump
 from aloft.planner.task.errors import PlanError
 from aloft.planner.task.plan import JumpPlan
-from aloft.planner.task.task import Knots, make_task, read_task
+from aloft.planner.task.read_task import read_task
+from aloft.planner.task.task import Knots, make_task
 from aloft.robots.description import find_robot
 
 ROBOT = find_robot("bruce")

@@ -13,7 +13,8 @@ from aloft.planner.problem.unpacking import can_start
 from aloft.planner.solving.easing import eased, tighten, with_impacts
 from aloft.planner.solving.solve import make_problem, solve_jump
 from aloft.planner.solving.solver import solve
-from aloft.planner.task.task import make_task, read_task
+from aloft.planner.task.read_task import read_task
+from aloft.planner.task.task import make_task
 from aloft.robots.description import find_robot
 from aloft.robots.kinematics import matrices_of_quaternions
 

@@ -5,7 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from aloft.planner.task.task import JumpTask, Knots, TaskError, make_task, read_task
+from aloft.planner.task.read_task import read_task
+from aloft.planner.task.task import JumpTask, Knots, TaskError, make_task
 from aloft.robots.description import find_robot
 
 

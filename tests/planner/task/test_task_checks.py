@@ -6,7 +6,8 @@ from typing import Any
 import pytest
 
 from aloft.planner.library.library import SHIPPED, solve_and_check
-from aloft.planner.task.task import TaskError, make_task, read_task
+from aloft.planner.task.read_task import read_task
+from aloft.planner.task.task import TaskError, make_task
 from aloft.planner.task.task_checks import contradictions, leg_travel
 from aloft.robots.description import find_robot
 

@@ -11,7 +11,8 @@ from aloft.planner.library import library
 from aloft.planner.library.library import SHIPPED, PlanLibrary
 from aloft.planner.task.errors import PlanError
 from aloft.planner.task.plan import JumpPlan
-from aloft.planner.task.task import JumpTask, TaskError, make_task, read_task
+from aloft.planner.task.read_task import read_task
+from aloft.planner.task.task import JumpTask, TaskError, make_task
 from aloft.robots.description import RobotDescription, find_robot
 from aloft.studies.batch import plan_grid as grid
 from aloft.studies.batch.job import JobResult, attempt
