@@ -9,7 +9,10 @@ from itertools import pairwise
 from ...plotting import FAINT, look, new_figure, style, svg_text
 
 MOST_FILLED = 3
-"""Where there are more curves than this, none is filled: it would hide what lies below."""
+"""Where there are more curves than this, none is filled, and the curves are turned a little against one
+another: they would hide what lies below."""
+TURN = math.radians(1.0)
+"""The angle between neighbours among many curves [rad]."""
 
 
 def polar_chart(
@@ -51,14 +54,18 @@ def polar_chart(
             closed = goes_around([angle for angle, _ in ordered])
             if closed:
                 ordered.append(ordered[0])
-            angles, radii = [angle for angle, _ in ordered], [radius for _, radius in ordered]
+            aside = 0.0
+            if len(curves) > MOST_FILLED:
+                aside = TURN * (number - 0.5 * (len(curves) - 1))
+            angles = [angle + aside for angle, _ in ordered]
+            radii = [radius for _, radius in ordered]
             if closed and len(curves) <= MOST_FILLED:
                 axes.fill(angles, radii, color=look(number)["color"], alpha=0.06, linewidth=0)
             axes.plot(
                 angles, radii, marker="o", markersize=4.5, markeredgecolor="white", clip_on=False,
                 markeredgewidth=0.7, label=name, gid=f"line-{number}", **look(number),
             )  # fmt: skip
-        figure.legend(loc="outside right upper")
+        figure.legend(loc="outside right center")
         return svg_text(figure)
 
 
