@@ -113,20 +113,20 @@ class ExactDynamics:
         for ball in self.balls:
             # The lowest point moves as the centre does, which is above the sole at the zero pose.
             up = self.data.oMf[self.sole_frames[ball.foot]].rotation[:, 2]
-            rates[ball.foot] += ball.radius * np.cross(jacobians[ball.foot][3:] @ v, up)
+            turn = jacobians[ball.foot][3:] @ v
+            rates[ball.foot] += ball.radius * np.cross(turn, up)
         return rates
 
     def foot_angles(self) -> tuple[Array, Array]:
         """Heading and pitch of the feet [rad], both (n_feet,), in the state that was evaluated
         last. A ball has none of its own: it has the base's heading and no pitch."""
-        base, yaw, pitch = self.data.oMi[1].rotation, [], []
-        for frame in self.sole_frames:
-            x, y, z = (float(part) for part in self.data.oMf[frame].rotation[:, 0])
-            yaw.append(math.atan2(y, x))
-            pitch.append(math.atan2(-z, math.hypot(x, y)))
+        ahead = [self.data.oMf[frame].rotation[:, 0] for frame in self.sole_frames]
+        base = self.data.oMi[1].rotation
+        yaw = np.array([math.atan2(y, x) for x, y, _ in ahead])
+        pitch = np.array([math.atan2(-z, math.hypot(x, y)) for x, y, z in ahead])
         for ball in self.balls:
-            yaw[ball.foot], pitch[ball.foot] = math.atan2(base[1, 0], base[0, 0]), 0.0
-        return np.array(yaw), np.array(pitch)
+            yaw[ball.foot], pitch[ball.foot] = np.arctan2(base[1, 0], base[0, 0]), 0.0
+        return yaw, pitch
 
     def _contact_places(self) -> Array:
         places = self._places(self.contact_frames)
