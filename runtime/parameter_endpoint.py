@@ -77,7 +77,7 @@ class ParameterEndpoint:
         self._thread.start()
 
     def record(self, tick: int) -> None:
-        """Nothing: what is changed, others record."""
+        """Do nothing: the recorder keeps the changes of parameters, this only receives them."""
 
     def close(self) -> None:
         """Answer no more."""

@@ -30,6 +30,10 @@ ROOMS = ("mathematics", "blocks", "hal")
 HOT = [path for room in ROOMS for path in sorted((ROOT / room).rglob("*.py"))]
 PLAIN = {"Array", "Flags", "Indices", "float", "int", "bool"}
 NOT_HOT = {
+    "hal.bear.conditions.conditions": "of an error byte, for people",
+    "hal.bear.conditions.describe": "of an error byte, for people",
+    "hal.bear.conditions.is_critical": "of an error byte, by integer arithmetic",
+    "hal.simulated.mujoco_robot._nearest_step": "for the text of an error, when a graph is loaded",
     "blocks.jumping.landing_heuristic.foot_sides": "of the description, when a graph is loaded",
     "hal.simulated.random_streams._signed": "of exact integers, when a run is restored",
     "hal.simulated.scenes.step": "makes a scene, when a run is loaded",

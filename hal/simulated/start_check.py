@@ -29,7 +29,7 @@ MOST_BASE_RATE = 0.1
 """What the base may still turn at [rad/s]."""
 MOST_TILT_ERROR = 0.03
 """By how much the base may be turned otherwise than asked for [rad]."""
-MOST_SAG = 0.05
+MOST_SAG = 0.02
 """By how much a held joint may be away from where it is held [rad, or m for a slide]."""
 NEAR = 0.001
 """A contact point higher above the ground than this is in the air [m]."""

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from ..validation import RobotError, RobotFault
 from ..validation.faults import listing
 from .bodies import Inertial, joined
-from .capsules import Capsule
+from .capsules import Capsule, coarse
 from .raw_model import RawBody, RawJoint, RawModel
 
 Array = NDArray[np.float64]
@@ -184,7 +184,7 @@ def _link_data(link: BuiltLink) -> dict[str, Any]:
     tensor = whole.inertia
     pairs = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
     shapes = [
-        {"start": tidy(c.start, 6), "end": tidy(c.end, 6), "radius": round(c.radius, 6)}
+        {"start": coarse(c.start), "end": coarse(c.end), "radius": coarse(np.array([c.radius]))[0]}
         for c in link.capsules
     ]
     return {

@@ -10,6 +10,7 @@ from ..link_poses import link_poses, standing_heights
 from ..parts import Array, Shape
 from ..robot_description import RobotDescription
 from ..standing_pose import find_standing_pose
+from .capsules import coarse
 
 CLEARANCE = 0.002
 """How far above the ground a shape that is no contact point has to end [m]."""
@@ -77,5 +78,7 @@ def _above(shape: Shape, rotation: Array, room: float) -> Shape | None:
     # The end stays a little apart from the other: a capsule has a length.
     share = (room - heights[low]) / (heights[high] - heights[low])
     ends[low] += min(share, 0.99) * (ends[high] - ends[low])
-    start, end = (tuple(float(v) for v in np.round(end, 6)) for end in ends)
+    start, end = (tuple(coarse(end)) for end in ends)
+    if start == end:
+        return None
     return Shape.model_validate({"start": start, "end": end, "radius": shape.radius})

@@ -185,8 +185,10 @@ def _particular_schema(name: str, block_type: type[Block], definitions: Schema) 
         schema.pop("live", None)
         description = " ".join(filter(None, [schema.pop("description", ""), _unit_text(schema)]))
         options = [schema, _REFERENCE]
-        if schema.pop("unit", ""):  # then a text with a unit is a number, also inside a list
-            options += [{"type": "string", "pattern": "^[-+0-9.]"}, {"type": "array"}]
+        if schema.pop("unit", ""):  # then a text with a unit is a number, also inside a collection
+            per_joint = "PerJoint" in json.dumps(schema)
+            inside = {"type": "object"} if per_joint else {"type": "array"}
+            options += [{"type": "string", "pattern": "^[-+0-9.]"}, inside]
         properties[key] = {"anyOf": options, "description": description}
     summary = (block_type.__doc__ or "").strip().partition("\n")[0]
     return {

@@ -87,3 +87,19 @@ def test_every_block_is_described(validator: Draft7Validator) -> None:
     assert gain["properties"]["in"]["properties"]["u"]["description"] == "Vector: what is scaled"
     frequency = schema["definitions"]["blocks.SineWave"]["properties"]["with"]["properties"]
     assert frequency["frequency"]["description"] == "oscillations per second [Hz]"
+
+
+@pytest.mark.parametrize(
+    ("gain", "good"),
+    [
+        ("40", True),
+        ('{"*": 40, "*_knee": 60 N m/rad}', True),
+        ("40 N m/rad", True),
+        ("[40, 40, 40, 40, 40]", False),
+    ],
+)
+def test_values_per_joint_are_numbers_or_mappings_and_no_lists(
+    validator: Draft7Validator, gain: str, good: bool
+) -> None:
+    text = f"rate: 500\nblocks:\n  pd: {{use: blocks.JointPD, with: {{flight_stiffness: {gain}}}}}"
+    assert (errors(validator, text) == []) is good
