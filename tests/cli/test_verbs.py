@@ -3,6 +3,7 @@
 import json
 import resource
 import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -188,3 +189,15 @@ def test_a_bug_does_not_look_like_a_fall(
     result = call_json("check", "count.yaml", code=3)
     assert result == {"success": False, "reason": "bug: ZeroDivisionError: by zero"}
     assert "Traceback" in call("check", "count.yaml", code=3).stderr
+
+
+def test_a_verb_imports_no_other_verbs_file() -> None:
+    code = (
+        "import sys; sys.argv = ['aloft', 'check', 'nothing.yaml']\n"
+        "from aloft.cli import main\n"
+        "try: main()\n"
+        "except SystemExit: pass\n"
+        "print(sorted(m for m in sys.modules if m in ('aloft.cli.run', 'aloft.cli.plan')))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines()[-1] == "[]"
