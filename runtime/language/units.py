@@ -1,8 +1,8 @@
 """Physical units as SI exponents and a scale, parsed from text such as ``N m`` or ``rad/s``.
 
-A unit is checked when a graph is loaded and never touched while it runs. Angles are dimensionless
-in SI, but a graph that feeds radians where metres are meant is wrong, so ``rad`` keeps an exponent
-of its own.
+Units are checked when a graph is loaded and not used while it runs. Angles are dimensionless in SI,
+but a graph that feeds radians where plain numbers or metres are expected is wrong, so ``rad`` has
+an exponent of its own.
 """
 
 from __future__ import annotations
@@ -109,8 +109,8 @@ _QUANTITY = re.compile(
 def parse_unit(text: str) -> Unit:
     """The unit that ``text`` names.
 
-    A space or ``*`` multiplies; ``/`` divides by the one factor or bracket behind it; ``^`` raises
-    to an integer power. The empty text and ``1`` are dimensionless.
+    A space or ``*`` multiplies; ``/`` divides by the single factor or bracket that follows it;
+    ``^`` raises to an integer power. The empty text and ``1`` are dimensionless.
 
     Raises:
         UnitError: the text is not a product of known symbols.
@@ -169,9 +169,9 @@ def _product(
 
 
 def parse_quantity(text: str, unit: str) -> float:
-    """The value of a text such as ``70 N``, ``10 ms`` or ``1/3 kHz`` in ``unit``.
+    """The value in ``unit`` of a text such as ``70 N``, ``10 ms`` or ``1/3 kHz``.
 
-    A bare number is taken as is.
+    A number without a unit is taken as it is.
 
     Raises:
         UnitError: there is no number, or its unit has another dimension.

@@ -91,7 +91,7 @@ def wrap_offset(flat: FlatBlock, base_rate: Node | None) -> FlatBlock:
 
 
 def check_hyperperiod(drafts: Iterable[Draft], where: Position, problems: Problems) -> None:
-    """Note rates whose common pattern takes too long to repeat."""
+    """Report rates whose hyperperiod, the number of ticks after which they repeat, is too long."""
     try:
         hyperperiod(draft.period_ticks for draft in drafts)
     except AloftError as error:
