@@ -1,4 +1,4 @@
-"""The errors of the runtime, one class a kind, and the exit codes of the command line."""
+"""The errors of the runtime, one class for each kind, and the exit codes of the command line."""
 
 from __future__ import annotations
 
@@ -39,11 +39,11 @@ class UnknownBlockError(AloftError, LookupError):
 
 
 class BlockError(AloftError):
-    """A block cannot go on: raised by a block with a message for the user."""
+    """A block cannot go on; the block raises this with a message for the user."""
 
 
 class RunError(AloftError):
-    """A run ended early: names the block, the tick and the reason."""
+    """A run ended early; the error names the block, the tick and the reason."""
 
     def __init__(self, message: str, *, block: str = "", tick: int = -1) -> None:
         super().__init__(message)

@@ -1,8 +1,8 @@
 """Physical units as SI exponents and a scale, parsed from text such as ``N m`` or ``rad/s``.
 
-A unit is checked when a graph is loaded and never touched while it runs. Angles are dimensionless
-in SI, but a graph that feeds radians where metres are meant is wrong, so ``rad`` keeps an exponent
-of its own.
+Units are checked when a graph is loaded and not used while it runs. Angles are dimensionless in SI,
+but a graph that feeds radians where plain numbers or metres are expected is wrong, so ``rad`` has
+an exponent of its own.
 """
 
 from __future__ import annotations
@@ -105,8 +105,8 @@ _QUANTITY = re.compile(r"^\s*(?P<number>[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)
 def parse_unit(text: str) -> Unit:
     """The unit that ``text`` names.
 
-    A space or ``*`` multiplies; ``/`` divides by the one factor or bracket behind it; ``^`` raises
-    to an integer power. The empty text and ``1`` are dimensionless.
+    A space or ``*`` multiplies; ``/`` divides by the single factor or bracket that follows it;
+    ``^`` raises to an integer power. The empty text and ``1`` are dimensionless.
 
     Raises:
         UnitError: the text is not a product of known symbols.
@@ -165,7 +165,7 @@ def _product(
 
 
 def parse_quantity(text: str, unit: str) -> float:
-    """The value of a text such as ``70 N`` or ``10 ms`` in ``unit``; a bare number is taken as is.
+    """The value in ``unit`` of a text such as ``70 N`` or ``10 ms``, or of one without a unit.
 
     Raises:
         UnitError: there is no number, or its unit has another dimension.

@@ -1,4 +1,5 @@
-"""From written files to one flat graph: includes, sub-graphs, parameters and overrides."""
+"""Makes one flat graph from the written files: expands includes, sub-graphs and their parameters,
+and applies overrides."""
 
 from __future__ import annotations
 
@@ -33,7 +34,7 @@ class _Scope:
     offset: Node | None = None
     sets: tuple[Override, ...] = ()
     wires: Mapping[str, tuple[Link | None, Position, str]] = field(default_factory=dict)
-    """From outside, by ``block.input``: the link, its place and its file."""
+    """Wires that other files give, by ``block.input``: the link, its place and its file."""
 
     @property
     def prefix(self) -> str:
@@ -50,7 +51,7 @@ class _Draft:
 
 
 def flatten_file(path: Path, overrides: Overrides, problems: Problems) -> FlatGraph:
-    """The flat graph of a file; what is wrong is noted and left out."""
+    """The flat graph of a file; what is wrong is reported to ``problems`` and left out."""
     return _Flattener(problems).run(path, read_file(path, str(path), problems), overrides)
 
 
@@ -148,7 +149,7 @@ class _Flattener:
         wires: Mapping[str, tuple[Link | None, Position, str]],
         scope: _Scope,
     ) -> None:
-        """Note overrides and wires of blocks that do not exist."""
+        """Report overrides and wires of blocks that do not exist."""
         lost = [(o.block, o.key, o.where, Code.OVERRIDE) for o in sets]
         if scope.instance is None:
             lost += [(o.block, o.key, o.where, Code.OVERRIDE) for o in scope.sets]
@@ -301,7 +302,7 @@ class _Flattener:
         self._expand(files, inner)
 
     def _parameters(self, block: FlatBlock, subgraph: WrittenGraph) -> dict[str, Node] | None:
-        """The values of a sub-graph's parameters for one use; none if one is missing."""
+        """The values of a sub-graph's parameters for one use; ``None`` if one is missing."""
         declared = {entry.key: entry for entry in subgraph.parameters}
         misspelt: dict[str, None] = {}
         for entry in block.parameters:
@@ -346,7 +347,7 @@ class _Flattener:
 
 
 def _finish(draft: _Draft, resolver: Resolver) -> FlatBlock:
-    """The block with its wires led to real outputs."""
+    """The block, every wire of which comes from an output of a block that is no sub-graph."""
     wires: dict[str, FlatWire] = {}
     excused = []
     for name, link in draft.links.items():

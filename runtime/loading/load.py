@@ -1,4 +1,4 @@
-"""The entrances: a file or a text to a checked graph, or to the report of what is wrong."""
+"""The public functions that load a graph file or text: into a checked graph, or a report."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def load(path: str | Path, overrides: Overrides = ()) -> CheckedGraph:
         overrides: ``{"landing.w_l": [0.03, 0.04]}`` or ``["landing.w_l=[0.03, 0.04]"]``.
 
     Raises:
-        LoadError: something is wrong; it carries the report of everything that is.
+        LoadError: the graph is wrong; the error carries the report of all problems.
     """
     problems = Problems()
     graph = examine(flatten_file(Path(path), overrides, problems), problems)
@@ -28,10 +28,10 @@ def load(path: str | Path, overrides: Overrides = ()) -> CheckedGraph:
 
 
 def load_text(text: str, path: str | Path, overrides: Overrides = ()) -> CheckedGraph:
-    """The graph in a text that stands for the file ``path``; what it names is found beside that.
+    """The graph in a text; files it names are searched for as if the text were the file ``path``.
 
     Raises:
-        LoadError: something is wrong; it carries the report of everything that is.
+        LoadError: the graph is wrong; the error carries the report of all problems.
     """
     problems = Problems()
     graph = examine(flatten_text(text, Path(path), overrides, problems), problems)

@@ -65,7 +65,7 @@ def read_offset(flat: FlatBlock, period: int, problems: Problems) -> int:
 
 
 def check_hyperperiod(drafts: Iterable[Draft], where: Position, problems: Problems) -> None:
-    """Note rates whose common pattern takes too long to repeat."""
+    """Report rates whose hyperperiod, the number of ticks after which they repeat, is too long."""
     try:
         hyperperiod(draft.period_ticks for draft in drafts)
     except AloftError as error:

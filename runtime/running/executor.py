@@ -1,6 +1,6 @@
-"""The executor: takes a graph through its whole life, and ends every run in good order.
+"""The executor takes a graph through its whole life cycle and ends every run in good order.
 
-While a run goes on the garbage collector is off and what exists is frozen.
+During a run the garbage collector is off, so that it interrupts no tick.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ class Executor:
         run_hash: whether to hash every tick.
         timing: whether to time every block. Only benchmarks switch it off.
         finite_check: whether to check every tick. Only benchmarks switch it off.
-        time_source: what time is; tests have one of their own.
+        time_source: where the time comes from; by default the system's monotonic clock.
         on_ready: called once all blocks have started, before the first tick; a replay restores a
             keyframe here.
 
@@ -80,11 +80,11 @@ class Executor:
         self._cautions: list[str] = []
 
     def run(self, ticks: int | None = None) -> RunResult:
-        """The whole life of the graph, once: start, tick, stop cycles, close.
+        """Take the graph once through its whole life: start, ticks, stop cycles, close.
 
-        Runs for ``ticks``, by default as long as the graph says. SIGINT and SIGTERM stop it after
-        the present tick, and so does a block that asks for it. Whatever ended the run is in the
-        result, an error too: see ``RunResult.raise_if_failed``.
+        The run lasts ``ticks`` ticks, by default the graph's duration. SIGINT, SIGTERM and a block
+        that asks for it end the run after the present tick. The result says what ended the run,
+        also if it was an error: see ``RunResult.raise_if_failed``.
 
         Raises:
             AloftError: the graph has run already.
@@ -94,7 +94,7 @@ class Executor:
         clock, graph = self.bound.clock, self.bound.graph
         limit = ticks
         if ticks is None and graph.ticks is not None:
-            limit = max(0, graph.ticks - clock.tick)  # a restored graph runs only what is left
+            limit = max(0, graph.ticks - clock.tick)  # a restored graph runs only the rest
         error: RunError | None = None
         problems: list[str] = []
         start_time = end_time = self._time.now()
@@ -140,7 +140,7 @@ class Executor:
         if self._log is not None:
             self._log.expect(ticks)
         for sink in self._sinks:
-            self._opened.append(sink)  # before, as a failed open may have opened something
+            self._opened.append(sink)  # before the call, as a failed open may have opened a file
             sink.open(self.bound)
             self.ticker.records.append(sink.record)
             if isinstance(sink, TakesNotes):
@@ -175,7 +175,7 @@ class Executor:
             self._note("caution", caution, "WARN")
 
     def _pause(self) -> None:
-        """The time between stop cycles: a period, so that a bus can carry each."""
+        """Wait for one period between two stop cycles, so that a bus has time to carry each."""
         self._time.sleep(self.bound.clock.base_period)
 
     def _result(
@@ -228,7 +228,7 @@ class Executor:
         unmet: str | None,
         praise: str | None,
     ) -> tuple[ExitCode, str]:
-        """The exit code and the reason: the first that applies, gravest first."""
+        """The exit code and the reason; of several reasons, the gravest."""
         stopped = self.bound.clock.stop_reason
         if error is not None and not isinstance(error.__cause__, KeyboardInterrupt):
             return ExitCode.RUN_FAILED, str(error)
@@ -246,7 +246,8 @@ class Executor:
 
 @contextmanager
 def _quiet_collector() -> Iterator[None]:
-    """No garbage collection within, and what exists now is never looked at: no pauses."""
+    """Switch the garbage collector off within, and exempt all existing objects from later
+    collections, so that no collection interrupts a tick."""
     enabled = gc.isenabled()
     with ExitStack() as after:
         gc.collect()

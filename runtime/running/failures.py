@@ -1,4 +1,4 @@
-"""What went wrong in a block, in one line: which block, in what, the error, and where it was raised."""
+"""Describes a block's failure in one line: block, method, error, and where it was raised."""
 
 from __future__ import annotations
 

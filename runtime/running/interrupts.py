@@ -1,4 +1,4 @@
-"""SIGINT and SIGTERM end a run cleanly: after the present tick, with the stop cycles."""
+"""SIGINT and SIGTERM end a run cleanly: the present tick is finished, then the stop cycles run."""
 
 from __future__ import annotations
 
@@ -12,12 +12,13 @@ from .life_cycle import LifeCycle
 
 
 class Interrupts:
-    """Handles the two signals within a ``with``; elsewhere than in the main thread does nothing.
+    """Handles the two signals in a ``with`` statement of the main thread; elsewhere does nothing.
 
-    The first signal asks for the run to end after the tick. A further one raises
-    ``KeyboardInterrupt``, for a block that hangs, but only where that is caught: while ``armed``,
-    which the executor sets while blocks start and tick, or inside a guarded call while stopping.
-    Raising disarms, so no error can hit who deals with the one before.
+    The first signal asks for the run to end after the present tick. A further signal raises
+    ``KeyboardInterrupt``, so that a block that hangs can be interrupted, but only where that error
+    is caught: while ``armed``, which the executor sets while blocks start and tick, or inside a
+    guarded call while stopping. Raising resets ``armed``, so that no second error interrupts the
+    code that handles the first.
     """
 
     def __init__(self, clock: Clock, life: LifeCycle) -> None:
