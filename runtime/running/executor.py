@@ -193,6 +193,8 @@ class Executor:
             except Exception as failure:  # noqa: BLE001  # the other blocks' metrics still count
                 problems.append(f"block '{path}' failed in metrics: {describe(failure)}")
         metrics, unmet, praise = merge_metrics(by_block)
+        judges = [path for path, of_block in by_block.items() if of_block.get("reason")]
+        unmet, praise = self._with_stop(unmet, judges), self._with_stop(praise, judges)
         code, reason = self._verdict(error, problems, interrupts, unmet, praise)
         for program in self.ticker.programs:
             program.fold()
@@ -219,6 +221,13 @@ class Executor:
             log=self._log,
             graph=self.bound.graph,
         )
+
+    def _with_stop(self, verdict: str | None, judges: Sequence[str]) -> str | None:
+        """What a score says, with why another block ended the run; a score knows its own reason."""
+        clock = self.bound.clock
+        if verdict is None or not clock.stop_reason or clock.stopped_by in ("", *judges):
+            return verdict
+        return f"{verdict}; block '{clock.stopped_by}' ended the run: {clock.stop_reason}"
 
     def _verdict(
         self,

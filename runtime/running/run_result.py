@@ -19,7 +19,7 @@ from .sinks import MemoryLog
 from .timing import BlockTimes
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class RunResult:
     """The outcome of one run.
 
@@ -54,6 +54,14 @@ class RunResult:
     log: MemoryLog | None = None
     graph: CheckedGraph | None = None
     """The graph that ran; ``None`` only in a result made by hand."""
+
+    def __repr__(self) -> str:
+        outcome = "success" if self.success else "no success"
+        logged = f", {len(self.log.ticks)} ticks logged" if self.log is not None else ""
+        return (
+            f"<RunResult: {outcome}: {self.reason}; {self.ticks} ticks, {self.duration_s:.6g} s"
+            f"{logged}, {len(self.metrics)} metrics, hash {self.run_hash or 'none'}>"
+        )
 
     @property
     def duration_s(self) -> float:
