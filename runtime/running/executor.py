@@ -14,7 +14,7 @@ from typing import Any
 from ..language.block import Metric
 from ..language.errors import AloftError, ExitCode, RunError
 from ..language.stages import CheckedGraph, ClockSpec
-from .failures import describe
+from .failures import describe, locate
 from .interrupts import Interrupts
 from .life_cycle import LifeCycle, LifeState
 from .memory import BoundGraph
@@ -123,7 +123,7 @@ class Executor:
             finally:
                 end_time = self._time.now()
                 if error is not None:
-                    self._note("fault", str(error), "ERROR")
+                    self._note_error(locate(error))
                 self._note("life", f"stopping: {clock.stop_reason or 'the end'}")
                 self.life.stop(self._pause if self.ticker.pacer is not None else None)
                 problems += self.life.problems
@@ -167,6 +167,12 @@ class Executor:
 
     def _note(self, kind: str, text: str, level: str = "INFO") -> None:
         self.ticker.tell(Note(self.bound.clock.tick, kind, text, level))
+
+    def _note_error(self, error: RunError) -> None:
+        """Note what ended the run: where it was raised, and for machines the whole traceback."""
+        place = f" (at {error.where})" if error.where else ""
+        note = Note(self.bound.clock.tick, "fault", f"{error}{place}", "ERROR", error.to_json())
+        self.ticker.tell(note)
 
     def _ask_for_cautions(self) -> None:
         for path, block in self.bound.blocks.items():

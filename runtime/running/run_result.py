@@ -117,6 +117,7 @@ class RunResult:
             "skipped_periods": self.skipped_periods,
             "metrics": {name: _plain(value) for name, value in self.metrics.items()},
             "blocks": {path: asdict(times) for path, times in self.blocks.items()},
+            "error": None if self.error is None else self.error.to_json(),
             "stop_problems": list(self.stop_problems),
             "cautions": list(self.cautions),
             "warnings": list(self.warnings),
