@@ -15,6 +15,7 @@ from .links import Link, read_link
 from .nodes import Entry, MapNode, Node, ScalarNode, plain, text_of
 from .overrides import Override, Overrides, read_overrides, read_sets
 from .problems import Code, Problems, instead, listing, nearest
+from .rates import wrap_offset
 from .references import Bindings, report_unused
 from .subgraphs import Instance, Resolver
 from .written import WrittenBlock, WrittenGraph, read_graph, wrong_kind
@@ -32,6 +33,8 @@ class _Scope:
     stack: Stack = ()
     rate: Node | None = None
     offset: Node | None = None
+    shifted: bool = False
+    """Whether the offset is said further out than the rate, so that it may exceed a period."""
     sets: tuple[Override, ...] = ()
     wires: Mapping[str, tuple[Link | None, Position, str]] = field(default_factory=dict)
     """Wires that other files give, by ``block.input``: the link, its place and its file."""
@@ -48,6 +51,8 @@ class _Draft:
 
     block: FlatBlock
     links: dict[str, Link | None]
+    shifted: bool = False
+    """Whether the offset is inherited from further out than the rate."""
 
 
 def flatten_file(path: Path, overrides: Overrides, problems: Problems) -> FlatGraph:
@@ -89,7 +94,13 @@ class _Flattener:
                     _merge(graph, _as_entry(command), path.parent)
             self._expand(files, replace(scope, sets=own))
         resolver = Resolver(self.instances, self.problems)
-        blocks = tuple(_finish(draft, resolver) for draft in self.drafts.values())
+        base_rate = graph["rate"][0].value if "rate" in graph else None
+        blocks = tuple(
+            wrap_offset(_finish(draft, resolver), base_rate)
+            if draft.shifted
+            else _finish(draft, resolver)
+            for draft in self.drafts.values()
+        )
 
         def written(key: str) -> Entry | None:
             return graph[key][0] if key in graph else None
@@ -225,6 +236,7 @@ class _Flattener:
         links, places = self._links(block, file, scope, path)
         rate = substitute(block.rate) if block.rate else scope.rate
         offset = substitute(block.offset) if block.offset else scope.offset
+        shifted = block.offset is None and (block.rate is not None or scope.shifted)
         draft = _Draft(
             FlatBlock(
                 path,
@@ -238,13 +250,16 @@ class _Flattener:
                 input_places=places,
             ),
             links,
+            shifted,
         )
         if use is None or not (isinstance(use, ScalarNode) and isinstance(use.value, str)):
             if use is not None:
                 expected = "a block such as blocks.JointPD, module:Class, or a file.yaml"
                 wrong_kind(use, "'use'", expected, self.problems, at=path)
         elif use.value.endswith(_SUFFIXES):
-            self._instance(draft, use, file, replace(scope, rate=rate, offset=offset))
+            self._instance(
+                draft, use, file, replace(scope, rate=rate, offset=offset, shifted=shifted)
+            )
             return
         else:
             draft.block = replace(draft.block, use=use.value, use_where=use.where)

@@ -74,6 +74,10 @@ def test_blocks_names_what_is_alike(call: Call) -> None:
     assert "there is no block called 'blocks.Gian'; the nearest are blocks.Gain" in done.stderr
 
 
+def test_blocks_names_those_of_that_class(call: Call) -> None:
+    assert "the nearest are blocks.Gain" in call("blocks", "Gain", code=2).stderr
+
+
 def test_a_block_beside_the_graph_is_described(folder: Path, call: Call) -> None:
     assert "Counts up from its seed" in call("blocks", "counter:Counter").stdout
 
