@@ -74,6 +74,15 @@ def unit_of(field: RecordedField) -> str:
     return str(field.unit)
 
 
+def unit_of_element(field: RecordedField, robot: RobotDescription | None, element: int) -> str:
+    """The unit of one element of a field, given by its place in C order."""
+    unit = unit_of(field)
+    if robot is None or field.unit or not is_generalised(field) or ", " not in unit:
+        return unit
+    moves = {"floating": 3, "planar": 2, "fixed": 0}[robot.base_joint]
+    return unit.split(", ")[0 if element < moves else 1]
+
+
 def is_generalised(field: RecordedField) -> bool:
     """Whether a field has one element for each of the robot's generalised velocities."""
     return tuple(field.dimensions) == ("n_velocities",)
