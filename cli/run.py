@@ -19,6 +19,7 @@ from .output import (
     errors_reported,
     number,
     print_json,
+    print_place,
     print_warning,
     say,
     table,
@@ -80,6 +81,9 @@ def run(
         bool, typer.Option("--json", help="Tables go to standard error, one JSON object to output.")
     ] = False,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print the verdict only.")] = False,
+    traceback: Annotated[
+        bool, typer.Option("--traceback", help="Print the whole traceback of a block that fails.")
+    ] = False,
 ) -> None:
     """Run a graph; print its metrics and the time each block took; write a recording."""
     from ..runtime.graph import load
@@ -87,7 +91,7 @@ def run(
 
     settings = [*(overrides or []), *([f"duration={duration}"] if duration else [])]
     out = console(to_stderr=as_json, quiet=quiet)
-    with errors_reported(as_json):
+    with errors_reported(as_json, traceback=traceback):
         if seeds and record is not None:
             raise AloftError("--record is for one run; with --seeds nothing is recorded")
         if seeds and rerun is not Live.NONE:
@@ -102,7 +106,10 @@ def run(
             place = None if no_record else record or default
             said: list[str] = []
             viewer = open_viewer(rerun, said)
-            code = run_once(loaded, place, out, as_json, sinks, viewer, keep=keep, said=said)
+            code = run_once(
+                loaded, place, out, as_json, sinks, viewer,
+                keep=keep, said=said, traceback=traceback,
+            )  # fmt: skip
             if viewer is not None:
                 leave_viewer(viewer, wait=not as_json and sys.stdin.isatty())
     raise typer.Exit(code)
@@ -165,6 +172,7 @@ def run_once(
     *,
     keep: int = 0,
     said: Sequence[str] = (),
+    traceback: bool = False,
 ) -> ExitCode:
     """Run the graph, record and show it, and print the result; ``said`` are warnings so far."""
     from ..logs.recording.recorder import Recorder
@@ -197,6 +205,8 @@ def run_once(
         print_json({"graph": name, "overrides": overrides, **about})
     else:
         print_verdict(result)
+        if result.error is not None:
+            print_place(result.error, traceback=traceback)
     return result.exit_code
 
 

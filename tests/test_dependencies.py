@@ -45,7 +45,7 @@ def others_modules(path: Path) -> Iterator[str]:
         elif isinstance(node, ast.ImportFrom) and node.level == 0 and node.module:
             names = [node.module]
         for name in {name.partition(".")[0] for name in names}:
-            if name not in sys.stdlib_module_names and name != "aloft" and name not in near:
+            if name not in sys.stdlib_module_names and name not in ("aloft", "tests", *near):
                 yield name
 
 

@@ -59,6 +59,7 @@ FIRST = {
     "motor torque": ("rise", "take_off_speed", "effort"),
     "motor torque at speed": ("rise", "take_off_speed", "effort"),
     "motor speed": ("rise", "take_off_speed", "effort"),
+    "held joints": ("rise", "take_off_speed", "effort"),
     "friction": ("distance_x", "distance_y", "friction"),
     "footholds": ("distance_x", "distance_y", "twist", "landing_height"),
     "ground clearance": ("foot_clearance", "landing_height"),

@@ -10,6 +10,7 @@ and the joint torques from the other rows. Nothing here shares code with the pla
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -105,25 +106,24 @@ class ExactDynamics:
     def sole_velocities(self, v: Array) -> Array:
         """The velocities of ``sole_places`` in the state that was evaluated last, (n_feet, 3)."""
         pin, axes = self.pin, self.pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
-        found = [
-            pin.getFrameJacobian(self.model, self.data, frame, axes) @ v
-            for frame in self.sole_frames
+        jacobians = [
+            pin.getFrameJacobian(self.model, self.data, frame, axes) for frame in self.sole_frames
         ]
-        rates = np.array([row[:3] for row in found])
+        rates = np.array([jacobian[:3] @ v for jacobian in jacobians])
         for ball in self.balls:
             # The lowest point moves as the centre does, which is above the sole at the zero pose.
             up = self.data.oMf[self.sole_frames[ball.foot]].rotation[:, 2]
-            rates[ball.foot] += ball.radius * np.cross(found[ball.foot][3:], up)
+            turn = jacobians[ball.foot][3:] @ v
+            rates[ball.foot] += ball.radius * np.cross(turn, up)
         return rates
 
     def foot_angles(self) -> tuple[Array, Array]:
         """Heading and pitch of the feet [rad], both (n_feet,), in the state that was evaluated
         last. A ball has none of its own: it has the base's heading and no pitch."""
-        turns = np.array([self.data.oMf[frame].rotation for frame in self.sole_frames])
+        ahead = [self.data.oMf[frame].rotation[:, 0] for frame in self.sole_frames]
         base = self.data.oMi[1].rotation
-        ahead = turns.reshape(-1, 3, 3)[:, :, 0]
-        yaw = np.arctan2(ahead[:, 1], ahead[:, 0])
-        pitch = np.arctan2(-ahead[:, 2], np.hypot(ahead[:, 0], ahead[:, 1]))
+        yaw = np.array([math.atan2(y, x) for x, y, _ in ahead])
+        pitch = np.array([math.atan2(-z, math.hypot(x, y)) for x, y, z in ahead])
         for ball in self.balls:
             yaw[ball.foot], pitch[ball.foot] = np.arctan2(base[1, 0], base[0, 0]), 0.0
         return yaw, pitch

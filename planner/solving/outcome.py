@@ -15,6 +15,7 @@ ADVICE = {
     "motor torque": "ask for a smaller jump, a longer thrust_time or a stronger profile",
     "motor torque at speed": "ask for a smaller jump, a longer thrust_time or a faster profile",
     "motor speed": "ask for a smaller jump, a longer flight or a faster profile",
+    "held joints": "ask for a smaller jump or a longer thrust_time, or let these joints move",
     "friction": "ask for a shorter distance or more friction",
     "ground clearance": "ask for a greater rise or less foot_clearance",
     "leg clearance": "ask for less twist or less leg_clearance",

@@ -19,6 +19,7 @@ from ..problem.layout import Stretch, layout
 from ..problem.problem import Problem, ProblemBuilder
 from ..problem.stage_functions import PIECES, make_coordinates
 from ..problem.unpacking import can_start, knot_times, pack, unpack
+from ..task.errors import PlanError, TaskError
 from ..task.plan import JumpPlan
 from ..task.sequence import PHASES
 from ..task.task import JumpTask, Knots
@@ -58,9 +59,12 @@ def solve_jump(
 
     Raises:
         PlanError: no motion was found; ``family`` names the constraints that could not be met.
-        TaskError: the task names joints or a profile that the robot has not.
+        TaskError: the task names joints that the robot has not.
     """
-    robot, task = task.equipped(robot), task.resolved(robot)
+    try:
+        robot, task = task.equipped(robot), task.resolved(robot)
+    except TaskError as error:
+        raise PlanError(str(error), family="motor torque") from error
     model_of(robot)  # raises what is wrong with the robot itself
     part = welded(robot)
     start = warm_start and for_moving_joints(warm_start, part)

@@ -31,7 +31,7 @@ PLAN_FORMAT = 1
 
 
 class Knots(Parameters):
-    """How many intervals each phase is divided into; about 60 in all is enough for BRUCE."""
+    """How many intervals each phase is divided into; about 60 in all are enough for a small biped."""
 
     squat: int = parameter(8, ge=2, le=200, text="going down")
     thrust: int = parameter(16, ge=4, le=200, text="pushing off")

@@ -78,7 +78,7 @@ def test_a_jump_beyond_the_motors_is_refused_with_a_family() -> None:
     ("change", "message"),
     [
         ({"profile": "petrol"}, "there is koala, relaxed"),
-        ({"initial": {"right_ankle": 0.1}}, "soles are not flat"),
+        ({"initial": {"right_ankle": 0.1}}, "do not lie in one plane"),
     ],
 )
 def test_what_cannot_be_planned_is_named(change: dict[str, Any], message: str) -> None:
