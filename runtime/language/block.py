@@ -143,6 +143,8 @@ class Clock:
     tick: int = 0
     stop_reason: str | None = None
     kind: str = "free"
+    stopped_by: str = ""
+    """The path of the block that asked for the end of the run."""
 
 
 @dataclass(frozen=True)
@@ -341,6 +343,7 @@ class Block:
         """Ask for the run to end after this tick; of several reasons the first is kept."""
         if self.context.clock.stop_reason is None:
             self.context.clock.stop_reason = reason
+            self.context.clock.stopped_by = self.context.path
 
     def setup(self) -> None:
         """Build models and scratch arrays, once, after the ports are bound."""

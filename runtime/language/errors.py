@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from enum import IntEnum
+from typing import Any
 
 
 class ExitCode(IntEnum):
@@ -49,3 +50,12 @@ class RunError(AloftError):
         super().__init__(message)
         self.block = block
         self.tick = tick
+        self.where = ""
+        """``file:line`` of the statement that raised what ended the run, where that is known."""
+        self.traceback = ""
+        """The whole traceback of what ended the run, as Python prints it."""
+
+    def to_json(self) -> dict[str, Any]:
+        """The error as plain data."""
+        names = ("block", "tick", "where", "traceback")
+        return {"message": str(self), **{name: getattr(self, name) for name in names}}

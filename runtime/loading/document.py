@@ -8,6 +8,7 @@ key is a problem, and so is every syntax error.
 
 from __future__ import annotations
 
+import codecs
 import re
 from pathlib import Path
 from typing import Any
@@ -62,16 +63,37 @@ def read_file(
     ``kind_of_file`` holds two texts for messages: the name of such a file and some of its keys.
     """
     try:
-        text = path.read_text(encoding="utf-8")
+        data = path.read_bytes()
+        text = data.decode("utf-8-sig")
     except OSError as error:
         reason = error.strerror or str(error)
         problems.add(Code.FILE, f"cannot read {shown}: {reason}", Position(shown, 0, 0))
         return None
     except UnicodeDecodeError as error:
-        message = f"{shown} is not UTF-8 text (byte {error.start})"
-        problems.add(Code.FILE, message, Position(shown, 0, 0))
+        _report_encoding(data, error, shown, problems)
         return None
     return read_mapping(text, shown, problems, kind_of_file)
+
+
+def _report_encoding(
+    data: bytes, error: UnicodeDecodeError, shown: str, problems: Problems
+) -> None:
+    """Say which encoding a file seems to have, and where it is not UTF-8."""
+    before = data[: error.start]
+    line = before.count(b"\n") + 1
+    column = len(before.rpartition(b"\n")[2].decode("utf-8", "replace")) + 1
+    where, name = Position(shown, line, column), "ISO-8859-1"
+    found = f"byte 0x{data[error.start]:02x}, in Latin-1 {chr(data[error.start])!r}"
+    if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)) or b"\0" in data[:64]:
+        where, name, found = Position(shown, 1, 1), "UTF-16", "UTF-16"
+    problems.add(
+        Code.FILE,
+        f"{shown} is not UTF-8 text",
+        where,
+        expected="text in UTF-8",
+        found=found,
+        fix=f"save it as UTF-8, or: iconv -f {name} -t UTF-8 {shown} > new.yaml",
+    )
 
 
 def read_mapping(

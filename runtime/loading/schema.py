@@ -20,7 +20,7 @@ _REFERENCE: Schema = {"type": "string", "pattern": "^\\$", "description": "a par
 _RATE: Schema = {
     "anyOf": [
         {"type": "number", "exclusiveMinimum": 0},
-        {"type": "string", "pattern": "^[0-9.]+([eE][-+]?[0-9]+)? *k?Hz$"},
+        {"type": "string", "pattern": "^[0-9.]+([eE][-+]?[0-9]+)?( */ *[0-9.]+)? *k?Hz$"},
         _REFERENCE,
     ]
 }

@@ -149,6 +149,7 @@ class WireCheck:
             return
         flat = draft.flat
         meant: dict[str, None] = {}
+        proposed: dict[str, None] = {}
         for name, wire in flat.wires.items():
             port = draft.inputs.get(name)
             if port is None:
@@ -158,7 +159,8 @@ class WireCheck:
         for name, port in draft.inputs.items():
             wired = name in flat.wires or name in flat.excused or name in meant
             if not wired and not port.optional:
-                candidates = self._candidates(draft, port)
+                candidates = self._candidates(draft, port, proposed)
+                proposed.update(dict.fromkeys(candidates[:1]))
                 self.problems.add(
                     Code.UNWIRED_INPUT,
                     f"input {name!r} of {flat.path} is not wired",
@@ -318,17 +320,27 @@ class WireCheck:
             fix=f"{at.rpartition('.')[2]}: {candidates[0]}" if candidates else "",
         )
 
-    def _candidates(self, target: Draft, port: Input[Any]) -> tuple[str, ...]:
-        """Outputs that could feed an input; those with the same type of signal come first."""
+    def _candidates(
+        self, target: Draft, port: Input[Any], proposed: Iterable[str] = ()
+    ) -> tuple[str, ...]:
+        """Outputs that could feed an input; those with the same type of signal come first.
+
+        What feeds another input of the block, or is ``proposed`` for one, is hardly meant twice.
+        """
+        taken = {wire.source: None for wire in target.flat.wires.values()}
+        taken.update(dict.fromkeys(proposed))
         exact: list[str] = []
         other: list[str] = []
         for source in self.drafts.values():
             if source is target:
                 continue
             for name, output in source.outputs.items():
-                if name not in source.absent and fits(output, port, source, target):
+                path = f"{source.flat.path}.{name}"
+                if path in taken or name in source.absent:
+                    continue
+                if fits(output, port, source, target):
                     same = output.signal is port.signal
-                    (exact if same else other).append(f"{source.flat.path}.{name}")
+                    (exact if same else other).append(path)
         return tuple([*exact, *other][:3])
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import unicodedata
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -156,6 +157,14 @@ def _read_include(entry: Entry | None, problems: Problems) -> tuple[ScalarNode, 
     return tuple(files)
 
 
+def _ascii(name: str) -> str:
+    """A name like this one in the letters that names may have; empty where there is none."""
+    for letters, instead_of in (("ae", "ä"), ("oe", "ö"), ("ue", "ü"), ("ss", "ß")):
+        name = name.replace(instead_of, letters)
+    name = unicodedata.normalize("NFKD", name).encode("ascii", "ignore").decode()
+    return name if _NAME.match(name) else ""
+
+
 def _read_block(entry: Entry, problems: Problems) -> WrittenBlock | None:
     name, where = entry.key, entry.key_where
     if name == "inputs" or not _NAME.match(name):
@@ -165,8 +174,9 @@ def _read_block(entry: Entry, problems: Problems) -> WrittenBlock | None:
             if name == "inputs"
             else f"{name!r} cannot name a block",
             where,
-            expected="a letter, then letters, digits and _",
+            expected="a letter from a to z or A to Z, then such letters, digits and _",
             found=name,
+            fix=_ascii(name) if not name.isascii() else "",
         )
         return None
     if not isinstance(entry.value, MapNode):

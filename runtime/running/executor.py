@@ -14,7 +14,7 @@ from typing import Any
 from ..language.block import Metric
 from ..language.errors import AloftError, ExitCode, RunError
 from ..language.stages import CheckedGraph, ClockSpec
-from .failures import describe
+from .failures import describe, locate
 from .interrupts import Interrupts
 from .life_cycle import LifeCycle, LifeState
 from .memory import BoundGraph
@@ -123,7 +123,7 @@ class Executor:
             finally:
                 end_time = self._time.now()
                 if error is not None:
-                    self._note("fault", str(error), "ERROR")
+                    self._note_error(locate(error))
                 self._note("life", f"stopping: {clock.stop_reason or 'the end'}")
                 self.life.stop(self._pause if self.ticker.pacer is not None else None)
                 problems += self.life.problems
@@ -168,6 +168,12 @@ class Executor:
     def _note(self, kind: str, text: str, level: str = "INFO") -> None:
         self.ticker.tell(Note(self.bound.clock.tick, kind, text, level))
 
+    def _note_error(self, error: RunError) -> None:
+        """Note what ended the run: where it was raised, and for machines the whole traceback."""
+        place = f" (at {error.where})" if error.where else ""
+        note = Note(self.bound.clock.tick, "fault", f"{error}{place}", "ERROR", error.to_json())
+        self.ticker.tell(note)
+
     def _ask_for_cautions(self) -> None:
         for path, block in self.bound.blocks.items():
             self._cautions += [f"{path}: {text}" for text in block.cautions()]
@@ -193,6 +199,8 @@ class Executor:
             except Exception as failure:  # noqa: BLE001  # the other blocks' metrics still count
                 problems.append(f"block '{path}' failed in metrics: {describe(failure)}")
         metrics, unmet, praise = merge_metrics(by_block)
+        judges = [path for path, of_block in by_block.items() if of_block.get("reason")]
+        unmet, praise = self._with_stop(unmet, judges), self._with_stop(praise, judges)
         code, reason = self._verdict(error, problems, interrupts, unmet, praise)
         for program in self.ticker.programs:
             program.fold()
@@ -219,6 +227,13 @@ class Executor:
             log=self._log,
             graph=self.bound.graph,
         )
+
+    def _with_stop(self, verdict: str | None, judges: Sequence[str]) -> str | None:
+        """What a score says, with why another block ended the run; a score knows its own reason."""
+        clock = self.bound.clock
+        if verdict is None or not clock.stop_reason or clock.stopped_by in ("", *judges):
+            return verdict
+        return f"{verdict}; block '{clock.stopped_by}' ended the run: {clock.stop_reason}"
 
     def _verdict(
         self,

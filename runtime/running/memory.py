@@ -206,5 +206,6 @@ class BoundGraph:
         self.memory.restore(snapshot)
         self.clock.tick = snapshot.tick
         self.clock.stop_reason = None
+        self.clock.stopped_by = ""
         for block in self.blocks.values():
             block.thaw()

@@ -19,7 +19,7 @@ from .sinks import MemoryLog
 from .timing import BlockTimes
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class RunResult:
     """The outcome of one run.
 
@@ -54,6 +54,14 @@ class RunResult:
     log: MemoryLog | None = None
     graph: CheckedGraph | None = None
     """The graph that ran; ``None`` only in a result made by hand."""
+
+    def __repr__(self) -> str:
+        outcome = "success" if self.success else "no success"
+        logged = f", {len(self.log.ticks)} ticks logged" if self.log is not None else ""
+        return (
+            f"<RunResult: {outcome}: {self.reason}; {self.ticks} ticks, {self.duration_s:.6g} s"
+            f"{logged}, {len(self.metrics)} metrics, hash {self.run_hash or 'none'}>"
+        )
 
     @property
     def duration_s(self) -> float:
@@ -109,6 +117,7 @@ class RunResult:
             "skipped_periods": self.skipped_periods,
             "metrics": {name: _plain(value) for name, value in self.metrics.items()},
             "blocks": {path: asdict(times) for path, times in self.blocks.items()},
+            "error": None if self.error is None else self.error.to_json(),
             "stop_problems": list(self.stop_problems),
             "cautions": list(self.cautions),
             "warnings": list(self.warnings),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from hashlib import blake2b
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -100,6 +100,11 @@ class MemoryLog:
 
     def close(self) -> None:
         """Nothing to do."""
+
+    def __getstate__(self) -> dict[str, Any]:
+        """What was recorded, without the views of memory that only a run needs."""
+        kept = {"_expected": None, "_chunks": [self.rows()], "_used": len(self.ticks)}
+        return {**kept, "ticks": self.ticks, "notes": self.notes, "layout": self.layout}
 
     def rows(self) -> NDArray[np.uint8]:
         """All recorded ticks, (ticks, bytes)."""
