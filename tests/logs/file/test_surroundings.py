@@ -6,7 +6,8 @@ from pathlib import Path
 
 from aloft.logs.file.header import header_of, machine
 from aloft.logs.file.surroundings import other_files, project_state
-from aloft.runtime.language.block import Block, Output, Parameters, parameter
+from aloft.runtime.language.block import Block, Output
+from aloft.runtime.language.parameters import Parameters, parameter
 from aloft.runtime.language.signals import Field, Signal
 from aloft.runtime.running.memory import BoundGraph
 from aloft.runtime.testing.graphs import Use, checked_graph
