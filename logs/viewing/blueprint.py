@@ -42,9 +42,7 @@ def recording_blueprint(
     )
     below = rrb.Tabs(
         states_view(header, shown),
-        rrb.TextLogView(
-            origin="/", contents=[f"{run.root}{EVENTS}" for run in shown], name="Events"
-        ),
+        events_view(shown),
         active_tab=0,
     )
     left = rrb.Vertical(scene_view(header, shown), below, row_shares=[3, 2]) if ports else below
@@ -54,6 +52,25 @@ def recording_blueprint(
         rrb.TimePanel(state="collapsed", timeline="t", **panel),
         rrb.SelectionPanel(state="collapsed"),
         rrb.BlueprintPanel(state="collapsed"),
+    )
+
+
+def events_view(shown: Sequence[Shown]) -> Any:
+    """What happened, with the time at full width: no column says where the text is kept."""
+    import rerun.blueprint as rrb
+    from rerun.blueprint.encodings import TextLogColumn, TextLogColumnKind, TimelineColumn
+
+    return rrb.TextLogView(
+        origin="/",
+        contents=[f"{run.root}{EVENTS}" for run in shown],
+        name="Events",
+        columns=rrb.TextLogColumns(
+            timeline_columns=[TimelineColumn("t"), TimelineColumn("tick", visible=False)],
+            text_log_columns=[
+                TextLogColumn(TextLogColumnKind.LogLevel),
+                TextLogColumn(TextLogColumnKind.Body),
+            ],
+        ),
     )
 
 

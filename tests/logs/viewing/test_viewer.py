@@ -5,6 +5,7 @@ import subprocess
 import time
 from pathlib import Path
 from typing import Any
+from urllib.request import urlopen
 
 import pytest
 
@@ -12,6 +13,7 @@ from aloft import load
 from aloft.logs.file.reader import read
 from aloft.logs.recording.comparison import write_comparison
 from aloft.logs.recording.recorder import Recorder
+from aloft.logs.viewing.page_server import OUTSIDE, policy
 from aloft.logs.viewing.viewer import ViewerError, find_program, free_ports, start_viewer
 
 from .browser import PROGRAM, Browser
@@ -97,8 +99,33 @@ def test_a_browser_shows_the_recording(recording: Path, tmp_path: Path) -> None:
                 picture = browser.picture()
             (tmp_path / "page.png").write_bytes(picture)
             assert len(picture) >= 60_000, "the page shows nothing"
+            asked = "performance.getEntriesByType('resource').map(entry => entry.name).join(' ')"
+            answer = browser.ask("Runtime.evaluate", expression=asked)
+            addresses = answer["result"]["value"].split()
+            assert any("re_viewer" in address for address in addresses)
+            outside = [a for a in addresses if not a.startswith("http://127.0.0.1:")]
+            assert outside == [], "the page calls other machines"
+            tried = "fetch('https://example.com').then(() => 'gone out', error => 'refused')"
+            answer = browser.ask("Runtime.evaluate", expression=tried, awaitPromise=True)
+            assert answer["result"]["value"] == "refused"
     finally:
         viewer.stop()
+
+
+def test_the_page_has_no_links_to_other_machines() -> None:
+    viewer = start_viewer("web")
+    try:
+        with urlopen(viewer.page) as answer:
+            page, found = answer.read(), answer.headers["Content-Security-Policy"]
+        assert b"<script" in page and not OUTSIDE.search(page)
+        assert found == policy(viewer.port) and "https:" not in found
+        environment = Path(f"/proc/{viewer.process.pid}/environ").read_bytes().split(b"\0")
+        assert b"CI=1" in environment, "Rerun sends no usage statistics then"
+        server = viewer.page_server
+        assert server is not None and server.poll() is None
+    finally:
+        viewer.stop()
+    assert server.poll() is not None
 
 
 def test_the_viewer_listens_on_the_loopback_only() -> None:
