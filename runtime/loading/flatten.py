@@ -11,12 +11,15 @@ from ..language.stages import Position
 from .document import read_file, read_mapping
 from .files import FileTree, Stack
 from .flat import FlatBlock, FlatGraph, FlatWire
+from .graph_keys import as_entry, is_graph_key, merge
+from .kinds_of_files import is_another_kind
 from .links import Link, read_link
 from .nodes import Entry, MapNode, Node, ScalarNode, plain, text_of
 from .overrides import Override, Overrides, read_overrides, read_sets
 from .problems import Code, Problems, instead, listing, nearest
 from .rates import wrap_offset
 from .references import Bindings, report_unused
+from .shipped import addresses_like
 from .subgraphs import Instance, Resolver
 from .written import WrittenBlock, WrittenGraph, read_graph, wrong_kind
 
@@ -57,6 +60,16 @@ class _Draft:
 
 def flatten_file(path: Path, overrides: Overrides, problems: Problems) -> FlatGraph:
     """The flat graph of a file; what is wrong is reported to ``problems`` and left out."""
+    similar = () if path.exists() else addresses_like(path)
+    if similar:
+        problems.add(
+            Code.FILE,
+            f"cannot read {path}: no such file",
+            Position(str(path), 0, 0),
+            nearest=similar,
+            fix=f"{similar[0]}, which is shipped; 'aloft graphs' lists all",
+        )
+        return _Flattener(problems).run(path, None, overrides)
     return _Flattener(problems).run(path, read_file(path, str(path), problems), overrides)
 
 
@@ -77,6 +90,8 @@ class _Flattener:
         commands = read_overrides(overrides, self.problems)
         graph: dict[str, tuple[Entry, Path]] = {}
         empty = False
+        if tree is not None and is_another_kind(tree, shown, self.problems):
+            tree = None
         if tree is None:
             self.files.incomplete = True
         if tree is not None:
@@ -85,13 +100,13 @@ class _Flattener:
             files = self.files.gather(root, scope.stack)
             empty = not any(_has_blocks(file) for file in files)
             names = [block.name for file in files for block in file.blocks]
-            own = tuple(o for o in commands if not _is_graph_key(o, names))
+            own = tuple(o for o in commands if not is_graph_key(o, names))
             for file in files:
                 for entry in file.graph:
-                    _merge(graph, entry, file.folder)
+                    merge(graph, entry, file.folder)
             for command in commands:
-                if _is_graph_key(command, names):
-                    _merge(graph, _as_entry(command), path.parent)
+                if is_graph_key(command, names):
+                    merge(graph, as_entry(command), path.parent)
             self._expand(files, replace(scope, sets=own))
         resolver = Resolver(self.instances, self.problems)
         base_rate = graph["rate"][0].value if "rate" in graph else None
@@ -378,30 +393,3 @@ def _has_blocks(file: WrittenGraph) -> bool:
     """Whether anything is written under ``blocks``, even if it is wrong."""
     entry = file.tree.get("blocks")
     return entry is not None and bool(plain(entry.value))
-
-
-def _is_graph_key(override: Override, names: Iterable[str]) -> bool:
-    """Whether an override sets a key of the graph itself, such as ``rate`` or ``clock.kind``."""
-    if not override.block:
-        return True
-    return override.block in ("clock", "dimensions") and override.block not in names
-
-
-def _as_entry(override: Override) -> Entry:
-    path = (override.block, *override.path) if override.block else override.path
-    if len(path) == 1:
-        return Entry(path[0], override.where, override.value)
-    value = MapNode((), override.where).assign(path[1:], override.value, override.where)
-    return Entry(path[0], override.where, value)
-
-
-def _merge(graph: dict[str, tuple[Entry, Path]], entry: Entry, folder: Path) -> None:
-    """Let a later entry win; mappings are merged key by key."""
-    old = graph.get(entry.key)
-    if old is not None and isinstance(entry.value, MapNode):
-        merged = old[0].value
-        if isinstance(merged, MapNode):
-            for item in entry.value:
-                merged = merged.assign((item.key,), item.value, item.key_where)
-            entry = replace(entry, value=merged)
-    graph[entry.key] = (entry, folder)

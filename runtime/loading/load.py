@@ -10,6 +10,7 @@ from .flat import FlatGraph
 from .flatten import flatten_file, flatten_text
 from .overrides import Overrides
 from .problems import LoadError, Problems, Report
+from .shipped import graph_path
 
 
 def load(path: str | Path, overrides: Overrides = ()) -> CheckedGraph:
@@ -23,7 +24,7 @@ def load(path: str | Path, overrides: Overrides = ()) -> CheckedGraph:
         LoadError: the graph is wrong; the error carries the report of all problems.
     """
     problems = Problems()
-    graph = examine(flatten_file(Path(path), overrides, problems), problems)
+    graph = examine(flatten_file(graph_path(path), overrides, problems), problems)
     return _result(graph, problems, str(path))
 
 
@@ -41,7 +42,7 @@ def load_text(text: str, path: str | Path, overrides: Overrides = ()) -> Checked
 def check(path: str | Path, overrides: Overrides = ()) -> Report:
     """The report on a graph file; ``ok`` when it may run."""
     problems = Problems()
-    examine(flatten_file(Path(path), overrides, problems), problems)
+    examine(flatten_file(graph_path(path), overrides, problems), problems)
     return problems.report(str(path))
 
 
@@ -52,7 +53,7 @@ def flatten(path: str | Path, overrides: Overrides = ()) -> FlatGraph:
         LoadError: some file cannot be read or expanded. Wires and values are not checked here.
     """
     problems = Problems()
-    graph = flatten_file(Path(path), overrides, problems)
+    graph = flatten_file(graph_path(path), overrides, problems)
     if len(problems):
         raise LoadError(problems.report(str(path)))
     return graph

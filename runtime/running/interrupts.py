@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import threading
+from contextlib import suppress
 from types import FrameType, TracebackType
 from typing import Any, Self
 
 from ..language.block import Clock
 from .life_cycle import LifeCycle
+
+_SAID = b"\nstopping after this tick, the robot in damping; Ctrl-C again ends a block that hangs\n"
 
 
 class Interrupts:
@@ -48,6 +52,9 @@ class Interrupts:
             self.received = signal.Signals(number)
             if self._clock.stop_reason is None:
                 self._clock.stop_reason = f"stopped by {self.received.name}"
+            if self.received is signal.SIGINT:
+                with suppress(OSError, ValueError):
+                    os.write(2, _SAID)
         elif self.armed or self._life.guarding:
             self.armed = self._life.guarding = False
             raise KeyboardInterrupt

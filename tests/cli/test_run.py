@@ -230,7 +230,6 @@ def test_a_block_that_raises_is_placed_in_the_users_file(
     notes = call_json("log", "info", data["recording"])["notes"]
     (fault,) = [note for note in notes if note["kind"] == "fault"]
     assert fault["text"].endswith(f"IndexError: list index out of range (at {place})")
-    assert "in look_up" in json.dumps(fault["data"])
     short = call("run", "count.yaml", "--no-record", code=3).stderr
     assert f"raised at {place}" in short
     assert "Traceback" not in short
