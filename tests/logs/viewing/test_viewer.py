@@ -7,7 +7,9 @@ from pathlib import Path
 from typing import Any
 from urllib.request import urlopen
 
+import numpy as np
 import pytest
+from PIL import Image
 
 from aloft import load
 from aloft.logs.file.reader import read
@@ -65,6 +67,47 @@ def test_the_viewer_finds_no_fault(recording: Path, tmp_path: Path) -> None:
         assert picture.stat().st_size > 40_000  # an empty one has a tenth of that
     finally:
         viewer.stop()
+
+
+@pytest.mark.long
+@needs_vulkan
+def test_the_ground_is_drawn_and_forces_are_zero_in_flight(tmp_path: Path) -> None:
+    """What a picture of a jump onto a step must show, counted in pixels of the colours drawn."""
+    from rerun.experimental import ViewerClient
+
+    recording, picture = tmp_path / "up.rrd", tmp_path / "up.png"
+    graph = load(ROOT / "graphs" / "up_5cm.yaml")
+    graph.run(sinks=[Recorder(recording)], log=False)
+    run = read(recording)
+    force = run["robot.truth.contact_force"]
+    flight = np.flatnonzero(~(force != 0.0).any(axis=(1, 2)) & (run.time > 0.5))
+    viewer = start_viewer("headless", [recording], size="1600x900")
+    try:
+        client = ViewerClient.connect(viewer.source)
+        check_views(client, len(run.ticks))
+        client.set_time("t", duration=float(run.time[flight].mean()), play_state="paused")
+        time.sleep(3.0)
+        client.save_screenshot(str(picture))
+    finally:
+        viewer.stop()
+    pixels = np.asarray(Image.open(picture).convert("RGB")).astype(int)
+    scene, plots = pixels[60:530, :635], pixels[:, 645:]
+    assert near(scene, (141, 146, 153), 45).sum() > 2000, "the step is there"
+    assert near(scene, (229, 57, 53), 40).sum() == 0, "no force arrow in flight"
+    view = plots[365:590, 475:]  # the plot of the forces on the feet
+    lines = near(view, (38, 198, 218), 40) | near(view, (255, 167, 38), 40)
+    lines = lines[:, 25:]  # without the numbers of the axis
+    rows = np.array([np.flatnonzero(column)[-1] if column.any() else -1 for column in lines.T])
+    ends = run.time[flight[[0, -1]]] / run.time[-1] * len(rows)
+    within = rows[int(ends[0]) + 6 : int(ends[1]) - 6]
+    within = within[within >= 0]
+    assert len(within) > 20 and np.ptp(within) <= 2, "the curve is flat in flight"
+    assert within.max() >= rows.max() - 1, "and lies on zero, below everything else"
+
+
+def near(pixels: Any, color: tuple[int, int, int], most: int) -> Any:
+    """Which pixels differ from a colour by no more than ``most`` in each part."""
+    return (np.abs(pixels - np.array(color)) <= most).all(axis=-1)
 
 
 def check_views(client: Any, ticks: int) -> None:
