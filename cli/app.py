@@ -25,7 +25,7 @@ Exit codes:
 """
 
 VERBS = (
-    "run", "view", "replay", "check", "graph", "blocks", "plan", "bench", "study", "test", "params",
+    "run", "view", "replay", "check", "graph", "graphs", "blocks", "plan", "bench", "study", "test", "params",
     "log", "robot",
 )  # fmt: skip
 """All verbs, in the order of the help. The file of each has its name, and so has what it offers:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
@@ -52,7 +53,10 @@ def export(
     csv: Annotated[bool, typer.Option("--csv", help="Comma-separated values.")] = False,
     parquet: Annotated[bool, typer.Option("--parquet", help="Apache Parquet.")] = False,
     mcap: Annotated[
-        bool, typer.Option("--mcap", help="MCAP with JSON; needs pip install 'aloft[mcap]'.")
+        bool,
+        typer.Option(
+            "--mcap", help="MCAP for Foxglove, PlotJuggler; needs pip install 'aloft[mcap]'."
+        ),
     ] = False,
     signal: Annotated[
         list[str] | None,
@@ -64,7 +68,7 @@ def export(
     as_json: AsJson = False,
 ) -> None:
     """Write the signals of a recording, every number exact, into a file of another format."""
-    from ..logs.file.export import EXPORTS
+    from ..logs.exporting.export import EXPORTS
 
     with errors_reported(as_json):
         kinds = [k for k, on in (("csv", csv), ("parquet", parquet), ("mcap", mcap)) if on]
@@ -82,6 +86,44 @@ def export(
         print_json({"success": True, "file": str(target), "ticks": len(run.ticks)})
     else:
         say(console(), f"{len(run.ticks)} ticks in {target}")
+
+
+@log.command("compare")
+def compare(
+    first: File,
+    second: Annotated[Path, typer.Argument(help="The recording to compare it with.")],
+    align: Annotated[
+        Literal["lift-off", "start"] | None,
+        typer.Option(help="What the runs have in common; by default lift-off, if both have one."),
+    ] = None,
+    most: Annotated[int, typer.Option("--most", min=1, help="How many signals to show.")] = 20,
+    as_json: AsJson = False,
+) -> None:
+    """Align two runs and print which signals differ most, where, and by how much."""
+    from ..logs.exporting.difference import compare_runs
+
+    with errors_reported(as_json):
+        found = compare_runs(read(first), read(second), align)
+    if as_json:
+        print_json({"success": True, **asdict(found)})
+        return
+    out = console()
+    if not found.signals:
+        say(out, f"all {found.equal} signals are equal in {found.ticks} ticks")
+    else:
+        rows = [
+            (d.signal, d.element, f"{d.largest:.4g} {d.unit}".strip(), f"{d.at:+.3f} s",
+             f"{d.rms:.3g}", "was constant" if d.share is None else f"{d.share:.1%}")
+            for d in found.signals[:most]
+        ]  # fmt: skip
+        columns = ("signal", "element", ">largest", ">at", ">rms", ">of its range")
+        title = f"{first} and {second}, aligned at {found.align}"
+        out.print(table(title, columns, rows))
+        say(out, f"{found.equal} signals are equal and {len(found.signals)} differ; "
+            f"{found.ticks} ticks were compared")  # fmt: skip
+    for name, names in ((first, found.only_first), (second, found.only_second)):
+        if names:
+            say(out, f"only {name} has {len(names)} signals: {', '.join(names[:5])}")
 
 
 @log.command("repair")

@@ -19,6 +19,7 @@ from .output import (
     errors_reported,
     number,
     print_json,
+    print_place,
     print_warning,
     say,
     table,
@@ -77,6 +78,9 @@ def run(
         bool, typer.Option("--json", help="Tables go to standard error, one JSON object to output.")
     ] = False,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print the verdict only.")] = False,
+    traceback: Annotated[
+        bool, typer.Option("--traceback", help="Print the whole traceback of a block that fails.")
+    ] = False,
 ) -> None:
     """Run a graph; print its metrics and the time each block took; write a recording."""
     from ..runtime.graph import load
@@ -84,7 +88,7 @@ def run(
 
     settings = [*(overrides or []), *([f"duration={duration}"] if duration else [])]
     out = console(to_stderr=as_json, quiet=quiet)
-    with errors_reported(as_json):
+    with errors_reported(as_json, traceback=traceback):
         if seeds and record is not None:
             raise AloftError("--record is for one run; with --seeds nothing is recorded")
         if seeds and rerun is not Live.NONE:
@@ -98,7 +102,7 @@ def run(
             sinks = [endpoint] if endpoint is not None else []
             place = None if no_record else record or default
             viewer = open_viewer(rerun)
-            code = run_once(loaded, place, out, as_json, sinks, viewer)
+            code = run_once(loaded, place, out, as_json, sinks, viewer, traceback=traceback)
             if viewer is not None:
                 leave_viewer(viewer, wait=not as_json and sys.stdin.isatty())
     raise typer.Exit(code)
@@ -156,6 +160,8 @@ def run_once(
     as_json: bool,
     sinks: Sequence[Sink] = (),
     viewer: Viewer | None = None,
+    *,
+    traceback: bool = False,
 ) -> ExitCode:
     """Run the graph, record and show it, and print the result."""
     from ..logs.recording.recorder import Recorder
@@ -183,6 +189,8 @@ def run_once(
         print_json({"graph": name, "overrides": overrides, **result.to_json(), "recording": shown})
     else:
         print_verdict(result)
+        if result.error is not None:
+            print_place(result.error, traceback=traceback)
     return result.exit_code
 
 

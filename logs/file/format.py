@@ -18,9 +18,10 @@ output and a field. All but the static ones are on the timelines ``t`` (exact na
                      tick k ran, from which a run can go on
 ``notes``            ``aloft:note``: JSON of a ``Note``: life cycle, overruns, faults, parameter
                      changes, dropped ticks
-``states/B/P/F``     each change of a number whose values have names, and of a truth value, for
-                     the viewer; of several truth values each is in ``states/B/P/F/<its name>``
+``states/NAME``      each change of a number whose values have names, and of a truth value, for
+                     the viewer; ``state_lanes.all_lanes`` chooses the short names
 ``limits/B/P/F``     the limits of a field by the robot's description, for the viewer
+``plots``            what is computed for plots only, for the viewer: see ``foot_forces``
 ``events``           notes, changes of state, lift-off and touchdown as text, for the viewer
 ``world``            the robot in 3D, for the viewer; see ``scene``
 ``times``            the time each block took, as text, for the viewer; written last
@@ -52,6 +53,7 @@ FORMAT = 2
 """The number of this format; a reader refuses any other."""
 SIGNALS, STATES, KEYFRAMES, NOTES, EVENTS = "signals", "states", "keyframes", "notes", "events"
 LIMITS, TIMES, WORLD, GRAPH = "limits", "times", "world", "graph"
+PLOTS = "plots"
 RECORDED = "recorded"
 EXACT, BUS, STATE, NOTE, SPAN = "exact", "bus", "state", "note", "span"
 

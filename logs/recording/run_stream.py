@@ -34,7 +34,7 @@ from ..viewing.scene import Scene
 from ..viewing.scene_part import Colors
 from ..viewing.scene_ports import scene_ports
 from ..viewing.signal_names import axis_colors, element_names
-from ..viewing.state_lanes import LaneReader, lanes_of
+from ..viewing.state_lanes import LaneReader, all_lanes
 
 LIMIT_COLOR = 0x9E9E9EB0
 
@@ -76,7 +76,8 @@ class RunStream:
             if not field.constant and (most is None or np.prod(field.shape) <= most)
         ]
         self._changed = {field.name: ChangedRows() for field in self._fields if changes_only}
-        lanes = [lane for field in self._fields for lane in lanes_of(field, header.robot)]
+        names = {field.name for field in self._fields}
+        lanes = [lane for lane in all_lanes(header) if lane.field.name in names]
         self._lanes, self._reader = lanes, LaneReader(lanes)
         self._limits = [
             (field, limits) for field in self._fields if (limits := limits_of(field, header))

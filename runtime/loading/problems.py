@@ -65,7 +65,7 @@ _UNREADABLE = (Code.YAML, Code.UNKNOWN_REFERENCE)
 
 @dataclass(frozen=True)
 class Problem:
-    """One mistake: what, where, both ends, what would be right, and how to get there."""
+    """One mistake: what is wrong, where (both ends of a wire), what was expected, and the fix."""
 
     code: Code
     message: str
@@ -78,7 +78,7 @@ class Problem:
     expected: str = ""
     found: str = ""
     nearest: tuple[str, ...] = ()
-    """Legal names like the one found, the likeliest first."""
+    """Legal names that resemble the one found, the most similar first."""
     fix: str = ""
 
     def lines(self) -> list[tuple[str, str]]:
@@ -174,7 +174,7 @@ class Report:
 
 
 class LoadError(AloftError):
-    """A graph that may not run; its text is the whole report."""
+    """A graph has problems and cannot run; the text of the error is the whole report."""
 
     exit_code = ExitCode.BAD_INPUT
 
@@ -184,22 +184,22 @@ class LoadError(AloftError):
 
 
 class Problems:
-    """Collects problems while a graph is loaded; the same one is kept once."""
+    """Collects problems while a graph is loaded; a problem that is noted twice is kept once."""
 
     def __init__(self) -> None:
         self._found: dict[Problem, None] = {}
 
     def add(self, code: Code, message: str, where: Position, **details: Any) -> None:
-        """Note a problem; ``details`` are the further fields of ``Problem``."""
+        """Note a problem; ``details`` are the other fields of ``Problem``."""
         self._found.setdefault(Problem(code, message, where, **details))
 
     def __len__(self) -> int:
         return len(self._found)
 
     def report(self, file: str) -> Report:
-        """Everything noted so far, sorted by position; ties as they were found.
+        """All problems so far, sorted by position; those at one position in the order of finding.
 
-        What is wrong at a place that could not even be read follows from that, and is left out.
+        Where a place has a syntax error, its other problems follow from that and are left out.
         """
         unread = {p.where: p for p in self._found if p.code in _UNREADABLE}
         kept = [p for p in self._found if unread.get(p.where, p) is p]
@@ -207,7 +207,7 @@ class Problems:
 
 
 def nearest(name: str, legal: Iterable[str], count: int = 3) -> tuple[str, ...]:
-    """The legal names most like ``name``, the likeliest first; none if nothing is alike."""
+    """The legal names most similar to ``name``, the most similar first; empty if none is."""
     names = list(dict.fromkeys(legal))
     lowered: dict[str, str] = {}
     for candidate in names:
@@ -217,7 +217,7 @@ def nearest(name: str, legal: Iterable[str], count: int = 3) -> tuple[str, ...]:
 
 
 def instead(key: str, value: str, where: Position, right: str) -> str:
-    """What to paste for a misspelt key: the override again, or the key with its value."""
+    """The fix to paste for a misspelt key: the corrected override, or the key with its value."""
     if not where.line:
         start, dot, rest = where.file.rpartition(f".{key}")
         return f"{start}.{right}{rest}" if dot else where.file
@@ -225,7 +225,7 @@ def instead(key: str, value: str, where: Position, right: str) -> str:
 
 
 def listing(names: Iterable[str], limit: int = 12) -> str:
-    """Names in one line, cut off where there are many."""
+    """Names in one line, cut off after ``limit`` names."""
     all_names = list(names)
     shown = ", ".join(all_names[:limit])
     if len(all_names) > limit:

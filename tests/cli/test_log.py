@@ -76,12 +76,30 @@ def test_mcap(recorded: Path, call: Call) -> None:
     with open("count.mcap", "rb") as file:
         for schema, channel, message in make_reader(file).iter_messages():
             assert schema is not None and schema.encoding == "jsonschema"
+            assert channel.topic != "/log" or schema.name == "foxglove.Log"
             found.setdefault(channel.topic, []).append((message.log_time, json.loads(message.data)))
     name = next(iter(run.signals()))
     port, _, field = name.rpartition(".")
     messages = found[port.replace(".", "/")]
     assert [values[field] for _, values in messages] == run[name].tolist()
     assert [instant for instant, _ in messages] == [k * 10_000_000 for k in range(100)]
+
+
+def test_a_run_is_compared_with_itself_and_another(
+    recorded: Path, call: Call, call_json: CallJson
+) -> None:
+    said = call("log", "compare", "count.rrd", "count.rrd").stdout
+    assert "signals are equal in 100 ticks" in said
+    found = call_json("log", "compare", "count.rrd", "count.rrd")
+    assert found["align"] == "start" and found["signals"] == [] and found["equal"] >= 1
+    problem = call_json(
+        "log", "compare", "count.rrd", "count.rrd", "--align", "lift-off", code=2
+    )  # fmt: skip
+    assert problem["reason"] == "count.rrd has no lift-off; compare with --align start"
+    assert (
+        "none.rrd cannot be read"
+        in call_json("log", "compare", "count.rrd", "none.rrd", code=2)["reason"]
+    )
 
 
 def test_without_mcap_it_says_what_to_install(

@@ -10,6 +10,7 @@ from typing import Any
 
 import pytest
 
+import aloft
 import aloft.benchmarks
 import aloft.runtime.loading
 
@@ -72,6 +73,25 @@ def test_blocks_lists_and_describes(call: Call, call_json: CallJson) -> None:
 def test_blocks_names_what_is_alike(call: Call) -> None:
     done = call("blocks", "blocks.Gian", code=2)
     assert "there is no block called 'blocks.Gian'; the nearest are blocks.Gain" in done.stderr
+
+
+def test_shipped_graphs_have_addresses(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, call: Call, call_json: CallJson
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    listed = {row["graph"]: row for row in call_json("graphs")["graphs"]}
+    assert {"aloft:jump", "aloft:push", "aloft:robots/go2_jump"} <= set(listed)
+    assert all(row["summary"] for row in listed.values())
+    assert "aloft:jump" in call("graphs").stdout
+    assert "no problems" in call("check", "aloft:jump").stdout
+    assert aloft.load("aloft:jump").checked.name == "jump"
+    for wrong in ("jump.yaml", "graphs/jump.yaml", "aloft:jmp"):
+        (problem,) = call_json("run", wrong, code=2)["problems"]
+        assert problem["fix"].startswith("aloft:jump, which is shipped")
+
+
+def test_blocks_names_those_of_that_class(call: Call) -> None:
+    assert "the nearest are blocks.Gain" in call("blocks", "Gain", code=2).stderr
 
 
 def test_a_block_beside_the_graph_is_described(folder: Path, call: Call) -> None:
