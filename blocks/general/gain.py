@@ -25,7 +25,7 @@ class Gain(Block):
         self.on_parameters()
 
     def on_parameters(self) -> None:
-        """As an array, so that no tick makes one."""
+        """Keep the factor as an array, so that no tick allocates one."""
         self._gain = np.array(self.params.gain)
 
     def step(self) -> None:

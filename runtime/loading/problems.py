@@ -60,6 +60,9 @@ class Code(StrEnum):
     OVERRIDE = "override"
 
 
+MOST_SHOWN = 20
+"""Problems of one kind that are printed."""
+
 _UNREADABLE = (Code.YAML, Code.UNKNOWN_REFERENCE)
 
 
@@ -142,9 +145,25 @@ class Report:
         count = len(self.problems)
         return f"{self.file}: {count or 'no'} problem{'s' if count != 1 else ''}"
 
+    def shown(self) -> tuple[list[Problem], list[str]]:
+        """The problems to print, the first ``MOST_SHOWN`` of each kind, and a line on the others."""
+        counts: dict[Code, int] = {}
+        kept = []
+        for problem in self.problems:
+            counts[problem.code] = counts.get(problem.code, 0) + 1
+            if counts[problem.code] <= MOST_SHOWN:
+                kept.append(problem)
+        more = [
+            f"{count - MOST_SHOWN} more problems of the kind {code}; --json has all of them"
+            for code, count in counts.items()
+            if count > MOST_SHOWN
+        ]
+        return kept, more
+
     def text(self) -> str:
-        """The whole report as plain text."""
-        return "\n\n".join([*(p.text() for p in self.problems), self.headline()])
+        """The report as plain text; of very many problems of one kind the first ones."""
+        kept, more = self.shown()
+        return "\n\n".join([*(p.text() for p in kept), *more, self.headline()])
 
     def rich(self) -> Text:
         """The whole report for a terminal, in colour."""
@@ -152,7 +171,8 @@ class Report:
 
         styles = {"expected": "green", "found": "red", "nearest": "cyan", "fix": "bold green"}
         out = Text()
-        for problem in self.problems:
+        kept, more = self.shown()
+        for problem in kept:
             out.append(f"{problem.where}: ", "bold")
             out.append(f"{problem.code}: ", "bold red")
             out.append(f"{problem.message}\n")
@@ -160,6 +180,8 @@ class Report:
                 out.append(f"    {label:<9}  ", "dim")
                 out.append(f"{text}\n", styles.get(label, ""))
             out.append("\n")
+        for line in more:
+            out.append(f"{line}\n\n")
         out.append(self.headline(), "bold green" if self.ok else "bold red")
         return out
 
