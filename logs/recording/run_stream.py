@@ -14,7 +14,6 @@ from ...runtime.running.notes import Note
 from ..file.changed_rows import ChangedRows
 from ..file.format import (
     EVENTS,
-    EXACT,
     GRAPH,
     LIMITS,
     NOTE,
@@ -187,10 +186,7 @@ class RunStream:
     ) -> None:
         import rerun as rr
 
-        columns = list(rr.Scalars.columns(scalars=flat.astype(np.float64, copy=False)))
-        if field.dtype == "int64":
-            exact = rr.DynamicArchetype.columns("aloft", components={EXACT: flat.reshape(-1)})
-            columns += list(exact.partition(np.full(len(flat), flat.shape[1])))
+        columns = rr.Scalars.columns(scalars=flat.astype(np.float64, copy=False))
         self.stream.send_columns(self._entity(SIGNALS, field), self._times(ticks), columns)
 
     def _write_limits(self, batch: RecordedRows) -> None:

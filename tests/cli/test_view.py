@@ -31,7 +31,7 @@ def test_a_comparison_of_what_is_no_recording(tmp_path: Path) -> None:
     path = tmp_path / "a.rrd"
     path.write_text("nothing")
     code, text = view(path, "--with", path, "--save", tmp_path / "both.rrd", "--no-show")
-    assert code == 2 and "cannot be read" in text
+    assert code == 2 and "is not a recording: it does not begin like" in text
 
 
 def test_two_runs_become_one_file(tmp_path: Path) -> None:
