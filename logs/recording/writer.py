@@ -119,8 +119,9 @@ class RecordingWriter:
     def _write_packed(self, first: int, rows: NDArray[np.uint8]) -> None:
         import rerun as rr
 
-        packed = np.frombuffer(pack(first, rows), np.uint8)
-        column = rr.DynamicArchetype.columns("aloft", components={PACKED: packed})
+        packed = pack(first, rows)
+        # as an Arrow array: Rerun would make a Python object of each byte of a NumPy array
+        column = rr.DynamicArchetype.columns("aloft", components={PACKED: _bytes(packed)})
         times = time_columns(self.header, np.array([first]))
         self._stream.send_columns(ROWS, times, list(column.partition([len(packed)])))
         self._put(Content.ROWS, first, first + len(rows) - 1)
@@ -141,10 +142,9 @@ class RecordingWriter:
 
         columns = []
         for name, data in ((BUS, snapshot.bus), (STATE, snapshot.state)):
-            flat = np.frombuffer(data, np.uint8)
-            if len(flat):
-                column = rr.DynamicArchetype.columns("aloft", components={name: flat})
-                columns += list(column.partition([len(flat)]))
+            if data:
+                column = rr.DynamicArchetype.columns("aloft", components={name: _bytes(data)})
+                columns += list(column.partition([len(data)]))
         times = time_columns(self.header, np.array([snapshot.tick]))
         self._stream.send_columns(KEYFRAMES, times, columns)
         self._put(Content.KEYFRAME, snapshot.tick, snapshot.tick)
@@ -223,6 +223,13 @@ class RecordingWriter:
         finally:
             self._stream.disconnect()
             self.place.close()
+
+
+def _bytes(data: bytes) -> Any:
+    """An Arrow array of bytes that shares their memory."""
+    import pyarrow as pa
+
+    return pa.Array.from_buffers(pa.uint8(), len(data), [None, pa.py_buffer(data)])
 
 
 def warm_up() -> None:
