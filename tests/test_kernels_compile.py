@@ -153,6 +153,15 @@ UNUSED = {
     "aloft.mathematics.pid.step_pid": (
         GAINS, POSE[0], POSE[2], POSE[3], PidMemory(*np.ones((3, 3))), np.zeros(3),
     ),
+    "aloft.mathematics.lookup.interval": (np.linspace(-1.0, 1.0, 9), 0, 9, 0.3),
+    "aloft.mathematics.lookup.interpolate": (np.linspace(-1.0, 1.0, 4), POSE[:, 2], 0.3, True),
+    "aloft.mathematics.lookup.interpolate_grid": (
+        np.array([0.0, 1.0, 2.0, 4.0]), np.array([2, 2]), POSE[1], np.array([0.3, 5.0]), False,
+        np.zeros(2, np.int64), np.zeros(2),
+    ),
+    "aloft.mathematics.transfer_function.advance": (
+        POSE[1:], POSE[0], TARGET[0], 0.5, POSE[:, 0], TARGET, np.zeros(3), np.zeros(4),
+    ),
     "aloft.mathematics.whole_body_qp.share_weight": (
         np.array([True, False, True, True]), 50.0, np.zeros((4, 3)),
     ),
