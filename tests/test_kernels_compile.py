@@ -162,6 +162,8 @@ UNUSED = {
     "aloft.mathematics.transfer_function.advance": (
         POSE[1:], POSE[0], TARGET[0], 0.5, POSE[:, 0], TARGET, np.zeros(3), np.zeros(4),
     ),
+    "aloft.mathematics.euler_angles.from_euler": (POSE[1], np.zeros(4)),
+    "aloft.mathematics.euler_angles.to_euler": (np.array([0.1, 0.2, 0.3, 0.92]), np.zeros(3)),
     "aloft.mathematics.whole_body_qp.share_weight": (
         np.array([True, False, True, True]), 50.0, np.zeros((4, 3)),
     ),

@@ -11,7 +11,7 @@ from .vector import Vector
 
 
 class Gain(Block):
-    """The input times a constant: y[i] = gain u[i], or gain[i] u[i] with one gain an element.
+    """The input times a constant: y = gain u. There may be one gain for each element.
 
     ``MatrixGain`` multiplies by a matrix.
     """
