@@ -1,1 +1,1 @@
-"""The blocks that ship with aloft: what computes. One block, one file."""
+"""The blocks that ship with aloft, each in a file of its own."""

@@ -1,5 +1,5 @@
 """The command line, ``aloft VERB``. Every verb has a file; heavy imports are inside the verbs only."""
 
-from .app import app, main
+from .app import main, make_app
 
-__all__ = ["app", "main"]
+__all__ = ["main", "make_app"]

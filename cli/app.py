@@ -4,26 +4,15 @@ from __future__ import annotations
 
 import sys
 import traceback
+from collections.abc import Iterable
+from importlib import import_module
 from typing import Annotated, Any, cast
 
 import typer
 
 from .. import __version__
 from ..runtime.language.errors import ExitCode
-from .bench import bench
-from .blocks import blocks
-from .check import check
-from .graph import graph
-from .log import log
 from .output import print_json
-from .params import params
-from .plan import plan
-from .replay import replay
-from .robot import robot
-from .run import run
-from .study import study
-from .test import test
-from .view import view
 
 EXIT_CODES = """\b
 Exit codes:
@@ -35,19 +24,37 @@ Exit codes:
   143  stopped cleanly by SIGTERM
 """
 
-app = typer.Typer(
-    name="aloft",
-    help="Run, check and look at graphs of blocks.",
-    epilog=EXIT_CODES,
-    no_args_is_help=True,
-    pretty_exceptions_enable=False,
-    rich_markup_mode=None,
-)
-for _verb in (run, view, replay, check, graph, blocks, plan, bench, study, test):
-    app.command(epilog=EXIT_CODES if _verb is run else None)(_verb)
-app.add_typer(params)
-app.add_typer(log)
-app.add_typer(robot)
+VERBS = (
+    "run", "view", "replay", "check", "graph", "graphs", "blocks", "plan", "bench", "study", "test", "params",
+    "log", "robot",
+)  # fmt: skip
+"""All verbs, in the order of the help. The file of each has its name, and so has what it offers:
+a command, or a group of commands."""
+
+
+def make_app(verbs: Iterable[str] = VERBS) -> typer.Typer:
+    """The command line with those verbs; the files of others are not imported."""
+    app = typer.Typer(
+        name="aloft",
+        help="Run, check and look at graphs of blocks.",
+        epilog=EXIT_CODES,
+        no_args_is_help=True,
+        pretty_exceptions_enable=False,
+        rich_markup_mode=None,
+    )
+    for verb in verbs:
+        offered = getattr(import_module(f".{verb}", __package__), verb)
+        if isinstance(offered, typer.Typer):
+            app.add_typer(offered)
+        else:
+            app.command(epilog=EXIT_CODES if verb == "run" else None)(offered)
+    app.callback()(_options)
+    return app
+
+
+def asked_for(arguments: list[str]) -> tuple[str, ...]:
+    """The verb that a command line begins with, or all of them where it begins otherwise."""
+    return (arguments[0],) if arguments and arguments[0] in VERBS else VERBS
 
 
 def _print_version(wanted: bool) -> None:
@@ -56,7 +63,6 @@ def _print_version(wanted: bool) -> None:
         raise typer.Exit
 
 
-@app.callback()
 def _options(
     version: Annotated[
         bool,
@@ -73,7 +79,7 @@ def main() -> None:
     # typer exports only the most special of the errors that a wrong command line raises
     usage_error = cast("type[Exception]", typer.BadParameter.__bases__[0])
     try:
-        code = app(standalone_mode=False)
+        code = make_app(asked_for(sys.argv[1:]))(standalone_mode=False)
     except usage_error as caught:
         error: Any = caught
         if "--json" in sys.argv:

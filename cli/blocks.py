@@ -45,14 +45,13 @@ def reference(name: str) -> BlockReference:
     """The contract of one block. Raises ``UnknownBlockError`` with the names that are alike."""
     from ..runtime.language.errors import UnknownBlockError
     from ..runtime.language.reference import block_reference
-    from ..runtime.language.registry import find_block, known_names
-    from ..runtime.loading.problems import nearest
+    from ..runtime.language.registry import find_block, nearest_names
 
     here = Path.cwd()  # where a block of the user's may lie
     try:
         return block_reference(name, find_block(name, here))
     except UnknownBlockError as error:
-        similar = ", ".join(nearest(name, known_names()))
+        similar = ", ".join(nearest_names(name, here))
         hint = f"; the nearest are {similar}" if similar else "; 'aloft blocks' lists all"
         raise UnknownBlockError(f"{error}{hint}") from error
 

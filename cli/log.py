@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from ..runtime.language.errors import AloftError
-from .output import console, errors_reported, number, print_json, say, table
+from ..runtime.language.errors import AloftError, ExitCode
+from .output import console, errors_reported, number, print_json, print_warning, say, table
 
 if TYPE_CHECKING:
     from ..logs.file.reader import RecordedRun
@@ -28,13 +29,17 @@ AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
 def info(file: File, as_json: AsJson = False) -> None:
     """Print what ran, its outcome, and every signal with its unit."""
     with errors_reported(as_json):
-        run = read(file)
+        run = read(file, damaged=True)
         about = summary(run)
     if as_json:
-        print_json({"success": True, **about})
-        return
+        print_json({"success": not run.damage, **about})
+        raise typer.Exit(ExitCode.NOT_SUCCESSFUL if run.damage else ExitCode.SUCCESS)
     out = console()
-    rows = [(key, plain(value)) for key, value in about.items() if key not in ("signals", "notes")]
+    rows = [
+        (key, plain(value))
+        for key, value in about.items()
+        if key not in ("signals", "notes", "damage")
+    ]
     out.print(table(str(file), ("", ""), rows))
     fields = [
         (s["name"], s["dtype"], plain(s["shape"]), s["unit"] or "", s["frame"] or "", s["text"])
@@ -44,6 +49,10 @@ def info(file: File, as_json: AsJson = False) -> None:
     out.print(table("signals", columns, fields))
     notes = [(str(note["tick"]), note["level"], note["text"]) for note in about["notes"]]
     out.print(table("what happened", (">tick", "", "note"), notes))
+    for each in run.damage:
+        print_warning(f"{file} is damaged: {each}")
+    if run.damage:
+        raise typer.Exit(ExitCode.NOT_SUCCESSFUL)
 
 
 @log.command("export")
@@ -52,7 +61,10 @@ def export(
     csv: Annotated[bool, typer.Option("--csv", help="Comma-separated values.")] = False,
     parquet: Annotated[bool, typer.Option("--parquet", help="Apache Parquet.")] = False,
     mcap: Annotated[
-        bool, typer.Option("--mcap", help="MCAP with JSON; needs pip install 'aloft[mcap]'.")
+        bool,
+        typer.Option(
+            "--mcap", help="MCAP for Foxglove, PlotJuggler; needs pip install 'aloft[mcap]'."
+        ),
     ] = False,
     signal: Annotated[
         list[str] | None,
@@ -64,7 +76,7 @@ def export(
     as_json: AsJson = False,
 ) -> None:
     """Write the signals of a recording, every number exact, into a file of another format."""
-    from ..logs.file.export import EXPORTS
+    from ..logs.exporting.export import EXPORTS
 
     with errors_reported(as_json):
         kinds = [k for k, on in (("csv", csv), ("parquet", parquet), ("mcap", mcap)) if on]
@@ -84,44 +96,95 @@ def export(
         say(console(), f"{len(run.ticks)} ticks in {target}")
 
 
+@log.command("compare")
+def compare(
+    first: File,
+    second: Annotated[Path, typer.Argument(help="The recording to compare it with.")],
+    align: Annotated[
+        Literal["lift-off", "start"] | None,
+        typer.Option(help="What the runs have in common; by default lift-off, if both have one."),
+    ] = None,
+    most: Annotated[int, typer.Option("--most", min=1, help="How many signals to show.")] = 20,
+    as_json: AsJson = False,
+) -> None:
+    """Align two runs and print which signals differ most, where, and by how much."""
+    from ..logs.exporting.difference import compare_runs
+
+    with errors_reported(as_json):
+        found = compare_runs(read(first), read(second), align)
+    if as_json:
+        print_json({"success": True, **asdict(found)})
+        return
+    out = console()
+    if not found.signals:
+        say(out, f"all {found.equal} signals are equal in {found.ticks} ticks")
+    else:
+        rows = [
+            (d.signal, d.element, f"{d.largest:.4g} {d.unit}".strip(), f"{d.at:+.3f} s",
+             f"{d.rms:.3g}", "was constant" if d.share is None else f"{d.share:.1%}")
+            for d in found.signals[:most]
+        ]  # fmt: skip
+        columns = ("signal", "element", ">largest", ">at", ">rms", ">of its range")
+        title = f"{first} and {second}, aligned at {found.align}"
+        out.print(table(title, columns, rows))
+        say(out, f"{found.equal} signals are equal and {len(found.signals)} differ; "
+            f"{found.ticks} ticks were compared")  # fmt: skip
+    for name, names in ((first, found.only_first), (second, found.only_second)):
+        if names:
+            say(out, f"only {name} has {len(names)} signals: {', '.join(names[:5])}")
+
+
 @log.command("repair")
 def repair(file: File, as_json: AsJson = False) -> None:
-    """Repair a recording that was cut off, in place: the incomplete part at its end is removed."""
+    """Repair a recording in place: what was cut off or is damaged is taken out, the rest is kept."""
     from ..logs.file.repair import repair as mend
-    from ..logs.recording.tail_repair import take_in_tail
+    from ..logs.recording.place import is_being_written, whole_of
 
     with errors_reported(as_json):
         try:
+            if is_being_written(file):
+                raise AloftError(f"{file} is being written just now; wait for the end of the run")
             done = mend(file)
-            taken_in = 0 if done.closed else take_in_tail(file)
+            name = whole_of(file)
+            if name is not None and not name.exists():
+                file = file.rename(name)
         except OSError as error:
             raise AloftError(f"{file} cannot be mended: {error.strerror or error}") from None
         run = read(file)
     ticks = run.ticks
     last = int(ticks[-1]) if len(ticks) else None
     if as_json:
-        found = {"closed": done.closed, "removed_bytes": done.removed, "messages": done.messages}
-        found["ticks_from_tail"] = taken_in
+        found: dict[str, Any] = {
+            "closed": done.closed,
+            "removed_bytes": done.removed,
+            "messages": done.messages,
+        }
+        found |= {"damage": [str(each) for each in done.damage], "file": str(file)}
         print_json({"success": True, **found, "ticks": len(ticks), "last_tick": last})
         return
-    if done.closed:
+    if done.was_whole:
         say(console(), f"{file} is whole: nothing was done")
         return
-    cut = f"{done.removed} bytes of an incomplete message were removed" if done.removed else (
-        "no message was incomplete, nothing was removed"
+    for each in done.damage:
+        say(console(), f"damage was taken out: {each}")
+    cut = "" if done.closed or done.damage else (
+        "it was not closed by who wrote it, and what came after is lost; "
     )  # fmt: skip
-    if taken_in:
-        cut += f"; {taken_in} ticks were taken in from {file}.tail"
     kept = f"{len(ticks)} ticks are kept, the last is {last}" if len(ticks) else "no tick is kept"
-    say(console(), f"{file} was not closed by who wrote it; {cut}. {kept}; what came after is lost")
+    say(console(), f"{file} is mended: {cut}{kept}")
 
 
-def read(file: Path) -> RecordedRun:
+def read(file: Path, *, damaged: bool = False) -> RecordedRun:
     """The recording. Raises ``AloftError`` if it cannot be read."""
     from ..logs.file import reader
+    from ..logs.recording.place import part_of
 
     try:
-        return reader.read(file)
+        return reader.read(file, damaged=damaged)
+    except FileNotFoundError:
+        part = part_of(file)
+        also = f"; {part} is there: it is being written, or was cut off" if part.exists() else ""
+        raise AloftError(f"{file} cannot be read: there is no such file{also}") from None
     except OSError as error:
         raise AloftError(f"{file} cannot be read: {error.strerror or error}") from None
 
@@ -132,7 +195,9 @@ def summary(run: RecordedRun) -> dict[str, Any]:
     duration = len(ticks) / header.base_rate
     return {
         "graph": header.name,
-        "whole": outcome is not None,
+        "whole": run.whole,
+        "checksums": run.scan.sealed,
+        "damage": [str(each) for each in run.damage],
         "outcome": outcome["reason"] if outcome else None,
         "run_hash": outcome["run_hash"] if outcome else None,
         "ticks": len(ticks),
@@ -140,6 +205,7 @@ def summary(run: RecordedRun) -> dict[str, Any]:
         "base_rate_hz": header.base_rate,
         "clock": header.clock,
         "dropped_ticks": run.dropped_ticks,
+        "missing_ticks": run.missing_ticks,
         "keyframes": len(run.keyframes),
         "parameter_changes": len(run.parameter_changes),
         "size_bytes": run.path.stat().st_size,

@@ -95,8 +95,16 @@ def print_warning(message: str) -> None:
     typer.echo(message, err=True)
 
 
+def print_place(error: RunError, *, traceback: bool) -> None:
+    """Print, on standard error, where a block failed: the line, or the whole traceback."""
+    if traceback and error.traceback:
+        typer.echo(error.traceback, err=True)
+    elif error.where:
+        typer.echo(f"  raised at {error.where}; --traceback shows how it came there", err=True)
+
+
 @contextmanager
-def errors_reported(as_json: bool) -> Iterator[None]:
+def errors_reported(as_json: bool, *, traceback: bool = False) -> Iterator[None]:
     """Turn what aloft raises on purpose into a message and the exit code that belongs to it."""
     try:
         yield
@@ -111,10 +119,10 @@ def errors_reported(as_json: bool) -> Iterator[None]:
     except AloftError as error:
         code = ExitCode.RUN_FAILED if isinstance(error, RunError) else ExitCode.BAD_INPUT
         if as_json:
-            details = (
-                {"block": error.block, "tick": error.tick} if isinstance(error, RunError) else {}
-            )
+            details = error.to_json() if isinstance(error, RunError) else {}
             print_json({"success": False, "reason": str(error), **details})
         else:
             print_error(str(error))
+            if traceback and isinstance(error, RunError):
+                print_place(error, traceback=True)
         raise typer.Exit(code) from error

@@ -19,6 +19,7 @@ from .output import (
     errors_reported,
     number,
     print_json,
+    print_place,
     print_warning,
     say,
     table,
@@ -65,6 +66,9 @@ def run(
     rerun: Annotated[
         Live, typer.Option(help="Show the run while it goes on: in a window, in a browser.")
     ] = Live.NONE,
+    keep: Annotated[
+        int, typer.Option(min=0, help="How many earlier recordings of that name are kept.")
+    ] = 0,
     no_record: Annotated[bool, typer.Option("--no-record", help="Write no recording.")] = False,
     params: Annotated[
         str,
@@ -77,6 +81,9 @@ def run(
         bool, typer.Option("--json", help="Tables go to standard error, one JSON object to output.")
     ] = False,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print the verdict only.")] = False,
+    traceback: Annotated[
+        bool, typer.Option("--traceback", help="Print the whole traceback of a block that fails.")
+    ] = False,
 ) -> None:
     """Run a graph; print its metrics and the time each block took; write a recording."""
     from ..runtime.graph import load
@@ -84,7 +91,7 @@ def run(
 
     settings = [*(overrides or []), *([f"duration={duration}"] if duration else [])]
     out = console(to_stderr=as_json, quiet=quiet)
-    with errors_reported(as_json):
+    with errors_reported(as_json, traceback=traceback):
         if seeds and record is not None:
             raise AloftError("--record is for one run; with --seeds nothing is recorded")
         if seeds and rerun is not Live.NONE:
@@ -97,15 +104,20 @@ def run(
             endpoint = open_endpoint(loaded, params)
             sinks = [endpoint] if endpoint is not None else []
             place = None if no_record else record or default
-            viewer = open_viewer(rerun)
-            code = run_once(loaded, place, out, as_json, sinks, viewer)
+            said: list[str] = []
+            viewer = open_viewer(rerun, said)
+            code = run_once(
+                loaded, place, out, as_json, sinks, viewer,
+                keep=keep, said=said, traceback=traceback,
+            )  # fmt: skip
             if viewer is not None:
                 leave_viewer(viewer, wait=not as_json and sys.stdin.isatty())
     raise typer.Exit(code)
 
 
-def open_viewer(live: Live) -> Viewer | None:
-    """Open the viewer that shows the run. Without a viewer the run is not shown."""
+def open_viewer(live: Live, said: list[str]) -> Viewer | None:
+    """Open the viewer that shows the run. Without a viewer the run is not shown, and ``said`` gets
+    the reason."""
     from ..logs.viewing.viewer import ViewerError, start_viewer
     from .view import open_page
 
@@ -114,7 +126,8 @@ def open_viewer(live: Live) -> Viewer | None:
     try:
         viewer = start_viewer("web" if live is Live.WEB else "window")
     except ViewerError as error:
-        print_warning(f"the run is not shown: {error}")
+        said.append(f"the run is not shown: {error}")
+        print_warning(said[-1])
         return None
     if live is Live.WEB:
         typer.echo(f"live view: {viewer.page}", err=True)
@@ -156,8 +169,12 @@ def run_once(
     as_json: bool,
     sinks: Sequence[Sink] = (),
     viewer: Viewer | None = None,
+    *,
+    keep: int = 0,
+    said: Sequence[str] = (),
+    traceback: bool = False,
 ) -> ExitCode:
-    """Run the graph, record and show it, and print the result."""
+    """Run the graph, record and show it, and print the result; ``said`` are warnings so far."""
     from ..logs.recording.recorder import Recorder
     from .progress import TickCounter, progress_bar
     from .view import how_to_view
@@ -166,23 +183,30 @@ def run_once(
     recorder = None
     if record is not None or viewer is not None:
         live = viewer.source if viewer is not None else ""
-        recorder = Recorder(record, live=live, on_warning=print_warning)
+        recorder = Recorder(record, keep=keep, live=live, on_warning=print_warning)
     with progress_bar(out, f"running {name}", graph.checked.ticks) as (progress, task):
         counter = TickCounter(progress, task)
         recorders = [recorder] if recorder is not None else []
         result = graph.run(sinks=[*recorders, counter, *sinks], log=False)
     recording = recorder.recording if recorder is not None else None
     print_result(out, name, result)
-    if recording is not None:
-        say(out, f"recording: {recording}; to see it: {how_to_view(recording)}")
+    if recorder is not None and recording is not None:
+        missing = f" ({recorder.missing} ticks are not in it)" if recorder.missing else ""
+        say(out, f"recording: {recording}{missing}; to see it: {how_to_view(recording)}")
+        if recorder.before:
+            say(out, recorder.before)
     for problem in (*result.cautions, *result.stop_problems):
         print_warning(problem)
     if as_json:
         shown = str(recording) if recording else None
         overrides = dict(graph.checked.overrides)
-        print_json({"graph": name, "overrides": overrides, **result.to_json(), "recording": shown})
+        warnings = [*said, *result.warnings]
+        about = {**result.to_json(), "warnings": warnings, "recording": shown}
+        print_json({"graph": name, "overrides": overrides, **about})
     else:
         print_verdict(result)
+        if result.error is not None:
+            print_place(result.error, traceback=traceback)
     return result.exit_code
 
 

@@ -1,9 +1,11 @@
-"""Writes the README's table of tasks from a study's summary.
+"""Writes a page's table of tasks from a study's summary; the page is the README unless it is named.
 
 ::
 
     aloft study graphs/studies/tasks.yaml
     python docs/refresh_tasks.py results/tasks/summary.json
+    aloft study graphs/studies/robots.yaml
+    python docs/refresh_tasks.py results/robots/summary.json docs/robots_results.md
 """
 
 from __future__ import annotations
@@ -30,6 +32,6 @@ def tasks_table(summary: dict[str, object]) -> str:
 
 
 if __name__ == "__main__":
-    readme = ROOT / "README.md"
+    page = Path(sys.argv[2]) if len(sys.argv) > 2 else ROOT / "README.md"
     table = tasks_table(json.loads(Path(sys.argv[1]).read_text()))
-    readme.write_text(TABLE.sub(rf"\g<1>{table}\g<2>", readme.read_text()))
+    page.write_text(TABLE.sub(rf"\g<1>{table}\g<2>", page.read_text()))

@@ -1,1 +1,1 @@
-"""What touches the world: the robot interface and the simulator."""
+"""Everything that touches the world: the robot interface, the simulator, drivers, their twins."""

@@ -1,4 +1,4 @@
-"""What every robot is to a graph, simulated or real."""
+"""The interface between a graph and a robot, simulated or real."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ class Robot(Block, ABC):
     * ``write`` sends ``command`` to the drives.
     * ``advance`` lets the time to the next tick pass. A simulator computes it. A robot that drives
       the clock waits for the next cycle of its bus. One that the runtime paces returns at once.
-    * ``damp`` is one cycle of coming to rest: it puts all drives into damping, whatever was
-      commanded, and lets one period pass. The runtime calls it at least five times at the end of
+    * ``damp`` is one stop cycle: it puts all drives into damping, whatever was commanded, and lets
+      one period pass. The runtime calls it at least five times at the end of
       every run, also after an exception, a signal or the loss of a machine. It must therefore not
       depend on anything that may have failed.
 
@@ -68,11 +68,11 @@ class Robot(Block, ABC):
         return absent
 
     def emit(self) -> None:
-        """Publish the sensors."""
+        """Publish the sensors' readings."""
         self.read()
 
     def update(self) -> None:
-        """Take the command and live on to the next tick."""
+        """Take the command and let the time to the next tick pass."""
         self.write()
         self.advance()
 
@@ -81,7 +81,7 @@ class Robot(Block, ABC):
         self.open()
 
     def stop_cycle(self) -> None:
-        """Come to rest."""
+        """Put all drives into damping for one cycle."""
         self.damp()
 
     @abstractmethod

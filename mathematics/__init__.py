@@ -1,1 +1,1 @@
-"""Pure functions over arrays that blocks share: rotations, polynomials, filters, programs; no blocks."""
+"""Pure functions over arrays that blocks share: rotations, polynomials, filters, programs."""

@@ -2,9 +2,10 @@
 
 An element is a unit quaternion x, y, z, w from body to world and m vectors (m, 3) [world]:
 velocity, position and contact points. As a matrix it is [[R, V], [0, I]] with the vectors as the
-columns of V, so the product turns the right element's vectors by the left one's orientation and
-adds. A tangent vector (3 + 3 m) is a rotation vector [rad], then one rate for each vector; as a
-matrix [[phi]x, Xi], zeros below. Nothing here allocates.
+columns of V. So a product rotates the vectors of the right element by the orientation of the left
+one and adds the vectors of the left one. A tangent vector (3 + 3 m) is a rotation vector phi [rad]
+followed by one rate Xi_k for each vector; as a matrix it is [[phi]x, Xi] with zeros below. No
+function here allocates memory.
 """
 
 from __future__ import annotations
@@ -22,14 +23,15 @@ from .rotations import multiply, normalise, rotate
 Array = NDArray[np.float64]
 
 _SMALL = 1e-4
-"""Below this angle [rad] the coefficients come from their series, which is then exact."""
+"""Below this angle [rad] the coefficients are computed by their series, which is exact there."""
 
 
 @kernel
 def bend(phi: Array, vector: Array, out: Array) -> None:
-    """The left Jacobian of SO(3) at ``phi`` times a vector: what it becomes while being turned.
+    """Multiply a vector by the left Jacobian J of SO(3) at ``phi``: ``out`` = J v, (3,).
 
-    J v = v + (1 - cos a) / a^2 phi x v + (a - sin a) / a^3 phi x (phi x v), with a the angle.
+    J v = v + (1 - cos a) / a^2 phi x v + (a - sin a) / a^3 phi x (phi x v), with the angle
+    a = |phi|. J v is the integral of v while it is rotated by phi at a constant rate.
     """
     x, y, z = float(phi[0]), float(phi[1]), float(phi[2])
     a, b, c = float(vector[0]), float(vector[1]), float(vector[2])
@@ -48,7 +50,7 @@ def bend(phi: Array, vector: Array, out: Array) -> None:
 
 @kernel
 def unbend(phi: Array, vector: Array, out: Array) -> None:
-    """The inverse of ``bend``, for angles below 2 pi.
+    """Multiply a vector by the inverse of the left Jacobian of SO(3), for angles below 2 pi.
 
     J^-1 v = v - phi x v / 2 + (1 / a^2 - (1 + cos a) / (2 a sin a)) phi x (phi x v).
     """
@@ -70,7 +72,10 @@ def unbend(phi: Array, vector: Array, out: Array) -> None:
 
 @kernel
 def exponential(tangent: Array, orientation: Array, vectors: Array) -> None:
-    """The group element of a tangent vector, written to ``orientation`` and ``vectors``."""
+    """The exponential map: the group element of a tangent vector (3 + 3 m).
+
+    The result is written to ``orientation`` (4,) and ``vectors`` (m, 3).
+    """
     rotation_exponential(tangent, orientation)
     for k in range(vectors.shape[0]):
         bend(tangent, tangent[3 * k + 3 : 3 * k + 6], vectors[k])
@@ -78,7 +83,7 @@ def exponential(tangent: Array, orientation: Array, vectors: Array) -> None:
 
 @kernel
 def logarithm(orientation: Array, vectors: Array, tangent: Array) -> None:
-    """The tangent vector of a group element, its rotation at most pi."""
+    """The logarithm: the tangent vector (3 + 3 m) of a group element; its angle is at most pi."""
     rotation_logarithm(orientation, tangent)
     for k in range(vectors.shape[0]):
         unbend(tangent, vectors[k], tangent[3 * k + 3 : 3 * k + 6])
@@ -92,7 +97,7 @@ def divide(
     """``left`` times the inverse of ``right``: the right-invariant error of ``left``.
 
     Args:
-        orientation, vectors: the result; none of the arguments.
+        orientation, vectors: the result; they must not be arrays of the arguments.
         spare: scratch (4,).
     """
     for i in range(3):
@@ -107,7 +112,7 @@ def divide(
 
 @kernel
 def retract(tangent: Array, orientation: Array, vectors: Array, turn: Array, spare: Array) -> None:
-    """The element becomes exp(``tangent``) times itself: a correction expressed in the world.
+    """Replace the element X by exp(``tangent``) X: a correction that is expressed in the world.
 
     Args:
         turn, spare: scratch, (4,) and (3,).

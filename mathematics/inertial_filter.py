@@ -1,8 +1,9 @@
 """The mathematics of the state estimator as pure functions: propagation and corrections.
 
 Orientations are quaternions x, y, z, w from body to world and are changed in place. Points are
-the contact points seen from the base [m, body frame], their rates what they would have if the
-base only turned [m/s, body frame]. Nothing here allocates.
+the positions of the contact points relative to the base [m, body frame]. Their rates are the
+velocities they would have if the base only rotated [m/s, body frame]. No function here allocates
+memory.
 """
 
 from __future__ import annotations
@@ -33,16 +34,17 @@ def propagate(
     middle: Array,
     acceleration: Array,
 ) -> None:
-    """One period of inertial navigation.
+    """Integrate the inertial measurements over one period T.
 
-    The angular velocity is taken to be linear between its samples and the specific force is the
-    mean over the period, turned by the orientation in the middle of it:
+    The angular velocity is assumed to be linear between its samples, and the specific force f to be
+    its mean over the period. f is rotated by the orientation R_mid in the middle of the period:
     v += (R_mid f + g) T, p += v T + (R_mid f + g) T^2 / 2.
 
     Args:
-        last_rate, rate: angular velocity at the beginning and the end [rad/s, body]; the first
-            becomes the mean.
-        middle, acceleration: scratch, (4,) and (3,); the second is the world acceleration after.
+        last_rate, rate: angular velocity at the beginning and the end [rad/s, body], (3,) each;
+            ``last_rate`` is overwritten by the mean of both.
+        middle, acceleration: scratch, (4,) and (3,); ``acceleration`` holds the acceleration
+            [m/s^2, world] afterwards.
     """
     for i in range(3):
         last_rate[i] = 0.5 * (float(last_rate[i]) + float(rate[i]))
@@ -58,7 +60,10 @@ def propagate(
 
 @kernel
 def turn(orientation: Array, x: float, y: float, z: float) -> None:
-    """Turn by a small rotation vector [rad, world], to second order and normalised."""
+    """Rotate an orientation by a small rotation vector [rad, world], to second order.
+
+    The quaternion is normalised afterwards.
+    """
     qx, qy, qz, qw = (
         float(orientation[0]),
         float(orientation[1]),
@@ -76,9 +81,10 @@ def turn(orientation: Array, x: float, y: float, z: float) -> None:
 
 @kernel
 def right_up(orientation: Array, specific_force: Array, gain: float, up: Array) -> None:
-    """Turn a share ``gain`` of the way to where the specific force points straight up.
+    """Correct the tilt of an orientation by the specific force, which should point straight up.
 
     Args:
+        gain: the share, 0 to 1, of the angle between the specific force and up that is corrected.
         up: scratch (3,).
     """
     rotate(orientation, specific_force, up)
@@ -91,7 +97,7 @@ def right_up(orientation: Array, specific_force: Array, gain: float, up: Array) 
 
 @kernel
 def upright(specific_force: Array, orientation: Array) -> None:
-    """The orientation without heading in which the specific force points straight up."""
+    """The orientation, with no rotation about the vertical, whose specific force points upwards."""
     x, y, z = float(specific_force[0]), float(specific_force[1]), float(specific_force[2])
     size = math.sqrt(x * x + y * y + z * z)
     orientation[0] = orientation[1] = orientation[2] = 0.0
@@ -109,10 +115,11 @@ def upright(specific_force: Array, orientation: Array) -> None:
 def misalignment(
     orientation: Array, points: Array, forward: Array, out: Array, place: Array
 ) -> bool:
-    """The turn (3,) [rad, world] that brings all points to one height and ``forward`` to x.
+    """The rotation (3,) [rad, world] that brings all points to one height and ``forward`` to x.
 
-    A small turn (a, b) about the world's x and y changes the height of a point at (x, y) from the middle
-    by a y - b x; least squares over the points. False, and zero, while they are in one line.
+    A small rotation (a, b) about the world's x and y axes changes the height of a point at (x, y)
+    relative to the points' mean by a y - b x; a and b are the least-squares solution over all
+    points. Where the points lie in one line the function returns False and the rotation is zero.
 
     Args:
         forward: the direction the feet point [body].
@@ -143,10 +150,11 @@ def misalignment(
 
 @kernel
 def weigh(world_rates: Array, active: Flags, velocity: Array, gate: float, weights: Array) -> float:
-    """How far to trust that each active point stands still; returns the largest weight.
+    """Weigh each active point by how likely it stands still; returns the largest weight.
 
-    The point's velocity is ``velocity`` plus its world rate. Its weight falls from one as
-    1 / (1 + (speed / gate)^2)^2: noise passes, a slipping or lifting point does not.
+    A point's velocity is ``velocity`` plus its rate [m/s, world]. Its weight is
+    1 / (1 + (speed / gate)^2)^2, which is near one for noise and small for a point that slips or
+    lifts off.
     """
     largest = 0.0
     for i in range(weights.shape[0]):
@@ -162,11 +170,12 @@ def weigh(world_rates: Array, active: Flags, velocity: Array, gate: float, weigh
 
 
 class StandingPoints(NamedTuple):
-    """Contact points, turned to the world.
+    """The contact points in world coordinates.
 
-    ``places`` from the base's origin and their ``rates`` as the base turns and the joints move [m,
-    m/s], (n, 3); which are ``active`` and with what ``weights``, (n,); the ``anchors`` where they stand
-    [m, world], (n, 3), and which have one, ``anchored`` (n,).
+    ``places`` (n, 3) are their positions relative to the base's origin [m], and ``rates`` (n, 3)
+    their velocities [m/s] due to the base's rotation and the joints' motion. ``active`` (n,) says
+    which are in contact, and ``weights`` (n,) how far each is trusted. ``anchors`` (n, 3) are the
+    positions where they stand [m, world], and ``anchored`` (n,) says which points have one.
     """
 
     places: Array
@@ -187,10 +196,11 @@ def stand_on(
 ) -> None:
     """Correct velocity and position by the points that stand still.
 
-    Every active point is anchored where it was first seen active. If it stands still, the base
-    moves with minus its rate and is at its anchor minus its place; the weighted means of these
-    corrections are applied with the gains. What a point is not trusted with, it drags its anchor
-    along, so a foot that has slipped is anchored where it came to rest.
+    Every active point has an anchor, at first the position at which it became active. If the point
+    stands still, the base's velocity is minus the point's rate, and its position is the anchor
+    minus the point's place. The weighted means of these two corrections are applied with the gains.
+    A point of low weight moves its anchor with it, so the anchor of a foot that has slipped is
+    where the foot came to rest.
     """
     active, weights = points.active, points.weights
     anchors, anchored = points.anchors, points.anchored

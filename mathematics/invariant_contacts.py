@@ -1,10 +1,12 @@
-"""Contact points in the state of an invariant filter: how they come, go and are measured.
+"""Contact points in the state of an invariant filter: adding, removing and measuring them.
 
-The error's order is rotation, velocity, position, N contact points, gyroscope's bias,
-accelerometer's bias, encoders' offsets; vectors of the state are velocity, position, contact
-points (2 + N, 3). A point that is not in the state has no covariance. Leg kinematics say where a
-point is from the base: R h(q - offset), with Jacobian R J in the world. Residuals are -H times the
-error plus noise, as ``kalman_update`` wants them. Nothing here allocates.
+The error (n,) consists of rotation, velocity, position, N contact points, gyroscope bias,
+accelerometer bias and encoder offsets, in this order. The vectors of the state (2 + N, 3) are
+velocity, position and contact points. A point that is not in the state has zero covariance. Leg
+kinematics measure the position of a point relative to the base, R h(q - offset) in the world, with
+the Jacobian R J. Residuals are r = -H e + noise, as in ``kalman_update``. No function here
+allocates memory. Source: Hartley et al., Contact-aided invariant extended Kalman filtering for
+robot state estimation, IJRR 2020.
 """
 
 from __future__ import annotations
@@ -21,7 +23,7 @@ Indices = NDArray[np.int64]
 
 @kernel
 def remove_contact(point: int, covariance: Array) -> None:
-    """Take a contact point out of the state."""
+    """Remove a contact point from the state: set its covariances to zero."""
     first = 9 + 3 * point
     covariance[first : first + 3, :] = 0.0
     covariance[:, first : first + 3] = 0.0
@@ -29,11 +31,14 @@ def remove_contact(point: int, covariance: Array) -> None:
 
 @kernel
 def place_jacobian(world_jacobian: Array, offsets: int, sensitivity: Array) -> None:
-    """H (3, n) of where a point is by leg kinematics, but for the point's own columns.
+    """The measurement Jacobian H (3, n) of a point's position by leg kinematics.
+
+    The columns of the point itself are left to ``measurement_jacobian``.
 
     Args:
         world_jacobian: R J, (3, n_joints).
         offsets: the index of the first encoder offset in the error.
+        sensitivity: becomes H.
     """
     for i in range(3):
         for k in range(offsets):
@@ -46,11 +51,11 @@ def place_jacobian(world_jacobian: Array, offsets: int, sensitivity: Array) -> N
 def add_contact(
     point: int, sensitivity: Array, noise: Array, covariance: Array, rows: Array, corner: Array
 ) -> None:
-    """Put a contact point into the state, where leg kinematics see it now.
+    """Add a contact point to the covariance, at the position measured by leg kinematics.
 
     Args:
-        sensitivity: from ``place_jacobian``; minus it times the error is the point's error.
-        noise: of the place that is seen [m^2], (3, 3).
+        sensitivity: H from ``place_jacobian``; the error of the new point is -H e plus noise.
+        noise: covariance of the measured position [m^2], (3, 3).
         rows, corner: scratch, (3, n) and (3, 3).
     """
     first = 9 + 3 * point
@@ -68,10 +73,11 @@ def add_contact(
 
 @kernel
 def innovation(point: int, world_point: Array, vectors: Array, residual: Array) -> None:
-    """The residual of a point in the state: where the legs see it, less where it is.
+    """The innovation (3,) [m] of a point: its measured position minus its estimated one.
 
     Args:
-        world_point: from the base to the point, R h [m, world], (3,).
+        world_point: the measurement, from the base to the point, R h [m, world], (3,).
+        residual: becomes the innovation.
     """
     for i in range(3):
         seen = float(vectors[1, i]) + float(world_point[i])
@@ -80,7 +86,7 @@ def innovation(point: int, world_point: Array, vectors: Array, residual: Array) 
 
 @kernel
 def measurement_jacobian(point: int, sensitivity: Array) -> None:
-    """Complete H from ``place_jacobian`` by the point's own columns."""
+    """Fill in the point's own columns of the measurement Jacobian from ``place_jacobian``."""
     first = 9 + 3 * point
     for i in range(3):
         for k in range(3):
@@ -92,13 +98,13 @@ def height_row(
     row: int, point: int, reference: int, height: float, vectors: Array,
     sensitivity: Array, residual: Array,
 ) -> None:  # fmt: skip
-    """A row of H and r that says how high a point is: over another one, or over the world's zero.
+    """One row of H and r for the measured height of a point, over another point or the world.
 
-    The place of a point turns with the error of rotation, so its row depends on the estimate.
+    An error of the rotation also rotates the point's position, so the row depends on the estimate.
 
     Args:
-        reference: the other point; none if below zero.
-        height: of the point, or of its height over the other one [m].
+        reference: the index of the other point; negative for the height over the world's origin.
+        height: the measured height [m].
     """
     for k in range(sensitivity.shape[1]):
         sensitivity[row, k] = 0.0
@@ -116,13 +122,15 @@ def height_row(
 
 @kernel
 def world_definition_jacobian(levers: Array, vectors: Array, sensitivity: Array) -> None:
-    """H (3, n) of where the world is by the feet: its origin in the points' middle, x and y, and
-    its x axis where the feet point.
+    """The measurement Jacobian H (3, n) of the world frame's definition by the feet.
 
-    The third row is zero where the levers are: such points show no heading.
+    The first two rows put the world's origin at the mean x and y of the points, the third puts its
+    x axis in the heading of the feet. The third row is zero if all levers are zero, because such
+    points have no heading.
 
     Args:
-        levers: places about a middle that turn with the feet's heading [m], (N, 2).
+        levers: horizontal positions relative to a centre, which rotate with the heading of the
+            feet [m], (N, 2).
     """
     n, total = levers.shape[0], 0.0
     for row in range(3):
@@ -134,7 +142,7 @@ def world_definition_jacobian(levers: Array, vectors: Array, sensitivity: Array)
     for point in range(n):
         column = 9 + 3 * point
         x, y = float(vectors[2 + point, 0]), float(vectors[2 + point, 1])
-        # The error of a place is xi_d and what the error of rotation about z makes of it.
+        # The error of a point's position is xi_d plus the effect of the rotation error about z.
         sensitivity[0, column] = 1.0 / n
         sensitivity[0, 2] -= y / n
         sensitivity[1, column + 1] = 1.0 / n
@@ -150,11 +158,14 @@ def world_definition_jacobian(levers: Array, vectors: Array, sensitivity: Array)
 def add_contact_noise(
     feet: Indices, present: Flags, own: float, shared: float, period: float, covariance: Array
 ) -> None:
-    """What stands moves a little in a period: the points of a foot together, each by itself.
+    """Add the process noise of standing points: each moves a little, and each foot as a whole.
 
     Args:
         feet: the foot of every point, (N,).
-        own, shared: standard deviations after a second, per axis [m].
+        present: which points are in the state, (N,).
+        own, shared: standard deviations per axis after one second [m], of a single point and of the
+            common motion of a foot's points.
+        period: [s].
     """
     for point in range(feet.shape[0]):
         for other in range(feet.shape[0]):

@@ -1,14 +1,14 @@
-"""How the right-invariant error of an inertial estimate grows in one period, and its covariance.
+"""The time update of a right-invariant extended Kalman filter: error transition and covariance.
 
-The error of a state is a vector (n): the logarithm of estimate times inverse truth on SE_{2+N}(3)
-(rotation, velocity, position, N contact points, all in the world), then estimate minus truth of the
-gyroscope's bias, the accelerometer's bias and further constants. Without biases it obeys a linear
-equation that does not depend on the trajectory (Hartley et al. 2020, theorem 1): gravity turns an
-error of tilt into one of velocity, and that into one of position::
+The error (n,) of a state consists of the logarithm of estimate times inverse truth on SE_{2+N}(3)
+(rotation, velocity, position and N contact points, all in the world), followed by estimate minus
+truth of the gyroscope bias, the accelerometer bias and further constants. Without biases the error
+obeys a linear equation that does not depend on the trajectory (Hartley et al. 2020, theorem 1): an
+error of tilt lets gravity cause an error of velocity, and that an error of position::
 
     xi_R' = 0,   xi_v' = [g]x xi_R,   xi_p' = xi_v,   xi_d' = 0
 
-A bias enters through the adjoint of the estimate. Nothing here allocates.
+A bias enters through the adjoint of the estimate. No function here allocates memory.
 """
 
 from __future__ import annotations
@@ -27,7 +27,10 @@ Indices = NDArray[np.int64]
 
 @kernel
 def error_transition(gravity: float, period: float, transition: Array) -> None:
-    """The constant part of the transition matrix (n, n): exp of the equation above."""
+    """The constant part of the transition matrix F (n, n): the exponential of the equation above.
+
+    ``gravity`` is in m/s^2, ``period`` in s.
+    """
     for i in range(transition.shape[0]):
         for k in range(transition.shape[1]):
             transition[i, k] = 1.0 if i == k else 0.0
@@ -43,15 +46,16 @@ def error_transition(gravity: float, period: float, transition: Array) -> None:
 def input_jacobian(
     rotation: Array, vectors: Array, present: Flags, gravity: float, period: float, reach: Array
 ) -> None:
-    """What a constant error of the IMU does to the state's in one period: ``reach`` (n, 6).
+    """The effect of a constant IMU error on the state's error over one period: ``reach`` (n, 6).
 
-    Its columns are for angular velocity [rad/s, body] and specific force [m/s^2, body]: minus the
-    adjoint of the estimate, integrated to second order.
+    The columns of ``reach`` are for angular velocity [rad/s, body] and specific force [m/s^2,
+    body]. The matrix is minus the adjoint of the estimate, integrated to second order.
 
     Args:
         rotation: the estimated orientation (3, 3), in the middle of the period.
-        vectors: estimated velocity, position and contact points (2 + N, 3), there too.
-        present: which contact points are in the state, (N,); the others do not move.
+        vectors: the estimated velocity, position and contact points (2 + N, 3), in the middle of
+            the period, too.
+        present: which contact points are in the state, (N,); the rows of the others are zero.
     """
     for j in range(3):
         x, y, z = float(rotation[0, j]), float(rotation[1, j]), float(rotation[2, j])
@@ -62,7 +66,7 @@ def input_jacobian(
                 reach[row, j] = reach[row + 1, j] = reach[row + 2, j] = 0.0
                 continue
             a, b, c = float(vectors[k, 0]), float(vectors[k, 1]), float(vectors[k, 2])
-            if k == 0:  # half a period of the error of tilt that grows meanwhile
+            if k == 0:  # the tilt error that grows during the period acts for half of it on average
                 c -= 0.5 * gravity * period
             elif k == 1:
                 a += 0.5 * period * float(vectors[0, 0])
@@ -81,11 +85,14 @@ def propagate_covariance(
     transition: Array, reach: Array, bias: int, noise: Array, covariance: Array,
     scaled: Array, product: Array,
 ) -> None:  # fmt: skip
-    """One period of the covariance (n, n): F P F' + W W', W being the noise of the IMU's samples.
+    """Propagate the covariance P (n, n) over one period: F P F' + W W'.
+
+    W is ``reach`` with its columns scaled by the noise of the IMU's samples.
 
     Args:
-        transition: F; its columns of the biases become ``reach``.
-        bias: the index of the first of six bias columns.
+        transition: F; ``reach`` is written into its columns of the biases.
+        reach: from ``input_jacobian``, (n, 6).
+        bias: the index of the first of the six bias columns.
         noise: standard deviations of angular velocity and specific force, (6,).
         scaled, product: scratch, (n, 6) and (n, n).
     """
@@ -101,9 +108,9 @@ def propagate_covariance(
 
 @kernel
 def vector_deviation(covariance: Array, first: int, vector: Array) -> float:
-    """The standard deviation of the norm of a vector's own error.
+    """The standard deviation of the length of a vector's error in the world.
 
-    The error of a vector u is xi_u and what the error of rotation does to it: xi_u + xi_R x u.
+    The error of a vector u is xi_u plus the effect of the rotation error: xi_u + xi_R x u.
 
     Args:
         first: the index of xi_u in the error.
@@ -124,15 +131,17 @@ def vector_deviation(covariance: Array, first: int, vector: Array) -> float:
 def sample_deviations(
     reading: Array, limit: float, noise: float, doubt: float, run: Indices, out: Array
 ) -> bool:
-    """The standard deviation of a sample's axes; whether one of them is at the end of its range.
+    """The standard deviations of a sample's axes, (3,); returns whether an axis is saturated.
 
-    What a saturated sample is off by lasts, so the n-th in a row does not add to the errors before
-    it like new noise, as the root of n, but like one error, as n.
+    The error of a saturated axis is nearly the same in consecutive samples. So over n samples it
+    grows in proportion to n, not to the square root of n as independent noise does.
 
     Args:
-        reading: a sample, (3,). limit: of its range.
-        noise, doubt: the deviations of an axis inside the range and at its end.
-        run: for how many samples in a row every axis has been there; brought up to date.
+        reading: a sample, (3,).
+        limit: the end of the sensor's range, in the unit of the sample.
+        noise, doubt: standard deviations of an axis inside its range, and of a saturated axis.
+        run: for how many samples in a row each axis has been saturated, (3,); it is updated.
+        out: becomes the standard deviations, (3,).
     """
     any_full = False
     for axis in range(3):

@@ -1,7 +1,7 @@
-"""Joint feedback as pure functions: blending two of them, soft stops, friction, stance targets.
+"""Joint feedback as pure functions: blending, soft stops, friction compensation, stance targets.
 
 A feedback is a stiffness [N m/rad] towards an angle [rad] and a damping [N m s/rad] towards a
-velocity [rad/s], one element a joint (n,). Nothing here allocates.
+velocity [rad/s], with one element for each joint (n,). No function here allocates memory.
 """
 
 from __future__ import annotations
@@ -28,8 +28,8 @@ class Feedback(NamedTuple):
 class SoftStops(NamedTuple):
     """Springs and dampers that begin ``margin`` [rad] inside joint limits (n, 2).
 
-    The springs are ``gain`` times ``stiffness``; the dampers grow from none there to ``gain``
-    times ``damping`` at the limit.
+    The springs have ``gain`` times ``stiffness``. The damping grows linearly from zero at the
+    margin to ``gain`` times ``damping`` at the limit.
     """
 
     limits: Array
@@ -50,9 +50,10 @@ class Motion(NamedTuple):
 def blend_feedback(
     weight: Array, first: Feedback, second: Feedback, measured: Motion, out: Feedback
 ) -> None:
-    """One feedback that equals ``weight`` (n,) of the first plus the rest of the second.
+    """Blend two feedbacks into one, whose torque is the weighted mean of both torques.
 
-    K = w K1 + (1 - w) K2 towards (w K1 x1 + (1 - w) K2 x2) / K; the measured value where K = 0.
+    With the weights w (n,) of the first feedback the gain is K = w K1 + (1 - w) K2 and the target
+    (w K1 x1 + (1 - w) K2 x2) / K. Where K = 0 the target is the measured value.
     """
     blend_gain(
         weight, first.stiffness, first.position, second.stiffness, second.position,
@@ -75,7 +76,7 @@ def blend_gain(
     gain: Array,
     target: Array,
 ) -> None:
-    """One gain and target of ``blend_feedback``."""
+    """Blend one pair of gains and targets, stiffness or damping, as ``blend_feedback`` does."""
     for i in range(gain.shape[0]):
         first = float(weight[i]) * float(first_gain[i])
         second = (1.0 - float(weight[i])) * float(second_gain[i])
@@ -115,10 +116,11 @@ def add_soft_stops(measured: Array, stops: SoftStops, out: Feedback) -> None:
 def add_friction(
     velocity: Array, friction: Array, damping: Array, speed: float, scratch: Array, torque: Array
 ) -> None:
-    """Add what the friction of joints that move takes away, in the direction of their velocity.
+    """Add the torque that compensates joint friction to ``torque`` [N m], (n,).
 
-    friction tanh(velocity / speed) + damping velocity: most of the ``friction`` [N m] from ``speed``
-    [rad/s] on, none at rest; ``damping`` [N m s/rad] in proportion.
+    It is friction tanh(velocity / speed) + damping velocity, with Coulomb ``friction`` [N m] and
+    viscous ``damping`` [N m s/rad]. The first term is zero at rest and has three quarters of its
+    full value at ``speed`` [rad/s].
     """
     np.divide(velocity, speed, scratch)
     np.tanh(scratch, scratch)
@@ -132,10 +134,11 @@ def add_friction(
 def integrate_accelerations(
     period: float, leak: float, acceleration: Array, measured: Motion, targets: Motion
 ) -> None:
-    """Integrate accelerations [rad/s^2] (n,) to ``targets``, drawn to the measured joints.
+    """Integrate accelerations [rad/s^2] (n,) to ``targets`` that leak towards the measured joints.
 
-    x' = v + (q - x) / leak, v' = a + (q' - v) / leak: below the corner frequency 1/leak the
-    targets are the measurements and the feedback vanishes; above it they are the intention.
+    x' = v + (q - x) / leak and v' = a + (q' - v) / leak. Below the corner frequency 1/leak the
+    targets follow the measured joints, so the feedback vanishes; above it they follow the
+    integrated accelerations.
     """
     share = min(period / leak, 1.0)
     for i in range(acceleration.shape[0]):

@@ -1,8 +1,8 @@
 """The measurement update of a Kalman filter, three rows at a time, as pure functions.
 
-The error e of the estimate has covariance P (n, n). A measurement says what the residual
-r = -H e + noise is, so the estimate is corrected by K r. Rows that are not needed are zero in H and
-r, with a noise of one. Nothing here allocates.
+The error e of the estimate has the covariance P (n, n). A measurement has the residual
+r = -H e + noise, and the estimate is corrected by K r. Rows that a measurement does not need are
+zero in H and r and have a noise of one. No function here allocates memory.
 """
 
 from __future__ import annotations
@@ -33,10 +33,14 @@ def weigh(
     covariance: Array, sensitivity: Array, noise: Array, residual: Array,
     seen: Array, inverse: Array, spare: Array,
 ) -> float:  # fmt: skip
-    """How unlikely a residual is: r' S^-1 r with S = H P H' + N, chi-squared with three degrees.
+    """The squared Mahalanobis distance r' S^-1 r of a residual, with S = H P H' + N.
+
+    If the model holds it is chi-squared distributed with three degrees of freedom.
 
     Args:
-        sensitivity: H, (3, n). noise: N, (3, 3). residual: r, (3,).
+        sensitivity: H, (3, n).
+        noise: N, (3, 3).
+        residual: r, (3,).
         seen, inverse: become P H' (n, 3) and S^-1 (3, 3), for ``correct``.
         spare: scratch (3, 3).
     """
@@ -58,8 +62,8 @@ def correct(
 ) -> None:  # fmt: skip
     """Update the covariance in Joseph's form, (I - K H) P (I - K H)' + K N K', after ``weigh``.
 
-    The form is a sum of squares: whatever rounding does to K, the result stays positive. It is
-    made symmetric to the last bit.
+    In this form the result stays positive whatever the rounding errors of K. It is made symmetric
+    to the last bit.
 
     Args:
         seen, inverse: from ``weigh``; the first is overwritten.

@@ -16,7 +16,7 @@ def solve_damped(rows: Array, damping: float, normal: Array, vector: Array) -> N
 
     Args:
         rows: A, (m, n), contiguous.
-        damping: above zero, in A's unit; what keeps x finite where A has no full rank.
+        damping: greater than zero, in A's unit; it keeps x finite where A is rank deficient.
         normal: scratch (n, n).
     """
     np.dot(rows.T, rows, normal)
@@ -29,7 +29,8 @@ def solve_damped(rows: Array, damping: float, normal: Array, vector: Array) -> N
 def solve_positive(matrix: Array, vector: Array) -> None:
     """Solve a symmetric positive definite system in place: ``vector`` becomes the solution.
 
-    By LDL'; ``matrix`` is overwritten. A pivot that rounding has made not positive is skipped.
+    The method is an LDL' factorisation, which overwrites ``matrix``. A pivot that is not positive
+    because of rounding is skipped.
     """
     n = vector.shape[0]
     for j in range(n):

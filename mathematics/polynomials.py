@@ -16,17 +16,17 @@ class Quintic:
     coefficients: tuple[float, ...]
 
     def position(self, time: float) -> float:
-        """Its value."""
+        """The value of the polynomial at ``time``."""
         a, b, c, d, e, f = self.coefficients
         return a + time * (b + time * (c + time * (d + time * (e + time * f))))
 
     def velocity(self, time: float) -> float:
-        """Its first derivative."""
+        """The first derivative at ``time``."""
         _, b, c, d, e, f = self.coefficients
         return b + time * (2 * c + time * (3 * d + time * (4 * e + time * 5 * f)))
 
     def acceleration(self, time: float) -> float:
-        """Its second derivative."""
+        """The second derivative at ``time``."""
         _, _, c, d, e, f = self.coefficients
         return 2 * c + time * (6 * d + time * (12 * e + time * 20 * f))
 
@@ -51,9 +51,10 @@ def quintic(
 
 @kernel
 def minimum_jerk(share: float) -> tuple[float, float, float]:
-    """The way from 0 to 1 of least jerk: its value and two derivatives over ``share`` of the time.
+    """The minimum-jerk motion from 0 to 1: its value and two derivatives after a ``share`` u.
 
-    At rest at both ends: 10 u^3 - 15 u^4 + 6 u^5; outside 0 to 1 it stays at the nearer end.
+    The motion 10 u^3 - 15 u^4 + 6 u^5 begins and ends at rest. A ``share`` outside of 0 to 1 gives
+    the state at the nearer end.
     """
     u = min(max(share, 0.0), 1.0)
     return (

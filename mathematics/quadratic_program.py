@@ -27,10 +27,10 @@ class QuadraticProgramSolver:
 
     @staticmethod
     def check_name(name: str) -> None:
-        """Raise ``LookupError``, which names what is installed, where there is no such solver.
+        """Raise ``LookupError`` if no such solver is installed; the message names those that are.
 
-        For the usual solver this is a matter of microseconds; for any other qpsolvers is imported,
-        which takes about 0.3 s.
+        For the usual solver this takes microseconds. For any other one qpsolvers is imported, which
+        takes about 0.3 s.
         """
         if name == "daqp" and find_spec("daqp") is not None:
             return
@@ -52,12 +52,12 @@ class QuadraticProgramSolver:
         self._solve: Any = solve_problem
 
     def solve(self, p: Array, q: Array, g: Array, h: Array, a: Array, b: Array) -> Array | None:
-        """The minimiser, or None where the solver found none or failed."""
+        """The minimiser x (n,), or ``None`` if the solver found none or failed."""
         try:
             answer = self._solve(self._problem(p, q, g, h, a, b), self.name, **self._options)
         except Exception:  # noqa: BLE001
-            # Solvers raise whatever they please on a hopeless problem; to the caller, who has a
-            # defined fallback, all of it is the same: there is no answer.
+            # On an infeasible problem solvers raise errors of many types. The caller has a defined
+            # fallback for all of them, so each means that there is no solution.
             return None
         x = answer.x
         if not answer.found or x is None or not np.isfinite(x).all():

@@ -1,8 +1,9 @@
 """Rotations as pure functions over arrays: quaternions, matrices, exponential and logarithm.
 
 A quaternion is x, y, z, w (Hamilton) and takes body vectors to the world. Functions write their
-result into ``out``, which may be the same array as an argument, and allocate nothing. Angles are
-in rad. Scalars are read with ``float``: Python's own arithmetic is faster than NumPy's on them.
+result into ``out``, which may be the same array as an argument, and allocate no memory. Angles are
+in rad. Elements are read with ``float``, because Python's arithmetic on single numbers is faster
+than NumPy's.
 """
 
 from __future__ import annotations
@@ -41,7 +42,7 @@ def skew(vector: Array, out: Array) -> None:
 
 @kernel
 def normalise(quaternion: Array, out: Array) -> None:
-    """The unit quaternion of the same direction; the identity where there is no direction."""
+    """Divide a quaternion by its norm; the quaternion zero becomes the identity."""
     x, y, z, w = (
         float(quaternion[0]),
         float(quaternion[1]),
@@ -69,7 +70,7 @@ def conjugate(quaternion: Array, out: Array) -> None:
 
 @kernel
 def multiply(a: Array, b: Array, out: Array) -> None:
-    """The quaternion product: first the rotation ``b``, then ``a``."""
+    """The quaternion product a b, which is the rotation ``b`` followed by the rotation ``a``."""
     ax, ay, az, aw = float(a[0]), float(a[1]), float(a[2]), float(a[3])
     bx, by, bz, bw = float(b[0]), float(b[1]), float(b[2]), float(b[3])
     out[0] = aw * bx + ax * bw + ay * bz - az * by
@@ -80,7 +81,7 @@ def multiply(a: Array, b: Array, out: Array) -> None:
 
 @kernel
 def rotate(quaternion: Array, vector: Array, out: Array) -> None:
-    """``vector`` turned by a unit quaternion: from body to world."""
+    """Rotate ``vector`` by a unit quaternion: from body to world."""
     x, y, z, w = (
         float(quaternion[0]),
         float(quaternion[1]),
@@ -96,7 +97,7 @@ def rotate(quaternion: Array, vector: Array, out: Array) -> None:
 
 @kernel
 def rotate_back(quaternion: Array, vector: Array, out: Array) -> None:
-    """``vector`` turned by the inverse of a unit quaternion: from world to body."""
+    """Rotate ``vector`` by the inverse of a unit quaternion: from world to body."""
     x, y, z, w = (
         -float(quaternion[0]),
         -float(quaternion[1]),
@@ -185,7 +186,7 @@ def logarithm(quaternion: Array, out: Array) -> None:
 
 @kernel
 def integrate(quaternion: Array, angular_velocity: Array, duration: float, out: Array) -> None:
-    """The orientation after turning at a constant body rate [rad/s] for ``duration`` [s]."""
+    """The orientation after rotating at a constant body rate [rad/s] for ``duration`` [s]."""
     wx, wy, wz = (
         float(angular_velocity[0]),
         float(angular_velocity[1]),
@@ -210,7 +211,7 @@ def integrate(quaternion: Array, angular_velocity: Array, duration: float, out: 
 
 @kernel
 def yaw(quaternion: Array) -> float:
-    """The heading [rad]: the angle about the world's z of the body's x axis."""
+    """The heading [rad]: the angle about the world's z axis from its x axis to the body's."""
     x, y, z, w = (
         float(quaternion[0]),
         float(quaternion[1]),
@@ -229,11 +230,11 @@ def tilt(quaternion: Array) -> float:
         float(quaternion[2]),
         float(quaternion[3]),
     )
-    # From half angles: the arc cosine of the matrix element would lose half the digits at zero.
+    # Computed from half angles, as the arc cosine of R_zz would lose half the digits at zero.
     return 2.0 * math.atan2(math.sqrt(x * x + y * y), math.sqrt(z * z + w * w))
 
 
 @kernel
 def wrap(angle: float) -> float:
-    """The same angle [rad] from -pi to pi."""
+    """The equivalent angle [rad] between -pi and pi."""
     return angle - 2.0 * math.pi * math.floor(angle / (2.0 * math.pi) + 0.5)

@@ -1,4 +1,4 @@
-"""How far inside its support a robot's centre of mass is."""
+"""The stability margin of a standing robot: how far its centre of mass is inside the support."""
 
 from __future__ import annotations
 
@@ -14,12 +14,13 @@ from .kernel import kernel
 def support_margin(
     points: NDArray[np.float64], loaded: NDArray[np.bool_], x: float, y: float
 ) -> float:
-    """The distance [m] of (``x``, ``y``) from the edge of the convex hull of the ``loaded`` ones
-    of ``points`` (n, 2 or 3), positive inside and negative outside or on a hull without area.
+    """The distance [m] of the place (``x``, ``y``) from the edge of the support polygon.
 
-    Every pair of points that has all others on its left is an edge; the margin is the smallest
-    distance to the left of an edge. Outside a corner that understates how far away the place is.
-    With one point it is minus the distance to it, with none minus one metre.
+    The support polygon is the convex hull of the ``loaded`` ones of ``points`` (n, 2 or 3). The
+    margin is positive inside, and negative outside or if the hull has no area. A pair of points
+    that has all others on its left is an edge, and the margin is the smallest distance of the place
+    to the left of an edge. Near a corner, outside, it is less than the true distance. With one
+    loaded point it is minus the distance to that point, with none it is minus one metre.
     """
     count, first, margin = points.shape[0], -1, math.inf
     for i in range(count):

@@ -7,8 +7,9 @@ stance (3 each, world). Tasks are rows J a = d, each with a weight; the program 
     subject to  M_b a + h_b - J_b' f = 0        (the six rows of the floating base)
                 G [a; f] <= b                   (friction pyramids, force and torque limits)
 
-which is the paper's problem (wbc_qp). Every function writes into arrays that its caller owns and
-allocates nothing. Arrays that belong together travel as a named record, which the caller makes once.
+which is the paper's problem (section V, wbc_qp). Every function writes into arrays that its caller
+owns and allocates nothing. Arrays that belong together are passed as a named tuple, which the
+caller makes once.
 """
 
 from __future__ import annotations
@@ -70,7 +71,7 @@ class Constraints(NamedTuple):
 
 
 class FrictionCone(NamedTuple):
-    """What a point in stance may do: friction coefficient and bounds of the normal force [N]."""
+    """Limits of a contact force: friction coefficient and bounds of the normal force [N]."""
 
     friction: float
     force_min: float
@@ -93,8 +94,11 @@ class TorqueScratch(NamedTuple):
 
 
 class TorqueSpeedCurves(NamedTuple):
-    """What each motor can do, (n_motors,) each: ``peak`` torque [N m] up to the ``corner`` speed,
-    then less, linearly to none at the ``no_load`` speed [rad/s]."""
+    """The torque-speed curves of the motors, (n_motors,) each.
+
+    A motor has its ``peak`` torque [N m] up to the ``corner`` speed [rad/s]; from there the torque
+    falls linearly to zero at the ``no_load`` speed [rad/s].
+    """
 
     peak: Array
     corner: Array
@@ -109,7 +113,7 @@ def assemble_cost(
     scratch: CostScratch,
     cost: Cost,
 ) -> None:
-    """The sum of the tasks' weighted squares and of the two regularising terms."""
+    """The cost: the tasks' weighted squared errors plus the two regularisation terms."""
     n = tasks.jacobian.shape[1]
     for i in range(tasks.jacobian.shape[0]):
         np.multiply(tasks.jacobian[i], tasks.weights[i], scratch.weighted[i])
@@ -127,7 +131,7 @@ def assemble_cost(
 
 @kernel
 def base_dynamics(terms: RigidBodyTerms, active: Indices, rows: Constraints) -> None:
-    """The six equations of the floating base (paper, base_dyn): matrix x = bound.
+    """The six equations of motion of the floating base (paper, base_dyn): matrix x = bound.
 
     Args:
         active: the points in stance, in the order of their forces in x.
@@ -174,7 +178,8 @@ def torque_limits(
 
     Args:
         active: the points in stance, in the order of their forces in x.
-        transmission: T, from joint torque to what is limited: motor torque, or the identity.
+        transmission: T, from joint torques to the torques that are limited: those of the motors,
+            or for the identity those of the joints.
         rows: out, (2 n_joints, n_x) and (2 n_joints,).
     """
     n = terms.mass_matrix.shape[0]
@@ -194,8 +199,10 @@ def torque_limits(
 
 @kernel
 def motor_limits(speed: Array, curves: TorqueSpeedCurves, bounds: Bounds) -> None:
-    """What each motor can do at its speed [rad/s], (n_motors,): ``peak`` up to ``corner``, then
-    linearly to zero at ``no_load``; the braking torque is ``peak`` at any speed."""
+    """The torque bounds of each motor at its speed [rad/s], (n_motors,).
+
+    The driving torque follows the torque-speed curve; the braking torque is ``peak`` at any speed.
+    """
     for i in range(speed.shape[0]):
         value, peak = float(speed[i]), float(curves.peak[i])
         corner, no_load = float(curves.corner[i]), float(curves.no_load[i])
@@ -209,10 +216,12 @@ def motor_limits(speed: Array, curves: TorqueSpeedCurves, bounds: Bounds) -> Non
 def joint_torque(
     terms: RigidBodyTerms, acceleration: Array, force: Array, product: Array, torque: Array
 ) -> None:
-    """The joints' rows of the dynamics (paper, opt_torque): M_j a + h_j - sum J_j' f.
+    """The joint torques, from the joints' rows of the equation of motion (paper, opt_torque):
+    tau = M_j a + h_j - sum J_j' f, (n_joints,) [N m].
 
     Args:
-        force: on every contact point (n_contacts, 3), zero where there is none.
+        acceleration: a, the generalised acceleration, (n_velocities,).
+        force: f on every contact point [N, world], (n_contacts, 3), zero where there is none.
         product: scratch (n_joints,).
     """
     np.dot(terms.mass_matrix[6:, :], acceleration, torque)
@@ -225,7 +234,7 @@ def joint_torque(
 
 @kernel
 def share_weight(stance: NDArray[np.bool_], weight: float, force: Array) -> None:
-    """The robot's weight [N] shared equally, straight up, by the points in stance."""
+    """Share the robot's weight [N] equally among the points in stance, as upward forces."""
     force[:, :] = 0.0
     loaded = 0
     for i in range(stance.shape[0]):

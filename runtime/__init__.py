@@ -1,1 +1,1 @@
-"""What runs a graph: signals, blocks, loading, schedule, executor, clocks, test bench."""
+"""The runtime: what a block is, loading a graph from YAML, running it, and testing blocks."""

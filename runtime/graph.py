@@ -23,11 +23,20 @@ from .running.run_result import RunResult
 from .running.sinks import Sink
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Graph:
     """A checked graph. Every run binds memory and blocks of its own, so runs do not meet."""
 
     checked: CheckedGraph
+
+    def __repr__(self) -> str:
+        graph = self.checked
+        robot = f", robot {graph.robot.name}" if graph.robot is not None else ""
+        length = "" if graph.ticks is None else f", {graph.ticks / graph.base_rate:.6g} s"
+        return (
+            f"<Graph {graph.name!r}: {len(graph.blocks)} blocks at {graph.base_rate:.6g} Hz"
+            f"{length}{robot}>"
+        )
 
     @property
     def seed_parameters(self) -> tuple[str, ...]:

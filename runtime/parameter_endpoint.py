@@ -1,14 +1,14 @@
-"""Where a running graph can be asked for its parameters, and told to change them.
+"""The endpoint at which a running graph lists its parameters and accepts changes of them.
 
-A Unix-domain socket, readable by its owner alone; nothing listens on a network. One request is one
-line of JSON and so is its answer::
+It is a Unix-domain socket that only its owner can read; nothing listens on a network. A request is
+one line of JSON, and so is its answer::
 
     {"verb": "list"}                                  {"graph": ..., "parameters": [...]}
     {"verb": "set", "settings": ["landing.w_c=0.1"]}  {"changes": [{"tick": 812, "path": ...}]}
 
-and ``{"error": text}``, with the report of a ``LoadError`` as ``report``, where something is wrong.
-A thread of its own answers; the control thread only ever looks into the slot of
-``LiveParameters``, once a tick.
+Where something is wrong the answer is ``{"error": text}``, with the report of a ``LoadError`` under
+``report``. A thread of its own answers; the control thread only looks into the slot of
+``LiveParameters`` once a tick.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from .running.memory import BoundGraph
 LONGEST_REQUEST = 1 << 16
 """Bytes of one request."""
 PATIENCE = 5.0
-"""Seconds either side waits for the other."""
+"""The time that either side waits for the other [s]."""
 _LONGEST_PATH = 100  # bytes; the address of a Unix-domain socket has room for little more
 
 
@@ -77,7 +77,7 @@ class ParameterEndpoint:
         self._thread.start()
 
     def record(self, tick: int) -> None:
-        """Do nothing: the recorder keeps the changes of parameters, this only receives them."""
+        """Do nothing: changes of parameters are recorded elsewhere."""
 
     def close(self) -> None:
         """Answer no more."""
@@ -95,14 +95,14 @@ class ParameterEndpoint:
                 connection, _ = self._socket.accept()
             except OSError:
                 return
-            with connection, suppress(OSError):  # who asks may have left
+            with connection, suppress(OSError):  # the client may have closed the connection
                 connection.settimeout(PATIENCE)
                 answer = _answer(_read_line(connection), parameters, graph)
                 connection.sendall(json.dumps(answer).encode() + b"\n")
 
 
 def _answer(request: bytes, parameters: LiveParameters, graph: str) -> dict[str, Any]:
-    """What to say to one request, whatever it is."""
+    """The answer to one request; a request that makes no sense gets an error as its answer."""
     try:
         message = json.loads(request)
         verb = message["verb"]
@@ -110,7 +110,7 @@ def _answer(request: bytes, parameters: LiveParameters, graph: str) -> dict[str,
             listed = []
             for path, block in parameters.blocks.items():
                 listed += [asdict(entry) for entry in entries({path: block})]
-                time.sleep(0)  # lets the control thread go first
+                time.sleep(0)  # gives the processor to the control thread if it wants to run
             return {"graph": graph, "parameters": listed}
         if verb == "set":
             adjustment = adjust(parameters.blocks, [str(text) for text in message["settings"]])
@@ -126,7 +126,7 @@ def _answer(request: bytes, parameters: LiveParameters, graph: str) -> dict[str,
 
 
 def _read_line(connection: socket.socket) -> bytes:
-    """Bytes up to the end of a line or of the connection. Raises ``OSError``."""
+    """Read until the end of a line or of the connection. Raises ``OSError``."""
     parts: list[bytes] = []
     size = 0
     while size < LONGEST_REQUEST and not (parts and parts[-1].endswith(b"\n")):
@@ -170,10 +170,13 @@ def answers(path: Path) -> bool:
 
 
 def set_parameters(path: Path, settings: Sequence[str]) -> list[dict[str, Any]]:
-    """Change parameters of the graph at ``path``: ``["landing.w_c=0.1"]``; what was changed.
+    """Change parameters of the graph that listens at ``path``, such as ``["landing.w_c=0.1"]``.
+
+    Returns:
+        The changes that were made, as the attributes of each ``ParameterChange``.
 
     Raises:
-        EndpointError: as ``ask``.
+        EndpointError: nobody answers there, or a setting was refused; the text says why.
     """
     changes: list[dict[str, Any]] = ask(path, {"verb": "set", "settings": list(settings)})[
         "changes"

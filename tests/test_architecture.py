@@ -58,6 +58,7 @@ ALLOWED: dict[str, tuple[str, ...]] = {
     "logs/viewing": ("logs/file", "robots", "runtime/language"),
     "logs/recording": ("logs/file", "logs/viewing", "robots", "runtime/language", "runtime/running"),
     "logs/replay": ("logs/file", "logs/viewing", "robots", "runtime"),
+    "logs/exporting": ("logs/file", "logs/viewing", "robots", "runtime/language"),
     "logs": ("logs/file",),
     "studies": ("robots", "runtime", "planner", "blocks", "hal", "logs"),
     "benchmarks": ("robots", "runtime", "planner", "blocks", "hal", "logs"),

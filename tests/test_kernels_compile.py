@@ -134,7 +134,7 @@ UNUSED = {
         np.array([0.1, 0.2, 0.3, 0.92]), np.ones((3, 3)), np.array([0.6, 0.0, 0.0, 0.8]),
         np.ones((3, 3)), np.zeros(4), np.zeros((3, 3)), np.zeros(4),
     ),
-    "aloft.blocks.control.balance_target.grow": (np.ones(3), 0.6, 0.25, np.zeros(3), np.zeros(3)),
+    "aloft.blocks.control.balance_target.add_quadratic_growth": (np.ones(3), 0.6, 0.25, np.zeros(3), np.zeros(3)),
     "aloft.blocks.general.periods.first_tick": (0.5, 0.002),
     "aloft.mathematics.linear.multiply_vector": (POSE, POSE[0], np.zeros(4)),
     "aloft.mathematics.linear.add_product": (POSE, POSE[0], np.ones(4)),
@@ -156,7 +156,7 @@ UNUSED = {
     "aloft.mathematics.lookup.interval": (np.linspace(-1.0, 1.0, 9), 0, 9, 0.3),
     "aloft.mathematics.lookup.interpolate": (np.linspace(-1.0, 1.0, 4), POSE[:, 2], 0.3, True),
     "aloft.mathematics.lookup.interpolate_grid": (
-        np.array([0.0, 1.0, 2.0, 4.0]), np.array([2, 2]), POSE[1], np.array([0.3, 5.0]), False,
+        np.array([0.0, 1.0, 2.0, 4.0]), np.array([2, 2]), POSE[:, 1], np.array([0.3, 5.0]), False,
         np.zeros(2, np.int64), np.zeros(2),
     ),
     "aloft.mathematics.transfer_function.advance": (

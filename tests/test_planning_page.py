@@ -43,9 +43,9 @@ def test_a_plan_is_read_as_the_page_shows() -> None:
 def test_commands_of_the_page_have_options_that_are_there() -> None:
     from typer.main import get_command
 
-    from aloft.cli import app
+    from aloft.cli import make_app
 
-    known = {option for parameter in get_command(app).commands["plan"].params  # type: ignore[attr-defined]
+    known = {option for parameter in get_command(make_app()).commands["plan"].params  # type: ignore[attr-defined]
              for option in (*parameter.opts, *parameter.secondary_opts)}  # fmt: skip
     prose = PAGE.partition("The cluster needs")[0]
     used = set(re.findall(r"--[a-z][a-z-]+", prose))

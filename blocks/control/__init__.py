@@ -1,1 +1,1 @@
-"""Blocks that decide what the joints do."""
+"""Blocks that compute what the joints do: targets, models, torques and joint commands."""

@@ -1,4 +1,4 @@
-"""What the whole-body controller is to achieve: the plan, then balance over the feet."""
+"""The targets of the whole-body controller: the plan, and after it balance over the feet."""
 
 from __future__ import annotations
 
@@ -21,68 +21,69 @@ Vector = tuple[float, float, float]
 
 
 class BalanceMemory(Signal):
-    """What the balance remembers."""
+    """The state of ``BalanceTarget``."""
 
     standing_height = Field(unit="m", text="planned height of the centre of mass in the first tick")
     started = Field(dtype="bool", text="whether that height is known")
     trim = Field(3, unit="rad", frame="body", text="rotation added to the level target")
-    origin = Field(3, unit="m", frame="world", text="where the plan's origin is")
-    heading = Field(unit="rad", frame="world", text="where its x axis points")
-    off_place = Field(3, unit="m", frame="world", text="feet from their planned place")
+    origin = Field(3, unit="m", frame="world", text="position of the plan's origin")
+    heading = Field(unit="rad", frame="world", text="heading of the plan's x axis")
+    off_place = Field(3, unit="m", frame="world", text="the feet's offset from their planned place")
 
 
 class BalanceTarget(Block):
-    """Follows the plan until its last touchdown; then rests over the middle of the measured feet.
+    """Follows the plan until its last touchdown, then balances over the middle of the feet.
 
-    It serves any number of feet. The middle is the mean of the sole centres. Where the feet head
+    It serves any number of feet. Their middle is the mean of the sole centres, and their heading
     is the mean of the headings of the line and flat feet. Point feet have no heading of their own:
-    several of them turn with the pattern in which they stand, compared with the planned one by
-    least squares, and a single one heads as the base does.
+    that of several point feet is the rotation, by least squares, of the pattern in which they stand
+    from the planned pattern; that of a single one is the heading of the base.
 
-    Before the last touchdown positions and heading are the plan's, shifted and turned with the
-    measured feet. The plan is relative to where the feet stand, so a drift of the estimated
-    position or heading does not matter.
+    Before the last touchdown the target's positions and heading are the plan's, shifted and rotated
+    with the measured feet. The plan is relative to the feet, so a drift of the estimated position
+    or heading does not matter.
 
-    This carries every error of a landing on to the next, unless ``place_gain`` feeds back the
-    place. In the last T_p = ``place_time`` before a lift-off the jump is lengthened: with e how far
-    the feet's middle then is, by the estimated position, from where the plan has it, and T_f the
-    planned flight,
+    So the error of each landing would add to the next one, unless ``place_gain`` feeds the position
+    back. In the last T_p = ``place_time`` before a lift-off it changes the length of the jump. Let
+    e be the estimated position of the feet's middle minus the planned one, and T_f the planned
+    flight time. Then
 
         d = -place_gain e, of a length of at most place_limit
         v(t) = v_d s(u),   s = 10 u^3 - 15 u^4 + 6 u^5,   u = 1 - (t_lo - t) / T_p,
         v_d = d / (T_f + T_p / 2)
 
-    is added to the velocity, its integral to the place and its derivative to the acceleration of
-    the centre of mass: at touchdown these are worth d. The plan's place in the world is that of
-    the first tick. An error of the feet's heading is not made up for.
+    v is added to the velocity of the centre of mass, its integral to the position and its
+    derivative to the acceleration: at touchdown they have moved it by d. The plan's place in the
+    world is set in the first tick. An error of the feet's heading is not corrected.
 
-    After that touchdown the centre of mass goes over the middle of the sole centres, at
+    After the last touchdown the centre of mass goes over the middle of the sole centres, at
     ``landing_depth`` below standing height. When the phase is RECOVER it rises to standing height
-    with least jerk within ``rise_time``. The base goes level, heading as the feet do. Joint
-    friction leaves a small steady tilt; ``trim`` integrates it away,
+    with minimum jerk within ``rise_time``. The base goes level, with the heading of the feet. Joint
+    friction leaves a small steady tilt, which the integral ``trim`` removes,
 
         trim' = trim_rate Log(R' R_level), within trim_limit,    R_target = R_level Exp(trim),
 
-    about the body's x and y axes. Angular momentum and its rate should be zero.
+    about the body's x and y axes. The targets of angular momentum and its rate are zero.
 
-    A robot that is not quite the model misses the plan at lift-off, much the same way in every
-    jump of a task. ``velocity_correction`` dv and ``momentum_correction`` dk make up for what is
-    known of that: over the share u of a thrust that lasts T the plan becomes
+    A robot that differs from its model misses the plan at lift-off in much the same way in every
+    jump of a task. ``velocity_correction`` dv and ``momentum_correction`` dk compensate the known
+    part of that error: with u, from 0 to 1, the share of a thrust of duration T that is over, the
+    plan becomes
 
         v + u^2 dv,   a + 2 u dv / T,   p + T u^3 dv / 3,   k + u^2 dk,   k' + 2 u dk / T.
 
-    Does not plan a step: the feet stay where they are.
+    The block does not plan steps: the feet stay where they are.
     """
 
     class Params(Parameters):
         landing_depth: float = live_parameter(
-            0.06, unit="m", ge=0.0, le=0.5, text="height held after touchdown, below standing"
+            0.06, unit="m", ge=0.0, le=0.5, text="depth below standing held after touchdown"
         )
         rise_time: float = live_parameter(
-            0.6, unit="s", gt=0.0, text="from there to standing height"
+            0.6, unit="s", gt=0.0, text="time to rise from there to standing height"
         )
         trim_rate: float = live_parameter(
-            3.0, unit="1/s", ge=0.0, le=20.0, text="how fast a steady tilt is integrated away"
+            3.0, unit="1/s", ge=0.0, le=20.0, text="integral gain on a steady tilt"
         )
         trim_limit: float = live_parameter(
             0.08, unit="rad", ge=0.0, le=0.5, text="largest trim about each axis"
@@ -102,13 +103,13 @@ class BalanceTarget(Block):
             0.0,
             ge=0.0,
             le=1.0,
-            text="share of the feet's error of place the next jump makes up for",
+            text="share of the feet's position error that the next jump corrects",
         )
         place_limit: float = live_parameter(
-            0.03, unit="m", ge=0.0, le=0.2, text="by how much it lengthens a jump at most"
+            0.03, unit="m", ge=0.0, le=0.2, text="largest change of a jump's length"
         )
         place_time: float = live_parameter(
-            0.2, unit="s", gt=0.0, le=1.0, text="how long before lift-off it begins to"
+            0.2, unit="s", gt=0.0, le=1.0, text="how long before lift-off it begins"
         )
 
     needs = ("floating base", "feet")
@@ -157,7 +158,7 @@ class BalanceTarget(Block):
         self.target.joint_acceleration[...] = reference.joint_acceleration
 
     def _begin(self, heading: float) -> None:
-        """Note how high it stands by the plan, and where the plan's world is."""
+        """Note the planned standing height, and the place of the plan in the world."""
         memory, reference = self.memory, self.reference
         memory.standing_height[()] = reference.com[2]
         memory.heading[()] = heading - self._planned_heading()
@@ -167,7 +168,7 @@ class BalanceTarget(Block):
         memory.started[()] = True
 
     def _heading(self) -> float:
-        """Where the feet head [rad]: by their own directions, or by how they stand together."""
+        """The feet's heading [rad], by their own directions or by the pattern they stand in."""
         terms, reference = self.terms, self.reference
         if self._heads.any():
             return mean_heading(terms.foot_rotation, self._heads)
@@ -186,7 +187,7 @@ class BalanceTarget(Block):
         return planned
 
     def _follow(self, heading: float) -> float:
-        """The plan from the measured feet; how far that turns it [rad]."""
+        """Write the plan relative to the measured feet; returns the angle of its rotation [rad]."""
         reference, target = self.reference, self.target
         middle_point(reference.foot_position, self._planned_middle)
         turn = heading - self._planned_heading()
@@ -204,11 +205,11 @@ class BalanceTarget(Block):
         multiply(self._turn, reference.orientation, target.orientation)
         target.angular_velocity[...] = reference.angular_velocity
         if self.params.place_gain > 0.0:
-            self._make_up()
+            self._correct_place()
         return turn
 
-    def _make_up(self) -> None:
-        """Lengthen the next jump by what the feet are off their place."""
+    def _correct_place(self) -> None:
+        """Change the length of the next jump to correct the feet's position error."""
         p, reference, target, memory = self.params, self.reference, self.target, self.memory
         lift_off = float(reference.lift_off_time)
         flight = float(reference.touchdown_time) - lift_off
@@ -224,15 +225,19 @@ class BalanceTarget(Block):
         )  # fmt: skip
 
     def _correct(self, turn: float) -> None:
-        """Add what the thrust is known to miss."""
+        """Add the known corrections of velocity and momentum during the thrust."""
         target, elapsed = self.target, float(self.phase.time_in_phase)
         left = float(self.reference.lift_off_time) - float(self.reference.time)
         duration = max(elapsed + left, self.period)
         share = min(elapsed / duration, 1.0)
         turn_about_vertical(self._corrections[1], turn, self._vector)
-        grow(self._vector, share, duration, target.angular_momentum, target.angular_momentum_rate)
+        add_quadratic_growth(
+            self._vector, share, duration, target.angular_momentum, target.angular_momentum_rate
+        )
         turn_about_vertical(self._corrections[0], turn, self._vector)
-        grow(self._vector, share, duration, target.com_velocity, target.com_acceleration)
+        add_quadratic_growth(
+            self._vector, share, duration, target.com_velocity, target.com_acceleration
+        )
         np.multiply(self._vector, duration * share**3 / 3.0, out=self._vector)
         np.add(target.com, self._vector, out=target.com)
 
@@ -277,7 +282,7 @@ def middle_point(points: Array, out: Array) -> None:
 
 @kernel
 def mean_heading(rotations: Array, counted: NDArray[np.bool_]) -> float:
-    """The heading [rad] of the mean of the x axes of those rotations (n, 3, 3) that count (n,)."""
+    """The heading [rad] of the mean x axis of the rotations (n, 3, 3) that are ``counted`` (n,)."""
     x = y = 0.0
     for i in range(rotations.shape[0]):
         if counted[i]:
@@ -288,10 +293,10 @@ def mean_heading(rotations: Array, counted: NDArray[np.bool_]) -> float:
 
 @kernel
 def pattern_turn(planned: Array, planned_middle: Array, points: Array, middle: Array) -> float:
-    """How far a pattern of points (n, 3) has turned about the vertical [rad], by least squares.
+    """The rotation [rad] of a pattern of points (n, 3) about the vertical, by least squares.
 
     Args:
-        planned, planned_middle: the pattern before it turned, and its middle (3,).
+        planned, planned_middle: the pattern before the rotation, and its middle (3,).
         points, middle: the same points now, and their middle.
     """
     sine = cosine = 0.0
@@ -305,7 +310,7 @@ def pattern_turn(planned: Array, planned_middle: Array, points: Array, middle: A
 
 @kernel
 def turn_about_vertical(vector: Array, angle: float, out: Array) -> None:
-    """A vector (3,) turned about the world's z axis."""
+    """Rotate a vector (3,) about the world's z axis by ``angle`` [rad]."""
     cosine, sine = math.cos(angle), math.sin(angle)
     x, y = float(vector[0]), float(vector[1])
     out[0], out[1], out[2] = cosine * x - sine * y, sine * x + cosine * y, vector[2]
@@ -323,13 +328,16 @@ def lengthen(
     velocity: Array,
     acceleration: Array,
 ) -> None:
-    """Add to a jump's motion (3,) what makes up for feet off their place; see the block's text.
+    """Add the correction of the feet's position error to a jump's motion; see ``BalanceTarget``.
 
     Args:
-        off_place: horizontally, how far the feet are from their place (3,) [m].
-        limit: of the lengthening [m].
-        flight: how long the flight behind the lift-off lasts [s].
-        duration, share: how long before lift-off it begins [s], and how much of that is over.
+        off_place: the horizontal position error of the feet, (3,) [m].
+        gain: the share of the error that is corrected.
+        limit: the largest change of the jump's length [m].
+        flight: the duration of the planned flight [s].
+        duration, share: how long before lift-off the correction begins [s], and the share of that
+            time which is over, 0 to 1.
+        place, velocity, acceleration: of the centre of mass, (3,) each; they are changed.
     """
     u = min(max(share, 0.0), 1.0)
     grown, rate, _ = minimum_jerk(u)
@@ -343,9 +351,16 @@ def lengthen(
 
 
 @kernel
-def grow(goal: Array, share: float, duration: float, value: Array, rate: Array) -> None:
-    """Add what grows to ``goal`` (3,) as the square of the ``share`` of ``duration`` [s]; see the
-    block's text."""
+def add_quadratic_growth(
+    goal: Array, share: float, duration: float, value: Array, rate: Array
+) -> None:
+    """Add to ``value`` (3,) a term that grows with the square of time to ``goal`` (3,).
+
+    Args:
+        share: the share of ``duration`` [s] that is over, 0 to 1.
+        value, rate: a quantity and its time derivative; share^2 goal is added to the one, and the
+            derivative of that to the other.
+    """
     for k in range(3):
         value[k] += share * share * float(goal[k])
         rate[k] += 2.0 * share / duration * float(goal[k])
@@ -353,7 +368,7 @@ def grow(goal: Array, share: float, duration: float, value: Array, rate: Array) 
 
 @kernel
 def integrate_trim(error: Array, gain: float, limit: float, trim: Array) -> None:
-    """One step of the integral about x and y, kept within the limit; none about z."""
+    """One step of the integral of the tilt about x and y, within the limit; z stays zero."""
     for k in range(2):
         trim[k] = min(max(float(trim[k]) + gain * float(error[k]), -limit), limit)
     trim[2] = 0.0

@@ -33,12 +33,12 @@ class Dynamics(Block):
     the rotors out. Friction is in none of the terms.
 
     A foot with one contact point is a ball that rolls: its contact point, and its sole, are the
-    ball's lowest point however the foot is turned. What rests when it rolls is the ball's material
-    there, whose velocity changes by that of the centre and the ball's turning alone. Contact points
-    of other feet are fixed to the foot.
+    ball's lowest point whatever the foot's orientation. While the ball rolls the material at that
+    point is at rest; its velocity is that of the centre plus that due to the ball's rotation.
+    Contact points of other feet are fixed to the foot.
 
-    Does not filter or estimate anything, and knows no ground: contact points are points of the
-    feet, loaded or not.
+    The block does not filter or estimate anything, and knows no ground: contact points are points
+    of the feet, loaded or not.
     """
 
     needs = ("floating base",)
@@ -62,7 +62,7 @@ class Dynamics(Block):
         self._velocity = np.zeros(n_velocities)
         self._still = np.zeros(n_velocities)
         joints = [built.model.frames[sole].parentJoint for sole in built.sole_frames]
-        # Views of Pinocchio's own memory: it writes there again in every tick.
+        # Views of Pinocchio's own memory, which it overwrites in every tick.
         data = self._data
         self._mass_matrix: Array = data.M
         self._jacobian: Array = data.J
@@ -151,7 +151,7 @@ class Dynamics(Block):
 
 @kernel
 def move_jacobian(origin_jacobian: Array, point: Array, shift: Array, out: Array) -> None:
-    """The linear velocity of a body's point per v, (3, n), from the body's at the world's origin.
+    """The Jacobian (3, n) of a body's point, from the body's spatial Jacobian at the origin.
 
     A body that moves with (v_0, w) at the origin moves with v_0 + w x p at p, so
     J_p = [1 | -[p]x] J_0.
@@ -220,11 +220,11 @@ def rolling_drift(
     lowest: Array,
     out: Array,
 ) -> None:
-    """How the velocity of a ball's lowest point changes (row 1), in the body's frame.
+    """The rate of change of the velocity of a ball's lowest point (row 1), in the body's frame.
 
-    The lowest point is always another one of the ball's material, so its velocity
-    v_c + w x (lowest - centre) changes by a_c + w' x (lowest - centre): the acceleration of one
-    point of the material would count the turning about the centre too.
+    The lowest point consists of other material at every instant. So its velocity
+    v_c + w x (lowest - centre) has the derivative a_c + w' x (lowest - centre), without the
+    centripetal acceleration that a fixed point of the material has.
 
     Args:
         linear, angular, linear_rate, angular_rate: as for ``point_motion``.

@@ -1,4 +1,4 @@
-"""The torque that holds a robot on a fixed base up against gravity."""
+"""The joint torques that hold a robot on a fixed base against gravity."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from ..signals import JointState, JointTorque
 
 
 class GravityCompensation(Block):
-    """The joint torques g(q) that gravity would have to be answered with at the measured joint
-    positions, by Pinocchio: with them the robot stays where it is, or goes on as it moves.
+    """The joint torques g(q) that balance gravity at the measured joint positions, by Pinocchio.
 
-    For a slide it is the force along its axis. Joints without a motor have their torque, too, and
-    their drives cannot give it. It does not compensate friction, and nothing that the robot
-    carries; add that as a link to its description.
+    With these torques alone a robot at rest stays at rest. For a slide the torque is the force
+    along its axis. It is computed also for joints without a motor, whose drives cannot produce it.
+    The block compensates neither friction nor a load that the robot carries; add a load as a link
+    to the robot's description.
 
-    Only for a fixed base: what holds up a robot that moves freely depends on where its feet stand,
-    which is the whole-body controller's business.
+    It needs a fixed base: the torques that hold up a robot with a floating base depend on its
+    contacts, and the whole-body controller computes them.
     """
 
     needs = ("robot",)
@@ -33,7 +33,7 @@ class GravityCompensation(Block):
 
     @classmethod
     def requires(cls, params: Parameters, robot: RobotDescription | None) -> Iterable[Misfit]:
-        """A fixed base."""
+        """Report a base that is not fixed."""
         if robot is not None and robot.base_joint != "fixed":
             yield Misfit(
                 f"it needs a robot on a fixed base; {robot.name} has a {robot.base_joint} one",

@@ -1,4 +1,4 @@
-"""Joint gains for robots for which nobody has given any."""
+"""Default joint gains, from a robot's inertia and motors."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ from ...robots.pinocchio_model import build_pinocchio_model
 Array = NDArray[np.float64]
 
 NATURAL_FREQUENCY = 60.0
-"""Of a joint under the default gains by itself [rad/s], where its motor is strong enough."""
+"""Natural frequency [rad/s] of a joint with the default gains, if its motor is strong enough."""
 DAMPING_RATIO = 0.8
 SATURATION_ERROR = 0.2
-"""Error of a joint [rad] at which the default stiffness asks for the motor's peak torque."""
+"""The joint error [rad] at which the default stiffness may at most ask for the peak torque."""
 
 
 def default_gains(robot: RobotDescription) -> tuple[Array, Array]:
     """Stiffness [N m/rad] and damping [N m s/rad] of every joint, (n_joints,) each.
 
-    A joint with the inertia I that it has in the standing pose, rotors included and the base held,
-    gets K = I w^2 with ``NATURAL_FREQUENCY`` w, but no more than asks for its peak torque at
-    ``SATURATION_ERROR``, and D = 2 ``DAMPING_RATIO`` sqrt(K I).
+    Let I be the inertia of a joint in the standing pose with the base held, rotors included, and w
+    the ``NATURAL_FREQUENCY``. Then K = I w^2, but at most the peak torque per ``SATURATION_ERROR``,
+    and D = 2 ``DAMPING_RATIO`` sqrt(K I).
     """
     import pinocchio
 

@@ -34,7 +34,7 @@ from .tasks.foot_joints import leg_joints
 
 
 class JointFollower(Signal):
-    """How far each leg's gains have moved to those of flight, and the stance targets."""
+    """Each leg's blend between the gains of stance and flight, and the stance targets."""
 
     airborne = Field("n_feet", unit="", text="0: stance gains, 1: flight gains")
     position = Field("n_joints", unit="rad", text="integrated stance targets")
@@ -43,7 +43,7 @@ class JointFollower(Signal):
 
 
 class JointPD(Block):
-    """The joint command of every tick (paper, V, first equation)::
+    """The joint command of every tick: feedforward plus joint feedback (paper, V, first equation)::
 
         tau = tau_ff + Kp (q_d - q) + Kd (q_d' - q')
 
@@ -51,40 +51,41 @@ class JointPD(Block):
 
     **Legs.** A leg with a stance point gets the whole-body controller's tau_ff and the stance gains.
     A leg without one during FLIGHT or LANDING gets the flight gains, the targets of its inverse
-    kinematics and, as tau_ff, ``flight_feedforward`` times the planned torques while the plan flies
-    too, so that it need not lag behind by what moves it. A leg that lands late keeps swinging while
-    the others already stand. Between the two everything moves linearly within ``blend``.
+    kinematics and, as tau_ff, ``flight_feedforward`` times the planned torques while the plan is in
+    flight too, so that it lags less. A leg that lands late keeps swinging while the others already
+    stand. Gains, targets and torques change linearly from one set to the other within ``blend``.
 
-    **Other joints.** Joints that the robot's description holds have the flight gains towards their
-    angle all the time, besides tau_ff. Joints that belong to no leg and are not held go with the
+    **Other joints.** Joints that the robot's description holds always have tau_ff and the flight
+    gains towards their held angle. Joints that belong to no leg and are not held follow the
     whole-body controller while any leg stands; while all legs swing they have the flight gains
     towards the planned angles, or towards the standing pose if no plan is wired.
 
-    **Stance gains** are zero by default: the feedforward alone carries the robot. Where they are
-    not, ``stance_targets`` says towards what they act: ``measured`` are the measured joints, so that
-    only the damping acts, towards zero velocity; ``acceleration`` the whole-body controller's
-    accelerations integrated twice, pulled back to the measured joints with time constant ``leak``;
-    ``legs``, the paper's, the inverse kinematics of the planned feet seen from the centre of mass.
+    **Stance gains** are zero by default, so that the feedforward alone carries the robot. Otherwise
+    ``stance_targets`` says what their targets are. With ``measured`` they are the measured angles
+    and zero velocity, so that only the damping acts. With ``acceleration`` they are the whole-body
+    controller's accelerations, integrated twice, with a leak towards the measured joints of the
+    time constant ``leak``. With ``legs``, as in the paper, they are the inverse kinematics of the
+    planned feet relative to the centre of mass.
 
-    **Friction.** ``friction_share`` of the friction and damping of the robot's motors is made up for,
-    in the direction each joint moves, and ``friction`` besides.
+    **Friction.** The torque that compensates ``friction_share`` of the friction and damping of the
+    robot's motors, and all of ``friction``, is added in the direction in which each joint moves.
 
     **Soft stops.** A joint nearer than ``stop_margin`` to its limit, on the ground or in the air, is
-    also held back: by ``stop_gain`` times its flight stiffness towards that margin and, growing from
-    none there to ``stop_gain`` times its flight damping at the limit, towards rest.
+    pushed back: by ``stop_gain`` times its flight stiffness towards that margin, and by a damping
+    that grows from zero at the margin to ``stop_gain`` times its flight damping at the limit.
 
-    Gains are given by joint name or pattern. Without flight gains each joint gets some by its
-    inertia and its motor's peak torque (``joint_gains.default_gains``). For a sampled drive keep
-    Kd times its period below half the joint's inertia. Limits no torque: the drives do, and the
-    whole-body controller should.
+    Gains are given by joint name or pattern. Without flight gains each joint gets default gains by
+    its inertia and its motor's peak torque (``joint_gains.default_gains``). For a sampled drive keep
+    Kd times its period below half the joint's inertia. The block limits no torques: the drives do,
+    and the whole-body controller should.
     """
 
     class Params(Parameters):
         flight_stiffness: PerJoint | None = live_parameter(
-            None, unit="N m/rad", ge=0.0, text="Kp in the air; none: by inertia and peak torque"
+            None, unit="N m/rad", ge=0.0, text="Kp in the air; none: default gains"
         )
         flight_damping: PerJoint | None = live_parameter(
-            None, unit="N m s/rad", ge=0.0, text="Kd in the air; none: by inertia and peak torque"
+            None, unit="N m s/rad", ge=0.0, text="Kd in the air; none: default gains"
         )
         flight_feedforward: float = live_parameter(
             1.0, ge=0.0, le=1.0, text="share of the planned torques that is fed forward in the air"
@@ -96,19 +97,19 @@ class JointPD(Block):
             PerJoint(0.0), unit="N m s/rad", ge=0.0, text="Kd on the ground"
         )
         blend: float = live_parameter(
-            0.004, unit="s", ge=0.0, text="time from one set of gains to another"
+            0.004, unit="s", ge=0.0, text="duration of the change between both sets of gains"
         )
         stance_targets: Literal["measured", "acceleration", "legs"] = parameter(
-            "measured", text="what the stance gains act towards"
+            "measured", text="the targets of the stance gains"
         )
         leak: float = live_parameter(
-            0.02, unit="s", gt=0.0, text="time constant with which integrated targets forget"
+            0.02, unit="s", gt=0.0, text="time constant of the leak of integrated targets"
         )
         stop_margin: float = live_parameter(
-            0.05, unit="rad", gt=0.0, le=0.3, text="distance from a joint's limit of its soft stop"
+            0.05, unit="rad", gt=0.0, le=0.3, text="distance of a soft stop from the joint's limit"
         )
         stop_gain: float = live_parameter(
-            0.0, ge=0.0, le=20.0, text="gains of the soft stops, in those of flight; zero: none"
+            0.0, ge=0.0, le=20.0, text="gain of the soft stops, as a multiple of the flight gains"
         )
         friction: PerJoint = live_parameter(
             PerJoint(0.0), unit="N m", ge=0.0, text="further joint friction to compensate"
@@ -195,7 +196,7 @@ class JointPD(Block):
             add_soft_stops(self.joints.position, self._stops, self._out)
 
     def _blend(self) -> None:
-        """Move every leg's weight towards flight where none of its points may push."""
+        """Change the weight of each leg's flight gains: up where no point of it is in stance."""
         airborne, phase = self.follower.airborne, int(self.phase.phase[()])
         rate = self.period / self.params.blend if self.params.blend > self.period else 1.0
         least = 1.0 if self._chains else 0.0

@@ -1,4 +1,4 @@
-"""From where the feet should be to the joint positions that put them there."""
+"""The inverse kinematics of the legs: joint positions and velocities for foot targets."""
 
 from __future__ import annotations
 
@@ -37,17 +37,17 @@ from ..signals import FootTarget, JointState, JointTarget, JumpReference, Phase
 Array = NDArray[np.float64]
 
 _FASTEST = 100.0
-"""Foot velocities [m/s] are brought within this, so that no square overflows."""
+"""Foot velocities are limited to this [m/s], so that no square overflows."""
 _JUMP = 0.1
-"""A target that turns by more than this [rad] in a tick has been given anew."""
+"""A target that rotates by more than this [rad] in a tick is a new target, not a motion."""
 _STEPS = 24
-"""How many steps of the least squares are tried at most from each of its starts."""
+"""The largest number of least-squares steps from each starting point."""
 _LOOSE = 0.1
-"""Weight of what is given up first for a target out of reach, beside 1 for the rest."""
+"""Weight of those errors that matter less for a target out of reach; the others have weight 1."""
 
 
 class LegMemory(Signal):
-    """The feet's targets and the joints' answer at the last tick."""
+    """The feet's targets and the joints' solution of the last tick."""
 
     direction = Field(("n_feet", 3), unit="", frame="body", text="heel to toe, of unit length")
     known = Field(dtype="bool", text="whether there was a last tick")
@@ -56,82 +56,89 @@ class LegMemory(Signal):
 
 
 class LegInverseKinematics(Block):
-    """Joint positions and velocities for foot targets seen from the base (paper, V).
+    """Joint positions and velocities for foot targets relative to the base (paper, V).
 
-    A leg is the chain of joints from the base to a foot, of any number and kind. How much of the
-    target's orientation counts follows from the foot's contact points: nothing for a point foot, whose
-    ball's lowest point goes to the target's place,
-    the direction of its line for a line foot, all of it for a flat foot.
+    A leg is the chain of joints from the base to a foot, of any number and kind. The kind of foot
+    says how much of the target's orientation counts: all of it for a flat foot, the direction of
+    the contact line for a line foot, and none for a point foot, whose lowest point goes to the
+    target's position.
 
     A leg of hip yaw, pitch and roll with intersecting axes, a knee and an ankle that ends in a
     line foot is solved in closed form (``robots/five_joint_leg``), unless ``method`` is
     ``least_squares``. Any other leg is solved by damped least squares within the joint limits
-    (``robots/limb_inverse``), from the last tick's answer; where that does not lead to the target,
-    from the measured and from the standing joints too. Both answers agree to 1e-9 rad within
-    reach. ``reachable`` says whether the foot is where it should be.
+    (``robots/limb_inverse``), starting from the last tick's solution and, if that does not reach
+    the target, also from the measured and from the standing joints. Within reach both methods agree
+    to 1e-9 rad. ``reachable`` says whether the foot reaches its target.
 
-    A target out of reach is answered with the nearest that can be reached. With ``beyond: slide``
-    the foot gives up its place in the plane of its sole first, so it keeps its height above the
-    ground and lands flat, though not where it should; with ``beyond: turn`` it gives up its
-    orientation first. (The closed form gives them up one after the other, the least squares by
-    weighing the one less than the other.) Every joint stays ``margin`` inside its limits. A leg
-    solved in closed form slows down within ``softness`` of a full stretch.
+    For a target out of reach the solution is the nearest pose within reach. With ``beyond: slide``
+    errors in the plane of the sole are allowed first, so the foot keeps its height above the ground
+    and lands flat, though not where it should; with ``beyond: turn`` errors of orientation are
+    allowed first. (The closed form does this strictly, the least squares by a lower weight.) Every
+    joint stays ``margin`` inside its limits. A leg solved in closed form slows down within
+    ``softness`` of a full stretch.
 
-    Velocities follow by damped least squares from the rows J of the foot's Jacobian that count,
-    turns times ``turn_length``::
+    Velocities follow by damped least squares from those rows J of the foot's Jacobian that count;
+    rows of rotation are multiplied by ``turn_length``::
 
         q' = (J'J + damping^2 I)^-1 J'(p', turn_length w),   w from the targets of two ticks
 
     They are limited to ``speed_limit``, and are zero for a joint held at its limit. A target that
-    turns by more than 0.1 rad in one tick is a new target, not a motion.
+    rotates by more than 0.1 rad in one tick is a new target, not a motion.
 
     With ``follow: pitch`` the soles have the pitch they have in the plan, so that heels that rose
     before lift-off come down as planned and not at once. With ``follow: plan`` the targets are the
-    plan's joints while the plan flies, and the landing law has no say: a somersault turns as fast
-    as its legs are tucked, so its rotation is right only if all joints are where they should be.
+    plan's joints while the plan is in flight, and the landing law has no effect: the rate of a
+    somersault depends on how far the legs are tucked, so its rotation is right only if all joints
+    follow the plan.
 
     Joints that the description holds have their held position as the target; other joints that
-    belong to no leg have their measured position. Does not avoid collisions between the legs. The
-    load report has a problem for a joint that carries two feet, unless it is held.
+    belong to no leg have their measured position. The block does not avoid collisions between the
+    legs. The load report names every joint that carries two feet and is not held.
     """
 
     class Params(Parameters):
         method: Literal["auto", "least_squares"] = parameter(
             "auto", text="the closed form where it applies, or always the damped least squares"
         )
-        margin: float = parameter(0.05, unit="rad", ge=0.0, le=0.2, text="kept from joint limits")
+        margin: float = parameter(
+            0.05, unit="rad", ge=0.0, le=0.2, text="distance kept from joint limits"
+        )
         damping: float = live_parameter(
-            3e-4, unit="m", gt=0.0, text="of the least squares for velocity"
+            3e-4, unit="m", gt=0.0, text="damping of the least squares for velocity"
         )
         turn_length: float = live_parameter(
-            0.3, unit="m", gt=0.0, text="how much distance a turn of 1 rad of a foot counts as"
+            0.3, unit="m", gt=0.0, text="the distance that a foot's rotation by 1 rad is equal to"
         )
         speed_limit: float = live_parameter(
             30.0, unit="rad/s", gt=0.0, text="largest joint velocity"
         )
         softness: float = live_parameter(
-            0.005, unit="m", ge=0.0, le=0.05, text="over which a stretching leg slows down"
+            0.005,
+            unit="m",
+            ge=0.0,
+            le=0.05,
+            text="distance from full stretch over which a leg slows down",
         )
         follow: Literal["feet", "pitch", "plan"] = parameter(
             "feet", text="the feet's targets; those with the soles' planned pitch; or the plan's "
             "joints as long as the plan flies"
         )  # fmt: skip
         beyond: Literal["turn", "slide"] = live_parameter(
-            "turn", text="what is given up first for a target out of reach"
+            "turn", text="where errors are allowed first for a target out of reach"
         )
 
     needs = ("feet",)
     params: Params
 
-    feet = Input(FootTarget, text="where the feet should be, from the base")
-    joints = Input(JointState, text="measured joints: where to stay where any angle will do")
+    feet = Input(FootTarget, text="where the feet should be, relative to the base")
+    joints = Input(JointState, text="measured joints, kept where any angle is a solution")
     reference = Input(JumpReference, default={}, text="the plan, where its joints are followed")
     target = Output(JointTarget, text="joint angles and velocities to track")
-    memory = State(LegMemory, text="to difference the targets, and where the search starts")
+    memory = State(LegMemory, text="the last targets and the last solution")
 
     @classmethod
     def requires(cls, params: Parameters, robot: RobotDescription | None) -> Iterable[Misfit]:
-        """Legs that share no joint."""
+        """Report joints that two legs share."""
         assert robot is not None
         uses = Counter(joint for foot in robot.feet for joint in chain_to(robot, foot.link))
         for joint, count in uses.items():

@@ -1,4 +1,4 @@
-"""The last block before the drives: lets the command through, or damps for good."""
+"""The last block before the drives: passes the command on, or after a fault only damps."""
 
 from __future__ import annotations
 
@@ -24,10 +24,10 @@ _DAMPED_SPEED = 20.0
 
 
 class Fault(IntEnum):
-    """Why the robot was stopped."""
+    """The reason why the robot was put into damping."""
 
     NONE = 0
-    """It was not."""
+    """There is no fault."""
     TILT = 1
     """The base leant too far for too long."""
     JOINT_LIMIT = 2
@@ -45,9 +45,11 @@ class Fault(IntEnum):
 
 
 class SafetyState(Signal):
-    """What the monitor remembers."""
+    """The state of ``SafetyMonitor``."""
 
-    fault = Field(dtype="int64", values=Fault, text="why it damps; the first reason stays")
+    fault = Field(
+        dtype="int64", values=Fault, text="why the robot is damped; the first reason stays"
+    )
     fault_tick = Field(dtype="int64", text="when")
     tilted = Field(dtype="int64", text="ticks in a row the base has leant too far")
     beyond = Field("n_joints", dtype="int64", text="ticks in a row each joint was out of limits")
@@ -62,7 +64,7 @@ class SafetyState(Signal):
 class SafetyMonitor(Block):
     """Passes the joint command on until something is wrong, and from then on only damps.
 
-    A fault, once found, stays for the run; the first is kept in the state and in the metrics
+    A fault lasts to the end of the run. The first fault is kept in the state and in the metrics
     ``safety_fault`` and ``safety_fault_time_s``. It is a fault when
 
     * the base leans more than ``tilt_limit`` for ``tilt_hold``;
@@ -73,20 +75,26 @@ class SafetyMonitor(Block):
     * a state or a command is not finite, or beyond 10 m/s, 100 rad/s or its ``torque_limit``;
     * the whole-body controller has not solved for ``unsolved_ticks`` ticks in a row.
 
-    Damping commands zero torque and stiffness, the measured angle, zero velocity and ``damping``,
-    all finite whatever came in. Every tick is judged, also after a fault. Limits and damping are
-    given by joint name or pattern, and follow from the robot's motors where they are not. It does
-    not know of temperature, voltage or deadlines, and it does not stop the run: the score does.
+    In damping the command is zero torque and stiffness, the measured angle, zero velocity and the
+    gain ``damping``; all values are finite whatever the inputs are. Every tick is judged, also
+    after a fault. Limits and damping are given by joint name or pattern; by default they follow
+    from the robot's motors. The block does not watch temperature, voltage or deadlines, and it does
+    not stop the run: the score does.
     """
 
     class Params(Parameters):
         tilt_limit: float = parameter(1.2, unit="rad", gt=0.0, le=math.pi, text="largest lean")
-        tilt_hold: float = parameter(0.02, unit="s", ge=0.0, text="for how long it may be more")
+        tilt_hold: float = parameter(
+            0.02, unit="s", ge=0.0, text="how long the base may lean further"
+        )
         limit_margin: float = parameter(
             0.05, unit="rad", ge=0.0, text="how far a joint may be beyond its limits"
         )
         speed_limit: PerJoint | None = parameter(
-            None, unit="rad/s", gt=0.0, text="fastest joint; none: twice what its motors reach"
+            None,
+            unit="rad/s",
+            gt=0.0,
+            text="largest joint speed; none: twice what its motors reach",
         )
         joint_hold: float = parameter(
             0.02, unit="s", ge=0.0, text="for how long a joint may be further or faster"
@@ -103,13 +111,13 @@ class SafetyMonitor(Block):
             None,
             unit="N m s/rad",
             ge=0.0,
-            text="of the joints after a fault; none: the motors' peak torque at 20 rad/s",
+            text="joint damping after a fault; none: the motors' peak torque at 20 rad/s",
         )
 
     needs = ("robot",)
     params: Params
 
-    desired = Input(JointCommand, text="what the controller wants")
+    desired = Input(JointCommand, text="the controller's command")
     base = Input(BaseState, text="the estimated base")
     joints = Input(JointState, text="the measured joints")
     wbc = Input(WholeBodyCommand, text="whether the controller has solved")
@@ -177,7 +185,7 @@ class SafetyMonitor(Block):
         return result
 
     def _judge(self) -> Fault:
-        """The fault of this tick, the gravest first; all timers move on."""
+        """The gravest fault of this tick; all timers are updated."""
         state, params, joints, base = self.state, self.params, self.joints, self.base
         for values, limits in self._commands:
             if not within_each(values, limits):
@@ -224,7 +232,7 @@ class SafetyMonitor(Block):
 
 @kernel
 def within(values: Array, limit: float) -> bool:
-    """Whether all values are finite and of no greater magnitude; NaN is not."""
+    """Whether all values are finite and their magnitudes at most ``limit``."""
     inside = True
     for i in range(values.shape[0]):
         inside = inside and abs(float(values[i])) <= limit
@@ -233,7 +241,7 @@ def within(values: Array, limit: float) -> bool:
 
 @kernel
 def within_each(values: Array, limits: Array) -> bool:
-    """Whether every value is finite and of no greater magnitude than its limit; NaN is not."""
+    """Whether every value is finite and its magnitude at most its limit."""
     inside = True
     for i in range(values.shape[0]):
         inside = inside and abs(float(values[i])) <= float(limits[i])
@@ -242,7 +250,7 @@ def within_each(values: Array, limits: Array) -> bool:
 
 @kernel
 def count_beyond(values: Array, lower: Array, upper: Array, counts: NDArray[np.int64]) -> int:
-    """Count for each value how many times in a row it was out of bounds; the largest count."""
+    """Count how many times in a row each value was out of bounds; returns the largest count."""
     largest = 0
     for i in range(values.shape[0]):
         out = not float(lower[i]) <= float(values[i]) <= float(upper[i])
@@ -253,8 +261,10 @@ def count_beyond(values: Array, lower: Array, upper: Array, counts: NDArray[np.i
 
 @kernel
 def count_faster(values: Array, limits: Array, counts: NDArray[np.int64]) -> int:
-    """Count for each value how many times in a row its magnitude was above its limit; the largest
-    count."""
+    """Count how many times in a row each value's magnitude was above its limit.
+
+    Returns the largest count.
+    """
     largest = 0
     for i in range(values.shape[0]):
         above = abs(float(values[i])) > float(limits[i])

@@ -1,4 +1,4 @@
-"""Joint torques from the whole-body quadratic program."""
+"""Computes the joint torques by the whole-body quadratic program."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ Array = NDArray[np.float64]
 
 
 class SolverMemory(Signal):
-    """What the controller remembers for when the solver fails."""
+    """The state for ticks in which the solver fails."""
 
     torque = Field("n_joints", unit="N m", text="torque of the last solved program")
     failed = Field(dtype="int64", text="ticks since it was solved")
@@ -54,7 +54,7 @@ class SolverMemory(Signal):
 
 
 class WholeBodyController(Block):
-    """The weighted whole-body quadratic program of the paper (V, wbc_qp), at every tick afresh.
+    """The weighted whole-body quadratic program of the paper (V, wbc_qp), solved in every tick.
 
     Over the generalised acceleration a and the forces f_j of the points in stance::
 
@@ -65,33 +65,35 @@ class WholeBodyController(Block):
 
     then the torque is tau = H_j a + C_j v + G_j - sum_j J_{c_j,j}' f_j (opt_torque).
 
-    **Tasks.** What is wanted of the acceleration is a list of tasks, each a small class in
-    ``blocks/control/tasks`` with its error, its Jacobian and its gains: ``ContactPoints``,
-    ``LinearMomentum``, ``TorsoOrientation``, ``AngularMomentum`` (the paper's tasks 1 to 4) and
-    ``Posture``, which keeps joints that belong to no leg where they should be. A graph chooses others with
-    ``tasks``; an entry is the name of a task, or ``{task: module:Class, gains: {...}}`` for a
-    class of the user's own and for gains of one entry alone. See ``docs/whole_body.md``.
+    **Tasks.** The objectives are a list of tasks, each a small class in ``blocks/control/tasks``
+    with its error, its Jacobian and its gains: ``ContactPoints``, ``LinearMomentum``,
+    ``TorsoOrientation``, ``AngularMomentum`` (the paper's tasks 1 to 4) and ``Posture``, which
+    keeps joints that belong to no leg at their angles. A graph chooses others with ``tasks``; an
+    entry is the name of a task, or ``{task: module:Class, gains: {...}}`` for a class of the user's
+    own and for gains of one entry alone. See ``docs/whole_body.md``.
 
     ``stand`` gains hold in STAND and SQUAT, ``thrust`` in THRUST, ``landing`` after. The default
-    thrust gains put lateral motion above roll and yaw momentum: where a thigh is level the hip's
-    yaw and roll axes are in line, both cannot be had, and a jump should go straight up.
+    thrust gains give lateral motion priority over roll and yaw momentum: where a thigh is level the
+    hip's yaw and roll axes are in line, not both can be controlled, and a jump should go straight
+    up.
 
-    **Limits.** ``none`` is the paper's; ``joint`` bounds each joint's torque by the peak of the
-    motor at its place; ``motor`` bounds the torque of every motor through the transmission by
-    what it can give at its present speed, which is the truth of a robot with differential joints.
-    They are those of the robot's actuator profile in use.
+    **Limits** on torque are those of the robot's actuator profile in use. ``none``, as in the
+    paper, sets no limits. ``joint`` bounds each joint's torque by the peak torque of the motor with
+    the same index. ``motor`` bounds the torque of every motor, through the transmission, by its
+    torque-speed curve at its present speed, which is exact also for differential joints.
 
     Without a point in stance there is nothing to solve: torque, force and acceleration are zero,
     and the command counts as solved.
 
-    Should the solver fail, the last solved torque is given times ``fallback_decay`` to the number
-    of ticks since, for ``fallback_ticks`` ticks; after those the torque that carries the weight,
-    shared equally by the points in stance, with no acceleration. Failures are counted.
+    If the solver fails, the torque is the last solved one times ``fallback_decay`` to the power of
+    the number of ticks since, for ``fallback_ticks`` ticks. After these it is the torque that
+    carries the weight, shared equally by the points in stance, with no acceleration. Failures are
+    counted.
 
-    Works for any robot with a floating base and feet. It does no feedback on joints (``JointPD``
-    does) and keeps no solver state: a cold start makes the answer a function of the inputs alone.
-    The load report has a problem where the solver is not installed, where a task is unknown or
-    has no such gain, and where the feet can carry nothing.
+    The block works for any robot with a floating base and feet. It does no feedback on joints
+    (``JointPD`` does) and keeps no solver state: with a cold start the solution depends on the
+    inputs alone. The load report names a solver that is not installed, an unknown task or gain, and
+    feet that can carry no load.
     """
 
     array_allocations = 12
@@ -99,7 +101,7 @@ class WholeBodyController(Block):
 
     class Params(Parameters):
         tasks: list[str | TaskChoice] = parameter(
-            list(OWN_TASKS), min_length=1, text="what is wanted of the acceleration"
+            list(OWN_TASKS), min_length=1, text="the tasks, each an objective for the acceleration"
         )
         solver: str = parameter("daqp", text="any dense solver that qpsolvers finds installed")
         limits: Literal["none", "joint", "motor"] = parameter("motor", text="torque limits")
@@ -111,7 +113,10 @@ class WholeBodyController(Block):
             0.0, unit="N", ge=0.0, text="least normal force of a point"
         )
         force_max: float | None = live_parameter(
-            None, unit="N", gt=0.0, text="largest one; none: eight times the robot's weight"
+            None,
+            unit="N",
+            gt=0.0,
+            text="largest normal force of a point; none: eight times the robot's weight",
         )
         force_weight: float = live_parameter(1e-4, gt=0.0, text="W_f")
         acceleration_weight: float = live_parameter(1e-4, gt=0.0, text="W_a")
@@ -126,7 +131,7 @@ class WholeBodyController(Block):
                 angular_damping=(30.0, 30.0, 30.0),
                 track_angular_momentum=True,
             ),
-            text="gains in the thrust: angular momentum before the torso",
+            text="gains in the thrust; angular momentum matters more than the torso there",
         )
         landing: TaskGains = live_parameter(
             TaskGains(
@@ -141,7 +146,7 @@ class WholeBodyController(Block):
         )
         fallback_ticks: int = parameter(5, ge=0, text="ticks the last torque is held on failure")
         fallback_decay: float = live_parameter(
-            0.9, ge=0.0, le=1.0, text="factor on it per tick since the last solved program"
+            0.9, ge=0.0, le=1.0, text="factor on that torque per tick since the last solution"
         )
 
     needs = ("floating base", "feet")
@@ -151,11 +156,11 @@ class WholeBodyController(Block):
     phase = Input(PhaseState, text="the phase and the points in stance")
     joints = Input(JointState, text="joint angles and velocities")
     command = Output(WholeBodyCommand, text="torque, acceleration and contact forces")
-    memory = State(SolverMemory, text="for when the solver fails")
+    memory = State(SolverMemory, text="used when the solver fails")
 
     @classmethod
     def requires(cls, params: Parameters, robot: RobotDescription | None) -> Iterable[Misfit]:
-        """A solver that is installed, and feet with contact points that joints carry."""
+        """Report a solver that is not installed, and feet that can carry no load."""
         assert isinstance(params, cls.Params) and robot is not None
         if not robot.contacts:
             yield Misfit(f"{robot.name} has no contact points, so its feet can carry no load")
@@ -169,7 +174,7 @@ class WholeBodyController(Block):
 
     @classmethod
     def requires_of_graph(cls, params: Parameters, context: Context) -> Iterable[Misfit]:
-        """Tasks that can be found, each with gains that it has and that fit the robot."""
+        """Report unknown tasks, and gains that a task does not have or that misfit the robot."""
         assert isinstance(params, cls.Params)
         try:
             for chosen in choose_tasks(params.tasks, (context.graph_folder, context.folder)):
@@ -208,8 +213,8 @@ class WholeBodyController(Block):
         self._build_tasks(robot, n)
         self.on_parameters()
         self._active = np.zeros(n_contacts, dtype=np.int64)
-        # A program of its own size for every number of points in stance: forces fixed to zero by
-        # bounds would leave it without an interior.
+        # There is a program for every number of points in stance, each of its own size, because
+        # fixing forces to zero by bounds would leave the feasible set without an interior.
         self._programs = [
             WholeBodyProgram.of_size(n, count, limit_rows) for count in range(n_contacts + 1)
         ]

@@ -26,7 +26,7 @@ class WholeBodyProgram:
 
     @classmethod
     def of_size(cls, n_velocities: int, count: int, limit_rows: int) -> WholeBodyProgram:
-        """Zero matrices for ``count`` points in stance and so many rows of torque limits."""
+        """Zero matrices for ``count`` points in stance and ``limit_rows`` rows of torque limits."""
         size, cone_rows = n_velocities + 3 * count, PYRAMID_ROWS * count
         n_joints = n_velocities - 6
         matrix = np.zeros((cone_rows + limit_rows, size))

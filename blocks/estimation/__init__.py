@@ -1,1 +1,1 @@
-"""Blocks that find out where the robot is and how it moves."""
+"""Blocks that estimate the state of the robot: contacts, pose and velocity."""

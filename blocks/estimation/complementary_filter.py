@@ -1,4 +1,4 @@
-"""Where the base is and how it moves, by the paper's complementary filter."""
+"""The paper's estimator of the base's pose and velocity: a complementary filter."""
 
 from __future__ import annotations
 
@@ -7,21 +7,21 @@ from .inertial_estimator import InertialEstimator
 
 
 class ComplementaryFilter(InertialEstimator):
-    """The paper's complementary filter for the floating base (II-B), ballistic in flight if asked.
+    """The paper's complementary filter for the floating base (II-B).
 
     The IMU is integrated::
 
         R' = R [w]x,   v' = R f + g,   p' = v
 
-    and contact points that stand at a_i, seen from the base at r_i(q), correct the velocity by
-    v = -R (J_i q' + w x r_i) and the position by p = a_i - R r_i, with ``velocity_gain`` and
-    ``position_gain`` a tick. Every point in contact counts the same. In contact the accelerometer
-    rights the orientation by ``tilt_gain`` whenever it reads about 1 g. The gyroscope's bias is its mean
-    while the robot stands still; the accelerometer's is not known. What flight does, and where the
-    world's origin is: see ``flight`` and ``StateEstimator``.
+    and contact points that stand at a_i in the world, and at r_i(q) relative to the base, correct
+    the velocity towards v = -R (J_i q' + w x r_i) and the position towards p = a_i - R r_i, with
+    the gains ``velocity_gain`` and ``position_gain`` per tick. All points in contact have equal
+    weight. In contact the accelerometer corrects the tilt with ``tilt_gain`` whenever it reads
+    about 1 g. The estimate of the gyroscope's bias is its mean while the robot stands still; the
+    accelerometer's bias is not estimated. For flight and the world's origin see ``StateEstimator``.
 
-    ``StateEstimator`` has the same ports and adds what decides a jump. Yaw and horizontal position drift.
-    Never waits, never raises in a run.
+    ``StateEstimator`` has the same ports and estimates the state at lift-off much better. Yaw and
+    horizontal position drift. The block never waits and raises no errors in a run.
     """
 
     starts_level = False

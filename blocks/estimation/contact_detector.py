@@ -1,4 +1,4 @@
-"""From bouncing switches to points that carry load."""
+"""Detects by bouncing switches which contact points carry load."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from ..signals import ContactState, ContactSwitches
 
 
 class ContactTimers(Signal):
-    """How long each switch has been as it is, and what was decided."""
+    """How long each switch has been open or closed, and which points are in contact."""
 
     closed = Field("n_contacts", dtype="int64", text="ticks in a row a switch has been closed")
     opened = Field("n_contacts", dtype="int64", text="ticks in a row it has been open")
@@ -21,15 +21,15 @@ class ContactTimers(Signal):
 
 
 class ContactDetector(Block):
-    """A latch with hold for every contact point by itself (paper, II-A).
+    """Debounces the switch of every contact point separately (paper, II-A).
 
-    A point becomes active once its switch has been closed for ``close_samples`` ticks in a row,
-    and stays so until the switch has been open for longer than ``hold``: a bouncing switch never
-    lets go, and a foot that lands toe first is in contact at its toe only. Points never follow one
-    another: a landing foot is not taken to be flat.
+    A point becomes active once its switch has been closed for ``close_samples`` ticks in a row, and
+    stays active until the switch has been open for longer than ``hold``. So a bouncing switch does
+    not interrupt a contact, and a foot that lands toe first is in contact at its toe only: the
+    points of a foot do not influence one another.
 
-    The hold delays the report of a lift-off by as much; whoever needs lift-off sooner reads the
-    switches or the plan's time. Knows no forces.
+    The hold delays the report of a lift-off by the same time; a block that needs lift-off sooner
+    reads the switches or the plan's time. The block does not estimate forces.
     """
 
     class Params(Parameters):
@@ -68,7 +68,7 @@ def latch(
     opened: NDArray[np.int64],
     active: NDArray[np.bool_],
 ) -> None:
-    """One tick of all points: ``closed``, ``opened`` and ``active`` are brought up to date."""
+    """Update ``closed``, ``opened`` and ``active`` (n_contacts,) by the switches of one tick."""
     for point in range(switches.shape[0]):
         if switches[point]:
             closed[point] += 1

@@ -1,4 +1,4 @@
-"""What the estimators of the floating base that integrate the IMU have in common."""
+"""The common base of the estimators of the floating base that integrate the IMU."""
 
 from __future__ import annotations
 
@@ -30,13 +30,13 @@ Array = NDArray[np.float64]
 _FASTEST_TURN = 100.0
 _STRONGEST_FORCE = 1000.0
 _FASTEST_JOINT = 1000.0
-"""Sensor values are brought within these [rad/s, m/s^2, rad/s], so that nothing can overflow."""
+"""Sensor values are limited to these [rad/s, m/s^2, rad/s], so that nothing can overflow."""
 _IMPACT = 0.05
 """A change of the CoM's velocity in one tick [m/s] that ends a free fall."""
 
 
 class BaseEstimate(Signal):
-    """What an estimator of the base remembers."""
+    """The state of an estimator of the base."""
 
     position = Field(3, unit="m", frame="world", text="base origin")
     orientation = Field(4, unit="", text="quaternion x, y, z, w from body to world")
@@ -48,61 +48,69 @@ class BaseEstimate(Signal):
     mean_joint_rate = Field("n_joints", unit="rad/s", text="low-passed joint velocities")
     anchor = Field(("n_contacts", 3), unit="m", frame="world", text="where the points stand")
     anchored = Field("n_contacts", dtype="bool", text="which points have an anchor")
-    ballistic_velocity = Field(3, unit="m/s", frame="world", text="of the CoM, less gravity's part")
+    ballistic_velocity = Field(
+        3, unit="m/s", frame="world", text="velocity of the CoM at the start of the free fall"
+    )
     flight_ticks = Field(dtype="int64", text="ticks since the last trusted contact")
     started = Field(dtype="bool", text="whether the first sample has been seen")
 
 
 class BiasSamples(Signal):
-    """Means in the making: the block of samples being filled and the one before it."""
+    """Means that are being formed: sums over the present block of samples and the one before."""
 
     samples = Field(dtype="int64", text="samples the mean is made of")
     filled = Field(dtype="int64", text="samples in the block being filled")
     held = Field(dtype="int64", text="samples in the block before, none or a full block")
-    filling_sum = Field(3, frame="body", text="of what the learnt bias is the mean of")
-    held_sum = Field(3, frame="body", text="of the block before")
+    filling_sum = Field(3, frame="body", text="sum of the samples whose mean is the learnt bias")
+    held_sum = Field(3, frame="body", text="the same sum of the block before")
 
 
 class InertialParameters(Parameters):
-    """What such an estimator can be told."""
+    """The parameters of estimators that integrate the IMU."""
 
     flight: Literal["imu", "ballistic"] = parameter(
-        "imu", text="what carries the base in flight: the IMU, or a free fall of the CoM"
+        "imu", text="the prediction in flight: by the IMU, or by a free fall of the CoM"
     )
     velocity_gain: float = live_parameter(
-        0.03, gt=0.0, le=1.0, text="share of the legs' velocity correction that is taken a tick"
+        0.03, gt=0.0, le=1.0, text="gain of the legs' velocity correction, per tick"
     )
     position_gain: float = live_parameter(
-        0.05, gt=0.0, le=1.0, text="share of the legs' position correction that is taken a tick"
+        0.05, gt=0.0, le=1.0, text="gain of the legs' position correction, per tick"
     )
     tilt_gain: float = live_parameter(
-        0.002, ge=0.0, le=1.0, text="share of the accelerometer's tilt correction taken a tick"
+        0.002, ge=0.0, le=1.0, text="gain of the accelerometer's tilt correction, per tick"
     )
     still_rate: float = live_parameter(
-        0.08, unit="rad/s", gt=0.0, text="rate of base and joints below which it stands still"
+        0.08,
+        unit="rad/s",
+        gt=0.0,
+        text="rate of base and joints below which the robot stands still",
     )
 
 
 class InertialEstimator(Block):
     """The base of estimators that integrate the IMU and are corrected by the legs (paper, II-B).
 
-    **Prediction.** The gyroscope, less its bias, turns the orientation R; the specific force f,
-    less its bias and turned to the world, is integrated to velocity and position::
+    **Prediction.** The angular velocity w, which is the gyroscope minus its bias, is integrated to
+    the orientation R. The specific force f, which is the accelerometer minus its bias, is rotated
+    to the world and integrated to velocity and position::
 
         R' = R [w]x,   v' = R f + g,   p' = v
 
-    **Correction by the legs.** With r_i(q) a contact point seen from the base, a point at rest in
-    the world at a_i says v = -R (J_i q' + w x r_i) and p = a_i - R r_i. Both pull with the gains
-    ``velocity_gain`` and ``position_gain`` a tick, so the legs' noise is averaged over 1/gain ticks
-    without lag: the IMU carries the motion meanwhile. a_i is latched when the point touches down.
+    **Correction by the legs.** Let r_i(q) be a contact point relative to the base. If the point is
+    at rest in the world at a_i, then v = -R (J_i q' + w x r_i) and p = a_i - R r_i. The estimate is
+    corrected towards both with the gains ``velocity_gain`` and ``position_gain`` per tick, so the
+    legs' noise is averaged over 1/gain ticks; there is no lag, because the IMU predicts the motion
+    meanwhile. a_i is set when the point touches down.
 
-    **Flight.** With no point trusted the prediction runs alone. ``flight: imu`` integrates the IMU.
-    ``flight: ballistic`` averages the CoM's velocity by the IMU over the first 20 ms, and from then
-    on the CoM falls freely and the base follows from the joints; it does not drift, but it also
-    does not feel a push.
+    **Flight.** While no point is trusted there is only the prediction. ``flight: imu`` integrates
+    the IMU. ``flight: ballistic`` averages the CoM's velocity by the IMU over the first 20 ms; from
+    then on the CoM falls freely, and the base follows from the joints. That does not drift, but it
+    also does not notice a push.
 
-    It starts at the first sample, standing on level ground: the world's origin is midway between
-    the soles and x is where the feet point, for feet of one contact point the pattern they make.
+    It starts at the first sample, with the robot standing on level ground: the world's origin is
+    midway between the soles, and x is the heading of the feet; for feet of one contact point it is
+    the heading of the pattern in which they stand.
 
     A derived class says how the orientation is corrected and how far each point is trusted.
     """
@@ -110,7 +118,7 @@ class InertialEstimator(Block):
     Params = InertialParameters
     needs = ("floating base", "imu", "feet")
     starts_level: ClassVar[bool]
-    """Whether the first tilt is that of the contact points; else it is the accelerometer's."""
+    """Whether the first tilt is taken from the contact points; otherwise from the accelerometer."""
 
     params: InertialParameters
 
@@ -132,7 +140,10 @@ class InertialEstimator(Block):
 
     @abstractmethod
     def trust_points(self) -> tuple[float, float]:
-        """Write the weight of every point; the largest weight, and how far to use contacts at all."""
+        """Write the weight of every point.
+
+        Returns the largest weight, and a factor from 0 to 1 on all corrections by contacts.
+        """
 
     def setup(self) -> None:
         robot = self.robot
@@ -182,14 +193,17 @@ class InertialEstimator(Block):
             rotate(estimate.orientation, rate, world_rate)
         self._use_contacts()
         if self.params.flight == "ballistic":
-            self._fall()
+            self._integrate_free_fall()
         base.position[...] = estimate.position
         base.orientation[...] = estimate.orientation
         base.linear_velocity[...] = estimate.velocity
         base.angular_velocity[...] = estimate.angular_velocity
 
     def watch_motion(self) -> float:
-        """Low-pass all rates over 20 ms; the fastest [rad/s], infinite unless all points stand."""
+        """Low-pass all rates over 20 ms.
+
+        Returns the fastest rate of base and joints [rad/s]; infinite unless all points stand.
+        """
         estimate, share, fastest = self.estimate, self._watch_share, 0.0
         for i in range(3):
             mean = float(estimate.mean_rate[i])
@@ -212,7 +226,7 @@ class InertialEstimator(Block):
         )
 
     def _start(self) -> None:
-        """Standing on level ground around the origin, the feet pointing along x."""
+        """Start with the robot standing on level ground at the origin, its feet heading along x."""
         estimate, seen = self.estimate, self._kinematics
         upright(self._force, estimate.orientation)
         self._see_points()
@@ -229,11 +243,11 @@ class InertialEstimator(Block):
         for point in seen.points:
             rotate(estimate.orientation, point, self._spare)
             estimate.position[2] -= float(self._spare[2]) / len(seen.points)
-        estimate.mean_joint_rate.fill(1.0)  # moving, until it is seen not to
+        estimate.mean_joint_rate.fill(1.0)  # the robot counts as moving until it is seen at rest
         estimate.started[()] = True
 
     def is_unaccelerated(self) -> bool:
-        """Whether the accelerometer reads about 1 g, so that it shows where down is."""
+        """Whether the accelerometer reads about 1 g, so that it shows the vertical."""
         x, y, z = (float(self._force[i]) for i in range(3))
         return abs(math.sqrt(x * x + y * y + z * z) - GRAVITY) <= 0.1 * GRAVITY
 
@@ -243,11 +257,12 @@ class InertialEstimator(Block):
         self.learning.filling_sum.fill(0.0)
 
     def learn_bias(self, bias: Array, prior: float) -> None:
-        """Count a sample that has been added to ``filling_sum``, and bring the bias (3,) up to date.
+        """Count a sample that has been added to ``filling_sum``, and update the bias (3,).
 
-        A full block of samples counts only once the block after it is full too, so the beginning
-        of a motion, before it is noticed, does not get in. The mean starts from zero with the
-        weight of ``prior`` samples: the usual ratio of noise to bias.
+        A full block of samples counts only once the block after it is full too, so that samples
+        from the beginning of a motion, which is noticed late, are left out. The mean starts from
+        zero with the weight of ``prior`` samples: the usual ratio of the variances of noise and
+        bias.
         """
         learning = self.learning
         learning.filled[()] = filled = int(learning.filled[()]) + 1
@@ -273,7 +288,7 @@ class InertialEstimator(Block):
             estimate.position, estimate.velocity,
         )  # fmt: skip
 
-    def _fall(self) -> None:
+    def _integrate_free_fall(self) -> None:
         """In flight, let the centre of mass fall freely and the base follow from the joints."""
         estimate, ticks = self.estimate, int(self.estimate.flight_ticks[()])
         if ticks == 0:
@@ -290,4 +305,4 @@ class InertialEstimator(Block):
         elif np.abs(self._acceleration, out=self._error).max() < _IMPACT:
             estimate.velocity -= self._acceleration
         else:
-            estimate.flight_ticks[()] = 0  # the ground: what the IMU has felt stands
+            estimate.flight_ticks[()] = 0  # an impact: keep the velocity by the IMU

@@ -1,4 +1,4 @@
-"""What the invariant Kalman filter remembers, and its parameters."""
+"""The state and the parameters of the invariant Kalman filter."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from ...runtime.language.signals import Field, Signal
 
 
 class InvariantEstimate(Signal):
-    """What the filter remembers. The error's order is that of ``invariant_contacts``."""
+    """The state of the filter. The order of the error is that of ``invariant_contacts``."""
 
     orientation = Field(4, unit="", text="quaternion x, y, z, w from body to world")
     vectors = Field(
@@ -17,23 +17,25 @@ class InvariantEstimate(Signal):
         text="velocity [m/s], position [m], centres of the contacts' rubber [m]",
     )  # fmt: skip
     present = Field("n_contacts", dtype="bool", text="which contact points are in the state")
-    gyro_bias = Field(3, unit="rad/s", frame="body", text="what the gyroscope reads too much")
-    accelerometer_bias = Field(3, unit="m/s^2", frame="body", text="the same of the accelerometer")
-    encoder_offset = Field("n_joints", unit="rad", text="the same of the joint encoders")
+    gyro_bias = Field(3, unit="rad/s", frame="body", text="reading minus true value")
+    accelerometer_bias = Field(3, unit="m/s^2", frame="body", text="reading minus true value")
+    encoder_offset = Field("n_joints", unit="rad", text="joint readings minus true angles")
     covariance = Field(("n_errors", "n_errors"), text="of the error")
     angular_velocity = Field(3, unit="rad/s", frame="body", text="at the last tick, without bias")
     started = Field(dtype="bool", text="whether the first sample has been seen")
     saturated_ticks = Field(dtype="int64", text="ticks with a saturated sample")
     saturated_run = Field(
-        6, dtype="int64", text="ticks in a row that each axis of gyroscope, accelerometer is so"
+        6,
+        dtype="int64",
+        text="ticks in a row that each axis of gyroscope, accelerometer is saturated",
     )
 
 
 class InvariantFilterParameters(Parameters):
     """Noise of the sensors and of the contacts, and how the filter uses them.
 
-    Standard deviations of a sample are at the block's rate. The defaults are the standard trial's
-    noise; its biases and offsets are uniform, with these as their deviations.
+    The noise of a sample is that at the block's rate. The defaults are the noise of the standard
+    trial, whose uniform biases and offsets have these standard deviations.
     """
 
     gyro_noise: float = parameter(0.02, unit="rad/s", gt=0, text="noise of a gyroscope sample")
@@ -76,17 +78,17 @@ class InvariantFilterParameters(Parameters):
         text="further sliding of a foot per specific force beyond gravity",
     )
     gate: float = parameter(
-        16.3, gt=0, text="largest normalised squared residual of a contact that is believed"
+        16.3, gt=0, text="largest normalised squared residual of a contact that is accepted"
     )
     support: float = parameter(
-        4.0, unit="m/s^2", text="upward specific force below which no contact is believed"
+        4.0, unit="m/s^2", text="upward specific force below which no contact is accepted"
     )
     ground: Literal["level", "flat", "unknown"] = parameter(
-        "level", text="whether contacts are at one height, at height zero, or anywhere"
+        "level", text="whether contacts are at equal heights, at height zero, or at any height"
     )
     ground_noise: float = parameter(2e-4, unit="m", gt=0, text="noise of a contact point's height")
     ground_time: float = parameter(
-        0.2, unit="s", gt=0, text="how long errors of the ground's height last"
+        0.2, unit="s", gt=0, text="correlation time of errors of the ground's height"
     )
     gyro_range: float | None = parameter(
         None, unit="rad/s", gt=0, text="the gyroscope saturates here; none: never"
@@ -95,8 +97,8 @@ class InvariantFilterParameters(Parameters):
         None, unit="m/s^2", gt=0, text="the accelerometer saturates here; none: never"
     )
     saturated_rate: float = parameter(
-        10.0, unit="rad/s", gt=0, text="how far off a saturated axis of the gyroscope may be"
+        10.0, unit="rad/s", gt=0, text="standard deviation of a saturated axis of the gyroscope"
     )
     saturated_force: float = parameter(
-        100.0, unit="m/s^2", gt=0, text="how far off a saturated axis of the accelerometer may be"
+        100.0, unit="m/s^2", gt=0, text="standard deviation of a saturated accelerometer axis"
     )

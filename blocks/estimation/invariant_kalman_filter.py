@@ -1,4 +1,4 @@
-"""Where the base is and how it moves, by an invariant Kalman filter with contact."""
+"""Estimates the base's pose and velocity by an invariant Kalman filter with contacts."""
 
 from __future__ import annotations
 
@@ -41,15 +41,15 @@ Array = NDArray[np.float64]
 
 _FASTEST_TURN = 100.0
 _STRONGEST_FORCE = 1000.0
-"""Sensor values are brought within these [rad/s, m/s^2], so that nothing can overflow."""
+"""Sensor values are limited to these [rad/s, m/s^2], so that nothing can overflow."""
 _START_TURN = 0.05
 _START_SPEED = 0.01
 _START_PLACE = 0.02
 """Standard deviations at the start [rad, m/s, m], before the feet have been used."""
 _EXACT = 1e-5
-"""Standard deviation [m] of what holds because the world is defined so."""
+"""Standard deviation [m] of measurements that hold by the definition of the world frame."""
 _OPENING = 1.0
-"""How fast the velocity is doubted while no standing point agrees with it [m/s per root s]."""
+"""Process noise of the velocity while no standing point agrees with it [m/s per root second]."""
 
 
 class InvariantKalmanFilter(Block):
@@ -58,36 +58,35 @@ class InvariantKalmanFilter(Block):
     Same ports as ``StateEstimator``: ``set: {estimator.use: blocks.InvariantKalmanFilter}``.
 
     **State.** X = (R, v, p, d_1 .. d_N) on SE_{2+N}(3): the base's orientation, velocity and
-    position and the points that stand on the ground (toe and heel of each foot); the biases of
-    gyroscope and accelerometer; and the offsets of the joint encoders, which is what binds a robot
-    whose encoders are off by more than they are noisy. The error is xi = log(X_est X^-1).
+    position and the contact points that stand on the ground; the biases of gyroscope and
+    accelerometer; and the offsets of the joint encoders, which limit the accuracy on a robot whose
+    offsets are larger than its encoder noise. The error is xi = log(X_est X^-1).
 
-    **Prediction** by the IMU, as in ``StateEstimator``; the covariance by a transition that does
-    not depend on the trajectory (``invariant_propagation``). In flight there is nothing else.
+    **Prediction.** The state is propagated by the IMU, as in ``StateEstimator``, and the covariance
+    by a transition that does not depend on the trajectory (``invariant_propagation``). In flight
+    there is only the prediction.
 
-    **Contacts** are measured, never assumed. A point that is reported active, while the IMU feels
-    support, enters the state where leg kinematics see it and then stands still but for
-    ``contact_noise`` and what its foot slides as a whole, sqrt(slide_noise^2 + (impact_slide (|f| -
-    g))^2): feet slide a little where they are hit or push hardest. While it stands,
-    R h(q) + p - d = 0 corrects everything. A residual that is too unlikely (``gate``, chi-squared
-    of three degrees) says that the point has slipped or lifted: it leaves the state and enters
-    again where it is now, so nothing is learnt from it.
-    While all points are refused, the velocity's own variance grows until one is believed.
+    **Contacts.** A point that is reported active, while the IMU measures support, is added to the
+    state at the position that leg kinematics measure. From then on it stands still except for the
+    process noise ``contact_noise`` of the point and that of its foot,
+    sqrt(slide_noise^2 + (impact_slide (|f| - g))^2), because feet slide a little at impacts and
+    hard pushes. The measurement update is R h(q) + p - d = 0. If a residual is too unlikely
+    (``gate``, chi-squared with three degrees of freedom) the point has slipped or lifted: it is
+    removed from the state and added again at its present position, so that nothing is learnt from
+    it. While all points are rejected, process noise is added to the velocity until one is accepted.
 
-    **Ground.** ``level``: points that stand are at one height; ``flat``: at the height zero they
-    started on; ``unknown``: nothing is said. Its errors last, so it counts as one measurement in
-    ``ground_time``, not in every tick.
+    **Ground.** With ``level`` all points that stand are at one height, with ``flat`` at the height
+    zero of the start; ``unknown`` assumes nothing. Errors of the height are correlated in time, so
+    the heights count as one measurement per ``ground_time``, not per tick.
 
-    **Saturation.** A sample at the end of the given range is a bound, not a value. Its axis counts
-    with ``saturated_rate`` or ``saturated_force`` for its standard deviation, so the covariance
-    grows as it should and whatever else is known takes over. A rate that is saturated in flight is
-    not known at all; ``health`` says so.
+    **Saturation.** A sample at the end of the given range is a bound, not a value. Its axis has the
+    standard deviation ``saturated_rate`` or ``saturated_force``, so the covariance grows as it
+    should, and other measurements get more weight. A rate that is saturated in flight is not known
+    at all; ``health`` reports that.
 
-    It starts at the first sample, standing on level ground: the world's origin is midway between
-    the soles and x is where the feet point. Yaw and horizontal position drift from jump to jump.
-    Standard deviations are of one sample at the block's rate. The defaults are the standard
-    trial's noise; offsets and biases are there uniform, with these as their deviations.
-    Never waits, never raises in a run.
+    It starts at the first sample, with the robot standing on level ground: the world's origin is
+    midway between the soles and x is the heading of the feet. Yaw and horizontal position drift
+    from jump to jump. The block never waits and raises no errors in a run.
     """
 
     Params = InvariantFilterParameters
@@ -98,7 +97,7 @@ class InvariantKalmanFilter(Block):
     joints = Input(JointState, text="joint angles and velocities")
     contacts = Input(ContactState, text="which points carry load; a short hold serves best")
     base = Output(BaseState, text="pose and velocity of the base")
-    health = Output(EstimatorHealth, text="how far to believe it")
+    health = Output(EstimatorHealth, text="standard deviations of the estimate")
     estimate = State(InvariantEstimate, text="the filter")
 
     @classmethod
@@ -144,7 +143,7 @@ class InvariantKalmanFilter(Block):
         estimate, params = self.estimate, self.params
         np.clip(self.imu.angular_velocity, -_FASTEST_TURN, _FASTEST_TURN, out=self._gyro)
         np.clip(self.imu.specific_force, -_STRONGEST_FORCE, _STRONGEST_FORCE, out=self._force)
-        self._watch_saturation()
+        self._find_sample_noise()
         self._last_rate[...] = estimate.angular_velocity
         np.subtract(self._gyro, estimate.gyro_bias, out=estimate.angular_velocity)
         for axis in range(3):
@@ -153,7 +152,7 @@ class InvariantKalmanFilter(Block):
         np.subtract(self._force, estimate.accelerometer_bias, out=self._force)
         if estimate.started[()]:
             self._predict()
-            self._see()
+            self._evaluate_kinematics()
         else:
             self._start()
         self._use_contacts()
@@ -162,8 +161,8 @@ class InvariantKalmanFilter(Block):
         np.subtract(self._gyro, estimate.gyro_bias, out=estimate.angular_velocity)
         self._publish()
 
-    def _watch_saturation(self) -> None:
-        """The noise of this tick's samples, axis by axis."""
+    def _find_sample_noise(self) -> None:
+        """Compute the noise of this tick's samples for each axis, by whether it is saturated."""
         params, health, run = self.params, self.health, self.estimate.saturated_run
         health.gyro_saturated[()] = sample_deviations(
             self._gyro, params.gyro_range or math.inf, params.gyro_noise, params.saturated_rate,
@@ -207,8 +206,8 @@ class InvariantKalmanFilter(Block):
             for k in range(first, first + 3):
                 covariance[k, k] += walk * walk * period
 
-    def _see(self) -> None:
-        """Leg kinematics with what is known of the encoders' offsets."""
+    def _evaluate_kinematics(self) -> None:
+        """Evaluate the leg kinematics at the joint readings minus the estimated offsets."""
         estimate, seen = self.estimate, self._kinematics
         self._used_offset[...] = estimate.encoder_offset
         np.subtract(self.joints.position, self._used_offset, out=self._angles)
@@ -216,11 +215,11 @@ class InvariantKalmanFilter(Block):
         seen.differentiate()
         to_matrix(estimate.orientation, self._rotation)
 
-    def _look(self, point: int) -> None:
-        """Where a point is from the base, in the world, and what that depends on."""
+    def _measure_point(self, point: int) -> None:
+        """Measure a point's position relative to the base, in the world, and its Jacobian."""
         estimate = self.estimate
         np.dot(self._rotation, self._kinematics.jacobians[point], out=self._world_jacobian)
-        # As it is with the offsets as they are by now.
+        # Corrected for changes of the encoder offsets since the kinematics were evaluated.
         np.subtract(estimate.encoder_offset, self._used_offset, out=self._angles)
         np.dot(self._kinematics.jacobians[point], self._angles, out=self._spare)
         np.subtract(self._kinematics.centres[point], self._spare, out=self._spare)
@@ -228,10 +227,10 @@ class InvariantKalmanFilter(Block):
         place_jacobian(self._world_jacobian, self._offsets, self._sensitivity)
 
     def _start(self) -> None:
-        """Standing on level ground around the origin, the feet pointing along x."""
+        """Start with the robot standing on level ground at the origin, its feet heading along x."""
         estimate, params, seen = self.estimate, self.params, self._kinematics
         upright(self._force, estimate.orientation)
-        self._see()
+        self._evaluate_kinematics()
         for _ in range(20):
             misalignment(
                 estimate.orientation, seen.points, seen.forward, self._residual, self._spare
@@ -257,15 +256,15 @@ class InvariantKalmanFilter(Block):
                 estimate.covariance[k, k] = deviation_at_start * deviation_at_start
         estimate.started[()] = True
         self._believed.fill(True)
-        self._enter()
+        self._add_contacts()
         self._define_world()
 
     def _define_world(self) -> None:
-        """What holds because the world is where the feet are at the start: all points are at one
-        height, zero; its origin is in their middle; its x is where they point on average."""
+        """Apply the definition of the world frame as measurements: all points are at height zero,
+        their mean is the origin, and x is the mean heading of the feet."""
         n, vectors = self._points, self.estimate.vectors
         for first in range(0, n, 3):
-            self._level(range(first, min(first + 3, n)), -1, self.params.ground_noise**2)
+            self._correct_heights(range(first, min(first + 3, n)), -1, self.params.ground_noise**2)
         world_definition_jacobian(self._kinematics.heading_levers, vectors, self._sensitivity)
         self._residual.fill(0.0)
         np.multiply(self._identity, _EXACT * _EXACT, out=self._row_noise)
@@ -273,7 +272,7 @@ class InvariantKalmanFilter(Block):
         self._correct(self._row_noise)
 
     def _use_contacts(self) -> None:
-        """Correct by the points that stand; take in those that come, let go those that leave."""
+        """Correct by the points that stand; add those that touch down, remove those that leave."""
         estimate, params, trusted = self.estimate, self.params, self.health.trusted
         rotate(estimate.orientation, self._force, self._spare)
         supported = float(self._spare[2]) >= params.support
@@ -286,7 +285,7 @@ class InvariantKalmanFilter(Block):
             if not estimate.present[point]:
                 continue
             if believed:
-                self._look(point)
+                self._measure_point(point)
                 measurement_jacobian(point, self._sensitivity)
                 innovation(point, self._world_point, estimate.vectors, self._residual)
                 if self._weigh(self._place_noise) <= params.gate:
@@ -299,15 +298,15 @@ class InvariantKalmanFilter(Block):
         if refused and not agreed:
             for k in range(3, 6):
                 estimate.covariance[k, k] += _OPENING * _OPENING * self.period
-        self._enter()
+        self._add_contacts()
 
-    def _enter(self) -> None:
-        """Take in the points that are believed and not yet in the state."""
+    def _add_contacts(self) -> None:
+        """Add the points that are trusted and not yet in the state."""
         estimate = self.estimate
         for point in range(self._points):
             if not self._believed[point] or estimate.present[point]:
                 continue
-            self._look(point)
+            self._measure_point(point)
             add_contact(
                 point, self._sensitivity, self._place_noise, estimate.covariance,
                 self._rows, self._corner,
@@ -316,17 +315,17 @@ class InvariantKalmanFilter(Block):
             estimate.present[point] = True
 
     def _use_ground(self) -> None:
-        """The heights of the points that stand: one another's, or the one they started on."""
+        """Correct by the heights of the points that stand: they are equal, or zero."""
         params, reference = self.params, -1
         standing = [point for point in range(self._points) if self.health.trusted[point]]
         if params.ground == "level" and standing:
             reference = standing.pop(0)
         variance = params.ground_noise**2 * max(params.ground_time / self.period, 1.0)
         for first in range(0, len(standing), 3):
-            self._level(standing[first : first + 3], reference, variance)
+            self._correct_heights(standing[first : first + 3], reference, variance)
 
-    def _level(self, points: Sequence[int], reference: int, variance: float) -> None:
-        """Correct by the heights of up to three points, over the reference's or over zero."""
+    def _correct_heights(self, points: Sequence[int], reference: int, variance: float) -> None:
+        """Correct by the heights of up to three points, over the reference point or over zero."""
         self._sensitivity.fill(0.0)
         self._residual.fill(0.0)
         vectors, noise = self.estimate.vectors, self._row_noise
@@ -343,14 +342,14 @@ class InvariantKalmanFilter(Block):
         self._correct(noise)
 
     def _weigh(self, noise: Array) -> float:
-        """How unlikely the residual is."""
+        """The squared Mahalanobis distance of the residual."""
         return weigh(
             self.estimate.covariance, self._sensitivity, noise, self._residual,
             self._seen, self._inverse, self._corner,
         )  # fmt: skip
 
     def _correct(self, noise: Array) -> None:
-        """Correct everything by the residual that has just been weighed."""
+        """Correct the estimate and its covariance by the residual that has just been weighed."""
         estimate, correction = self.estimate, self._correction
         correct(
             estimate.covariance, self._sensitivity, noise, self._residual,

@@ -1,4 +1,4 @@
-"""Where the base is and how it moves, from IMU, joint encoders and contacts."""
+"""Estimates the base's pose and velocity from the IMU, the joint encoders and the contacts."""
 
 from __future__ import annotations
 
@@ -28,39 +28,44 @@ class GroundTrust(Signal):
 class StateEstimator(InertialEstimator):
     """A complementary filter for the floating base (paper, II-B) that weighs its contacts.
 
-    **Prediction.** The gyroscope, less its bias, turns the orientation R; the specific force f,
-    less its bias and turned to the world, is integrated to velocity and position::
+    **Prediction.** The angular velocity w, which is the gyroscope minus its bias, is integrated to
+    the orientation R. The specific force f, which is the accelerometer minus its bias, is rotated
+    to the world and integrated to velocity and position::
 
         R' = R [w]x,   v' = R f + g,   p' = v
 
-    **Correction by the legs.** With r_i(q) a contact point seen from the base, a point at rest in
-    the world at a_i says v = -R (J_i q' + w x r_i) and p = a_i - R r_i. Both pull with the gains
-    ``velocity_gain`` and ``position_gain`` a tick, so the legs' noise is averaged over 1/gain ticks
-    without lag: the IMU carries the motion meanwhile. a_i is latched when the point touches down.
+    **Correction by the legs.** Let r_i(q) be a contact point relative to the base. If the point is
+    at rest in the world at a_i, then v = -R (J_i q' + w x r_i) and p = a_i - R r_i. The estimate is
+    corrected towards both with the gains ``velocity_gain`` and ``position_gain`` per tick, so the
+    legs' noise is averaged over 1/gain ticks; there is no lag, because the IMU predicts the motion
+    meanwhile. a_i is set when the point touches down.
 
-    **What it adds to the paper's filter** (``ComplementaryFilter``) is what decides a jump:
+    **Differences from the paper's filter** (``ComplementaryFilter``), which matter for jumps:
 
-    * A point counts with weight 1 / (1 + (e / gate)^2)^2, e being its speed by the predicted base
-      velocity, and no point counts while the IMU feels no support. So slipping feet, heels that
-      lift and contacts that a latch still holds after lift-off do not spoil the lift-off velocity.
-      ``gate`` opens while everything is rejected and in the air, so a wrong prediction recovers.
-    * While all points are in contact and nothing is fast, the feet are flat on level ground: the
-      heights of the points give the tilt to the encoder offsets (about 3 mrad; a biased
-      accelerometer knows it to 10 mrad), the feet the heading, as long as they stand, and the drift
-      of both the gyroscope's bias: a least squares line over up to 250 ticks. Standing still
-      before the first flight, what the accelerometer reads beyond gravity is its bias, which would
-      be the drift in flight. Where the feet may come to stand at different heights, set
-      ``level_ground`` to false: then after a flight only the accelerometer rights the tilt.
+    * A point has the weight 1 / (1 + (e / gate)^2)^2, where e is its speed by the predicted base
+      velocity, and no point counts while the IMU measures no support. So slipping feet, heels that
+      lift and contacts that a latch still holds after lift-off do not disturb the velocity at
+      lift-off. ``gate`` grows while all points are rejected or in the air, so that the estimate
+      recovers from a wrong prediction.
+    * While all points are in contact and the robot moves slowly, the feet are flat on level ground.
+      Then the heights of the points give the tilt, as exactly as the encoder offsets allow (about
+      3 mrad, where a biased accelerometer has 10 mrad), and the feet give the heading while they
+      stand. The drift of both, by a least-squares line over up to 250 ticks, gives the gyroscope's
+      bias. While the robot stands still before the first flight, the accelerometer's reading minus
+      gravity gives its bias, which would cause a drift in flight. If the feet may come to stand at
+      different heights set ``level_ground`` to false: then after a flight only the accelerometer
+      corrects the tilt.
 
-    **Flight.** With no point trusted the prediction runs alone. ``flight: imu`` integrates the IMU.
-    ``flight: ballistic`` averages the CoM's velocity by the IMU over the first 20 ms, and from then
-    on the CoM falls freely and the base follows from the joints; it does not drift, but it also
-    does not feel a push.
+    **Flight.** While no point is trusted there is only the prediction. ``flight: imu`` integrates
+    the IMU. ``flight: ballistic`` averages the CoM's velocity by the IMU over the first 20 ms; from
+    then on the CoM falls freely, and the base follows from the joints. That does not drift, but it
+    also does not notice a push.
 
-    It starts at the first sample, standing on level ground: the world's origin is midway between
-    the soles and x is where the feet point; feet of one contact point point where the pattern is
-    turned that they make. Yaw and horizontal position drift; the ground's height is not known after
-    a jump except through the anchors. Never waits, never raises in a run.
+    It starts at the first sample, with the robot standing on level ground: the world's origin is
+    midway between the soles, and x is the heading of the feet; for feet of one contact point it is
+    the heading of the pattern in which they stand. Yaw and horizontal position drift. After a jump
+    the height of the ground is known only through the anchors. The block never waits and raises no
+    errors in a run.
     """
 
     class Params(InertialParameters):
@@ -68,7 +73,7 @@ class StateEstimator(InertialEstimator):
             0.08, unit="m/s", gt=0.0, text="speed at which a point is trusted by a quarter"
         )
         gate_growth: float = live_parameter(
-            2.0, unit="m/s^2", ge=0.0, text="how fast it opens while all points are rejected"
+            2.0, unit="m/s^2", ge=0.0, text="growth rate of the gate while all points are rejected"
         )
         support: float = live_parameter(
             4.0, unit="m/s^2", gt=0.0, text="upward specific force at which contacts count in full"
@@ -77,7 +82,7 @@ class StateEstimator(InertialEstimator):
             True, text="all points are at one height whenever all are in contact"
         )
         slow_rate: float = live_parameter(
-            1.5, unit="rad/s", gt=0.0, text="rate below which its feet are surely flat"
+            1.5, unit="rad/s", gt=0.0, text="rate of base and joints below which feet are flat"
         )
 
     starts_level = True
@@ -106,7 +111,7 @@ class StateEstimator(InertialEstimator):
             right_up(estimate.orientation, self._force, params.tilt_gain, self._spare)
 
     def _align_with_ground(self) -> None:
-        """Tilt and heading by the points, and the gyroscope's bias by the drift of both."""
+        """Correct tilt and heading by the points, and the gyroscope's bias by the drift of both."""
         estimate, trust, seen = self.estimate, self.trust, self._kinematics
         # Least squares over all ticks so far, then over the last 250: angle and its drift.
         trust.aligned[()] = ticks = min(int(trust.aligned[()]) + 1, 250)
@@ -125,7 +130,7 @@ class StateEstimator(InertialEstimator):
         turn(estimate.orientation, *self._error.tolist())
 
     def _learn_accelerometer_bias(self, still: bool) -> None:
-        """While the robot stands still: the mean of what the accelerometer reads beyond gravity."""
+        """While the robot stands still, learn the mean of the accelerometer minus gravity."""
         if not still:
             self.forget_samples()
             return

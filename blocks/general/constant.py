@@ -14,7 +14,7 @@ from .vector import Vector
 
 
 class Constant(Block):
-    """The same vector for ever: y[n] = value. It has as many elements as ``value``."""
+    """A constant vector: y[n] = value. It has as many elements as ``value``."""
 
     class Params(Parameters):
         value: list[float] = live_parameter(text="the vector", min_length=1)
@@ -40,9 +40,9 @@ class Constant(Block):
         self.on_parameters()
 
     def on_parameters(self) -> None:
-        """Make it anew."""
+        """Make the vector again from the changed parameters."""
         self._value = np.array(self.params.value)
 
     def step(self) -> None:
-        """Write it."""
+        """Write the vector."""
         np.copyto(self.y.value, self._value)

@@ -17,7 +17,7 @@ class Gain(Block):
     """
 
     class Params(Elements):
-        gain: PerElement = live_parameter(1.0, text="the factor, or one for each element")
+        gain: PerElement = live_parameter(1.0, text="the factor")
 
     params: Params
     u = Input(Vector, text="what is scaled")
@@ -28,7 +28,7 @@ class Gain(Block):
         self.on_parameters()
 
     def on_parameters(self) -> None:
-        """As an array, so that no tick makes one."""
+        """Keep the factor as an array, so that no tick allocates one."""
         self._gain = np.array(self.params.gain)
 
     def step(self) -> None:

@@ -1,4 +1,4 @@
-"""The parameters that blocks with a vector as their state share."""
+"""The common parameters of blocks whose state is a vector."""
 
 from __future__ import annotations
 

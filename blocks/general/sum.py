@@ -29,7 +29,7 @@ class Sum(Block):
         self.on_parameters()
 
     def on_parameters(self) -> None:
-        """As arrays, so that no tick makes them."""
+        """Keep the factors as arrays, so that no tick allocates any."""
         self._first, self._second = (np.array(weight) for weight in self.params.weights)
 
     def step(self) -> None:

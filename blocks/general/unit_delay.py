@@ -26,7 +26,7 @@ class UnitDelay(Block):
         self.x.value[...] = self.params.start_value()
 
     def emit(self) -> None:
-        """Write what is remembered."""
+        """Write the input of the last run."""
         np.copyto(self.y.value, self.x.value)
 
     def update(self) -> None:

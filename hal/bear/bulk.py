@@ -109,7 +109,7 @@ class BulkExchange:
         frame[-1] = checksum(memoryview(frame)[2:-1])
 
     def _receive(self, reply_time: float) -> int:
-        """How many bytes came in time, at the beginning of ``_answer``."""
+        """Receive into ``_answer``; returns how many bytes came in time."""
         port, answer, count = self.bus.port, memoryview(self._answer), 0
         end = time.monotonic() + reply_time
         while count < len(answer):
@@ -124,7 +124,7 @@ class BulkExchange:
         return count
 
     def _unpack(self, received: int) -> int:
-        """Take the good answers over; gives how many there are."""
+        """Take over the good answers; returns how many there are."""
         answered = place = 0
         self.ages += 1
         answer = memoryview(self._answer)

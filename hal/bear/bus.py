@@ -15,7 +15,7 @@ from .registers import CONFIG, STATUS, Register
 BAUDRATE = 8_000_000
 """The rate of a new actuator [bit/s]."""
 REPLY_TIME = 3e-3
-"""Seconds that an actuator has for its reply: the transfer, the adapter's delay of 1 ms, a reserve."""
+"""Seconds that an actuator has for its reply: transfer, the adapter's delay of 1 ms, a reserve."""
 TRIES = 3
 """How often a question is asked before the actuator counts as silent."""
 
@@ -29,7 +29,7 @@ class NoReplyError(BusError):
 
 
 class SerialPort(Protocol):
-    """What the bus needs of a serial port; ``serial.Serial`` has it all."""
+    """The methods of a serial port that the bus needs; ``serial.Serial`` has them."""
 
     timeout: float | None
 
@@ -40,7 +40,7 @@ class SerialPort(Protocol):
         """Up to ``size`` bytes, and what has come when ``timeout`` seconds are over."""
 
     def reset_input_buffer(self) -> None:
-        """Forget what was received and not read."""
+        """Discard what was received and not read."""
 
     def close(self) -> None:
         """Give the port back."""
@@ -67,7 +67,7 @@ class Reply:
 
 @dataclass
 class BusCounts:
-    """What went wrong on the bus since it was opened."""
+    """Counts of errors on the bus since it was opened."""
 
     silent: int = 0
     """Questions without an answer in time."""

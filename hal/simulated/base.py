@@ -1,4 +1,4 @@
-"""How the base of a simulated robot is held: its coordinates in the simulator, by kind."""
+"""The kinds of bases that a simulated robot can have, with their coordinates in the simulator."""
 
 from __future__ import annotations
 
@@ -29,11 +29,11 @@ class FixedBase:
     def __init__(self, data: MjData) -> None:
         self._data = data
         self.angular_velocity = np.zeros(3)
-        """Of the base [rad/s, body], as of the last ``refresh``."""
+        """The base's angular velocity [rad/s, body] at the last ``refresh``."""
 
     @staticmethod
     def add_joints(body: Any) -> None:
-        """Give the base's body in a model that is being built its joints."""
+        """Add the base's joints to its body in a model that is being built."""
 
     def place(self) -> None:
         """Put the base upright at the world's origin."""
@@ -64,7 +64,7 @@ class PlanarBase(FixedBase):
 
     @staticmethod
     def add_joints(body: Any) -> None:
-        """Two slides and a hinge."""
+        """Add two slides and a hinge."""
         import mujoco
 
         slide, hinge = mujoco.mjtJoint.mjJNT_SLIDE, mujoco.mjtJoint.mjJNT_HINGE
@@ -104,8 +104,8 @@ class PlanarBase(FixedBase):
 
 
 class FloatingBase(FixedBase):
-    """A base that moves freely: position and quaternion w, x, y, z; linear velocity in the world,
-    angular velocity in the body."""
+    """A base that moves freely. Its coordinates are position and quaternion w, x, y, z; its
+    velocities are the linear one in the world and the angular one in the body."""
 
     positions = 7
     velocities = 6
@@ -116,7 +116,7 @@ class FloatingBase(FixedBase):
 
     @staticmethod
     def add_joints(body: Any) -> None:
-        """A free joint."""
+        """Add a free joint."""
         body.add_freejoint(name="base")
 
     def place(self) -> None:

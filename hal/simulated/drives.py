@@ -1,4 +1,4 @@
-"""The drives of a simulated robot: commands on their way, joint feedback, motor limits."""
+"""The drives of a simulated robot: delayed commands, joint feedback and motor limits."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ Array = NDArray[np.float64]
 
 
 class Drives:
-    """Turns commands into joint torques at the physics rate, as drives close their own loops.
+    """Turns commands into joint torques at the physics rate, because drives close their own loops.
 
-    A command takes effect at the first physics step at or after its arrival and stays until the
-    next one arrives. All that is remembered lives in the given ``state`` and ``record``.
+    A command takes effect at the first physics step at or after its arrival and stays in effect
+    until the next one arrives. All memory of the drives is in the given ``state`` and ``record``.
 
     Args:
-        robot: with the actuator profile in use.
-        damping: of every joint in the damping mode [N m s/rad], (n_joints,).
-        state: the commands in the drives and on their way.
-        record: where saturation, peaks and excesses are noted.
+        robot: the description, with the actuator profile in use.
+        damping: the damping of every joint in the damping mode [N m s/rad], (n_joints,).
+        state: the active command and the commands that have not arrived yet.
+        record: where saturation, peak torques and excesses over limits are noted.
     """
 
     def __init__(
@@ -54,8 +54,13 @@ class Drives:
         ]  # fmt: skip
 
     def hold(self, position: Array, torque: Array, stiffness: Array, damping: Array) -> None:
-        """Forget all commands and hold ``position`` [rad] around ``torque`` [N m] with these gains
-        from now on; all are of the joints, (n_joints,)."""
+        """Drop all commands and from now on hold the joints at a position with these gains.
+
+        Args:
+            position: the joint angles to hold [rad], (n_joints,).
+            torque: the feedforward torques [N m], (n_joints,).
+            stiffness, damping: the gains [N m/rad, N m s/rad], (n_joints,).
+        """
         self._state.active[()] = 0
         self._state.pending[()] = 0
         self._state.last_due[()] = 0
@@ -67,13 +72,12 @@ class Drives:
         self._state.damping[0] = damping
 
     def damp(self) -> None:
-        """Forget all commands and go into damping at once."""
+        """Drop all commands and go into damping at once."""
         self._state.pending[()] = 0
         self._state.mode[int(self._state.active)] = CommandMode.DAMPING
 
     def send(self, command: JointCommand, due: int) -> None:
-        """Put a command on its way; it arrives at physics step ``due``, or when the one sent
-        before it does if that is later."""
+        """Send a command. It arrives at physics step ``due``, but not before earlier commands."""
         state = self._state
         due = max(due, int(state.last_due))
         pending = int(state.pending)
@@ -90,9 +94,10 @@ class Drives:
         state.pending[()] = pending + 1
 
     def joint_torque(self, step: int, position: Array, velocity: Array, out: Array) -> None:
-        """The joint torques [N m] during physics step ``step`` into ``out``.
+        """Write the joint torques [N m] during physics step ``step`` to ``out``.
 
-        ``position`` is what the drives' own encoders read, ``velocity`` the joint velocity.
+        ``position`` is the reading of the drives' own encoders [rad], ``velocity`` the joint
+        velocity [rad/s].
         """
         state = self._state
         pending = int(state.pending)
@@ -118,7 +123,7 @@ class Drives:
         self._limit(velocity, out)
 
     def _limit(self, velocity: Array, torque: Array) -> None:
-        """Clip to what the motors can do at their speed, and record how near they came."""
+        """Limit the torque to what the motors can do at their speed, and record saturation."""
         record = self._record
         np.dot(self._joint_to_motor, velocity, out=self._speed)
         motor_torque_limits(

@@ -8,9 +8,10 @@ The gains follow from the robot, so that a robot of 2 kg and one of 100 kg are h
 * Any other joint is held at a natural frequency of 60 rad/s, critically damped, for the inertia
   that the mass matrix says it has in the standing pose.
 
-Neither gain is more than the drive's loop bears, which is closed once a physics step of ``dt`` on
-the inertia ``I`` of the joint with all others free: stiffness at most ``I / (4 dt^2)``, damping at
-most ``I / dt``. The gains do not depend on what is drawn from the seed, but for that bound.
+Both gains are bounded so that the drive's loop is stable. It is closed once in every physics step
+of ``dt`` on the inertia ``I`` of the joint with all others free, so the stiffness is at most
+``I / (4 dt^2)`` and the damping at most ``I / dt``. Apart from that bound, the gains do not depend
+on what is drawn from the seed.
 """
 
 from __future__ import annotations
@@ -35,7 +36,7 @@ GRAVITY_SHARE = 18.0
 DAMPING_TIME = 0.005
 NATURAL_FREQUENCY = 60.0
 RELEASED = 1.0 / 3.0
-"""The damping of a drive in its damping mode, as a share of that with which it holds."""
+"""The damping of a drive in its damping mode, as a share of its damping while it holds the pose."""
 
 
 def holding_gains(model: MjModel, robot: RobotDescription) -> tuple[Array, Array]:
@@ -50,7 +51,9 @@ def holding_gains(model: MjModel, robot: RobotDescription) -> tuple[Array, Array
     mass = np.zeros((model.nv, model.nv))
     mujoco.mj_fullM(model, data, mass)
     answers = np.zeros((model.nv, model.nv))
-    mujoco.mj_solveM(model, data, answers, np.eye(model.nv))  # NumPy's rounds by machine
+    mujoco.mj_solveM(
+        model, data, answers, np.eye(model.nv)
+    )  # NumPy's solver rounds differently by machine
     free = 1.0 / np.diag(answers)[base.velocities :]
     carried = np.diag(mass)[base.velocities :]
     stiffness = carried * NATURAL_FREQUENCY**2
@@ -73,5 +76,5 @@ def passive_joints(robot: RobotDescription) -> NDArray[np.int64]:
 
 
 def _two_digits(value: float) -> float:
-    """Rounded to two significant digits: a round choice, the same on every machine."""
+    """The value rounded to two significant digits, so that it is the same on every machine."""
     return float(f"{value:.1e}") if math.isfinite(value) else value

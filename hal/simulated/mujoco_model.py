@@ -1,22 +1,23 @@
 """The simulator's model, built from the robot's description.
 
-One body and one joint for every joint of the description, so the two rigid-body models (this one
-and the controller's) have the same links. Rotor inertia is exact: a rotor that is geared to one
-joint is that joint's armature, and one that is geared to several is a fixed tendon with armature
+Every joint of the description has one body and one joint, so this rigid-body model and the
+controller's have the same links. Rotor inertia is exact: a rotor that is geared to one joint is
+that joint's armature, and a rotor that is geared to several is a fixed tendon with armature
 (``rotors.py``).
 
 Contact: spheres at the contact points and capsules for the rest of the robot. The capsules collide
-with the ground and with other limbs, not with their own limb and not with the base; a limb is all
-that hangs on one joint of the base. Capsules of two limbs that overlap in the standing pose do not
-collide with each other, as they are only coarse pictures of the links. Anything that a capsule
-touches is a forbidden contact. Cones are elliptic.
+with the ground and with other limbs, but not with their own limb or the base; a limb consists of
+all links that one joint of the base carries. Capsules of two limbs that overlap in the standing
+pose do not collide with each other, as they only approximate the links' shapes. Every contact of a
+capsule is a forbidden contact. Friction cones are elliptic.
 
 MuJoCo scales the stiffness of a contact with the mass that it carries: a time constant and a
 damping ratio are given, so robots of any mass sink in by the same fraction of a millimetre.
 
-Names in the model: links, joints and contact points as in the description (a contact point is a
-geom and a site, which is at the centre of the ball where it is all of a foot; a link called ``world`` is the body ``link/world``), motors ``motor/<joint>``,
-named points sites ``point/<name>``, and the sensors ``com``, ``com_velocity``,
+Names in the model: links, joints and contact points are called as in the description. A contact
+point is a geom and a site; if it is a foot's only point the site is at the centre of its ball. A
+link called ``world`` is the body ``link/world``. Motors are ``motor/<joint>``, named points are
+sites ``point/<name>``, and the sensors are ``com``, ``com_velocity``,
 ``angular_momentum``, ``accelerometer``, ``contacts`` (how many contacts there are at all),
 ``load/<contact point>`` (how many with the ground, and their net force on it).
 """
@@ -41,15 +42,16 @@ if TYPE_CHECKING:
 
 GROUND_BIT = 1
 MOST_LIMBS = 30
-"""Limbs that collision bits tell apart; further ones do not collide with the last of them."""
+"""The number of limbs that collision bits can distinguish; further limbs do not collide with the
+last of these."""
 CONTACT_TIME_CONSTANT = 0.004
 CONTACT_IMPEDANCE = (0.95, 0.99, 0.001, 0.5, 2.0)
 
 
 @dataclass(frozen=True)
 class Variation:
-    """What differs from the nominal world: friction coefficient, factor on the contacts' stiffness,
-    factor on every mass and inertia, offset of the base link's CoM [m, base frame]."""
+    """The differences from the nominal world: friction coefficient, factor on the stiffness of the
+    contacts, factor on every mass and inertia, offset of the base link's CoM [m, base frame]."""
 
     friction: float = 0.7
     contact_stiffness: float = 1.0
@@ -89,11 +91,12 @@ def mujoco_spec(
     timestep: float = 0.0005,
     variation: Variation | None = None,
 ) -> MjSpec:
-    """The same before it is compiled, for who adds to it, such as colours; limbs that overlap in
-    the standing pose do collide here.
+    """The model before it is compiled, so that callers can add to it, such as colours.
+
+    In this model limbs that overlap in the standing pose do collide.
 
     Raises:
-        ValueError: as ``build_mujoco_model``, but for the order of the joints.
+        ValueError: the transmission gears one motor to joints of different limbs.
     """
     import mujoco
 
@@ -113,13 +116,15 @@ def mujoco_spec(
 
 
 def body_name(link: str) -> str:
-    """The name of a link's body in the model; MuJoCo keeps ``world`` for itself."""
+    """The name of a link's body in the model; the name ``world`` is reserved by MuJoCo."""
     return "link/world" if link == "world" else link
 
 
 def _overlaps(model: MjModel, robot: RobotDescription) -> list[tuple[str, str]]:
-    """The pairs of bodies whose shapes overlap in the standing pose; for a robot on a fixed base
-    also those with the world, which it is mounted on."""
+    """The pairs of bodies whose shapes overlap in the standing pose.
+
+    For a robot on a fixed base they include pairs with the world, on which it is mounted.
+    """
     import mujoco
 
     data = mujoco.MjData(model)
@@ -137,7 +142,7 @@ def _overlaps(model: MjModel, robot: RobotDescription) -> list[tuple[str, str]]:
 
 
 def _surface(variation: Variation) -> dict[str, Any]:
-    """The contact parameters of every geom; stiffness goes with the inverse square of time."""
+    """The contact parameters of every geom; stiffness varies as 1 / (time constant)^2."""
     time_constant = CONTACT_TIME_CONSTANT / float(np.sqrt(variation.contact_stiffness))
     return {
         "condim": 3,
@@ -165,7 +170,7 @@ def _add_ground(spec: MjSpec, scene: Scene, variation: Variation) -> None:
 
 
 def _limb_of_link(robot: RobotDescription) -> dict[str, int]:
-    """For every link the number of its limb, 0 for the base; a limb is what hangs on one joint."""
+    """The number of every link's limb, 0 for the base; one joint of the base carries a limb."""
     limb = {robot.base: 0}
     for joint in robot.joints:
         on_base = joint.parent == robot.base
@@ -195,7 +200,7 @@ def _add_robot(spec: MjSpec, robot: RobotDescription, variation: Variation) -> N
         inertial = inertial if link.mass > 0.0 else {}
         body = parent.add_body(name=body_name(name), pos=position, **inertial)
         bodies[name] = body
-        # A limb's geoms carry the limb's bit and accept those of limbs before it: every pair once.
+        # A limb's geoms have the limb's bit and accept those of earlier limbs: each pair once.
         bits = {"contype": 0, "conaffinity": GROUND_BIT}
         if limb[name]:
             bits["contype"] = 1 << limb[name]

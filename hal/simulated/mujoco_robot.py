@@ -29,25 +29,25 @@ from .truth import TruthReport
 from .world import build_world, draw_variation
 
 SETTLING_TIME = 0.3
-"""For how long a robot settles before it is checked whether it stands [s]."""
+"""The time that a robot settles for, before it is checked whether it stands [s]."""
 OBSERVED_TIME = 0.02
-"""The last part of that, in which the load on its feet is averaged [s]."""
+"""The last part of the settling time, in which the load on the feet is averaged [s]."""
 
 
 class MujocoRobot(Robot):
     """The robot of the graph in MuJoCo: rigid links, rotors, motors, contact, noisy sensors.
 
-    Time: the control tick ``n`` is at ``t_n``; physics runs in steps of ``timestep`` between ticks
-    and starts, with ``random_start_phase``, at a phase of the control clock drawn from the seed.
+    Time: the control tick ``n`` is at ``t_n``. Physics runs in steps of ``timestep`` between ticks;
+    with ``random_start_phase`` it starts at a phase of the control clock drawn from the seed.
     Sensors are sampled at ``t_n``: the gyroscope and the joints at that instant, the accelerometer
-    as the mean over the tick before (what its filter passes), the switches by the force in the
+    as its mean over the tick before (its filter passes no more), the switches by the force in the
     physics step before. The command computed from them takes effect at the first physics step at
-    or after ``t_n + latency + jitter``, until the next one does. In between, the drives close the
-    joint loop at the physics rate with the command's gains, on their own encoders, and clip in
-    motor space by the torque-speed curve.
+    or after ``t_n + latency + jitter``, and stays in effect until the next one does. Meanwhile the
+    drives close the joint loop at the physics rate with the command's gains, by their own encoders,
+    and limit the torques in motor space by the torque-speed curves.
 
-    Command modes: ``OFF`` no torque; ``ACTIVE`` feedforward plus joint feedback; ``DAMPING``
-    ``drive_damping`` on every joint, whatever the command's gains say.
+    Command modes: ``OFF`` gives no torque, ``ACTIVE`` feedforward plus joint feedback, ``DAMPING``
+    the damping ``drive_damping`` on every joint, whatever the command's gains are.
 
     Start: the robot stands in its description's pose (torso turned by a drawn
     ``initial_attitude_error``, soles flat), held by its drives around the static torques with gains
@@ -58,7 +58,7 @@ class MujocoRobot(Robot):
 
     For a slide, metres and newtons stand for radians and newton metres in every parameter.
 
-    Everything random follows from ``seed``; every disturbance has a stream of its own, so setting
+    All random numbers follow from ``seed``. Every disturbance has a stream of its own, so setting
     one to zero changes no other. Snapshots are exact: a restored run continues bit for bit.
 
     It does not model: motor temperature and supply voltage, belt and cable elasticity, backlash,
@@ -66,7 +66,7 @@ class MujocoRobot(Robot):
 
     Raises:
         StartError: the robot does not stand as its description says.
-        IndexError: a push at a point the robot does not have.
+        IndexError: a push acts at a point that the robot does not have.
     """
 
     outside = "simulated"
@@ -83,7 +83,7 @@ class MujocoRobot(Robot):
 
     @classmethod
     def example_parameters(cls) -> Mapping[str, Any]:
-        """Every disturbance at once, so that the conformance suite meets them all."""
+        """All disturbances at once, so that the conformance suite covers them."""
         return {
             "gyro_noise": 0.02, "gyro_bias": 0.01, "gyro_range": 30.0,
             "accelerometer_noise": 0.1, "accelerometer_bias": 0.1, "accelerometer_range": 160.0,
@@ -94,7 +94,7 @@ class MujocoRobot(Robot):
 
     @classmethod
     def requires(cls, params: Parameters, robot: RobotDescription | None) -> Iterable[Misfit]:
-        """A transmission that the simulator can express, and a pose in which feet can stand."""
+        """Report a transmission that the simulator cannot express, and feet that cannot stand."""
         assert robot is not None
         complaint = unfit_motor(robot)
         if complaint:
@@ -108,7 +108,7 @@ class MujocoRobot(Robot):
 
     @classmethod
     def requires_of_graph(cls, params: Parameters, context: Context) -> Iterable[Misfit]:
-        """A physics step that divides the block's period."""
+        """Report a physics step that does not divide the block's period."""
         assert isinstance(params, SimulatorParameters)
         steps = context.period / params.timestep
         if abs(steps - round(steps)) > 1e-6 or round(steps) < 1:
@@ -136,7 +136,7 @@ class MujocoRobot(Robot):
     def local_dimensions(
         cls, params: Parameters, robot: RobotDescription | None
     ) -> Mapping[str, int]:
-        """The number of named points that something may push at; the seed is no size."""
+        """The number of named points that a force may act at; the seed is not a dimension."""
         return {"n_points": len(robot.points) if robot is not None else 0}
 
     @classmethod
@@ -191,7 +191,7 @@ class MujocoRobot(Robot):
         self._attach(mujoco.MjData(self._model))
 
     def _attach(self, data: Any) -> None:
-        """Views into the simulator's memory, made once."""
+        """Make the views into the simulator's memory, once."""
         model = self._model
         self._data = data
         base = self._base = BASES[self._robot.base_joint](data)
@@ -245,8 +245,8 @@ class MujocoRobot(Robot):
         self._settle(self._steps)
 
     def _settle(self, steps: int) -> None:
-        """Simulate that many physics steps while the joints that no motor can move are kept in the
-        standing pose, as if by hand."""
+        """Simulate physics steps in which joints that no motor can move stay in the standing pose,
+        as if held by hand."""
         if not len(self._passive):
             self._simulate(steps)
             return
@@ -282,14 +282,14 @@ class MujocoRobot(Robot):
         self._simulate(self._steps, pushed=True)
 
     def damp(self) -> None:
-        """One tick with the drives in damping; no force from outside."""
+        """Simulate one tick with the drives in damping and no external force."""
         self._drives.damp()
         self._external.fill(0.0)
         self._clear_record()
         self._simulate(self._steps)
 
     def freeze(self) -> None:
-        """Copy the simulator's and the random streams' state into the declared one."""
+        """Copy the state of the simulator and the random streams to the declared state."""
         import mujoco
 
         mujoco.mj_getState(
@@ -298,7 +298,7 @@ class MujocoRobot(Robot):
         self._streams.save(self.physics.random)
 
     def thaw(self) -> None:
-        """Take both back, and recompute what follows from positions and velocities."""
+        """Restore both from the declared state, and recompute what depends on them."""
         import mujoco
 
         mujoco.mj_setState(
@@ -308,7 +308,7 @@ class MujocoRobot(Robot):
         self._step1(self._model, self._data)
 
     def metrics(self) -> Mapping[str, Metric]:
-        """What was drawn from the seed."""
+        """The values that were drawn from the seed."""
         return {
             "robot_friction": float(self._variation.friction),
             "robot_mass_kg": float(self._robot.total_mass * self._variation.mass),
@@ -316,7 +316,7 @@ class MujocoRobot(Robot):
         }
 
     def _simulate(self, steps: int, *, pushed: bool = False) -> None:
-        """That many physics steps; afterwards all derived quantities are those of the end."""
+        """Simulate physics steps; afterwards all derived quantities are up to date."""
         model, data, record = self._model, self._data, self.record
         step = int(self.physics.step)
         for _ in range(steps):
@@ -344,7 +344,7 @@ class MujocoRobot(Robot):
         self.physics.step[()] = step
 
     def _apply_push(self) -> None:
-        """Put the external force on its body at its point; the moment follows the body."""
+        """Apply the external force at its point of its body, which moves with the body."""
         force = self.push.force
         fx, fy, fz = force.item(0), force.item(1), force.item(2)
         if fx == fy == fz == 0.0:
@@ -361,7 +361,7 @@ class MujocoRobot(Robot):
         wrench[3], wrench[4], wrench[5] = y * fz - z * fy, z * fx - x * fz, x * fy - y * fx
 
     def _clear_record(self) -> None:
-        """Begin a new tick; what switches remember stays."""
+        """Clear the record for a new tick, except for the memory of the switches."""
         record = self.record
         record.steps[()] = 0
         record.forbidden[()] = 0
@@ -375,8 +375,8 @@ class MujocoRobot(Robot):
 
 
 def _nearest_step(period: float, timestep: float) -> float:
-    """The largest step [s] up to ``timestep`` that divides the period, of few digits if one is
-    near."""
+    """The largest step [s] up to ``timestep`` that divides the period; one of few digits if such a
+    step is near."""
     count = max(1, math.ceil(period / timestep))
     steps = [period / k for k in range(count, 2 * count + 1)]
     return next((step for step in steps if abs(step * 1e5 - round(step * 1e5)) < 1e-9), steps[0])

@@ -1,4 +1,4 @@
-"""The parameters of the simulated robot: world, actuators, imperfections, all nominal by default."""
+"""The parameters of the simulated robot: its world, actuators and disturbances."""
 
 from __future__ import annotations
 
@@ -11,24 +11,27 @@ from . import scenes
 
 
 class SimulatorParameters(Parameters):
-    """What may be set on ``MujocoRobot``. A *spread* is half the width of a uniform distribution
-    around the nominal value, drawn once from the seed; a *noise* is the standard deviation of a
-    normal distribution, drawn for every sample."""
+    """The parameters of ``MujocoRobot``; by default there are no disturbances.
 
-    seed: int = parameter(0, ge=0, text="the seed of everything random")
+    A *spread* is half the width of a uniform distribution around the nominal value, from which one
+    value is drawn by the seed. A *noise* is the standard deviation of a normal distribution, from
+    which a value is drawn for every sample.
+    """
+
+    seed: int = parameter(0, ge=0, text="the seed of all random numbers")
     timestep: float = parameter(
         0.0005, unit="s", gt=0, le=0.002, text="physics step; it must divide the control period"
     )
 
     scene: Literal["flat", "step", "platform", "none"] = parameter(
-        "flat", text="what the ground is like; none: there is none"
+        "flat", text="the kind of ground; none: there is no ground"
     )
     step_height: float = parameter(0.05, unit="m", gt=0, text="scene step: its height")
     step_distance: float = parameter(
         0.1, unit="m", text="scene step: from the start to its front edge"
     )
     step_depth: float = parameter(
-        1.5, unit="m", gt=0, text="scene step: from there to where it goes down again"
+        1.5, unit="m", gt=0, text="scene step: its depth, from its front edge to its back edge"
     )
     platform_height: float = parameter(
         0.35, unit="m", gt=0, text="scene platform: its height above the floor"
@@ -50,11 +53,11 @@ class SimulatorParameters(Parameters):
         1.0, ge=1.0, le=16.0, text="further factor, log-uniform between its inverse and this"
     )
     mass_scale: float = parameter(1.0, gt=0, text="factor on all masses and inertias")
-    mass_spread: float = parameter(0.0, ge=0, lt=1, text="spread of that factor")
+    mass_spread: float = parameter(0.0, ge=0, lt=1, text="spread of the factor mass_scale")
     base_com_offset: list[float] = parameter(
         [0.0, 0.0, 0.0], unit="m", min_length=3, max_length=3, text="offset of the torso's CoM"
     )
-    base_com_spread: float = parameter(0.0, unit="m", ge=0, text="spread of that, per axis")
+    base_com_spread: float = parameter(0.0, unit="m", ge=0, text="spread of the offset, per axis")
 
     initial_attitude_error: float = parameter(
         0.0, unit="rad", ge=0, le=0.1,
@@ -63,28 +66,34 @@ class SimulatorParameters(Parameters):
     random_start_phase: bool = parameter(
         False, text="start physics at a drawn phase of the control clock"
     )
-    latency: float = parameter(0.0, unit="s", ge=0, le=0.1, text="from sensing to torque")
+    latency: float = parameter(0.0, unit="s", ge=0, le=0.1, text="delay from sensing to torque")
     jitter: float = parameter(
-        0.0, unit="s", ge=0, le=0.1, text="further latency, uniform from zero to this, per command"
+        0.0,
+        unit="s",
+        ge=0,
+        le=0.1,
+        text="additional latency of a command, uniform from zero to this",
     )
 
     gyro_noise: float = parameter(0.0, unit="rad/s", ge=0, text="gyroscope noise")
-    gyro_bias: float = parameter(0.0, unit="rad/s", ge=0, text="spread of its bias, per axis")
+    gyro_bias: float = parameter(
+        0.0, unit="rad/s", ge=0, text="spread of the gyroscope's bias, per axis"
+    )
     gyro_range: float | None = parameter(
-        None, unit="rad/s", gt=0, text="it saturates here; none: never"
+        None, unit="rad/s", gt=0, text="the gyroscope saturates at this rate; none: never"
     )
     accelerometer_noise: float = parameter(0.0, unit="m/s^2", ge=0, text="accelerometer noise")
     accelerometer_bias: float = parameter(
-        0.0, unit="m/s^2", ge=0, text="spread of its bias, per axis"
+        0.0, unit="m/s^2", ge=0, text="spread of the accelerometer's bias, per axis"
     )
     accelerometer_range: float | None = parameter(
-        None, unit="m/s^2", gt=0, text="it saturates here; none: never"
+        None, unit="m/s^2", gt=0, text="the accelerometer saturates at this value; none: never"
     )
     encoder_offset: float = parameter(
         0.0, unit="rad", ge=0, text="spread of the joint encoders' offsets"
     )
     encoder_resolution: float = parameter(
-        0.0, unit="rad", ge=0, text="joint angles are rounded to multiples of this; zero: not"
+        0.0, unit="rad", ge=0, text="joint angles are rounded to multiples of this; 0: not rounded"
     )
     joint_velocity_noise: float = parameter(0.0, unit="rad/s", ge=0, text="joint velocity noise")
     switch_threshold: list[float] = parameter(
@@ -97,8 +106,8 @@ class SimulatorParameters(Parameters):
 
     drive_damping: float | None = parameter(
         None, unit="N m s/rad", ge=0,
-        text="joint damping of a drive in its damping mode; none: a third of that which holds the "
-        "robot before the first command",
+        text="joint damping of a drive in its damping mode; none: a third of the damping that "
+        "holds the robot before the first command",
     )  # fmt: skip
 
     @model_validator(mode="after")

@@ -1,4 +1,4 @@
-"""A push from outside, for a given time at a given instant of the jump."""
+"""Pushes the robot once, for a given time, at a given instant of the jump."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from ...runtime.language.signals import Field, Signal
 
 
 class PushState(Signal):
-    """How far a push has come."""
+    """The progress of a push."""
 
     stood = Field(dtype="bool", text="whether the robot has touched the ground")
     waiting = Field(dtype="int64", text="ticks since the trigger")
-    pushed = Field(unit="s", text="for how long it has pushed")
+    pushed = Field(unit="s", text="how long the push has lasted so far")
 
 
 class Push(Block):
@@ -33,8 +33,9 @@ class Push(Block):
     ``force * (cos(angle) cos(elevation), sin(angle) cos(elevation), sin(elevation))``, so 0 is
     forward, 90 deg to the left, 180 deg backward. The push lasts a whole number of ticks except
     that the force of the last one is scaled, so that the impulse is ``force * duration`` exactly.
-    A force of zero never pushes. With ``speed_change`` the force is what changes the speed of the
-    robot's centre of mass by as much, so that the same push can be asked of robots of any mass.
+    With a force of zero there is no push. With ``speed_change`` the force is computed so that the
+    push changes the speed of the robot's centre of mass by that much; so robots of any mass can be
+    given the same push.
 
     The paper's test is 70 N for 0.01 s, 0.03 s after lift-off; it does not say where. The default
     is the torso's centre of mass, 0.12 m above the whole robot's, so the push also turns it.
@@ -43,7 +44,7 @@ class Push(Block):
     class Params(Parameters):
         force: float = live_parameter(70.0, unit="N", ge=0, text="magnitude; zero: no push")
         speed_change: float | None = live_parameter(
-            None, unit="m/s", ge=0, text="of the centre of mass, in place of `force`"
+            None, unit="m/s", ge=0, text="speed given to the centre of mass, in place of `force`"
         )
         angle: float = live_parameter(0.0, unit="rad", text="direction, from forward to the left")
         elevation: float = live_parameter(0.0, unit="rad", text="direction, above the horizontal")
@@ -57,12 +58,12 @@ class Push(Block):
     needs = ("robot",)
     params: Params
     truth = Input(RobotTruth, reads_truth=True, text="whether the robot is in the air")
-    push = Output(ExternalForce, text="the force, zero but during the push")
-    progress = State(PushState, text="how far it has come")
+    push = Output(ExternalForce, text="the force; it is zero except during the push")
+    progress = State(PushState, text="the progress of the push")
 
     @classmethod
     def requires(cls, params: Parameters, robot: RobotDescription | None) -> Iterable[Misfit]:
-        """A point of that name."""
+        """Report a point that the robot does not have."""
         assert isinstance(params, cls.Params) and robot is not None
         if params.point not in robot.points:
             points = list(robot.points)
@@ -76,12 +77,12 @@ class Push(Block):
             )
 
     def setup(self) -> None:
-        """Find the point and the force."""
+        """Find the point and compute the force."""
         self._point = list(self.robot.points).index(self.params.point)
         self.on_parameters()
 
     def on_parameters(self) -> None:
-        """Work out the force."""
+        """Compute the force from its parameters."""
         params = self.params
         flat, force = math.cos(params.elevation), params.force
         if params.speed_change is not None:
@@ -104,7 +105,7 @@ class Push(Block):
             progress.pushed += share * period
 
     def _waited(self) -> int:
-        """Ticks since the trigger, as counted up to now; a negative number before it."""
+        """The ticks since the trigger, up to now; negative before the trigger."""
         progress = self.progress
         if self.params.trigger == "start":
             progress.waiting += 1

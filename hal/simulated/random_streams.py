@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 
 class Purpose(IntEnum):
-    """What a stream is for. Numbers are never reused: they are part of what a seed means."""
+    """The purpose of a stream. Numbers are never reused, because they decide what a seed gives."""
 
     FRICTION = 0
     CONTACT_STIFFNESS = 1
@@ -38,11 +38,11 @@ RUNNING = (
 )  # fmt: skip
 """The streams that are drawn from during a run; the others are drawn once, before it."""
 WORDS = 3 * len(RUNNING)
-"""How many integers the state of the running streams takes."""
+"""The number of integers in the state of the running streams."""
 
 
 def stream(seed: int, purpose: Purpose) -> np.random.Generator:
-    """A fresh stream of that seed for that purpose."""
+    """A new stream for a seed and a purpose."""
     sequence = np.random.SeedSequence(seed, spawn_key=(int(purpose),))
     return np.random.Generator(np.random.PCG64(sequence))
 
@@ -52,7 +52,7 @@ def _signed(word: int) -> int:
 
 
 class RandomStreams:
-    """The streams of a run, whose state can be saved as integers and taken back exactly."""
+    """The streams of a run, whose state can be saved as integers and restored exactly."""
 
     def __init__(self, seed: int) -> None:
         self._streams = {purpose: stream(seed, purpose) for purpose in RUNNING}
@@ -70,7 +70,7 @@ class RandomStreams:
             out[3 * k + 2] = state["has_uint32"] << 32 | state["uinteger"]
 
     def load(self, words: NDArray[np.int64]) -> None:
-        """Take the state back; the seed must be the one it was saved with."""
+        """Restore the state; the seed must be the one that the state was saved with."""
         mask = (1 << 64) - 1
         for k, generator in enumerate(self._streams.values()):
             low, high, rest = (int(word) & mask for word in words[3 * k : 3 * k + 3])

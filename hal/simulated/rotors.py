@@ -1,12 +1,12 @@
-"""The rotors of a simulated robot: what their inertia adds to its joints.
+"""The rotors of a simulated robot, and the inertia that they add to its joints.
 
 With ``A`` the transmission's ``joint_to_motor`` and ``I_m`` the motors' rotor inertias at the
-gearbox output, the rotors add ``A^T diag(I_m) A`` to the joint-space inertia. MuJoCo has two ways to
-say that: armature of a joint, a term on the diagonal, and armature of a fixed tendon whose length is
-a weighted sum of joint positions, a term of rank one. A motor's row of ``A`` is such a weighted sum,
-so one tendon for each motor that is geared to several joints is exact for any transmission, as long
-as these joints lie on one limb, one behind the other: the simulator's inertia has no entries for
-others.
+gearbox output, the rotors add ``A^T diag(I_m) A`` to the joint-space inertia. MuJoCo can express
+that in two ways: by the armature of a joint, which is a term on the diagonal, and by the armature
+of a fixed tendon whose length is a weighted sum of joint positions, which is a term of rank one. A
+motor's row of ``A`` is such a weighted sum, so one tendon for each motor that is geared to several
+joints is exact for any transmission, as long as each of these joints carries the next: the
+simulator's inertia matrix has no entries for other pairs of joints.
 """
 
 from __future__ import annotations
@@ -26,8 +26,7 @@ Array = NDArray[np.float64]
 
 
 def joint_armature(robot: RobotDescription) -> Array:
-    """The armature [kg m^2] (n_joints,) of the joints, by all motors without a tendon of their
-    own."""
+    """The armature [kg m^2] (n_joints,) of the joints, from all motors without a tendon."""
     armature, shared = np.zeros(len(robot.joints)), _shared_motors(robot)
     for motor, inertia in enumerate(robot.motors.rotor_inertia.tolist()):
         if motor not in shared:
@@ -39,7 +38,7 @@ def add_rotors(spec: MjSpec, robot: RobotDescription) -> None:
     """Add a fixed tendon for every motor whose rotor couples joints.
 
     Raises:
-        ValueError: a motor couples joints that are not one behind the other.
+        ValueError: a motor couples two joints neither of which carries the other.
     """
     complaint = unfit_motor(robot)
     if complaint:
@@ -55,7 +54,7 @@ def add_rotors(spec: MjSpec, robot: RobotDescription) -> None:
 
 
 def unfit_motor(robot: RobotDescription) -> str:
-    """Which motor's rotor cannot be simulated, and why; empty where all can."""
+    """A text that says which motor's rotor cannot be simulated, and why; empty if all can."""
     names = [joint.name for joint in robot.joints]
     above = [joints_above(robot, joint.child) for joint in robot.joints]
     for motor in _shared_motors(robot):

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Box:
-    """A solid block with faces along the axes: its extent in x and y, its ``top`` and ``bottom``
-    [m, world]."""
+    """A solid block whose faces are normal to the axes, given by its extent in x and y and by its
+    ``top`` and ``bottom`` [m, world]."""
 
     x: tuple[float, float]
     y: tuple[float, float]
@@ -42,19 +42,18 @@ def flat() -> Scene:
 
 
 def nowhere() -> Scene:
-    """No ground within reach: the floor is a kilometre below. For robots on a fixed base that
-    swing below it."""
+    """No ground: the floor is a kilometre below, out of reach of a robot on a fixed base."""
     return Scene(floor=-1000.0)
 
 
 def step(height: float, distance: float, depth: float = 1.5) -> Scene:
-    """A step of ``height`` whose front edge is ``distance`` [m] ahead of the origin, and whose back
-    edge, where it goes down again, is ``depth`` behind that."""
+    """A step of ``height`` [m] whose front edge is ``distance`` [m] ahead of the origin, and whose
+    back edge is ``depth`` [m] further ahead."""
     return Scene(boxes=(Box((distance, distance + depth), (-0.75, 0.75), height, 0.0),))
 
 
 def platform(height: float, edge: float) -> Scene:
-    """A platform that the robot starts on, ``height`` above the floor, which ends ``edge`` [m]
-    ahead of the origin, or behind it where that is negative."""
+    """A platform that the robot starts on, ``height`` [m] above the floor. Its edge is ``edge`` [m]
+    ahead of the origin, or behind it if that is negative."""
     x = (edge - 0.6, edge) if edge >= 0.0 else (edge, edge + 0.6)
     return Scene(-height, (Box(x, (-0.4, 0.4), 0.0, -height),))

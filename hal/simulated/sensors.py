@@ -1,4 +1,4 @@
-"""The sensors of a simulated robot: noise, bias, offsets, rounding, saturation, bounce."""
+"""The sensors of a simulated robot, with noise, bias, offset, rounding, saturation and bounce."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class Sensors:
         self.accelerometer_bias = spread(Purpose.ACCELEROMETER_BIAS, params.accelerometer_bias, 3)
         """The accelerometer's bias [m/s^2]."""
         self.encoder_offset = spread(Purpose.ENCODER_OFFSET, params.encoder_offset, n)
-        """What every joint encoder reads too much [rad]."""
+        """The offset of every joint encoder: its reading minus the true angle [rad]."""
         low, high = params.switch_threshold
         draws = stream(params.seed, Purpose.SWITCH_THRESHOLD).random(n_contacts)
         self.switch_threshold = low + (high - low) * draws
@@ -51,7 +51,7 @@ class Sensors:
         self._changed = np.zeros(n_contacts, dtype=np.bool_)
 
     def read_imu(self, angular_velocity: Array, specific_force: Array, out: ImuReading) -> None:
-        """A sample of the IMU from the true values, both in the body frame; zero without one."""
+        """Write a sample of the IMU from the true values [rad/s, m/s^2, body]; zero without IMU."""
         params = self._params
         if not self._has_imu:
             out.angular_velocity.fill(0.0)
@@ -73,7 +73,7 @@ class Sensors:
                 np.maximum(reading, -limit, out=reading)
 
     def read_joints(self, position: Array, velocity: Array, torque: Array, out: JointState) -> None:
-        """A sample of encoders and currents from the true joint angles, velocities, torques."""
+        """Write a sample of encoders and currents from the joints' true motion and torques."""
         params = self._params
         np.add(position, self.encoder_offset, out=out.position)
         if params.encoder_resolution:
@@ -88,8 +88,11 @@ class Sensors:
         out.torque[:] = torque
 
     def watch_switches(self, step: int, ground_force: Array, record: TickRecord) -> None:
-        """Follow the switches in one physics step; ``ground_force`` is the vertical force of every
-        contact point on the ground [N], negative where the robot presses."""
+        """Update the switches in one physics step.
+
+        ``ground_force`` is the vertical force of every contact point on the ground [N], which is
+        negative where the robot presses.
+        """
         np.less_equal(ground_force, self._ground_force, out=self._closed)
         if self._bounce_steps:
             np.not_equal(self._closed, record.closed, out=self._changed)
@@ -97,8 +100,8 @@ class Sensors:
         record.closed[:] = self._closed
 
     def read_switches(self, step: int, record: TickRecord, out: ContactSwitches) -> None:
-        """A sample of the switches; one that has just changed reads either way at random. Robots
-        without switches read none as closed."""
+        """Write a sample of the switches; a switch that has just changed reads either way at
+        random. Without switches none is closed."""
         if not self._has_switches:
             out.closed.fill(False)
             return

@@ -1,7 +1,7 @@
-"""How a simulated robot stands before a run: its pose on the ground and the torques that hold it.
+"""How a simulated robot is made to stand before a run: its pose and the torques that hold it.
 
-Linear algebra here is MuJoCo's own: NumPy's rounds differently from one CPU to the next, and runs
-of the same seed would then differ from their first tick on.
+The linear algebra here is MuJoCo's own, because NumPy's rounds differently from one CPU to the
+next, and then runs of the same seed would differ from their first tick on.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 UNEVEN = 0.002
-"""By how much contact points may differ in height in the standing pose [m]."""
+"""The largest difference in height of contact points in the standing pose [m]."""
 _SINGULAR = 1e-12
 _DAMPING = 1e-8
 
@@ -93,8 +93,8 @@ def place_standing(
 
 
 def uneven_contacts(robot: RobotDescription) -> str:
-    """What keeps the robot from standing on level ground in its standing pose: contact points that
-    are above the lowest one, each with its height; empty where all are at one height."""
+    """A text that says which contact points are above the lowest one in the standing pose, so that
+    the robot cannot stand on level ground; empty if all are at one height."""
     heights = standing_heights(robot)
     above = heights - heights.min(initial=np.inf)
     if float(above.max(initial=0.0)) <= UNEVEN:
@@ -111,8 +111,8 @@ def uneven_contacts(robot: RobotDescription) -> str:
 
 
 def holding_torque(model: MjModel, data: MjData, base: FixedBase, robot: RobotDescription) -> Array:
-    """The joint torques [N m] that hold the robot still in its present pose, with the smallest
-    contact forces at the contact points that carry its weight."""
+    """The joint torques [N m] (n_joints,) that hold the robot still in its present pose, with the
+    smallest contact forces that carry its weight."""
     import mujoco
 
     mujoco.mj_forward(model, data)
@@ -125,7 +125,7 @@ def holding_torque(model: MjModel, data: MjData, base: FixedBase, robot: RobotDe
         rows = jacobian[3 * k : 3 * k + 3]
         place = data.site(contact.name).xpos - [0.0, 0.0, below[k]]
         mujoco.mj_jac(model, data, rows, None, place, int(model.site(contact.name).bodyid[0]))
-    # The force of least norm among those that carry the base: base_rows (base_rows' base_rows)^-1 w.
+    # The force of least norm that carries the base: base_rows (base_rows' base_rows)^-1 w.
     base_rows = np.ascontiguousarray(jacobian[:, :size])
     square, multiplier = np.zeros((size, size)), np.zeros(size)
     mujoco.mju_mulMatTMat(square, base_rows, base_rows)
@@ -147,8 +147,11 @@ def centre_on_origin(data: MjData, base: FixedBase, robot: RobotDescription) -> 
 
 
 def depth_of_contacts(robot: RobotDescription) -> Array:
-    """How far every contact point is below its site in the simulator's model [m], (n_contacts,):
-    the radius of the ball that is all of a foot, whose site is at its centre, and else zero."""
+    """How far every contact point is below its site in the simulator's model [m], (n_contacts,).
+
+    For a foot that is one ball this is the ball's radius, because the site is at the ball's centre;
+    for all other points it is zero.
+    """
     below = np.zeros(len(robot.contacts))
     for ball in ball_feet(robot):
         below[ball.point] = ball.radius
@@ -156,7 +159,7 @@ def depth_of_contacts(robot: RobotDescription) -> Array:
 
 
 def _leg_joints(robot: RobotDescription) -> NDArray[np.int64]:
-    """The joints that move a foot."""
+    """The indices of the joints that move a foot."""
     legs = np.zeros(len(robot.joints), dtype=np.bool_)
     for foot in robot.feet:
         legs |= joints_above(robot, foot.link)
@@ -193,7 +196,7 @@ def _solve_normal(matrix: Array, right: Array) -> Array:
 
 
 def _solve_positive(square: Array, right: Array, solution: Array) -> None:
-    """Solve a symmetric positive system; a singular one with a little damping."""
+    """Solve a symmetric positive definite system; a singular one is damped a little."""
     import mujoco
 
     largest = float(np.diag(square).max())

@@ -1,4 +1,4 @@
-"""Whether a simulated robot stands, once it has settled, as its description says it does."""
+"""Checks that a simulated robot, once it has settled, stands as its description says."""
 
 from __future__ import annotations
 
@@ -20,17 +20,17 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 LOAD_ERROR = 0.05
-"""By what share the feet's mean load may differ from the robot's weight."""
+"""The largest difference of the feet's mean load from the robot's weight, as a share of it."""
 MOST_JOINT_SPEED = 0.2
-"""What a joint may still move at [rad/s, or m/s for a slide]."""
+"""The largest speed of a joint that counts as still [rad/s, or m/s for a slide]."""
 MOST_BASE_SPEED = 0.03
-"""What the base may still move at [m/s]."""
+"""The largest speed of a base that counts as still [m/s]."""
 MOST_BASE_RATE = 0.1
-"""What the base may still turn at [rad/s]."""
+"""The largest angular speed of a base that counts as still [rad/s]."""
 MOST_TILT_ERROR = 0.03
-"""By how much the base may be turned otherwise than asked for [rad]."""
+"""The largest angle between the base's orientation and the one asked for [rad]."""
 MOST_SAG = 0.02
-"""By how much a held joint may be away from where it is held [rad, or m for a slide]."""
+"""The largest error of a held joint's position [rad, or m for a slide]."""
 NEAR = 0.001
 """A contact point higher above the ground than this is in the air [m]."""
 
@@ -41,12 +41,12 @@ MOST_NAMED = 3
 
 class StartCheck:
     """Checks that a settled robot stands: its feet carry its weight, nothing else touches anything,
-    nothing moves, and the base is turned as asked for.
+    nothing moves, and the base has the orientation asked for.
 
-    A robot on a fixed base, or without contact points, is only asked to be still when it is held.
+    A robot on a fixed base, or without contact points, must only be still while it is held.
 
     Args:
-        model, data: the simulator's, after settling.
+        model, data: the simulator's model and data, after settling.
         base: how the robot's base is held.
         robot: its description.
     """
@@ -58,13 +58,14 @@ class StartCheck:
         self._standing = bool(robot.contacts) and base.velocities > 0
 
     def check(self, load: Array, wanted: Array, torque: Array, rotation: Array) -> None:
-        """Raise ``StartError`` with what keeps the robot from standing, or where no cause is found
-        with what shows that it does not stand.
+        """Raise ``StartError`` if the robot does not stand.
+
+        The message gives the causes, or the symptoms if no cause is found.
 
         Args:
             load: the mean vertical force on every contact point [N], (n_contacts,).
             wanted: the joint positions in which the drives hold the robot [rad], (n_joints,).
-            torque: that hold it there without moving [N m], (n_joints,).
+            torque: the joint torques that hold it there without moving [N m], (n_joints,).
             rotation: the matrix (3, 3) from base to world that the robot was placed with.
         """
         symptoms = [*self._sagging(wanted), *self._moving()]
@@ -83,12 +84,12 @@ class StartCheck:
         )
 
     def _unbalanced(self) -> list[str]:
-        """The centre of mass outside the support."""
+        """Report a centre of mass outside of the support polygon."""
         places = np.array([self._data.site(c.name).xpos for c in self._robot.contacts])
         com = self._data.sensor("com").data
         loaded = np.ones(len(places), dtype=np.bool_)
         margin = support_margin(places, loaded, float(com[0]), float(com[1]))
-        if self._base.velocities == 3:  # it cannot fall sideways
+        if self._base.velocities == 3:  # a robot with a planar base cannot fall sideways
             x, ahead = float(com[0]), places[:, 0]
             margin = min(x - float(ahead.min()), float(ahead.max()) - x)
         if margin > 0.0:
@@ -97,7 +98,7 @@ class StartCheck:
         return [f"its centre of mass is {way} outside its contact points, so it tips over"]
 
     def _touching(self) -> list[str]:
-        """Links that touch something, and points that touch something else than the ground."""
+        """Report links that touch anything, and contact points that touch more than the ground."""
         model, contacts = self._model, [contact.name for contact in self._robot.contacts]
         found: dict[str, None] = {}
         for first, second in self._data.contact.geom.tolist():
@@ -115,7 +116,7 @@ class StartCheck:
         return _some(list(found))
 
     def _too_weak(self, torque: Array) -> list[str]:
-        """Motors that cannot produce what holds the robot; joints without motors are not held."""
+        """Report motors that are too weak to hold the robot; joints without motors do not count."""
         robot = self._robot
         needed = np.abs(robot.torque_to_motor @ torque)
         found = []
@@ -126,7 +127,7 @@ class StartCheck:
         return _some(found)
 
     def _unloaded(self, load: Array) -> list[str]:
-        """Feet in the air, and a weight that they do not carry."""
+        """Report feet in the air, and a load on the feet that is not the robot's weight."""
         total = float(load.sum())
         weight = float(self._model.body_subtreemass[0]) * GRAVITY
         if abs(total - weight) <= LOAD_ERROR * weight:
@@ -141,13 +142,13 @@ class StartCheck:
         return [carried, *_some(found)]
 
     def _sagging(self, wanted: Array) -> list[str]:
-        """Joints that are not where they are held, the worst first."""
+        """Report joints that are not where they are held, the worst first."""
         away = self._data.qpos[self._base.positions :] - wanted
         text = "joint {name} is {value:+.2g} {unit} from where it is held"
         return self._joints(away, MOST_SAG, text, "rad", "m")
 
     def _moving(self) -> list[str]:
-        """What still moves, the worst joints first."""
+        """Report joints that still move, the worst first, and a base that does."""
         speeds = self._data.qvel[self._base.velocities :]
         text = "joint {name} moves at {value:.2g} {unit}"
         found = self._joints(speeds, MOST_JOINT_SPEED, text, "rad/s", "m/s")
@@ -162,7 +163,7 @@ class StartCheck:
         return found
 
     def _joints(self, values: Array, most: float, text: str, hinge: str, slide: str) -> list[str]:
-        """What ``text`` says of every joint whose value is more than ``most``, the worst first."""
+        """``text`` for every joint whose value is more than ``most``, the worst first."""
         worst = sorted(range(len(values)), key=lambda k: -abs(values.item(k)))
         found = []
         for k in worst:
@@ -173,7 +174,7 @@ class StartCheck:
         return _some(found)
 
     def _tilted(self, rotation: Array) -> list[str]:
-        """A base that has turned from where it was put."""
+        """Report a base that has rotated since the robot was placed."""
         import mujoco
 
         turned = self._data.body(1).xmat.reshape(3, 3)
@@ -187,7 +188,7 @@ class StartCheck:
 
 
 def _some(found: list[str]) -> list[str]:
-    """The first few, and how many there are besides."""
+    """The first few texts, and the number of the others."""
     more = len(found) - MOST_NAMED
     return found if more <= 0 else [*found[:MOST_NAMED], f"the same of {more} more"]
 

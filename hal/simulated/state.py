@@ -1,4 +1,4 @@
-"""What a simulated robot remembers from tick to tick, as signals of declared state."""
+"""The state of a simulated robot from tick to tick, as signals."""
 
 from __future__ import annotations
 
@@ -6,8 +6,10 @@ from ...runtime.language.signals import Field, Signal
 
 
 class PhysicsState(Signal):
-    """The simulator's complete state (MuJoCo's integration state) and that of all random streams,
-    written before a snapshot and taken back after a restore."""
+    """The complete state of the simulator (MuJoCo's integration state) and of all random streams.
+
+    It is written before a snapshot and read back after a restore.
+    """
 
     step = Field(dtype="int64", text="physics steps since the run began")
     integration = Field("n_integration", text="time, positions, velocities, warm start, forces")
@@ -15,10 +17,10 @@ class PhysicsState(Signal):
 
 
 class DriveState(Signal):
-    """The drives' commands: a ring of ``n_queue`` slots, the active one and those on their way."""
+    """The drives' commands: a ring of ``n_queue`` slots for the active one and those to arrive."""
 
     active = Field(dtype="int64", text="slot of the command being executed")
-    pending = Field(dtype="int64", text="how many slots behind it are on their way")
+    pending = Field(dtype="int64", text="number of slots behind it that have not arrived")
     last_due = Field(dtype="int64", text="arrival of the command sent last; arrivals keep order")
     due = Field("n_queue", dtype="int64", text="physics step at which each arrives")
     mode = Field("n_queue", dtype="int64", text="see CommandMode")
@@ -30,7 +32,7 @@ class DriveState(Signal):
 
 
 class TickRecord(Signal):
-    """Sums and extremes over the physics steps of one tick, and what switches remember."""
+    """Sums and extremes over the physics steps of one tick, and the memory of the switches."""
 
     steps = Field(dtype="int64", text="physics steps recorded")
     load = Field(("n_contacts", 4), text="sum of contact counts and forces on the ground [N]")

@@ -1,4 +1,4 @@
-"""What only a simulator knows, gathered after every tick."""
+"""Collects after every tick what only a simulator knows."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The world that a seed stands for: what is drawn once, and the simulator's model of it."""
+"""The world that a seed stands for: the values drawn once, and the simulator's model."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 def draw_variation(params: SimulatorParameters) -> Variation:
-    """The world that the seed of these parameters stands for."""
+    """Draw the variation of the world from the seed in these parameters."""
 
     def uniform(purpose: Purpose) -> float:
         return float(stream(params.seed, purpose).uniform(-1.0, 1.0))
@@ -48,6 +48,6 @@ def build_world(
     model = build_mujoco_model(
         robot, scene=params.build_scene(), timestep=params.timestep, variation=variation
     )
-    # A state that has become NaN must be seen, not be quietly replaced by the initial one.
+    # A state that has become NaN must be noticed, and not be replaced by the initial state.
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
     return model

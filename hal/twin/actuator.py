@@ -100,7 +100,7 @@ class EmulatedActuator:
             self.fail(LIMIT)
 
     def answer(self, frame: Frame) -> bytes | None:
-        """The data of the answer to an instruction for this actuator; ``None`` where it is silent."""
+        """The data of the answer to an instruction for this actuator; ``None`` if it is silent."""
         data = frame.data
         match frame.code:
             case Instruction.PING:

@@ -8,7 +8,7 @@ from ..bear.frames import BROADCAST, Frame, FrameReader, Instruction, frame_byte
 from .actuator import EmulatedActuator
 
 Fault = Callable[[int, bytes], bytes]
-"""Takes an answer's device and bytes, and gives the bytes that really travel: fewer, others, none."""
+"""Takes an answer's device and bytes, and returns the bytes that really travel."""
 
 
 def faithful(device: int, answer: bytes) -> bytes:
@@ -33,7 +33,7 @@ class EmulatedBus:
         self._reader = FrameReader()
 
     def receive(self, data: bytes) -> bytes:
-        """What the master sends, and what it gets to hear."""
+        """Take the bytes that the master sends; returns the bytes that it receives."""
         damaged = self._reader.damaged
         frames = self._reader.feed(data)
         if self._reader.damaged > damaged:

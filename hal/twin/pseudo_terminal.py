@@ -42,7 +42,7 @@ class PseudoTerminal:
                 data = data[written:]
 
     def close(self) -> None:
-        """Pull the cable: reading and writing on the other side fails from now on."""
+        """Close both sides: from now on reading and writing fail, as with an unplugged cable."""
         if self._thread.is_alive():
             os.write(self._woken, b"x")
             self._thread.join()

@@ -9,26 +9,30 @@ output and a field. All but the static ones are on the timelines ``t`` (exact na
                      read in the viewer; ``outcome``: ``outcome`` (JSON of ``RunResult.to_json``),
                      written last, so a recording without it was cut off
 ``graph``            the graph as it ran, after includes, sub-graphs and overrides, as text
-``signals/B/P/F``    the field after every tick, flat, as float64 ``Scalars``; int64 fields also as
-                     component ``aloft:exact``, as float64 is exact up to 2^53 only. A value equal
-                     to that of the tick before and after is left out: see ``changed_rows``
-``recorded``         ``aloft:span``: first and last of ticks without a gap whose signals are all
-                     there; written after them
+``rows``             ``aloft:packed``: the bytes of the bus after each of some ticks without a
+                     gap, at most half a second of them; see ``row_codec``
+``signals/B/P/F``    the field after every tick as ``Scalars``, for the viewer; of fields with at
+                     most 64 elements, and where it changes only: see ``changed_rows``
 ``keyframes``        ``aloft:bus`` and ``aloft:state`` at tick k: the bytes of both buffers before
                      tick k ran, from which a run can go on
 ``notes``            ``aloft:note``: JSON of a ``Note``: life cycle, overruns, faults, parameter
                      changes, dropped ticks
-``states/B/P/F``     each change of a number whose values have names, and of a truth value, for
-                     the viewer; of several truth values each is in ``states/B/P/F/<its name>``
+``states/NAME``      each change of a number whose values have names, and of a truth value, for
+                     the viewer; ``state_lanes.all_lanes`` chooses the short names
 ``limits/B/P/F``     the limits of a field by the robot's description, for the viewer
+``plots``            what is computed for plots only, for the viewer: see ``foot_forces``
 ``events``           notes, changes of state, lift-off and touchdown as text, for the viewer
 ``world``            the robot in 3D, for the viewer; see ``scene``
 ``times``            the time each block took, as text, for the viewer; written last
 ===================  ===============================================================================
 
-Row k of a signal is its value after all outputs of tick k were written. Unwired inputs never
-change: they are in ``Header.bus_start``, over which the signals of a tick are laid to get the bytes
-of its bus back.
+Row k is the bus after all outputs of tick k were written. Every message of the file has a checksum:
+see ``messages``.
+
+Recordings of versions before 0.2 have format 2. They have no ``rows`` and no checksums. Their
+``signals`` hold every field exactly (int64 fields as component ``aloft:exact``), and ``recorded``
+(``aloft:span``) holds first and last of ticks without a gap whose signals are all there. Unwired
+inputs are in ``Header.bus_start``, over which the signals of a tick are laid.
 """
 
 from __future__ import annotations
@@ -48,12 +52,15 @@ from ...runtime.language.layout import Layout
 from ...runtime.language.signals import Slot
 from ...runtime.language.terrain import Ground, Terrain
 
-FORMAT = 2
-"""The number of this format; a reader refuses any other."""
+FORMAT = 3
+"""The number of this format."""
+READABLE = (2, 3)
+"""The formats that can be read."""
 SIGNALS, STATES, KEYFRAMES, NOTES, EVENTS = "signals", "states", "keyframes", "notes", "events"
 LIMITS, TIMES, WORLD, GRAPH = "limits", "times", "world", "graph"
-RECORDED = "recorded"
-EXACT, BUS, STATE, NOTE, SPAN = "exact", "bus", "state", "note", "span"
+PLOTS = "plots"
+RECORDED, ROWS = "recorded", "rows"
+EXACT, BUS, STATE, NOTE, SPAN, PACKED = "exact", "bus", "state", "note", "span", "packed"
 
 
 @dataclass(frozen=True)

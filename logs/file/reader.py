@@ -11,9 +11,7 @@
 from __future__ import annotations
 
 import json
-import math
-import warnings
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from difflib import get_close_matches
 from functools import cached_property
@@ -24,31 +22,15 @@ from typing import Any, NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
-from ...runtime.language.errors import AloftError
 from ...runtime.language.parameter_change import ParameterChange
 from ...runtime.running.memory import Snapshot
 from ...runtime.running.notes import Note
-from .changed_rows import filled
-from .format import (
-    BUS,
-    EXACT,
-    FORMAT,
-    KEYFRAMES,
-    NOTE,
-    NOTES,
-    RECORDED,
-    SIGNALS,
-    SPAN,
-    STATE,
-    Header,
-    RecordedField,
-    entity_of,
-)
-from .tail import read_tail
+from .contents import RecordingError, expect_intact, scanned, tables, tables_at
+from .format import BUS, KEYFRAMES, NOTE, NOTES, READABLE, STATE, Header, RecordedField
+from .messages import Content, Damage, Scan
+from .row_sources import PackedRows, Piece, RowSource, SeriesRows
 
-
-class RecordingError(AloftError):
-    """Raised for a file that is no recording or that is damaged. The message says what to do."""
+__all__ = ["RecordedRun", "RecordingError", "read"]
 
 
 @dataclass(frozen=True)
@@ -61,12 +43,31 @@ class RecordedRun:
             layouts, robot.
         outcome: what ``RunResult.to_json`` gave; ``None`` if the recording was cut off.
         notes: life cycle, overruns, faults, parameter changes and dropped ticks, in order.
+        scan: the intact messages of the file.
     """
 
     path: Path
     header: Header
     outcome: Mapping[str, Any] | None
     notes: tuple[Note, ...]
+    scan: Scan
+
+    @property
+    def damage(self) -> tuple[Damage, ...]:
+        """The parts of the file that are not what was written; ``read`` refuses such a file unless
+        it is told otherwise."""
+        return self.scan.damage
+
+    @property
+    def whole(self) -> bool:
+        """Whether the run's outcome is there, the file was closed, and every checksum is right."""
+        return self.outcome is not None and self.scan.closed and not self.scan.damage
+
+    @cached_property
+    def _source(self) -> RowSource:
+        if self.header.format == 2:
+            return SeriesRows(self.scan, self.header, whole=self.outcome is not None)
+        return PackedRows(self.scan, self.header)
 
     def signals(self) -> Mapping[str, RecordedField]:
         """Every recorded signal by ``block.port.field``, with unit, frame, shape and text."""
@@ -83,7 +84,7 @@ class RecordedRun:
             self.nearest(name)
         if "rows" in self.__dict__:
             return self.header.bus.layout().view(self.rows, name)
-        return self._whole(known[name], self._batches(known[name]))
+        return self._source.signal(known[name])
 
     def nearest(self, name: str) -> NoReturn:
         """Raise the ``KeyError`` for an unknown signal; its message has the nearest names."""
@@ -107,27 +108,10 @@ class RecordedRun:
 
         return polars.DataFrame(flat_columns(self, names))
 
-    @cached_property
+    @property
     def ticks(self) -> NDArray[np.int64]:
         """The recorded ticks, (ticks,), in order; those that were dropped are not among them."""
-        tail, _ = self._tail  # first, as what is taken out of it later is in the file by then
-        return np.unique(np.concatenate([tail, self.written_ticks()]))
-
-    def written_ticks(self) -> NDArray[np.int64]:
-        """The ticks that are in the file itself; the other ticks are in its tail."""
-        found = [np.zeros(0, np.int64)]
-        for _, batch in _stream(self.path, f"/{RECORDED}"):
-            for first, last in batch[f"aloft:{SPAN}"].to_pylist():
-                found.append(np.arange(first, last + 1))
-        return np.unique(np.concatenate(found))
-
-    @cached_property
-    def _tail(self) -> tuple[NDArray[np.int64], NDArray[np.uint8]]:
-        """Ticks and rows that were not in the file yet when the recording was cut off."""
-        size = self.header.bus.size
-        if self.outcome is not None:  # a tail that is there is another run's
-            return np.zeros(0, np.int64), np.zeros((0, size), np.uint8)
-        return read_tail(self.path, size)
+        return self._source.ticks
 
     @property
     def time(self) -> NDArray[np.float64]:
@@ -136,31 +120,43 @@ class RecordedRun:
 
     @cached_property
     def rows(self) -> NDArray[np.uint8]:
-        """The bytes of the bus after every recorded tick, (ticks, bytes): exactly as they were."""
-        by_entity: dict[str, list[Any]] = {}
-        for entity, batch in _stream(self.path, f"/{SIGNALS}/**"):
-            by_entity.setdefault(entity, []).append(batch)
-        layout = self.header.bus.layout()
-        start = np.frombuffer(self.header.bus_start, np.uint8)
-        rows = np.tile(start, (len(self.ticks), 1))
-        for field in self.signals().values():
-            batches = by_entity.pop(f"/{entity_of(SIGNALS, field.name)}", [])
-            first, last = layout.byte_range(field.name)
-            flat = self._whole(field, batches).reshape(len(rows), math.prod(field.shape))
-            rows[:, first:last] = np.ascontiguousarray(flat).view(np.uint8)
+        """The bytes of the bus after every recorded tick, (ticks, bytes): exactly as they were.
+
+        All of them are in memory then; ``pieces`` and ``window`` need less.
+        """
+        ticks = self.ticks
+        rows = np.empty((len(ticks), self.header.bus.size), np.uint8)
+        place = 0
+        for _, piece in self.pieces():
+            rows[place : place + len(piece)] = piece
+            place += len(piece)
         return rows
 
+    def pieces(self, first: int | None = None, last: int | None = None) -> Iterator[Piece]:
+        """Ticks (n,) and rows (n, bytes) from tick ``first`` up to, without, ``last``, some hundred at
+        a time and each read from the file when it is asked for."""
+        ticks = self.ticks
+        if not len(ticks):
+            return iter(())
+        low = int(ticks[0]) if first is None else first
+        return self._source.pieces(low, int(ticks[-1]) + 1 if last is None else last)
+
+    def window(self, first: int, last: int) -> Piece:
+        """The ticks from ``first`` up to, without, ``last``, (n,), and their rows, (n, bytes)."""
+        found = list(self.pieces(first, last))
+        if not found:
+            return np.zeros(0, np.int64), np.zeros((0, self.header.bus.size), np.uint8)
+        ticks, rows = zip(*found, strict=True)
+        return np.concatenate(ticks), np.concatenate(rows)
+
     @cached_property
-    def _snapshots(self) -> Mapping[int, Snapshot]:
-        found = {}
-        for _, batch in _stream(self.path, f"/{KEYFRAMES}"):
-            for k, tick in enumerate(batch["tick"].to_pylist()):
-                parts = {
-                    name: batch[f"aloft:{name}"][k].values.to_numpy().tobytes()
-                    for name in (BUS, STATE)
-                    if f"aloft:{name}" in batch.schema.names
-                }
-                found[tick] = Snapshot(tick, parts.get(BUS, b""), parts.get(STATE, b""))
+    def _snapshots(self) -> Mapping[int, Any]:
+        """The message of each keyframe, or, without seals, the keyframe itself."""
+        if self.scan.sealed:
+            return {m.first: m for m in self.scan.of(Content.KEYFRAME)}
+        found: dict[int, Snapshot] = {}
+        for _, batch in tables(self.scan, Content.KEYFRAME, f"/{KEYFRAMES}"):
+            found |= {each.tick: each for each in _snapshots_in(batch)}
         return dict(sorted(found.items()))
 
     @property
@@ -174,7 +170,10 @@ class RecordedRun:
         Raises:
             KeyError: there is no keyframe at that tick.
         """
-        return self._snapshots[tick]
+        found = self._snapshots[tick]
+        if not isinstance(found, Snapshot):
+            (found,) = _snapshots_in(tables_at(self.scan, found)[1])
+        return found
 
     @property
     def parameter_changes(self) -> tuple[ParameterChange, ...]:
@@ -183,89 +182,80 @@ class RecordedRun:
 
     @property
     def dropped_ticks(self) -> int:
-        """The number of ticks of the run that are not in the recording."""
+        """The number of ticks that found no room in the recorder, as its notes say."""
         return sum(int(note.data["count"]) for note in self.notes if note.kind == "dropped")
 
-    def _batches(self, field: RecordedField) -> Iterator[Any]:
-        entity = f"/{entity_of(SIGNALS, field.name)}"
-        return (batch for name, batch in _stream(self.path, entity) if name == entity)
-
-    def _whole(self, field: RecordedField, batches: Iterable[Any]) -> NDArray[Any]:
-        """The value at each of ``ticks``, also at those where an unchanged value was left out."""
-        if not len(self.ticks):
-            return np.zeros((0, *field.shape), field.dtype)
-        tail_ticks, tail = self._tail
-        ticks = [tail_ticks]
-        parts = [self.header.bus.layout().view(tail, field.name)]
-        for batch in batches:
-            name = f"aloft:{EXACT}" if field.dtype == "int64" else "Scalars:scalars"
-            ticks.append(batch["tick"].to_numpy())
-            values = batch[name].flatten().to_numpy().astype(field.dtype, copy=False)
-            parts.append(values.reshape(len(ticks[-1]), *field.shape))
-        return filled(self.ticks, np.concatenate(ticks), np.concatenate(parts))
+    @property
+    def missing_ticks(self) -> int:
+        """The number of ticks that were run but are not in the recording, as far as it shows: those
+        between recorded ticks and, if the outcome is there, those at the beginning and the end."""
+        ticks = self.ticks
+        if self.outcome is not None and "ticks" in self.outcome:
+            return max(0, int(self.outcome["ticks"]) - len(ticks))
+        return int(ticks[-1] - self.header.first_tick + 1 - len(ticks)) if len(ticks) else 0
 
 
-def read(path: str | PathLike[str]) -> RecordedRun:
-    """Open a recording.
+def read(path: str | PathLike[str], *, damaged: bool = False) -> RecordedRun:
+    """Open a recording, also one that is being written just now. Every checksum is verified.
+
+    Args:
+        path: the file.
+        damaged: open also a file with damage; the ticks that it has taken are then missing.
 
     Raises:
         FileNotFoundError: there is no such file.
-        RecordingError: it is not a recording of aloft's, is cut in the middle of a message, or was
-            written by a later version.
-        ImportError: Rerun is not installed.
+        DamagedError: bytes have changed since they were written; the message names the lost ticks.
+        RecordingError: it is not a recording of aloft's, or was written by a later version.
     """
     path = Path(path)
-    with path.open("rb"):
-        pass
-    texts = _properties(path)
+    found = scanned(path)
+    if not damaged:
+        expect_intact(found)
+    texts = _properties(found)
     if "header" not in texts:
+        expect_intact(found)
+        if found.sealed or not found.messages:
+            raise RecordingError(f"{path} was cut off before its beginning was written")
         raise RecordingError(f"{path} is a Rerun file, but not a recording of a run by aloft")
     number = json.loads(texts["header"]).get("format", 0)
-    if number != FORMAT:
-        newer = "update aloft" if number > FORMAT else "read it with an older one"
+    if number not in READABLE:
+        newer = "update aloft" if number > max(READABLE) else "read it with an older one"
         raise RecordingError(
-            f"{path} has format {number}, this version of aloft reads {FORMAT}; {newer}"
+            f"{path} has format {number}, this version of aloft reads "
+            f"{' and '.join(map(str, READABLE))}; {newer}"
         )
     notes = [
         (row, Note(**json.loads(text)))
-        for _, batch in _stream(path, f"/{NOTES}")
+        for _, batch in tables(found, Content.NOTES, f"/{NOTES}")
         for row, text in zip(
-            batch["rerun.controls.RowId"].to_pylist(),  # these grow in the order of writing
+            batch[0].to_pylist(),  # the numbers of the rows, which grow in the order of writing
             batch[f"aloft:{NOTE}"].flatten().to_pylist(),
             strict=True,
         )
     ]
     outcome = json.loads(texts["outcome"]) if "outcome" in texts else None
     ordered = tuple(note for _, note in sorted(notes, key=lambda entry: entry[0]))
-    return RecordedRun(path, Header.from_json(texts["header"]), outcome, ordered)
+    return RecordedRun(path, Header.from_json(texts["header"]), outcome, ordered, found)
 
 
-def _properties(path: Path) -> dict[str, str]:
+def _properties(found: Scan) -> dict[str, str]:
     """The texts under ``__properties``, by name."""
-    found = {}
-    for entity, batch in _stream(path, "/__properties/**", static=True):
-        for name in batch.schema.names:
-            key = name.rpartition(":")[2]
-            values = batch[name].to_pylist()[0]
-            if entity.startswith("/__properties/") and isinstance(values, list) and values:
-                found[key] = str(values[0])
-    return found
+    texts = {}
+    contents = (Content.START, Content.OUTCOME) if found.sealed else (Content.UNKNOWN,)
+    for content in contents:
+        for _, batch in tables(found, content, "/__properties/**", static=True):
+            for name in batch.schema.names:
+                values = batch[name].to_pylist()[0]
+                if isinstance(values, list) and values:
+                    texts[name.rpartition(":")[2]] = str(values[0])
+    return texts
 
 
-def _stream(path: Path, content: str, *, static: bool = False) -> Iterator[tuple[str, Any]]:
-    """Entity and Arrow record batch of every matching chunk, in no particular order."""
-    from rerun.chunk import RrdReader
-
-    try:
-        with warnings.catch_warnings():
-            warnings.filterwarnings("ignore", "RRD file has no footer")  # it is being written
-            reader = RrdReader(path)
-        for chunk in reader.stream().filter(content=content):
-            if chunk.is_static == static:
-                # Rerun escapes what is no letter, as in the names of blocks that loading inserts
-                yield str(chunk.entity_path).replace("\\", ""), chunk.to_record_batch()
-    except (RuntimeError, ValueError, OSError) as error:
-        raise RecordingError(
-            f"{path} cannot be read ({error}); if a recording was cut off, mend it with "
-            f"'aloft log repair {path}'"
-        ) from error
+def _snapshots_in(batch: Any) -> Iterator[Snapshot]:
+    for k, tick in enumerate(batch["tick"].cast("int64").to_pylist()):
+        parts = {
+            name: batch[f"aloft:{name}"][k].values.to_numpy().tobytes()
+            for name in (BUS, STATE)
+            if f"aloft:{name}" in batch.schema.names
+        }
+        yield Snapshot(tick, parts.get(BUS, b""), parts.get(STATE, b""))

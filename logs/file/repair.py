@@ -1,27 +1,20 @@
-"""Repairs a recording that was cut off: the file is shortened to its last complete message.
+"""Repairs a recording in place: what is not intact is taken out, and the file is closed.
 
-An ``.rrd`` file has a head of twelve bytes and then messages. A message has its kind and its
-length, eight bytes each, and then that many bytes. A writer that is killed, or that finds the disk
-full, leaves the last message incomplete. No reader can read such a file, but all messages before
-the last one are intact.
+Nothing of this needs room on the disk, except the sixteen bytes that close the file. What stands
+behind damage is moved forward, message by message.
 """
 
 from __future__ import annotations
 
+import errno
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
-from struct import Struct
 from typing import BinaryIO
 
 from ...runtime.language.errors import AloftError
-
-_MAGIC = b"RRF2"
-_FILE_HEAD = 12
-_MESSAGE = Struct("<QQ")
-_END = 0
-"""The kind of the message that closes a file; an index of the file follows it."""
-_LAST_KIND = 3
+from .contents import scanned
+from .messages import CLOSING, Damage, renumbered
 
 
 class RepairError(AloftError):
@@ -30,8 +23,14 @@ class RepairError(AloftError):
 
 @dataclass(frozen=True)
 class Repair:
-    """What was found and done: the ``messages`` that are whole, where in the file they begin and
-    ``end``, its size [bytes] before and after, and whether it had been ``closed`` by who wrote it.
+    """What was found and done.
+
+    Attributes:
+        path: the file.
+        messages: the number of intact messages.
+        size_before, size: of the file [bytes].
+        closed: whether it had been closed by who wrote it.
+        damage: what was not intact and has been taken out.
     """
 
     path: Path
@@ -39,13 +38,17 @@ class Repair:
     size_before: int
     size: int
     closed: bool
-    end: int
-    begin: int = _FILE_HEAD
+    damage: tuple[Damage, ...] = ()
 
     @property
     def removed(self) -> int:
         """The number of bytes that were removed."""
-        return self.size_before - self.size
+        return max(0, self.size_before - self.size)
+
+    @property
+    def was_whole(self) -> bool:
+        """Whether there was nothing to repair."""
+        return self.closed and not self.damage
 
 
 def repair(path: str | PathLike[str]) -> Repair:
@@ -53,30 +56,39 @@ def repair(path: str | PathLike[str]) -> Repair:
 
     Raises:
         OSError: the file cannot be read or written.
-        RepairError: it is not a Rerun file, or has no message that is whole.
+        RecordingError: it is not a Rerun file.
+        RepairError: it has no message that is intact.
     """
     path = Path(path)
-    with path.open("r+b") as file:
-        found = _examine(path, file)
-        if found.removed:
-            file.truncate(found.size)
-    return found
+    found = scanned(path)
+    count = len(found.messages)
+    if not count:
+        raise RepairError(f"{path} holds no message that is intact; there is nothing to save")
+    if found.closed and not found.damage:
+        return Repair(path, count, found.size, found.size, closed=True)
+    with path.open("r+b", buffering=0) as file:
+        end = found.end
+        if found.damage:
+            end = found.damage[0].begin
+            behind = [message for message in found.messages if message.place >= end]
+            for number, message in enumerate(behind, start=count - len(behind)):
+                data = renumbered(file, message, number)
+                file.seek(end)
+                file.write(data)
+                end += len(data)
+        file.truncate(end)
+        size = end + (_close(file, end) if found.sealed else 0)
+    return Repair(path, count, found.size, size, closed=found.closed, damage=found.damage)
 
 
-def _examine(path: Path, file: BinaryIO) -> Repair:
-    total = path.stat().st_size
-    if file.read(_FILE_HEAD)[: len(_MAGIC)] != _MAGIC:
-        raise RepairError(f"{path} is not a Rerun file of this format, or its beginning is lost")
-    messages, place = 0, _FILE_HEAD
-    while place + _MESSAGE.size <= total:
-        file.seek(place)
-        kind, length = _MESSAGE.unpack(file.read(_MESSAGE.size))
-        end = place + _MESSAGE.size + length
-        if kind > _LAST_KIND or end > total:
-            break
-        if kind == _END:
-            return Repair(path, messages, total, total, closed=True, end=place)
-        messages, place = messages + 1, end
-    if not messages:
-        raise RepairError(f"{path} holds no message that is whole; there is nothing to save")
-    return Repair(path, messages, total, place, closed=False, end=place)
+def _close(file: BinaryIO, end: int) -> int:
+    """Write the closing message. Returns its size, or zero if the disk has no room for it."""
+    file.seek(end)
+    try:
+        file.write(CLOSING)
+    except OSError as error:
+        if error.errno not in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG):
+            raise
+        file.truncate(end)
+        return 0
+    return len(CLOSING)

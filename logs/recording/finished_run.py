@@ -46,8 +46,7 @@ def write_recording(path: str | PathLike[str], result: RunResult) -> Recording:
     try:
         writer.write_rows(ticks, rows)
         changes = [parameter_note(change) for change in result.parameter_changes]
-        for note in sorted([*log.notes, *changes], key=lambda note: note.tick):
-            writer.write_note(note)
+        writer.write_notes(sorted([*log.notes, *changes], key=lambda note: note.tick))
         writer.write_outcome(result.to_json())
     finally:
         writer.close()

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from ...robots.description import RobotDescription
 from ...robots.kinematics import link_poses
-from ..viewing.robot_shapes import capsules, eye_controls, shapes_of
-from ..viewing.scene_contacts import force_scale
+from ..viewing.robot_shapes import capsules, eye_controls, scale_of, shapes_of
+from ..viewing.scene_contacts import ARROW_RADIUS, force_arrows
 from ..viewing.scene_part import Colors
 
 Array = NDArray[np.float64]
@@ -134,14 +134,16 @@ def _write_world(stream: Any, motion: RecordedMotion) -> None:
         position, rotation = poses.of(link.name)
         transforms = rr.Transform3D.columns(translation=position, mat3x3=rotation)
         stream.send_columns(entity, times, transforms)
-    forces, count = motion.contact_force * force_scale(robot), len(robot.contacts)
-    stream.log("world/contact_forces", rr.Arrows3D.from_fields(colors=[COLORS.force]), static=True)
+    forces, count = force_arrows(robot, motion.contact_force), len(robot.contacts)
+    scale = scale_of(robot)
+    looks = rr.Arrows3D.from_fields(colors=[COLORS.force], radii=[ARROW_RADIUS * scale])
+    stream.log("world/contact_forces", looks, static=True)
     arrows = rr.Arrows3D.columns(
         origins=motion.contact_position.reshape(-1, 3), vectors=forces.reshape(-1, 3)
     )
     stream.send_columns("world/contact_forces", times, arrows.partition([count] * len(forces)))
-    point = rr.Points3D.from_fields(colors=[COLORS.com], radii=[0.012])
+    point = rr.Points3D.from_fields(colors=[COLORS.com], radii=[0.012 * scale])
     stream.log("world/com", point, static=True)
     stream.send_columns("world/com", times, rr.Points3D.columns(positions=motion.com))
-    way = rr.LineStrips3D([motion.com], colors=[COLORS.com], radii=[0.002])
+    way = rr.LineStrips3D([motion.com], colors=[COLORS.com], radii=[0.002 * scale])
     stream.log("world/com_path", way, static=True)

@@ -19,12 +19,15 @@ from os import PathLike
 from pathlib import Path
 from typing import Literal
 
+from ...runtime.language.errors import AloftError
 from ...runtime.language.parameter_change import ParameterChange
 from ...runtime.running.memory import BoundGraph
 from ...runtime.running.notes import Note, parameter_note
 from ...runtime.running.run_result import RunResult
 from ..file.header import header_of
+from ..file.reader import read
 from . import recorder_link
+from .place import part_of, replaced, take_place
 from .recorder_link import RecorderLink
 from .recorder_process import KEYFRAME, NOTE, ROW, Report
 from .ring import space_of
@@ -33,10 +36,12 @@ WhenFull = Literal["wait", "drop"]
 
 
 class Recorder:
-    """A sink that records into one file, replacing what was there.
+    """A sink that records into one file, replacing what was there when the run has ended.
 
     Args:
-        path: the file; its folder is made. ``None`` writes none and only shows the run live.
+        path: the file; its folder is made. ``None`` writes none and only shows the run live. If
+            another run is being recorded there, this one takes another name, with a warning.
+        keep: how many earlier recordings of that name are kept; see ``place``.
         when_full: what to do when the process cannot keep up: ``wait``, which costs a simulation in
             virtual time nothing but a while, or ``drop`` ticks, which are counted. By default what
             suits the graph's clock: a run in real time never waits.
@@ -51,7 +56,10 @@ class Recorder:
 
     Attributes:
         warnings: what went wrong, one text each.
-        dropped: how many ticks were run but are not in the file.
+        path: the file in which the recording is found when the run has ended.
+        dropped: how many ticks were run but found no room in the ring.
+        before: what becomes of an earlier recording of that name, in words.
+        missing: how many ticks were run but are not in the file.
         report: what the process said at its end.
     """
 
@@ -59,6 +67,7 @@ class Recorder:
         self,
         path: str | PathLike[str] | None,
         *,
+        keep: int = 0,
         when_full: WhenFull | None = None,
         keyframe_period: float = 1.0,
         flush_period: float = 0.5,
@@ -70,6 +79,10 @@ class Recorder:
         self.path = Path(path) if path is not None else None
         self.warnings: list[str] = []
         self.dropped = 0
+        self.missing = 0
+        self.before = ""
+        self._keep = keep
+        self._seen = 0
         self.report: Report | None = None
         self.link: RecorderLink | None = None
         self._when_full = when_full
@@ -118,10 +131,14 @@ class Recorder:
         capacity = ticks * space_of(len(self._bus)) + 4 * space_of(len(self._frame))
         header = header_of(self._bound).to_json()
         try:
+            place = None
             if self.path is not None:
-                self.path.parent.mkdir(parents=True, exist_ok=True)
-                self.path.open("wb").close()
-            self.link = RecorderLink(self.path, header, capacity, *self._periods, self._live)
+                place = take_place(self.path, self._keep)
+                self.path = place.target
+                self.before = replaced(self.path, self._keep)
+                for text in place.said:
+                    self._warn(text)
+            self.link = RecorderLink(place, header, capacity, *self._periods, self._live)
         except OSError as error:
             return f"{self.path} cannot be written ({error.strerror or error})"
         return ""
@@ -130,6 +147,7 @@ class Recorder:
         """Copy the bus into the ring, and now and then the graph's whole memory as a keyframe."""
         if self.link is None:
             return
+        self._seen += 1
         if self._gap is not None or not self._write(ROW, tick, self._bus):
             self._find_room(tick)
         if self._every and (tick + 1) % self._every == 0:
@@ -218,21 +236,40 @@ class Recorder:
             while not self._note_gap(self._gap[1]) and self._waiting_helps():
                 time.sleep(1e-3)
         self.report, problem = self.link.finish(result.to_json(), self._waiting_helps)
-        if self.dropped:
-            self._warn(f"{self.dropped} ticks were run but not recorded")
+        self.missing = self.dropped
         if self.report is None:
-            self._warn(
-                f"the recording is not whole: {problem}; what was written before can be read after "
-                f"'aloft log repair {self.path}'"
-            )
-        elif self.report.problem:
-            self._warn(
-                f"the recording is not whole: {self.report.problem}; {self.report.rows} ticks were "
-                f"written, {self.report.lost} were not"
-            )
+            self._tell_of_a_cut(problem)
+        else:
+            self.missing += self.report.lost
+            if self.dropped:
+                self._warn(f"{self.dropped} ticks were run but not recorded")
+            if self.report.problem:
+                self._warn(
+                    f"the recording {self.path} is not whole: {self.report.problem}; "
+                    f"{self.report.rows} ticks are in it, {self.missing} are not"
+                )
+            if self.report.odd:
+                self._warn(self.report.odd)
         if self.report is not None and self.report.live_problem:
             self._warn(f"the viewer did not show all of the run: {self.report.live_problem}")
         return self.warnings
+
+    def _tell_of_a_cut(self, problem: str) -> None:
+        """Warn that the process has not ended the file, and count what is in it."""
+        if self.path is None:
+            self._warn(f"the run was not shown to its end: {problem}")
+            return
+        self.path = part_of(self.path)
+        try:
+            count = len(read(self.path, damaged=True).ticks)
+        except (AloftError, OSError):
+            count = 0
+        self.missing = self._seen - count
+        what = f"'aloft log repair {self.path}' completes it" if count else "nothing can be saved"
+        self._warn(
+            f"the recording is not whole: {problem}; {count} ticks are in {self.path}, "
+            f"{self.missing} were run but are not recorded; {what}"
+        )
 
 
 def _encoded(note: Note) -> bytes:

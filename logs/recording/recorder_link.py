@@ -14,6 +14,7 @@ from pathlib import Path
 from select import select
 from typing import Any
 
+from .place import Place
 from .recorder_process import HEADER, Report, Task
 from .ring import ALIGNMENT, RingWriter, make_memory, space_of
 
@@ -33,7 +34,7 @@ class RecorderLink:
     """A recorder's process that was started for one file, and the ring it reads.
 
     Args:
-        path: the file, if there is to be one.
+        place: the file's place, if there is to be a file. The process takes it over.
         header: of the recording, as text.
         capacity: least size of the ring [bytes].
         flush_period, sync_period, live: see ``Task``.
@@ -44,7 +45,7 @@ class RecorderLink:
 
     def __init__(
         self,
-        path: Path | None,
+        place: Place | None,
         header: str,
         capacity: int,
         flush_period: float,
@@ -58,8 +59,9 @@ class RecorderLink:
         try:
             self.ring = RingWriter(descriptor, capacity)
             self.ring.write(HEADER, 0, text)
-            place = str(path.absolute()) if path is not None else ""
-            task = Task(descriptor, capacity, place, flush_period, sync_period, live)
+            path = str(place.target.absolute()) if place is not None else ""
+            file, keep = (place.descriptor, place.keep) if place is not None else (-1, 0)
+            task = Task(descriptor, capacity, path, file, keep, flush_period, sync_period, live)
             folders = json.dumps([str(Path(folder).absolute()) for folder in sys.path])
             # not forked, as a copy of this process would hold its robot; and in a session of its
             # own, so that nobody's Ctrl-C ends it before the run has come to rest
@@ -67,11 +69,13 @@ class RecorderLink:
                 [sys.executable, "-c", _MAIN, json.dumps(asdict(task)), folders],
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
-                pass_fds=[descriptor],
+                pass_fds=[descriptor, *([file] if file >= 0 else [])],
                 start_new_session=True,
             )
         finally:
             os.close(descriptor)
+            if place is not None:
+                place.close()  # the process holds the file and its lock
         assert self._process.stdin is not None and self._process.stdout is not None
         self._input, self._output = self._process.stdin, self._process.stdout
         self._said = b""

@@ -3,8 +3,8 @@
 It is told what to do by a ``Task`` on its command line and by the first record in the ring, the
 header. On its standard input comes the outcome of the run. The end of the input says that nothing
 more will come, also when the process that runs the graph was killed: then what is in the ring is
-written, and the file is closed. On its standard output it says, in lines of JSON, that it is ready
-and, at the end, a ``Report``.
+written, and the file is closed and gets its name. On its standard output it says, in lines of JSON,
+that it is ready and, at the end, a ``Report``.
 """
 
 from __future__ import annotations
@@ -28,9 +28,8 @@ from ...runtime.running.failures import describe
 from ...runtime.running.memory import Snapshot
 from ...runtime.running.notes import Note
 from ..file.format import Header
-from ..file.repair import RepairError, repair
-from ..file.tail import TailWriter, record_type
 from .live_feed import LiveFeed
+from .place import Place
 from .ring import Record, RingReader
 from .writer import RecordingWriter, warm_up
 
@@ -42,22 +41,31 @@ LIVE_PERIOD = 0.1
 """Seconds after which a viewer is shown what has come."""
 LAST_SYNC = 2.0
 """Seconds that the end waits for the disk."""
-BATCH, BATCH_BYTES = 4096, 1 << 25
+BATCH, BATCH_BYTES = 1024, 1 << 24
 """Ticks written at once, and their bytes, at most."""
-BATCH_TIME = 10.0
-"""Seconds between two batches, at most."""
+DRAW_PERIOD = 10.0
+"""Seconds between two pieces of what the viewer shows: each costs the viewer time and memory."""
 
 
 @dataclass(frozen=True)
 class Task:
-    """What to write: the ring's ``descriptor`` and ``capacity``, the file, and how many seconds may
-    pass before what has come is handed to the operating system (``flush_period``), and before that
-    is told to put it on the disk (``sync_period``); an empty path stands for no file. ``live`` is
-    where a viewer listens that shows the run while it goes on, if one does."""
+    """What to write.
+
+    Attributes:
+        descriptor, capacity: of the ring.
+        path: the name that the recording gets; empty if no file is written.
+        file: the descriptor of the file, which is locked; see ``place``.
+        keep: the number of earlier recordings of that name that are kept.
+        flush_period: seconds after which what has come is handed to the operating system.
+        sync_period: seconds after which that is told to put it on the disk.
+        live: where a viewer listens that shows the run while it goes on, if one does.
+    """
 
     descriptor: int
     capacity: int
     path: str
+    file: int
+    keep: int
     flush_period: float
     sync_period: float
     live: str = ""
@@ -65,22 +73,29 @@ class Task:
 
 @dataclass
 class Report:
-    """What was done: rows surely written, the file's size [bytes], the most memory used [bytes], and
-    what went wrong, if anything; then ``lost`` rows may not be in the file. ``live_problem`` says
-    why
-    the viewer did not show all of the run."""
+    """What was done.
+
+    Attributes:
+        rows: the number of ticks in the file.
+        size: the file's size [bytes].
+        memory: the most memory used [bytes].
+        problem: what went wrong with the file, if anything.
+        lost: the number of ticks that were taken from the ring and are not in the file.
+        odd: what the user must know although the recording is whole.
+        live_problem: why the viewer did not show all of the run.
+    """
 
     rows: int = 0
     size: int = 0
     memory: int = 0
     problem: str = ""
     lost: int = 0
+    odd: str = ""
     live_problem: str = ""
 
 
 class RecorderProcess:
-    """Takes records out of the ring and writes them: ticks in batches, which keep the file and the
-    memory small, and until a batch is full into the file's tail; notes at every flush."""
+    """Takes records out of the ring and writes them: ticks and notes at every flush."""
 
     def __init__(self, task: Task) -> None:
         self.report = Report()
@@ -89,28 +104,27 @@ class RecorderProcess:
         record = next(self._ring.records())
         header = Header.from_json(bytes(record.data).decode())
         self._bus_size = header.bus.size
-        batch = max(1, min(BATCH, BATCH_BYTES // (self._bus_size + 8)))
-        self._batch = np.zeros(batch, record_type(self._bus_size))
-        self._ticks, self._rows = self._batch["tick"], self._batch["row"]
-        self._filled = self._flushed_rows = 0
+        batch = max(1, min(BATCH, BATCH_BYTES // max(1, self._bus_size)))
+        self._ticks = np.zeros(batch, np.int64)
+        self._rows = np.zeros((batch, self._bus_size), np.uint8)
+        self._filled = self._taken = 0
         self._notes: list[Note] = []
         self._last_tick = header.first_tick
-        self._dirty = False
         self._syncing = threading.Thread()
         self._writer: RecordingWriter | None = None
-        self._broken: RecordingWriter | None = None
-        self._tail: TailWriter | None = None
+        self._failed: RecordingWriter | None = None
+        self._place: Place | None = None
         warm_up()
         if task.path:
+            self._place = Place(Path(task.path), task.file, task.keep)
             self._guard(lambda: self._open(header))
         self.feed = LiveFeed(task.live, header) if task.live else None
         self._fed_rows = 0
-        self._flushed = self._synced = self._written = self._fed = time.monotonic()
+        self._flushed = self._synced = self._drawn = self._fed = time.monotonic()
 
     def _open(self, header: Header) -> None:
-        self._tail = TailWriter(Path(self._task.path))
-        self._writer = RecordingWriter(self._task.path, header)
-        self._writer.flush()
+        assert self._place is not None
+        self._writer = RecordingWriter(self._task.path, header, place=self._place)
 
     def take(self) -> None:
         """Take all records out of the ring, and flush if it is time."""
@@ -132,7 +146,8 @@ class RecorderProcess:
             self._rows[self._filled] = np.frombuffer(record.data, np.uint8)
             self._ticks[self._filled] = self._last_tick = record.tick
             self._filled += 1
-            if self._filled == len(self._batch):
+            self._taken += 1
+            if self._filled == len(self._ticks):
                 self._write_batch()
         elif record.kind == KEYFRAME:
             bus, state = bytes(record.data[: self._bus_size]), bytes(record.data[self._bus_size :])
@@ -145,17 +160,11 @@ class RecorderProcess:
 
     def flush(self) -> None:
         """Hand everything that was taken from the ring to the operating system."""
-        if time.monotonic() - self._written >= BATCH_TIME:
-            self._write_batch()
-        new = self._batch[self._flushed_rows : self._filled]
-        if len(new) and self._writer is not None and self._tail is not None:
-            tail = self._tail
-            self._guard(lambda: tail.append(new))
-        self._settle()
+        self._write_batch()
         self._write_notes()
-        if self._dirty and self._writer is not None:
-            self._guard(self._writer.flush)
-        self._dirty = False
+        if time.monotonic() - self._drawn >= DRAW_PERIOD:
+            self._write(lambda writer: writer.draw())
+            self._drawn = time.monotonic()
 
     def sync(self) -> None:
         """Have what was flushed put on the disk, which a thread waits for: a busy disk may take
@@ -165,17 +174,11 @@ class RecorderProcess:
             self._syncing.start()
 
     def _sync(self) -> None:
-        with suppress(OSError, ValueError):  # a disk that cannot take it fails the next flush too
-            if self._tail is not None:
-                self._tail.sync()
-            descriptor = os.open(self._task.path, os.O_RDONLY)
-            try:
-                os.fsync(descriptor)
-            finally:
-                os.close(descriptor)
+        with suppress(OSError):  # a disk that cannot take it fails the next flush too
+            os.fsync(self._task.file)
 
     def finish(self, outcome: dict[str, Any] | None) -> Report:
-        """Write what is left and close the file."""
+        """Write what is left, close the file and give it its name."""
         self.take()
         self._write_batch()
         if outcome is None:
@@ -185,12 +188,11 @@ class RecorderProcess:
         if outcome is not None:
             self._write(lambda writer: writer.write_outcome(outcome))
         if self._writer is not None:
-            self._guard(self._writer.close)
             self.sync()
             if self._syncing.is_alive():
                 self._syncing.join(LAST_SYNC)
-        if self._tail is not None and (self._writer is not None or not self._tail.count):
-            self._tail.remove()  # all is in the recording
+        self._count()
+        self._guard(self._close)
         if self.feed is not None:
             self.feed.finish(outcome)
             self.report.live_problem = self.feed.problem
@@ -198,6 +200,19 @@ class RecorderProcess:
             self.report.size = Path(self._task.path).stat().st_size
         self.report.memory = _memory()
         return self.report
+
+    def _close(self) -> None:
+        """Close the file; one that could not be written to its end gets its name as it is."""
+        if self._writer is not None:
+            self.report.odd = self._writer.close()
+        elif self._place is not None:
+            self._place.publish()
+
+    def _count(self) -> None:
+        """Count the ticks in the file, and those that are not."""
+        writer = self._writer or self._failed
+        self.report.rows = writer.recorded if writer is not None else 0
+        self.report.lost = self._taken - self.report.rows if self._task.path else 0
 
     def problems(self) -> list[str]:
         """The problems so far."""
@@ -216,47 +231,20 @@ class RecorderProcess:
             self.feed.rows(ticks.copy(), rows.copy())
 
     def _write_batch(self) -> None:
-        """Write the ticks that wait for it, and wait until the operating system has them."""
+        """Write the ticks that wait for it."""
         self._feed_rows()
-        if self._filled and self._writer is not None:
-            ticks = self._ticks[: self._filled].copy()
-            rows = self._rows[: self._filled]
-            self._write(lambda writer: writer.write_rows(ticks, rows))
-        if self._writer is not None:
-            self._guard(self._writer.flush)
-        self._settle()
-        if self._writer is not None and self._tail is not None:
-            self._guard(self._tail.clear)
-        self._filled = self._flushed_rows = self._fed_rows = 0
-        self._written = time.monotonic()
+        ticks, rows = self._ticks[: self._filled], self._rows[: self._filled]
+        self._write(lambda writer: writer.write_rows(ticks, rows))
+        self._filled = self._fed_rows = 0
 
     def _write_notes(self) -> None:
         notes, self._notes = self._notes, []
-        if notes:
-            self._write(lambda writer: writer.write_notes(notes))
-
-    def _settle(self) -> None:
-        """Count the rows that were handed over as written or, where that failed, as lost."""
-        count = self._filled - self._flushed_rows
-        if self._writer is None:
-            self.report.lost += count if self._task.path else 0
-        else:
-            self.report.rows += count
-        self._flushed_rows = self._filled
-
-    def _rescue(self) -> None:
-        """Write the ticks that the file did not take into the tail, as far as there is room."""
-        if self._tail is not None:
-            with suppress(OSError):
-                self._tail.append(self._batch[self._tail.count : self._filled])
-            self.report.rows += self._tail.count - self._flushed_rows
-            self._flushed_rows = self._tail.count
+        self._write(lambda writer: writer.write_notes(notes))
 
     def _write(self, write: Callable[[RecordingWriter], None]) -> None:
         writer = self._writer
         if writer is not None:
             self._guard(lambda: write(writer))
-            self._dirty = True
 
     def _guard(self, work: Callable[[], None]) -> None:
         """Call a function that writes. After a failure nothing is written any more, but the ring is emptied."""
@@ -264,11 +252,7 @@ class RecorderProcess:
             work()
         except Exception as error:  # noqa: BLE001  # whatever it is, the robot goes on
             self.report.problem = describe(error)
-            # kept, as Rerun may wait for ever when a stream whose file failed is let go
-            self._broken, self._writer = self._writer, None
-            with suppress(OSError, RepairError):
-                repair(self._task.path)  # so that what was written before can be read
-            self._rescue()
+            self._failed, self._writer = self._writer or self._failed, None
 
 
 def _memory() -> int:

@@ -14,7 +14,6 @@ from ...runtime.running.notes import Note
 from ..file.changed_rows import ChangedRows
 from ..file.format import (
     EVENTS,
-    EXACT,
     GRAPH,
     LIMITS,
     NOTE,
@@ -34,7 +33,7 @@ from ..viewing.scene import Scene
 from ..viewing.scene_part import Colors
 from ..viewing.scene_ports import scene_ports
 from ..viewing.signal_names import axis_colors, element_names
-from ..viewing.state_lanes import LaneReader, lanes_of
+from ..viewing.state_lanes import LaneReader, all_lanes
 
 LIMIT_COLOR = 0x9E9E9EB0
 
@@ -76,7 +75,8 @@ class RunStream:
             if not field.constant and (most is None or np.prod(field.shape) <= most)
         ]
         self._changed = {field.name: ChangedRows() for field in self._fields if changes_only}
-        lanes = [lane for field in self._fields for lane in lanes_of(field, header.robot)]
+        names = {field.name for field in self._fields}
+        lanes = [lane for lane in all_lanes(header) if lane.field.name in names]
         self._lanes, self._reader = lanes, LaneReader(lanes)
         self._limits = [
             (field, limits) for field in self._fields if (limits := limits_of(field, header))
@@ -185,10 +185,7 @@ class RunStream:
     ) -> None:
         import rerun as rr
 
-        columns = list(rr.Scalars.columns(scalars=flat.astype(np.float64, copy=False)))
-        if field.dtype == "int64":
-            exact = rr.DynamicArchetype.columns("aloft", components={EXACT: flat.reshape(-1)})
-            columns += list(exact.partition(np.full(len(flat), flat.shape[1])))
+        columns = rr.Scalars.columns(scalars=flat.astype(np.float64, copy=False))
         self.stream.send_columns(self._entity(SIGNALS, field), self._times(ticks), columns)
 
     def _write_limits(self, batch: RecordedRows) -> None:

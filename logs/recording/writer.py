@@ -1,56 +1,81 @@
 """Writes a recording piece by piece: rows, keyframes and notes as they come, the outcome at the end.
 
-``format`` describes the file. Every ``flush`` hands what was written to the operating system, so a
-process that is killed afterwards does not lose it.
+``format`` describes the content and ``messages`` the file. Rerun makes the messages in memory; they
+are sealed and written here. Whatever was written is with the operating system when the call
+returns, so a process that is killed afterwards does not lose it, and the file always ends with a
+whole message.
 """
 
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Sequence
 from os import PathLike
 from pathlib import Path
 from typing import Any
+from zlib import crc32
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...runtime.running.memory import Snapshot
 from ...runtime.running.notes import Note
-from ..file.format import BUS, KEYFRAMES, NOTE, RECORDED, SPAN, STATE, Header, spans
+from ..file.format import BUS, KEYFRAMES, NOTE, PACKED, ROWS, STATE, Header, spans
+from ..file.messages import ARROW, CLOSING, FILE_HEAD, HEAD, Content, Message, sealed, split
+from ..file.row_codec import pack
 from ..file.time_columns import time_columns
 from ..viewing.blueprint import recording_blueprint
+from .place import Place, take_place
 from .run_stream import RunStream
 
-FLUSH_TIMEOUT = 30.0
-"""Seconds a disk may take for what one flush hands over."""
+MOST_DRAWN = 64
+"""Fields with more elements, such as mass matrices, have no curves; their numbers are in the rows."""
+DRAWN_TICKS, DRAWN_BYTES = 4096, 1 << 25
+"""Ticks that are drawn at once and their bytes, at most: the viewer likes few large pieces."""
+ROWS_AT_ONCE = 512
+"""Ticks that are packed together, at most."""
 
 
 class RecordingWriter:
-    """Writes one file, replacing an older one.
+    """Writes one file, replacing an older one when it is closed.
 
     Args:
         path: the file; its folder is made.
         header: what is known before the first tick.
         recording_id: by default the graph's name; recordings of one run hold the same data.
+        place: where to write, if that was settled before.
+
+    Attributes:
+        recorded: the number of ticks in the file.
 
     Raises:
         ImportError: Rerun is not installed.
         OSError: the file cannot be written.
     """
 
-    def __init__(self, path: str | PathLike[str], header: Header, recording_id: str = "") -> None:
+    def __init__(
+        self,
+        path: str | PathLike[str],
+        header: Header,
+        recording_id: str = "",
+        place: Place | None = None,
+    ) -> None:
         import rerun as rr
 
-        self.path, self.header = Path(path), header
-        self.path.parent.mkdir(parents=True, exist_ok=True)
-        self.path.open("wb").close()  # Rerun would only warn, so find out here
+        self.place = place or take_place(Path(path))
+        self.header = header
+        self.path = self.place.target
+        self._size = self._messages = self._drawable = 0
+        self._begun = False
+        self.recorded = 0
+        self._undrawn: list[tuple[NDArray[np.int64], NDArray[np.uint8]]] = []
         self._stream = rr.RecordingStream(
             "aloft", recording_id=recording_id or header.name, send_properties=False
         )
         rr.set_log_time_enabled(False, recording=self._stream)
-        self._run = RunStream(self._stream, header, changes_only=True)
-        self._stream.save(self.path, default_blueprint=recording_blueprint(header))
+        self._made = self._stream.binary_stream()
+        self._run = RunStream(self._stream, header, changes_only=True, most=MOST_DRAWN)
         self._write_start()
 
     def _write_start(self) -> None:
@@ -69,19 +94,46 @@ class RecordingWriter:
             "schema_hashes": json.dumps(header.schema_hashes),
         }
         self._stream.send_property("aloft", rr.AnyValues(**about))
+        self._put(Content.START)
+        layout = recording_blueprint(header)
+        rr.send_blueprint(layout, make_active=False, make_default=True, recording=self._stream)
         self._run.write_start()
+        self._put(Content.PICTURE)
 
     def write_rows(self, ticks: NDArray[np.int64], rows: NDArray[np.uint8]) -> None:
-        """Write the bus (n, bytes) after each of ``ticks`` (n,), which come in order."""
+        """Write the bus (n, bytes) after each of ``ticks`` (n,), which come in order.
+
+        The rows are copied; curves and the robot in 3D are drawn of several thousand at once.
+        """
+        for first, last in spans(ticks) if len(ticks) else ():
+            for begin in range(int(first), int(last) + 1, ROWS_AT_ONCE):
+                end = min(begin + ROWS_AT_ONCE, int(last) + 1)
+                start = int(np.searchsorted(ticks, begin))
+                self._write_packed(begin, rows[start : start + end - begin])
+        if len(ticks):
+            self._undrawn.append((ticks.copy(), rows.copy()))
+            self._drawable += len(ticks)
+            if self._drawable >= min(DRAWN_TICKS, DRAWN_BYTES // max(1, rows.shape[1])):
+                self.draw()
+
+    def _write_packed(self, first: int, rows: NDArray[np.uint8]) -> None:
         import rerun as rr
 
-        if not len(ticks):
+        packed = np.frombuffer(pack(first, rows), np.uint8)
+        column = rr.DynamicArchetype.columns("aloft", components={PACKED: packed})
+        times = time_columns(self.header, np.array([first]))
+        self._stream.send_columns(ROWS, times, list(column.partition([len(packed)])))
+        self._put(Content.ROWS, first, first + len(rows) - 1)
+        self.recorded += len(rows)
+
+    def draw(self) -> None:
+        """Write for the viewer what has come since this was called last."""
+        if not self._undrawn:
             return
+        ticks, rows = (np.concatenate(parts) for parts in zip(*self._undrawn, strict=True))
+        self._undrawn, self._drawable = [], 0
         self._run.write_rows(ticks, rows)
-        found = spans(ticks)  # last, so that what they speak of is there
-        columns = rr.DynamicArchetype.columns("aloft", components={SPAN: found.reshape(-1)})
-        partitions = columns.partition(np.full(len(found), 2))
-        self._stream.send_columns(RECORDED, time_columns(self.header, found[:, 0]), partitions)
+        self._put(Content.PICTURE, int(ticks[0]), int(ticks[-1]))
 
     def write_keyframe(self, snapshot: Snapshot) -> None:
         """Write all that the graph remembered before ``snapshot.tick`` ran."""
@@ -93,40 +145,84 @@ class RecordingWriter:
             if len(flat):
                 column = rr.DynamicArchetype.columns("aloft", components={name: flat})
                 columns += list(column.partition([len(flat)]))
-        self._stream.send_columns(
-            KEYFRAMES, time_columns(self.header, np.array([snapshot.tick])), columns
-        )
+        times = time_columns(self.header, np.array([snapshot.tick]))
+        self._stream.send_columns(KEYFRAMES, times, columns)
+        self._put(Content.KEYFRAME, snapshot.tick, snapshot.tick)
 
     def write_note(self, note: Note) -> None:
         """Write a note twice: as data, and as text for the viewer."""
-        self._run.write_notes([note])
+        self.write_notes([note])
 
     def write_notes(self, notes: Sequence[Note]) -> None:
         """Write notes, in order, at once: a run that is late in each tick has many."""
-        self._run.write_notes(notes)
+        if notes:
+            self._run.write_notes(notes)
+            self._put(Content.NOTES, notes[0].tick, notes[-1].tick)
 
     def write_outcome(self, outcome: dict[str, Any]) -> None:
         """Write the outcome of the run. It comes last."""
         import rerun as rr
 
-        values = {"outcome": json.dumps(outcome), "run_hash": str(outcome.get("run_hash", ""))}
-        self._run.write_times(outcome)
-        self._stream.send_property("outcome", rr.AnyValues(**values))
-
-    def flush(self) -> None:
-        """Hand everything to the operating system. Raises ``OSError`` if it does not take it."""
-        try:
-            self._stream.flush(timeout_sec=FLUSH_TIMEOUT)
-        except RuntimeError as error:  # Rerun's writer has ended: the disk is full
-            raise OSError(f"{self.path} cannot be written any further ({error})") from error
-
-    def close(self) -> None:
-        """Flush and close the file. Raises ``OSError`` as ``flush`` does."""
+        self.draw()
         self._run.write_rest()
+        self._run.write_times(outcome)
+        self._put(Content.PICTURE)
+        values = {"outcome": json.dumps(outcome), "run_hash": str(outcome.get("run_hash", ""))}
+        self._stream.send_property("outcome", rr.AnyValues(**values))
+        self._put(Content.OUTCOME)
+
+    def _put(self, content: Content, first: int = 0, last: int = -1) -> None:
+        """Seal and write what Rerun has made of what was sent. Raises ``OSError``."""
+        data = self._made.read(flush=True) or b""
+        out = bytearray()
+        known = 0
+        if data and not self._begun:
+            out += data[:FILE_HEAD]
+            known, self._begun = crc32(data[:FILE_HEAD]), True
+        for head, body in split(data):
+            holds = content if HEAD.unpack(head)[0] == ARROW else Content.PICTURE
+            seal = Message(0, 0, ARROW, holds, self._messages, first, last)
+            out += sealed(head, body, seal, known)
+            known = 0
+            self._messages += 1
+        self._write(bytes(out))
+
+    def _write(self, data: bytes) -> None:
+        """Write all of ``data`` at the file's end, or, if there is no room, nothing of it."""
+        rest = memoryview(data)
+        at = self._size
         try:
-            self.flush()
+            while rest:
+                count = os.pwrite(self.place.descriptor, rest, at)
+                rest, at = rest[count:], at + count
+        except OSError as error:
+            os.ftruncate(self.place.descriptor, self._size)
+            why = error.strerror or error
+            raise OSError(f"{self.path} cannot be written any further ({why})") from error
+        self._size = at
+
+    def close(self) -> str:
+        """Close the file and give it its name. Returns a warning if something was odd about it.
+
+        Raises:
+            OSError: the disk is full; what stood in the file before remains readable.
+        """
+        try:
+            self.draw()
+            self._run.write_rest()
+            self._put(Content.PICTURE)
+            self._write(CLOSING)
+        finally:
+            warning = self.abandon()
+        return warning
+
+    def abandon(self) -> str:
+        """Give the file its name as it is, after a failure. Returns a warning or nothing."""
+        try:
+            return self.place.publish()
         finally:
             self._stream.disconnect()
+            self.place.close()
 
 
 def warm_up() -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from bisect import bisect_left
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -96,8 +95,7 @@ class OpenedRun:
 
     def rows(self, first: int, last: int) -> tuple[NDArray[np.int64], NDArray[np.uint8]]:
         """The ticks from ``first`` up to ``last``, and their rows."""
-        start, end = bisect_left(self.ticks, first), bisect_left(self.ticks, last)
-        return self.ticks[start:end], self.file.rows[start:end]
+        return self.file.window(first, last)
 
     def keyframe(self, tick: int) -> Snapshot:
         """What the graph remembered before ``tick``. Raises ``KeyError``."""

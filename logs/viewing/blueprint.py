@@ -13,7 +13,8 @@ from ..file.format import EVENTS, GRAPH, TIMES, WORLD, Header
 from .plot_views import Shown, block_tabs, main_plots
 from .robot_shapes import eye_controls
 from .scene_ports import scene_ports
-from .state_lanes import Lane, lanes_of
+from .scene_robot import EYE
+from .state_lanes import Lane, all_lanes
 
 LANES = ("active", "solved")
 """The truth values that have lanes beside those of the named numbers, such as phases."""
@@ -64,7 +65,7 @@ def scene_view(header: Header, shown: Sequence[Shown]) -> Any:
         origin=WORLD if not shown[0].root else "/",
         contents=[f"/{run.root}{WORLD}/**" for run in shown],
         name="Robot",
-        eye_controls=eye_controls(header.robot),
+        eye_controls=eye_controls(header.robot, follow=f"/{shown[0].root}{WORLD}/{EYE}"),
         line_grid=rrb.LineGrid3D(visible=True, spacing=0.1),
     )
 
@@ -73,10 +74,9 @@ def main_lanes(header: Header) -> list[Lane]:
     """The lanes that are shown at first."""
     return [
         lane
-        for field in header.bus.fields
-        if not field.constant
-        and ((field.values and field.field_name not in HIDDEN_LANES) or field.field_name in LANES)
-        for lane in lanes_of(field, header.robot)
+        for lane in all_lanes(header)
+        if (lane.field.values and lane.field.field_name not in HIDDEN_LANES)
+        or lane.field.field_name in LANES
     ]
 
 

@@ -7,6 +7,8 @@ from numpy.typing import NDArray
 
 SHORTEST_FLIGHT = 0.03
 """Without load for less [s] is a bounce, not a flight."""
+LIFT_OFF, TOUCHDOWN = "lift-off", "touchdown"
+"""The texts of the events."""
 
 
 class Flights:
@@ -29,12 +31,12 @@ class Flights:
         for tick, standing in zip(ticks.tolist(), on_ground, strict=True):
             if standing:
                 if self._told:
-                    events.append((tick, "touchdown"))
+                    events.append((tick, TOUCHDOWN))
                 self._began, self._told = None, False
                 continue
             if self._began is None:
                 self._began = tick
             if not self._told and tick - self._began >= self._least - 1:
-                events.append((self._began, "lift-off"))
+                events.append((self._began, LIFT_OFF))
                 self._told = True
         return events

@@ -14,12 +14,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..file.format import LIMITS, SIGNALS, Header, RecordedField, entity_of
+from .foot_forces import FOOT_FORCE, RANGE, WEIGHT, weight_of
 from .limits import limits_of
 from .scene_ports import ScenePorts, block_of, ports_of
-from .signal_names import AXES, element_names
+from .signal_names import AXES, element_names, unit_of
 
-MAIN_FIELDS = ("contact_force", "motor_torque", "motor_speed")
-"""Of the port that poses the robot, in the first tab beside centre of mass and base."""
+MAIN_FIELDS = ("motor_torque", "motor_speed")
+"""Of the port that poses the robot, in the first tab beside centre of mass, base and feet."""
+MOST_IN_LEGEND = 4
+"""A legend with more lines than this hides the curves, so it is hidden: the pointer on a curve shows
+its name."""
+MOST_IN_TAB = 6
+"""More plots than this in one tab would be too low to read."""
 MOST_PLOTS = 5
 """Shown first of a graph without a robot."""
 OTHER = np.array([0xFFA726FF, 0xC0CA33FF, 0x26C6DAFF], np.uint32)
@@ -61,7 +67,7 @@ def plot(header: Header, name: str, lines: Sequence[Line], shown: Sequence[Shown
     if len(shown) > 1 and len(lines) > 1:
         lines = lines[:1]  # of several runs only what is true, or else nobody could tell them apart
     first = lines[0].field
-    unit = f" [{first.unit}]" if first.unit not in (None, "", "1") else ""
+    unit = f" [{found}]" if (found := unit_of(first)) else ""
     frame = f", {first.frame}" if first.frame else ""
     entities, overrides = [], {}
     for k, run in enumerate(shown):
@@ -73,8 +79,54 @@ def plot(header: Header, name: str, lines: Sequence[Line], shown: Sequence[Shown
                 overrides[entity] = _series(header, line, label, other=k > 0)
     if limits_of(first, header):
         entities.append(shown[0].root + entity_of(LIMITS, first.name))
+    count = sum(len(element_names(line.field, header.robot)) for line in lines) * len(shown)
     return rrb.TimeSeriesView(
-        origin="/", contents=entities, name=f"{name}{unit}{frame}", overrides=overrides or None
+        origin="/",
+        contents=entities,
+        name=f"{name}{unit}{frame}{looks(lines, shown)}",
+        overrides=overrides or None,
+        plot_legend=legend(count),
+    )
+
+
+def legend(count: int) -> Any:
+    """The legend of a plot with so many lines: in a corner, or none where it would hide them."""
+    import rerun.blueprint as rrb
+
+    return rrb.PlotLegend("RightTop", visible=1 < count <= MOST_IN_LEGEND)
+
+
+def looks(lines: Sequence[Line], shown: Sequence[Shown]) -> str:
+    """What a title says of lines that lie over one another, in place of a legend."""
+    if len(shown) > 1:
+        return f" · bold {shown[0].label}, thin {shown[1].label}"
+    how = {"estimated": "bright: estimated", "planned": "dark: planned"}
+    told = [how[line.label] for line in lines if line.label in how]
+    return f" · {', '.join(told)}" if told else ""
+
+
+def feet_plot(header: Header, shown: Sequence[Shown]) -> Any:
+    """The vertical force on each foot, in a range that shows the stance."""
+    import rerun as rr
+    import rerun.blueprint as rrb
+
+    assert header.robot is not None
+    names, weight = [foot.name for foot in header.robot.feet], weight_of(header.robot)
+    overrides = {}
+    for run in shown[1:]:
+        thin = rr.SeriesLines(
+            names=[f"{run.label} {name}" for name in names],
+            widths=[0.75] * len(names),
+            aggregation_policy=EVERY_VALUE,
+        )
+        overrides[f"{run.root}{FOOT_FORCE}"] = thin
+    return rrb.TimeSeriesView(
+        origin="/",
+        contents=[f"{run.root}{FOOT_FORCE}" for run in shown] + [f"{shown[0].root}{WEIGHT}"],
+        name=f"vertical force on each foot [N]{looks((), shown)}",
+        axis_y=rrb.ScalarAxis(range=(RANGE[0] * weight, RANGE[1] * weight)),
+        overrides=overrides or None,
+        plot_legend=legend(len(names) * len(shown)),
     )
 
 
@@ -119,6 +171,8 @@ def main_plots(header: Header, ports: ScenePorts | None, shown: Sequence[Shown])
         if lines:
             lines.sort(key=lambda line: line.label != "")  # the true one first: it names the unit
             plots.append(plot(header, name, [_named(line) for line in lines], shown))
+    if ports.contact_force is not None and header.robot is not None and header.robot.feet:
+        plots.append(feet_plot(header, shown))
     names = [f"{pose}.{field}" for field in MAIN_FIELDS]
     plots += [field_plot(header, fields[name], shown) for name in names if name in fields]
     return plots
@@ -129,18 +183,40 @@ def _named(line: Line) -> Line:
 
 
 def block_tabs(header: Header, shown: Sequence[Shown]) -> list[Any]:
-    """One tab a block, in it all its signals but for great matrices."""
+    """One tab a block, in it all its signals but for large matrices.
+
+    A block with more plots than fit has a tab in its tab for each port, or for each few plots.
+    """
     import rerun.blueprint as rrb
 
-    tabs: dict[str, list[Any]] = {}
+    blocks: dict[str, dict[str, list[Any]]] = {}
     for port, fields in ports_of(header).items():
         for field in fields.values():
-            if len(element_names(field, None)) or not field.shape:
-                view = plot(
-                    header, f"{port.rpartition('.')[2]}.{field.field_name}", [Line(field)], shown
-                )
-                tabs.setdefault(block_of(port), []).append(view)
-    return [
-        rrb.Grid(*views, grid_columns=2 if len(views) > 3 else 1, name=block)
-        for block, views in tabs.items()
-    ]
+            if len(element_names(field, header.robot)):
+                short = port.rpartition(".")[2]
+                view = plot(header, f"{short}.{field.field_name}", [Line(field)], shown)
+                blocks.setdefault(block_of(port), {}).setdefault(short, []).append(view)
+    tabs = []
+    for block, ports in blocks.items():
+        views = [view for each in ports.values() for view in each]
+        if len(views) <= MOST_IN_TAB:
+            tabs.append(_grid(views, block))
+        else:
+            pages = [page for port, each in ports.items() for page in _pages(each, port)]
+            tabs.append(rrb.Tabs(*pages, name=block, active_tab=0))
+    return tabs
+
+
+def _pages(views: Sequence[Any], name: str) -> list[Any]:
+    """As many grids as are needed, of about equal size."""
+    count = -(-len(views) // MOST_IN_TAB)
+    parts = [views[k * len(views) // count : (k + 1) * len(views) // count] for k in range(count)]
+    if count == 1:
+        return [_grid(views, name)]
+    return [_grid(part, f"{name} {k + 1} of {count}") for k, part in enumerate(parts)]
+
+
+def _grid(views: Sequence[Any], name: str) -> Any:
+    import rerun.blueprint as rrb
+
+    return rrb.Grid(*views, grid_columns=2 if len(views) > 3 else 1, name=name)

@@ -12,6 +12,8 @@ from ...robots.description import Link, RobotDescription, Shape
 from ...robots.kinematics import link_poses
 
 Array = NDArray[np.float64]
+USUAL_REACH = 0.4
+"""The reach [m] of the robot that the sizes of marks and lines are given for."""
 
 
 def shapes_of(robot: RobotDescription, link: Link) -> list[Shape]:
@@ -38,16 +40,36 @@ def reach_of(robot: RobotDescription) -> float:
     return max(0.1, float(np.linalg.norm(poses.position[0], axis=1).max()))
 
 
-def eye_controls(robot: RobotDescription | None, distance: float = 1.0) -> Any:
-    """An eye to the right and in front of a standing robot, ``distance`` times the usual way off."""
+def scale_of(robot: RobotDescription) -> float:
+    """How large marks, lines and arrows are drawn, as a factor of what suits BRUCE."""
+    return reach_of(robot) / USUAL_REACH
+
+
+def eye_controls(
+    robot: RobotDescription | None, distance: float = 1.0, follow: str | None = None
+) -> Any:
+    """An eye to the right and in front of a standing robot, ``distance`` times the usual way off.
+
+    With ``follow`` it keeps its place beside that entity, which moves along with the robot.
+    """
     import rerun.blueprint as rrb
 
-    size = 2.5 * (reach_of(robot) if robot is not None else 0.4)
+    size = 3.2 * (reach_of(robot) if robot is not None else USUAL_REACH)
     position = tuple(distance * size * part for part in (0.6, -0.8, 0.4))
-    return rrb.EyeControls3D(position=position, look_target=(0.0, 0.0, 0.25 * size))
+    height = eye_height(robot) if robot is not None else 0.25 * size
+    return rrb.EyeControls3D(
+        position=position, look_target=(0.0, 0.0, height), tracking_entity=follow
+    )
 
 
-def capsules(shapes: Sequence[Shape], color: int, *, wires: bool = False) -> Any:
+def eye_height(robot: RobotDescription) -> float:
+    """The height [m] at which the camera looks: that of the base in the standing pose."""
+    return 0.85 * reach_of(robot)
+
+
+def capsules(
+    shapes: Sequence[Shape], color: int, *, wires: bool = False, line_radius: float = 0.0006
+) -> Any:
     """Rerun's capsules for ``shapes``, in the link's frame; with ``wires`` only their outlines.
 
     A capsule of Rerun's reaches from its origin along +z, so each is turned.
@@ -65,7 +87,7 @@ def capsules(shapes: Sequence[Shape], color: int, *, wires: bool = False) -> Any
         # an array of 32-bit colours: a list of four numbers could be one colour's red, green, blue
         # and alpha
         colors=np.full(len(shapes), color, np.uint32),
-        line_radii=np.full(len(shapes), 0.0006),
+        line_radii=np.full(len(shapes), line_radius),
         fill_mode="majorwireframe" if wires else "solid",
     )
 

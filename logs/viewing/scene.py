@@ -8,7 +8,8 @@ import numpy as np
 
 from ..file.format import EVENTS, Header, RecordedRows
 from ..file.time_columns import time_columns
-from .flights import SHORTEST_FLIGHT, Flights
+from .flights import SHORTEST_FLIGHT, TOUCHDOWN, Flights
+from .foot_forces import AFTER_TOUCHDOWN, FootForces, LandingPeaks
 from .scene_contacts import ContactPart
 from .scene_motion import FootTargetPart, MassCentrePart, PlanPart
 from .scene_part import Colors, Moments
@@ -33,6 +34,11 @@ class Scene:
         self._every = max(1, round(header.base_rate / PICTURE_RATE))
         self._parts = [part(stream, header, ports, f"{root}world", colors) for part in PARTS]
         self._flights = Flights(max(1, round(SHORTEST_FLIGHT * header.base_rate)))
+        self._loads = self._peaks = None
+        if ports.contact_force is not None and header.robot is not None and header.robot.feet:
+            self._loads = FootForces(stream, header, ports.contact_force, root)
+            after = max(1, round(AFTER_TOUCHDOWN * header.base_rate))
+            self._peaks = LandingPeaks(header.robot, after)
 
     def write_static(self) -> None:
         """Write everything that does not move."""
@@ -41,6 +47,8 @@ class Scene:
         self._stream.log(f"{self._root}world", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
         for part in self._parts:
             part.write_static()
+        if self._loads is not None:
+            self._loads.write_static()
 
     def write(self, batch: RecordedRows) -> None:
         """Write the instants of a batch that are drawn, and the flights that begin or end in it."""
@@ -49,6 +57,8 @@ class Scene:
             moments = Moments(batch, due, time_columns(self._header, batch.ticks[due]))
             for part in self._parts:
                 part.write(moments)
+        if self._loads is not None:
+            self._loads.write(batch)
         self._write_flights(batch)
 
     def _write_flights(self, batch: RecordedRows) -> None:
@@ -56,8 +66,11 @@ class Scene:
 
         if self._ports.contact_force is None:
             return
-        loaded = (batch.signal(self._ports.contact_force) != 0.0).any(axis=2)
-        events = self._flights.add(batch.ticks, loaded)
+        force = batch.signal(self._ports.contact_force)
+        events = self._flights.add(batch.ticks, (force != 0.0).any(axis=2))
+        if self._peaks is not None:
+            touchdowns = [tick for tick, text in events if text == TOUCHDOWN]
+            events = sorted(events + self._peaks.add(batch.ticks, force, touchdowns))
         if events:
             times = time_columns(self._header, np.array([tick for tick, _ in events]))
             texts = [text for _, text in events]

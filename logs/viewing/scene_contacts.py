@@ -11,11 +11,16 @@ from ...robots.description import RobotDescription
 from .robot_shapes import reach_of
 from .scene_part import Array, Moments, ScenePart
 
-ARROW = 0.02
-"""The length of a force arrow [m] for each m/s^2 that the force gives the whole robot, for each
-metre of the robot's reach: the arrow of its weight is a fifth of its reach."""
-CONE_HEIGHT = 0.06
-"""Height [m] at which a friction cone is cut: less than an arrow of the usual load."""
+GRAVITY = 9.81
+WEIGHT_ARROW = 0.6
+"""The length of the arrow of a robot's weight, as a share of the robot's reach. A robot that stands
+on four points has arrows a quarter as long, which are still easy to see."""
+LONGEST_ARROW = 1.0
+"""No arrow is longer than this share of the robot's reach, or else it would leave the view."""
+ARROW_RADIUS = 0.004
+"""The radius of an arrow's shaft [m] for a robot of the usual reach."""
+CONE_HEIGHT = 0.05
+"""Height [m] at which a friction cone is cut, for a robot of the usual reach."""
 CONE_SIDES = 16
 ABOVE_GROUND = 0.001
 """Lines on the ground are drawn this far above it [m], so that the grid does not hide them."""
@@ -23,7 +28,16 @@ ABOVE_GROUND = 0.001
 
 def force_scale(robot: RobotDescription) -> float:
     """The length of a force arrow for each newton [m/N]: small robots have small forces."""
-    return ARROW * reach_of(robot) / robot.total_mass
+    return WEIGHT_ARROW * reach_of(robot) / (GRAVITY * robot.total_mass)
+
+
+def force_arrows(robot: RobotDescription, force: Array) -> Array:
+    """The arrows [m] of forces [N], both (..., 3), none longer than the robot's reach allows."""
+    arrows = force * force_scale(robot)
+    lengths = np.linalg.norm(arrows, axis=-1, keepdims=True)
+    longest = LONGEST_ARROW * reach_of(robot)
+    shorter: Array = arrows * np.minimum(1.0, longest / np.maximum(lengths, 1e-12))
+    return shorter
 
 
 class ContactPart(ScenePart):
@@ -39,10 +53,13 @@ class ContactPart(ScenePart):
 
         if self.ports.contact_force is None:
             return
-        self.log("contact_forces", rr.Arrows3D.from_fields(colors=[self.colors.force]))
-        cones = rr.LineStrips3D.from_fields(colors=[self.colors.cone], radii=[0.0006])
+        width = ARROW_RADIUS * self.scale
+        arrows = rr.Arrows3D.from_fields(colors=[self.colors.force], radii=[width])
+        self.log("contact_forces", arrows)
+        thin, thick = 0.0006 * self.scale, 0.002 * self.scale
+        cones = rr.LineStrips3D.from_fields(colors=[self.colors.cone], radii=[thin])
         self.log("friction_cones", cones)
-        polygon = rr.LineStrips3D.from_fields(colors=[self.colors.support], radii=[0.002])
+        polygon = rr.LineStrips3D.from_fields(colors=[self.colors.support], radii=[thick])
         self.log("support_polygon", polygon)
 
     def write(self, moments: Moments) -> None:
@@ -55,7 +72,7 @@ class ContactPart(ScenePart):
         force = moments[self.ports.contact_force]
         arrows = rr.Arrows3D.columns(
             origins=position.reshape(-1, 3),
-            vectors=(force * force_scale(self.robot)).reshape(-1, 3),
+            vectors=force_arrows(self.robot, force).reshape(-1, 3),
         )
         counts = np.full(len(position), position.shape[1])
         self.send("contact_forces", moments, arrows.partition(counts))
@@ -67,7 +84,7 @@ class ContactPart(ScenePart):
     def _write_cones(
         self, moments: Moments, position: Array, loaded: NDArray[np.bool_], friction: float
     ) -> None:
-        cone = cone_lines(friction, CONE_HEIGHT)
+        cone = cone_lines(friction, CONE_HEIGHT * self.scale)
         self._write_lines(
             "friction_cones", moments, position[loaded][:, None] + cone, loaded.sum(1)
         )

@@ -16,9 +16,11 @@ class MassCentrePart(ScenePart):
         import rerun as rr
 
         if self.ports.com is not None:
-            ball = rr.Points3D.from_fields(colors=[self.colors.com], radii=[0.012])
+            ball = rr.Points3D.from_fields(colors=[self.colors.com], radii=[0.012 * self.scale])
             self.log("com", ball)
-            line = rr.LineStrips3D.from_fields(colors=[self.colors.com], radii=[0.0015])
+            line = rr.LineStrips3D.from_fields(
+                colors=[self.colors.com], radii=[0.0015 * self.scale]
+            )
             self.log("com_projection", line)
 
     def write(self, moments: Moments) -> None:
@@ -34,9 +36,8 @@ class MassCentrePart(ScenePart):
         if self.ports.ground_height is not None and self.robot.contacts:
             foot[:, 2] += moments[self.ports.ground_height].min(axis=1)
         # a small cross on the ground at the end of the line
-        arm = np.array(
-            [[0, 0, 0], [0.02, 0, 0], [-0.02, 0, 0], [0, 0, 0], [0, 0.02, 0], [0, -0.02, 0]]
-        )
+        ways = [[0, 0, 0], [1, 0, 0], [-1, 0, 0], [0, 0, 0], [0, 1, 0], [0, -1, 0]]
+        arm = 0.02 * self.scale * np.array(ways)
         lines = np.concatenate([com[:, None], foot[:, None] + arm], axis=1)
         columns = rr.LineStrips3D.columns(strips=list(lines))
         self.send("com_projection", moments, columns)
@@ -57,7 +58,7 @@ class PlanPart(ScenePart):
 
         if self.ports.plan is None:
             return
-        ball = rr.Points3D.from_fields(colors=[self.colors.plan], radii=[0.009])
+        ball = rr.Points3D.from_fields(colors=[self.colors.plan], radii=[0.009 * self.scale])
         self.log("plan/com", ball)
         for k, foot in enumerate(self.robot.feet):
             self.log(f"plan/{foot.name}", foot_outline(self, k, self.colors.plan))
@@ -133,4 +134,4 @@ def foot_outline(part: ScenePart, foot: int, color: int) -> object:
     high = points.max(axis=0, initial=0.0) + np.array([radius, radius, 0.0])
     corners = [(low[0], low[1]), (high[0], low[1]), (high[0], high[1]), (low[0], high[1])]
     strip = [(x, y, ABOVE_GROUND) for x, y in [*corners, corners[0]]]
-    return rr.LineStrips3D([strip], colors=[color], radii=[0.0015])
+    return rr.LineStrips3D([strip], colors=[color], radii=[0.0015 * part.scale])

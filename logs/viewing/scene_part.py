@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ...robots.description import RobotDescription
 from ...robots.kinematics import LinkPoses, link_poses
 from ..file.format import Header, RecordedRows
+from .robot_shapes import scale_of
 from .scene_ports import PoseSource, ScenePorts
 
 Array = NDArray[np.float64]
@@ -65,7 +66,10 @@ class Moments:
 
 
 class ScenePart:
-    """One part of the scene. ``write_static`` is called once, ``write`` for every batch."""
+    """One part of the scene. ``write_static`` is called once, ``write`` for every batch.
+
+    ``scale`` is the factor by which the sizes of marks and lines suit the robot.
+    """
 
     def __init__(
         self, stream: Any, header: Header, ports: ScenePorts, world: str, colors: Colors
@@ -74,6 +78,7 @@ class ScenePart:
         self.stream, self.header, self.ports = stream, header, ports
         self.robot: RobotDescription = header.robot
         self.world, self.colors = world, colors
+        self.scale = scale_of(self.robot)
 
     def write_static(self) -> None:
         """Write what does not change: shapes, colours, sizes."""

@@ -37,10 +37,11 @@ FORCES = Role("WholeBodyCommand", ("force:n_contacts",))
 PLAN = Role("JumpReference", ("com", "foot_position", "foot_yaw"))
 FEET = Role("FootTarget", ("position:n_feet", "rotation:n_feet"))
 PUSH = Role("ExternalForce", ("force", "point"))
-ROLES = (TRUTH, LOADS, GROUND, BASE, JOINTS, TERMS, FORCES, PLAN, FEET, PUSH)
+IMU = Role("ImuReading", ("angular_velocity", "specific_force"))
+ROLES = (TRUTH, LOADS, GROUND, BASE, JOINTS, TERMS, FORCES, PLAN, FEET, PUSH, IMU)
 OTHERS = (
-    "ContactState", "ContactSwitches", "EstimatorHealth", "ImuReading", "JointCommand",
-    "JointTarget", "JointTorque", "PhaseState", "WholeBodyTarget",
+    "ContactState", "ContactSwitches", "EstimatorHealth", "JointCommand", "JointTarget",
+    "JointTorque", "PhaseState", "WholeBodyTarget",
 )  # fmt: skip
 """Signals of the common vocabulary that have no role: similar fields do not give them one."""
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .scene_contacts import force_scale
+from .scene_contacts import ARROW_RADIUS, force_arrows
 from .scene_part import Moments, ScenePart
 
 
@@ -16,7 +16,8 @@ class PushPart(ScenePart):
         import rerun as rr
 
         if self.ports.push is not None:
-            self.log("push", rr.Arrows3D.from_fields(colors=[self.colors.push], radii=[0.006]))
+            width = 1.5 * ARROW_RADIUS * self.scale
+            self.log("push", rr.Arrows3D.from_fields(colors=[self.colors.push], radii=[width]))
 
     def write(self, moments: Moments) -> None:
         """Write the force where it acts."""
@@ -25,7 +26,7 @@ class PushPart(ScenePart):
         names = list(self.robot.points)
         if self.ports.push is None or not names:
             return
-        force = moments[f"{self.ports.push}.force"] * force_scale(self.robot)
+        force = force_arrows(self.robot, moments[f"{self.ports.push}.force"])
         point = np.clip(moments[f"{self.ports.push}.point"], 0, len(names) - 1)
         poses = moments.poses(self.robot, self.ports.pose)
         ends = np.zeros((len(names), len(moments), 3))

@@ -1,4 +1,4 @@
-"""Names for the elements of a field in legends: joints, contact points, axes."""
+"""Names for the elements of a field (joints, contact points, axes) and the unit in a plot's title."""
 
 from __future__ import annotations
 
@@ -10,19 +10,39 @@ from numpy.typing import NDArray
 from ...robots.description import RobotDescription
 from ..file.format import RecordedField
 
-MOST_NAMES = 24
-"""Legends longer than this help nobody."""
+MOST_NAMES = 48
+"""A matrix with more elements than this has no names, and so no plot: nobody could read it."""
+
+BASE_NAMES = {
+    "floating": ("base x", "base y", "base z", "base roll", "base pitch", "base yaw"),
+    "planar": ("base x", "base z", "base pitch"),
+    "fixed": (),
+}
+"""The base's elements of a generalised velocity, by how the base is held; joints come after them."""
+
+GENERALISED_UNITS = {
+    "velocity": "m/s, rad/s",
+    "acceleration": "m/s^2, rad/s^2",
+    "nonlinear_effects": "N, N m",
+}
+"""The units of fields with ``n_velocities`` elements, whose elements have two different units: first
+that of the base's translation, then that of the base's rotation and of the joints."""
 
 
 def names_along(
     field: RecordedField, size: int | str, length: int, robot: RobotDescription | None
 ) -> list[str]:
-    """The names along one axis of a field: the robot's own for its dimensions, x y z for three."""
+    """The names along one axis of a field.
+
+    They are the robot's own names for its dimensions; x, y, z (and w) for three or four elements;
+    linear and angular x, y, z for six; else numbers.
+    """
     if robot is not None:
         joints = [joint.name for joint in robot.joints]
         known = {
             # as many motors as joints, but a motor may turn two of them
             "n_joints": list(robot.transmission.motors) if "motor" in field.field_name else joints,
+            "n_velocities": [*BASE_NAMES[robot.base_joint], *joints],
             "n_contacts": [contact.name for contact in robot.contacts],
             "n_feet": [foot.name for foot in robot.feet],
         }
@@ -30,11 +50,13 @@ def names_along(
             return known[str(size)]
     if length in (3, 4):
         return list("xyzw"[:length])
+    if length == 6:
+        return [f"{kind} {axis}" for kind in ("linear", "angular") for axis in "xyz"]
     return [str(k) for k in range(length)]
 
 
 def element_names(field: RecordedField, robot: RobotDescription | None) -> list[str]:
-    """One name for every element in C order, or none at all where there would be too many."""
+    """One name for every element in C order, or none at all for a large matrix."""
     if not field.shape:
         return [field.field_name]
     axes = [
@@ -42,7 +64,28 @@ def element_names(field: RecordedField, robot: RobotDescription | None) -> list[
         for size, length in zip(field.dimensions, field.shape, strict=True)
     ]
     names = [" ".join(parts) for parts in product(*axes)]
-    return names if len(names) <= MOST_NAMES else []
+    return names if len(axes) == 1 or len(names) <= MOST_NAMES else []
+
+
+def unit_of(field: RecordedField) -> str:
+    """The unit of a field as a plot's title says it; empty where there is none."""
+    if field.unit in (None, "", "1"):
+        return GENERALISED_UNITS.get(field.field_name, "") if is_generalised(field) else ""
+    return str(field.unit)
+
+
+def unit_of_element(field: RecordedField, robot: RobotDescription | None, element: int) -> str:
+    """The unit of one element of a field, given by its place in C order."""
+    unit = unit_of(field)
+    if robot is None or field.unit or not is_generalised(field) or ", " not in unit:
+        return unit
+    moves = {"floating": 3, "planar": 2, "fixed": 0}[robot.base_joint]
+    return unit.split(", ")[0 if element < moves else 1]
+
+
+def is_generalised(field: RecordedField) -> bool:
+    """Whether a field has one element for each of the robot's generalised velocities."""
+    return tuple(field.dimensions) == ("n_velocities",)
 
 
 AXES = np.array([0xEF5350FF, 0x66BB6AFF, 0x42A5F5FF], np.uint32)

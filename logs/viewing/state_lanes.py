@@ -4,14 +4,15 @@ A lane shows when a field with few values changed."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...robots.description import RobotDescription
-from ..file.format import STATES, RecordedField, RecordedRows, entity_of
+from ..file.format import STATES, Header, RecordedField, RecordedRows, entity_of
 from .signal_names import element_names
 
 PALETTE = (
@@ -35,8 +36,41 @@ class Lane:
     told: bool
 
 
+def all_lanes(header: Header) -> list[Lane]:
+    """The lanes of every field of a run, each with the shortest entity that no other lane has.
+
+    The viewer writes the entity above a lane, so ``states/left_heel`` reads better than
+    ``states/contacts/state/active/left_heel``. Where two lanes would be called the same, both
+    have the name of the field, then that of the block, and at last the full name of the signal.
+    """
+    lanes = [
+        lane
+        for field in header.bus.fields
+        if not field.constant
+        for lane in lanes_of(field, header.robot)
+    ]
+    names = [_short_names(lane) for lane in lanes]
+    for _ in range(3):
+        taken = Counter(own[0] for own in names)
+        names = [own[1:] if taken[own[0]] > 1 and len(own) > 1 else own for own in names]
+    return [
+        replace(lane, entity=f"{STATES}/{own[0]}") for lane, own in zip(lanes, names, strict=True)
+    ]
+
+
+def _short_names(lane: Lane) -> Sequence[str]:
+    """What a lane may be called, the shortest name first."""
+    block = lane.field.name.rsplit(".", 2)[0].replace("/", ".")
+    field = lane.field.field_name
+    full = lane.entity.removeprefix(f"{STATES}/").replace("/", ".")
+    element = full.removeprefix(f"{lane.field.name}.".replace("/", ".")) if lane.field.shape else ""
+    if element:
+        return (element, f"{field}.{element}", f"{block}.{field}.{element}", full)
+    return (field, field if field == block else f"{block}.{field}", full, full)
+
+
 def lanes_of(field: RecordedField, robot: RobotDescription | None) -> list[Lane]:
-    """The lanes of a field. Most fields have none."""
+    """The lanes of one field, each by the full name of its signal. Most fields have none."""
     entity = entity_of(STATES, field.name)
     if field.values and not field.shape:
         colors = tuple(PALETTE[k % len(PALETTE)] for k in range(len(field.values)))

@@ -1,12 +1,12 @@
-"""Blocks: what computes. A block declares its ports, state and parameters; the runtime binds them.
+"""Blocks compute. A block declares its ports, state and parameters; the runtime binds them.
 
-A block is either of two machines:
+A block is one of two kinds of machine:
 
 * ``step()``: outputs follow from inputs in the same tick (a Mealy machine). It reads inputs,
   writes outputs and may change its state.
 * ``emit()`` and ``update()``: outputs follow from state alone (a Moore machine). ``emit`` writes
   outputs before any other block of the tick runs; ``update`` reads inputs after all have run.
-  Robots, delays and integrators are of this kind, and they are what breaks a loop.
+  Robots, delays and integrators are of this kind. Every loop of wires needs one of them.
 
 A small one::
 
@@ -47,7 +47,7 @@ Need = Literal["robot", "floating base", "feet", "imu", "switches"]
 
 
 class Port(Generic[S]):
-    """What inputs, outputs and states share: a signal type and a line of text."""
+    """The common base of inputs, outputs and states: a signal type and a line of text."""
 
     def __init__(self, signal: type[S], *, text: str = "") -> None:
         if not (isinstance(signal, type) and issubclass(signal, Signal)):
@@ -61,7 +61,7 @@ class Port(Generic[S]):
     def __set_name__(self, owner: type, name: str) -> None:
         self.name = name
 
-    # Non-data descriptor: a bound block holds the bound signal in its own dictionary.
+    # A non-data descriptor: a bound block has the bound signal in its own dictionary, which wins.
     @overload
     def __get__(self, instance: None, owner: type) -> Self: ...
     @overload
@@ -76,9 +76,9 @@ class Input(Port[S]):
     """A signal the block reads; its views cannot be written.
 
     Args:
-        signal: the fields the block needs; a source with more fields is fine.
-        default: makes the input optional; an unwired one then reads these values for ever, and
-            zero for every field not named. Values are numbers or nested lists.
+        signal: the fields the block needs; the source may have further fields.
+        default: makes the input optional: while unwired it always reads these values, and zero
+            for every field that is not named. Values are numbers or nested lists.
         reads_truth: the block is an observer that may read simulation truth (scoring, recording).
     """
 
@@ -104,8 +104,8 @@ class Output(Port[S]):
     """A signal the block writes.
 
     Args:
-        truth: only a simulator knows this; a controller that reads it would not work on a robot,
-            so a wire from here needs the graph's explicit leave.
+        truth: only a simulator knows this signal. A controller that reads it would not work on a
+            robot, so a wire from this output needs ``allow: truth`` in the graph.
     """
 
     def __init__(self, signal: type[S], *, text: str = "", truth: bool = False) -> None:
@@ -114,15 +114,15 @@ class Output(Port[S]):
 
 
 class State(Port[S]):
-    """What the block remembers from tick to tick, kept in the graph's state buffer."""
+    """Values that the block keeps from tick to tick, stored in the graph's state buffer."""
 
 
 @dataclass(frozen=True)
 class Misfit:
     """Something about the graph's robot or a parameter that a block cannot work with.
 
-    ``message`` says what is wrong. ``parameter`` is the parameter that it is about, if any, as
-    ``name`` or ``name.key``; ``nearest`` holds legal names like the one found; ``fix`` is what to
+    ``message`` says what is wrong. ``parameter`` is the parameter concerned, if any, as ``name`` or
+    ``name.key``. ``nearest`` holds legal names that resemble the one found. ``fix`` is the text to
     write instead.
     """
 
@@ -136,24 +136,26 @@ class Misfit:
 
 @dataclass
 class Clock:
-    """The time of a run: the present tick, the seconds one takes, and how it is paced (the
-    ``kind`` of its ``ClockSpec``)."""
+    """The time of a run: the present tick, the duration of a tick [s], and how the run is paced
+    (the ``kind`` of its ``ClockSpec``)."""
 
     base_period: float
     tick: int = 0
     stop_reason: str | None = None
     kind: str = "free"
+    stopped_by: str = ""
+    """The path of the block that asked for the end of the run."""
 
 
 @dataclass(frozen=True)
 class Context:
     """What the runtime tells a block about the graph it is in.
 
-    ``period_ticks`` and ``offset_ticks`` say in which base ticks the block runs; ``dimensions``
-    holds every resolved dimension the block can see; ``wired`` names its wired inputs;
-    ``folder`` is where the file lies that declares the block, to which files that a parameter names
-    are relative; ``graph_folder`` is where the graph lies that was loaded, beside which a user
-    keeps modules.
+    ``period_ticks`` and ``offset_ticks`` say in which base ticks the block runs. ``dimensions``
+    holds the sizes of all dimensions that the block can use, and ``wired`` names its wired inputs.
+    ``folder`` is the folder of the graph file that has the block in it: files that a parameter
+    names are relative to it. ``graph_folder`` is the folder of the graph that was loaded, beside
+    which users keep their modules.
     """
 
     path: str
@@ -173,12 +175,12 @@ class Context:
 
 
 class Block:
-    """The base of all blocks; see the module's text for how to write one.
+    """The base of all blocks; the module's docstring shows how to write one.
 
-    Life: the runtime constructs the block with its parameters and context, binds its ports and
-    state as attributes, calls ``setup`` once, then ``start`` when the run begins, then the
-    machine's methods tick by tick, then ``stop_cycle`` (at least five times, whatever happened)
-    and ``close``.
+    The runtime constructs the block with its parameters and context, binds its ports and state as
+    attributes and calls ``setup`` once. When the run begins it calls ``start``, then in every tick
+    ``step``, or ``emit`` and ``update``. When the run has ended, for whatever reason, it calls
+    ``stop_cycle`` (at least five times) and ``close``.
     """
 
     Params: ClassVar[type[Parameters]] = Parameters
@@ -187,16 +189,17 @@ class Block:
     states: ClassVar[Mapping[str, State[Any]]] = {}
 
     outside: ClassVar[Literal["no", "simulated", "real"]] = "no"
-    """Whether outputs come from outside the graph: from a simulator, which repeats itself, or from
-    the real world (a robot, another machine), which does not and is replayed from a recording."""
+    """Whether outputs come from outside the graph. A simulator gives the same outputs again when it
+    is run again; the real world (a robot, another machine) does not, so a replay takes its outputs
+    from the recording."""
 
     array_allocations: ClassVar[int] = 0
-    """How many arrays a tick may allocate. Not zero only where a library leaves no choice; the
-    class then says which in ``allocation_reason``."""
+    """How many arrays a tick may allocate. It is zero unless a library leaves no choice; then the
+    class says in ``allocation_reason`` which library that is."""
     allocation_reason: ClassVar[str] = ""
 
     needs: ClassVar[tuple[Need, ...]] = ()
-    """What the graph's robot must have for this block; missing ones are in the load report."""
+    """What the graph's robot must have for this block; the load report names what is missing."""
 
     params: Parameters
     context: Context
@@ -221,7 +224,8 @@ class Block:
         """Whether outputs follow from state alone (``emit`` and ``update``).
 
         Raises:
-            DeclarationError: the class has neither machine's methods, or some of both.
+            DeclarationError: the class defines neither ``step`` nor ``emit`` and ``update``, or
+                methods of both kinds.
         """
         step, emit, update = (hasattr(cls, name) for name in ("step", "emit", "update"))
         if step and not emit and not update:
@@ -237,29 +241,29 @@ class Block:
     def local_dimensions(
         cls, params: Parameters, robot: RobotDescription | None
     ) -> Mapping[str, int]:
-        """Dimensions of this block alone, which hide the graph's of the same name.
+        """Dimensions of this block alone; they hide dimensions of the graph with the same name.
 
-        By default every integer parameter is one, so a block with a parameter ``n`` may declare
-        fields of shape ``"n"``.
+        By default every integer parameter is a dimension, so a block with a parameter ``n`` may
+        declare fields of shape ``"n"``.
         """
         values = {name: getattr(params, name) for name in type(params).model_fields}
         return {n: v for n, v in values.items() if isinstance(v, int) and not isinstance(v, bool)}
 
     @classmethod
     def requires(cls, params: Parameters, robot: RobotDescription | None) -> Iterable[Misfit]:
-        """What does not fit this block, asked at load; nothing when all is well.
+        """The misfits between this block and its parameters and robot; none if all is well.
 
-        Called only if the robot has all that ``needs`` names, so a block that needs a robot is
-        never asked without one. What is found here is part of the load report.
+        Loading calls this, and puts the misfits into its report. It is called only if the robot has
+        everything in ``needs``, so ``robot`` is never ``None`` for a block that needs a robot.
         """
         return ()
 
     @classmethod
     def requires_of_graph(cls, params: Parameters, context: Context) -> Iterable[Misfit]:
-        """What does not fit the graph the block is in, asked at load together with ``requires``.
+        """The misfits between this block and the graph it is in; called together with ``requires``.
 
-        ``context`` is the one the block will be constructed with: it knows the period of the
-        block, which of its inputs are wired, and the folder to which files are relative.
+        ``context`` is the one that the block will be constructed with. It has the period of the
+        block, the names of its wired inputs, and the folder to which its files are relative.
         """
         return ()
 
@@ -267,11 +271,10 @@ class Block:
     def absent_outputs(
         cls, params: Parameters, robot: RobotDescription | None
     ) -> Mapping[str, str]:
-        """Outputs that mean nothing with these parameters and this robot, and why each.
+        """Outputs that the block cannot have with these parameters and this robot, with the reason.
 
-        Such an output keeps its place in memory, holds zeros, and must not be wired: a wire from it
-        is reported at load with the reason, such as ``go2 has no IMU``. Asked under the same
-        conditions as ``requires``.
+        Such an output keeps its place in memory and holds zeros. A wire from it is reported at load
+        with the reason, such as ``go2 has no IMU``. This is called when ``requires`` is.
         """
         return {}
 
@@ -279,17 +282,21 @@ class Block:
     def state_dimensions(
         cls, params: Parameters, robot: RobotDescription | None
     ) -> Mapping[str, int]:
-        """Further dimensions that only state fields use; may build models, so it runs at bind."""
+        """Further dimensions that only state fields use.
+
+        It may take long, for example to build a model, so it is called when the graph is bound to
+        memory and not when it is checked.
+        """
         return {}
 
     @classmethod
     def terrain(cls, params: Parameters) -> Terrain | None:
-        """The ground that the block knows of with these parameters; recordings draw it."""
+        """The ground of the block's world, if it has one; recordings draw it."""
         return None
 
     @classmethod
     def example_parameters(cls) -> Mapping[str, Any]:
-        """What the conformance suite sets on the block, which must at least be what is required."""
+        """The parameters for the conformance suite: at least those that have no default."""
         return {}
 
     @classmethod
@@ -298,9 +305,9 @@ class Block:
     ) -> Mapping[str, Mapping[str, Any]]:
         """Legal inputs for the conformance suite, by input and field, drawn anew every tick.
 
-        Only for fields where the suite's own are not legal: those are numbers within +-1, unit
-        quaternions for an ``orientation``, rotation matrices for a ``rotation``, and members of a
-        field's ``values``.
+        They are needed only for fields in which the suite's own values are not legal. These are
+        numbers within +-1, unit quaternions for a field called ``orientation``, rotation matrices
+        for one called ``rotation``, and members of a field's ``values``.
         """
         return {}
 
@@ -308,7 +315,7 @@ class Block:
     def robot(self) -> RobotDescription:
         """The graph's robot, with its actuator profile in use.
 
-        A block that declares what it needs of a robot is never set up without one.
+        A block that names anything in ``needs`` is never set up without a robot.
 
         Raises:
             BlockError: the graph has no robot.
@@ -333,9 +340,10 @@ class Block:
         return self.context.clock.base_period * self.context.clock.tick
 
     def request_stop(self, reason: str) -> None:
-        """Ask for the run to end after this tick; the first reason is the one kept."""
+        """Ask for the run to end after this tick; of several reasons the first is kept."""
         if self.context.clock.stop_reason is None:
             self.context.clock.stop_reason = reason
+            self.context.clock.stopped_by = self.context.path
 
     def setup(self) -> None:
         """Build models and scratch arrays, once, after the ports are bound."""
@@ -343,34 +351,37 @@ class Block:
     def on_parameters(self) -> None:
         """Take over live parameters that have changed in ``self.params``, between two ticks.
 
-        Recompute what ``setup`` derived from them; ``setup`` may well call this. After it the
-        block must go on exactly as one that had these parameters from the start and is in the
-        same state, so it writes neither state nor outputs. It runs on the control thread. Should
-        it raise, the old parameters come back and the change is refused with the error's text.
+        It recomputes whatever ``setup`` derived from the parameters; ``setup`` may call it for
+        that. Afterwards the block must go on exactly as one that had these parameters from the
+        start and is in the same state, so this method writes neither state nor outputs. It runs on
+        the control thread. If it raises, the old parameters are restored, and the change is refused
+        with the error's text.
         """
 
     def start(self) -> None:
-        """Open what the run needs; called once before the first tick."""
+        """Open the devices and files that the run needs; called once before the first tick."""
 
     def stop_cycle(self) -> None:
-        """One cycle of coming to rest; a robot commands damping here."""
+        """Send one command to come to rest: a robot commands damping here."""
 
     def close(self) -> None:
-        """Give back what ``start`` opened; called once, also after a failure."""
+        """Close what ``start`` opened; called once, also after a failure."""
 
     def freeze(self) -> None:
-        """Write what is remembered outside the declared state into it, before a snapshot."""
+        """Before a snapshot: write what the block keeps elsewhere into its declared state."""
 
     def thaw(self) -> None:
-        """Take it back from the declared state, after a restore."""
+        """After a restore: read back from the declared state what ``freeze`` wrote there."""
 
     def metrics(self) -> Mapping[str, Metric]:
         """The block's results at the end of a run, with units in their names."""
         return {}
 
     def cautions(self) -> Sequence[str]:
-        """What whoever reads a run's results must know of how they came about, such as a check that
-        was waived; asked once, when every block has started."""
+        """Warnings to those who read the run's results, such as of a check that was waived.
+
+        Called once, when every block has started.
+        """
         return ()
 
 

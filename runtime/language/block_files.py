@@ -1,4 +1,4 @@
-"""Finds blocks in files of Python by reading them, without importing any."""
+"""Finds blocks in Python files by parsing them, without importing any."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ from pathlib import Path
 _PORTS = ("Input", "Output")
 _MACHINE = ("step", "emit")
 _MOST_FILES = 300
-"""How many files of a user's folder are read at most, only to propose names."""
+"""How many files of a user's folder are read at most in order to propose names."""
 
 
 @dataclass(frozen=True)
 class WrittenClass:
-    """A class as its source shows it."""
+    """A class as it stands in the source."""
 
     name: str
     bases: tuple[str, ...]
-    """The last names of what it derives from: ``Block`` for ``aloft.Block``."""
+    """The base classes, each by the last part of its name: ``Block`` for ``aloft.Block``."""
     has_ports: bool
     has_machine: bool
     """Whether it defines ``step`` or ``emit``."""
@@ -29,7 +29,7 @@ class WrittenClass:
 
 
 def classes_in(path: Path) -> tuple[WrittenClass, ...]:
-    """The classes at the top level of a file; none where it cannot be read or is no Python."""
+    """The classes at the top level of a file; none if it cannot be read or parsed."""
     try:
         text = path.read_text(encoding="utf-8", errors="replace")
         if "class " not in text:
@@ -43,9 +43,9 @@ def classes_in(path: Path) -> tuple[WrittenClass, ...]:
 def blocks_in_packages(root: Path, packages: Iterable[str]) -> Mapping[str, Path]:
     """The blocks that graphs can use as ``package.Class``, with their files, sorted by name.
 
-    A class is a block if it derives from ``Block``, however far away. It can be used if it, or one
-    of those it derives from, has a port and a machine's method, it leaves nothing abstract, and its
-    name does not begin with an underscore.
+    A class is a block if it derives from ``Block``, also through other classes. It can be used if
+    it has or inherits a port and one of the methods ``step`` and ``emit``, it has no abstract
+    method, and its name does not begin with an underscore.
     """
     classes = [
         (package, path, written)
@@ -76,7 +76,7 @@ def blocks_in_packages(root: Path, packages: Iterable[str]) -> Mapping[str, Path
 def blocks_in_folder(folder: Path) -> Iterator[str]:
     """Blocks in a user's folder and the packages in it, as ``package.module:Class``.
 
-    Only classes whose base is called as a block are found, which is enough to propose a name.
+    Only classes whose base has the name of a block are found, which is enough to propose a name.
     """
     for path in _some_files(folder):
         parts = path.relative_to(folder).with_suffix("").parts
@@ -88,17 +88,17 @@ def blocks_in_folder(folder: Path) -> Iterator[str]:
 
 @lru_cache(maxsize=16)
 def files_of(folder: Path) -> tuple[Path, ...]:
-    """All files of Python below a folder that does not change while we run, sorted."""
+    """All Python files below a folder, sorted; it must not change while the program runs."""
     return tuple(sorted(folder.rglob("*.py")))
 
 
 def _some_files(folder: Path) -> Iterator[Path]:
-    """The files of Python in a folder and down to two folders below, up to a number."""
+    """The Python files in a folder and two levels of folders below it, up to ``_MOST_FILES``."""
     count = 0
     for pattern in ("*.py", "*/*.py", "*/*/*.py"):
         for path in sorted(folder.glob(pattern)):
             if any(part.startswith(".") for part in path.relative_to(folder).parts):
-                continue  # environments and caches
+                continue  # such as virtual environments and caches
             count += 1
             if count > _MOST_FILES:
                 return

@@ -1,4 +1,4 @@
-"""The block behind a delayed wire: ``delay: k`` in a graph file becomes one of these."""
+"""The block that delays a wire: every ``delay: k`` in a graph file becomes one of these."""
 
 from __future__ import annotations
 
@@ -18,21 +18,21 @@ class DelayParameters(Parameters):
     """The parameters of every delay."""
 
     initial: Mapping[str, Any] = parameter(
-        {}, text="what the first runs emit, by field: a number or nested lists; otherwise zero"
+        {}, text="the outputs of the first runs, by field: numbers or nested lists; otherwise zero"
     )
 
 
 class RingPosition(Signal):
-    """Where a ring buffer stands."""
+    """The position in a ring buffer."""
 
     oldest = Field(dtype="int64", text="index of the entry that is emitted next")
 
 
 class Delay(Block):
-    """The input of k runs ago: y[n] = u[n - k], and the initial values for the first k runs.
+    """Delays its input by k runs: y[n] = u[n - k]; the first k runs give the initial values.
 
-    Runs count at the block's own rate, which for a delayed wire is that of the source's block. A
-    Moore block, so it breaks a loop. It interpolates nothing. Subclasses made by
+    Runs are counted at the block's own rate, which for a delayed wire is the rate of the source's
+    block. It is a Moore block, so it breaks a loop. It does not interpolate. Subclasses made by
     ``delay_block_type`` fix the signal and k.
 
     Raises:
@@ -52,9 +52,9 @@ class Delay(Block):
             raise BlockError(problem)
         for name, value in self.params.initial.items():
             ring[name][...] = value
-            target[name][...] = value  # what a reader sees before the first run, with an offset
+            target[name][...] = value  # read before the first run of a block with an offset
         self._length: int = next(iter(ring.values())).shape[0]
-        # entry by entry, so that a tick indexes no array and thus makes none
+        # the views are made here, so that a tick indexes no array and thus allocates none
         self._entries: list[list[NDArray[Any]]] = [
             [ring[name][i : i + 1].reshape(target[name].shape) for name in target]
             for i in range(self._length)
@@ -79,7 +79,7 @@ class Delay(Block):
 def initial_problems(
     shapes: Mapping[str, tuple[int, ...]], initial: Mapping[str, Any]
 ) -> list[str]:
-    """What is wrong with a delay's initial values for fields of those shapes, one text each."""
+    """One text for each mistake in a delay's initial values for fields of the given shapes."""
     problems = []
     for name, value in initial.items():
         if name not in shapes:

@@ -1,8 +1,9 @@
-"""The errors of the runtime, one class a kind, and the exit codes of the command line."""
+"""The errors of the runtime, one class for each kind, and the exit codes of the command line."""
 
 from __future__ import annotations
 
 from enum import IntEnum
+from typing import Any
 
 
 class ExitCode(IntEnum):
@@ -39,13 +40,22 @@ class UnknownBlockError(AloftError, LookupError):
 
 
 class BlockError(AloftError):
-    """A block cannot go on: raised by a block with a message for the user."""
+    """A block cannot go on; the block raises this with a message for the user."""
 
 
 class RunError(AloftError):
-    """A run ended early: names the block, the tick and the reason."""
+    """A run ended early; the error names the block, the tick and the reason."""
 
     def __init__(self, message: str, *, block: str = "", tick: int = -1) -> None:
         super().__init__(message)
         self.block = block
         self.tick = tick
+        self.where = ""
+        """``file:line`` of the statement that raised what ended the run, where that is known."""
+        self.traceback = ""
+        """The whole traceback of what ended the run, as Python prints it."""
+
+    def to_json(self) -> dict[str, Any]:
+        """The error as plain data."""
+        names = ("block", "tick", "where", "traceback")
+        return {"message": str(self), **{name: getattr(self, name) for name in names}}

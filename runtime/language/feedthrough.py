@@ -1,8 +1,8 @@
 """Finds Moore blocks whose ``emit`` reads an input, by reading their source.
 
-Outputs of a Moore block follow from its state alone: ``emit`` runs before the block's inputs of the
-tick are written, so what it reads there is of the tick before, or nothing. The conformance suite
-notices that by running the block; this notices it when a graph is loaded.
+Outputs of a Moore block follow from its state alone: ``emit`` runs before the inputs of the tick
+are written, so it would read values of the tick before. The conformance suite finds that by running
+the block; this module finds it when a graph is loaded.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ _FOUND: dict[type[Block], tuple[InputRead, ...]] = {}
 
 @dataclass(frozen=True)
 class InputRead:
-    """An input that ``emit`` reads, and where: in a ``method`` of the block."""
+    """An input that ``emit`` reads, and the ``method`` of the block in which it does so."""
 
     name: str
     method: str
@@ -32,9 +32,9 @@ class InputRead:
 def inputs_read_by_emit(block_type: type[Block]) -> tuple[InputRead, ...]:
     """The inputs that ``emit``, or a method or property it uses, reads as ``self.<input>``.
 
-    Only what the source says outright is found: an input that is kept under another name in
-    ``setup``, or read by a function that is given the block, is not. Empty for a Mealy block, and
-    where there is no source.
+    Only a direct access is found: not an input that ``setup`` keeps under another name, nor one
+    read by a function that takes the block as an argument. The result is empty for a Mealy block,
+    and where the source is not available.
     """
     if not block_type.is_moore():
         return ()
@@ -54,7 +54,7 @@ def _look(block_type: type[Block]) -> tuple[InputRead, ...]:
             continue
         seen.add(function)
         names = tuple(_all_names(function))
-        if any(name in block_type.inputs for name in names):  # else its source need not be parsed
+        if any(name in block_type.inputs for name in names):  # otherwise parsing can be spared
             for name, line in _own_attributes(function):
                 if name in block_type.inputs and name not in found:
                     file = function.__code__.co_filename
@@ -65,7 +65,7 @@ def _look(block_type: type[Block]) -> tuple[InputRead, ...]:
 
 
 def _functions(block_type: type[Block], name: str) -> Iterator[FunctionType]:
-    """What may run when a method looks up ``self.<name>``; with ``super()`` also its parents'."""
+    """The functions that ``self.<name>`` may call, with those of base classes for ``super()``."""
     for owner in block_type.__mro__:
         if owner is Block or not issubclass(owner, Block):
             continue
@@ -78,7 +78,7 @@ def _functions(block_type: type[Block], name: str) -> Iterator[FunctionType]:
 
 
 def _all_names(function: FunctionType) -> Iterator[str]:
-    """The names in the code of a function and of the functions inside it."""
+    """All names in the code of a function and of the functions inside it."""
     waiting = [function.__code__]
     while waiting:
         code = waiting.pop()
@@ -92,7 +92,7 @@ def _own_attributes(function: FunctionType) -> Iterator[tuple[str, int]]:
         lines, first = inspect.getsourcelines(function)
         tree = ast.parse(textwrap.dedent("".join(lines)))
     except (OSError, TypeError, SyntaxError):
-        return  # no source, such as in an interactive session
+        return  # there is no source, as in an interactive session
     if not function.__code__.co_argcount:
         return
     own = function.__code__.co_varnames[0]

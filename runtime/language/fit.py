@@ -1,4 +1,4 @@
-"""Whether a block can work with the robot and the graph it is in: asked before anything is set up."""
+"""Finds out, before anything is set up, whether a block can work with its robot and its graph."""
 
 from __future__ import annotations
 
@@ -38,13 +38,13 @@ def has(robot: RobotDescription, need: Need) -> bool:
 
 
 def fix_without_robot() -> str:
-    """What to write in a graph that needs a robot and names none."""
+    """The line to write into a graph that needs a robot and names none."""
     first, *others = robot_names()
     return f"robot: {first}" + (f"  # or {', '.join(others)}" if others else "")
 
 
 def unmet_needs(block_type: type[Block], robot: RobotDescription | None) -> tuple[Misfit, ...]:
-    """What the block needs of a robot and this one does not have."""
+    """One misfit for everything that the block needs of a robot and this robot does not have."""
     if not block_type.needs:
         return ()
     if robot is None:
@@ -66,11 +66,11 @@ def unmet_needs(block_type: type[Block], robot: RobotDescription | None) -> tupl
 def find_misfits(
     block_type: type[Block], params: Parameters, context: Context
 ) -> tuple[Misfit, ...]:
-    """Everything about the robot and the graph that the block cannot work with.
+    """All misfits between a block and the robot and graph it is in.
 
-    First what ``needs`` names and the robot lacks; only if it lacks nothing, values per joint that
-    do not fit the joints, and what ``requires`` and ``requires_of_graph`` say. What the block's own
-    code raises is a misfit too.
+    First come the entries of ``needs`` that the robot lacks. If it lacks none, there follow values
+    per joint that do not fit the robot's joints, and the misfits that ``requires`` and
+    ``requires_of_graph`` return. An error raised by the block's code is a misfit too.
     """
     robot = context.robot
     unmet = unmet_needs(block_type, robot)
@@ -123,7 +123,7 @@ def _ends(names: Iterable[str]) -> tuple[str, ...]:
 
 
 def _lack(robot: RobotDescription, need: Need) -> str:
-    """What the robot has instead, as the end of a sentence."""
+    """What the robot has instead, as the end of a sentence for a message."""
     if need == "floating base":
         return f"has a {robot.base_joint} base"
     return "has none"

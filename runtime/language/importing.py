@@ -1,4 +1,4 @@
-"""Imports modules that hold blocks: installed ones, and files of a user beside a graph."""
+"""Imports modules that hold blocks: installed modules, and a user's files beside a graph."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class UnknownModuleError(UnknownBlockError):
 
 
 def user_module(module_name: str, folders: Iterable[Path]) -> ModuleType:
-    """A module from a file in the first of some folders that has it, else from anywhere.
+    """Import a module from the first of some folders that has it, or else as an installed module.
 
     Raises:
         UnknownBlockError: there is no such module, or the name cannot be one.
@@ -61,10 +61,10 @@ def _file_of(module_name: str, folder: Path) -> Path | None:
 
 
 def _from_file(module_name: str, file: Path, folder: Path) -> ModuleType:
-    """The module in a file, under its own name where no other module has taken that."""
+    """Import the module in a file, under its own name unless another module has that name."""
     present = sys.modules.get(module_name)
     if present is None:
-        # At the end, so that a file beside a graph never hides an installed package from others.
+        # At the end of the path, so that a file beside a graph never hides an installed package.
         if str(folder) not in sys.path:
             sys.path.append(str(folder))
             importlib.invalidate_caches()
@@ -94,7 +94,7 @@ def _same_file(module: ModuleType, file: Path) -> bool:
 
 
 def _import_file(key: str, file: Path) -> ModuleType:
-    """A file whose module name is taken by another file, under a name of its own."""
+    """Import a file whose module name another file has taken, under the name ``key``."""
     if key in sys.modules:
         return sys.modules[key]
     spec = importlib.util.spec_from_file_location(key, file)
@@ -110,7 +110,7 @@ def _import_file(key: str, file: Path) -> ModuleType:
 
 
 def _import_error(module_name: str, error: BaseException) -> AloftError:
-    """What to raise for a module that failed: it is not there, or it is broken."""
+    """The error to raise for a module that could not be imported: it is missing, or it failed."""
     last = traceback.format_exception_only(error)[-1].strip()
     if isinstance(error, SyntaxError):
         return BlockImportError(last, f"{error.filename}:{error.lineno}:{error.offset}")

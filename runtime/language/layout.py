@@ -1,7 +1,7 @@
-"""Where every field of every signal lies in one buffer: pure arithmetic, no memory.
+"""Computes where every field of every signal lies in one buffer; it allocates no memory itself.
 
-A buffer has three sections, ``float64``, ``int64`` and ``bool``, each starting at a multiple of 64
-bytes and packed inside. Floats come first so that one call checks them all for finiteness.
+A buffer has three sections, ``float64``, ``int64`` and ``bool``. Each starts at a multiple of 64
+bytes and is packed inside. The floats lie together so that one call checks that all are finite.
 """
 
 from __future__ import annotations
@@ -17,9 +17,9 @@ from .errors import DeclarationError
 from .signals import DTYPES, Signal, Slot
 
 LARGEST = 1_000_000_000
-"""How many bytes the signals and states of a graph may need; those of a robot need some 10 kB."""
+"""How many bytes the signals and states of a graph may need; a robot's usually need some 10 kB."""
 ALIGNMENT = 64
-"""Bytes: a cache line, and what the widest vector instructions like."""
+"""Bytes: the size of a cache line, and the alignment of the widest vector instructions."""
 
 
 @dataclass(frozen=True)
@@ -37,11 +37,11 @@ class Layout:
 
     slots: Mapping[str, Slot]
     lengths: Mapping[str, int]
-    """Elements by section."""
+    """The number of elements of each section."""
     offsets: Mapping[str, int]
-    """Bytes from the buffer's start by section."""
+    """The byte at which each section starts, from the start of the buffer."""
     size: int
-    """Bytes of the whole buffer, a multiple of 64."""
+    """The size of the whole buffer in bytes, a multiple of 64."""
 
     @classmethod
     def of(cls, ports: Iterable[PortLayout]) -> Layout:
@@ -91,7 +91,7 @@ class Layout:
         return name + (f"[{', '.join(str(int(i)) for i in place)}]" if slot.shape else "")
 
     def byte_range(self, name: str) -> tuple[int, int]:
-        """First byte and one past the last of a slot. Raises ``KeyError``."""
+        """The first byte of a slot and the byte after its last. Raises ``KeyError``."""
         slot = self.slots[name]
         item = DTYPES[slot.section].itemsize
         start = self.offsets[slot.section] + slot.start * item
@@ -105,7 +105,7 @@ class Layout:
             name: ``block.port.field``.
 
         Returns:
-            The field, shape (...) or (n, ...); not a copy where memory allows it.
+            The field, of shape (...) or (n, ...): a view of ``rows`` where that is possible.
         """
         slot = self.slots[name]
         first, last = self.byte_range(name)

@@ -1,4 +1,4 @@
-"""A change of parameters while a graph runs: what was asked for, and what became of it."""
+"""A change of parameters while a graph runs: the request for it, and its outcome."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from .parameters import Parameters
 
 @dataclass(frozen=True)
 class ParameterChange:
-    """One parameter, ``block.parameter``, that was ``old`` in all ticks before ``tick`` and is
-    ``new`` from it on. Values are plain data, as a graph file would have them."""
+    """One parameter, ``block.parameter``, that was ``old`` before ``tick`` and is ``new`` from that
+    tick on. Values are plain data, as in a graph file."""
 
     tick: int
     path: str
@@ -22,9 +22,10 @@ class ParameterChange:
 
 @dataclass
 class Adjustment:
-    """Checked new parameters by block, and what they change: path, old and new value of each.
+    """New parameters that have been checked, by block, with the path, old and new value of each.
 
-    When it has been ``answered``, it was taken over at ``tick``, or refused because of ``error``.
+    Once ``answered`` is true, the adjustment was either applied at ``tick`` or refused for the
+    reason in ``error``.
     """
 
     params: Mapping[str, Parameters]
@@ -34,5 +35,5 @@ class Adjustment:
     answered: bool = False
 
     def changes(self) -> tuple[ParameterChange, ...]:
-        """What was changed."""
+        """The changes of single parameters that the adjustment has made."""
         return tuple(ParameterChange(self.tick, *value) for value in self.values)

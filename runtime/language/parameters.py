@@ -1,6 +1,6 @@
-"""Parameters: what a graph may set on a block, checked and converted by pydantic.
+"""Parameters are the values that a graph may set on a block; pydantic checks and converts them.
 
-A parameter with a unit may be written as a bare number in that unit or as text with any unit of
+A parameter with a unit may be written as a bare number in that unit, or as a text with any unit of
 the same dimension: ``force: 70 N``, ``duration: 10 ms``.
 """
 
@@ -30,10 +30,10 @@ def parameter(
     max_length: int | None = None,
     live: bool = False,
 ) -> Any:
-    """Declare a parameter: its default (none makes it required), unit, bounds and text.
+    """Declare a parameter: its default, unit, bounds and text. Without a default it is required.
 
     ``live`` parameters may be changed while the graph runs: the block reads them from
-    ``self.params`` in every tick, or derives from them anew in ``Block.on_parameters``.
+    ``self.params`` in every tick, or recomputes what depends on them in ``Block.on_parameters``.
     """
     extra: dict[str, Any] = {"unit": unit, **({"live": True} if live else {})}
     if default is not ... and isinstance(default, list):
@@ -93,5 +93,5 @@ class Parameters(BaseModel):
                 try:
                     converted[name] = _convert(converted[name], unit)
                 except UnitError:
-                    continue  # left as text, so pydantic reports it at its own place
+                    continue  # stays a text, which pydantic then reports at its own place
         return converted

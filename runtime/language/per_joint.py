@@ -25,9 +25,9 @@ class PerJoint(RootModel[StrictFloat | dict[str, StrictFloat]]):
 
         stiffness: {"*": 40, "*_knee": 60, left_knee: 65}
 
-    A list is refused: what it means would change with the order of the joints. When a graph is
-    loaded, a pattern that matches no joint and a joint without a value are problems of the load
-    report. Bounds and a unit are declared as for a number, and hold for every value::
+    A list is refused, because its meaning would change with the order of the joints. The load
+    report names patterns that match no joint and joints without a value. Bounds and a unit are
+    declared as for a number, and hold for every value::
 
         stiffness: PerJoint = live_parameter(40.0, unit="N m/rad", ge=0.0, text="...")
     """
@@ -47,8 +47,8 @@ class PerJoint(RootModel[StrictFloat | dict[str, StrictFloat]]):
         """The values in the order of the description's joints, (n_joints,).
 
         Raises:
-            LookupError: a pattern matches no joint, or a joint has no value; after a load without
-                problems neither can be.
+            LookupError: a pattern matches no joint, or a joint has no value. Loading reports both,
+                so this cannot happen in a graph that was loaded without problems.
         """
         unmatched, missing = self.unmatched_patterns(robot), self.joints_without_value(robot)
         if unmatched:
@@ -81,7 +81,7 @@ class PerJoint(RootModel[StrictFloat | dict[str, StrictFloat]]):
                 value = each
         return value
 
-    # Pydantic checks bounds by comparing the whole: they hold if they hold for every value.
+    # Pydantic checks bounds by comparing the whole object; a bound holds if all values obey it.
 
     def _all(self, holds: Callable[[float], bool]) -> bool:
         return all(holds(value) for value in self._patterns().values())
@@ -100,9 +100,9 @@ class PerJoint(RootModel[StrictFloat | dict[str, StrictFloat]]):
 
 
 def by_name(values: Sequence[Any], robot: RobotDescription) -> dict[str, Any]:
-    """What a list of values by position may have meant, by joint name; empty where that is unclear.
+    """The likely meaning of a list of values by position, by joint name; empty if it is unclear.
 
-    It is understood as one value for every joint, or one for every joint of a leg, from the base
+    The list is taken for one value for every joint, or one for every joint of a leg, from the base
     outwards and the same for all legs.
     """
     joints = [joint.name for joint in robot.joints]
@@ -129,7 +129,7 @@ def _chain(robot: RobotDescription, link: str) -> Iterator[str]:
 
 
 def _pattern(names: Sequence[str]) -> str:
-    """What names have in common at their start and end, with a star between."""
+    """The common start and the common end of some names, with a star between them."""
     shortest = min(len(name) for name in names)
     start = 0
     while start < shortest and len({name[start] for name in names}) == 1:
@@ -140,6 +140,6 @@ def _pattern(names: Sequence[str]) -> str:
     while end < shortest - start and len({name[-1 - end] for name in names}) == 1:
         end += 1
     head, tail = names[0][:start], names[0][len(names[0]) - end :]
-    # Whole words where that says the same: "*_knee", not "*t_knee".
+    # Whole words are preferred where they match the same names: "*_knee", not "*t_knee".
     words = f"{head[: head.rfind('_') + 1]}*{tail[tail.find('_') :] if '_' in tail else ''}"
     return words if words != "*" else f"{head}*{tail}"

@@ -29,7 +29,7 @@ class FieldReference:
 
 @dataclass(frozen=True)
 class PortReference:
-    """One port; ``note`` says what is special: optional, simulation truth."""
+    """One port; ``note`` says if it is optional or carries simulation truth."""
 
     name: str
     signal: str
@@ -122,7 +122,7 @@ def _parameter(name: str, info: FieldInfo) -> ParameterReference:
 
 
 def type_text(annotation: Any) -> str:
-    """A type as one would write it: ``float``, ``list[float]``, ``'daqp' | 'quadprog'``."""
+    """A type as it is written in code: ``float``, ``list[float]``, ``'daqp' | 'quadprog'``."""
     origin = get_origin(annotation)
     arguments = get_args(annotation)
     if origin is Literal:

@@ -1,12 +1,12 @@
 """Finds blocks by the name a graph file uses, and imports only those that are used.
 
-Three kinds of names:
+There are three kinds of names:
 
-* ``blocks.LandingHeuristic``, ``hal.MujocoRobot``: one of our packages and the class; the file is
-  ``landing_heuristic.py`` by convention, otherwise it is found by reading all files;
-* ``package.module:Class``: a class of a module beside the graph, in the current folder, or anywhere
-  Python finds it;
-* the name of an entry point of the group ``aloft.blocks`` of an installed package.
+* ``blocks.LandingHeuristic``, ``hal.MujocoRobot``: a package of aloft and a class in it. By
+  convention its file is ``landing_heuristic.py``; otherwise all files are parsed to find it.
+* ``package.module:Class``: a class of a module beside the graph, in the current folder, or
+  wherever Python finds it.
+* The name of an entry point of the group ``aloft.blocks`` of an installed package.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from .errors import DeclarationError, UnknownBlockError
 from .importing import BlockImportError, import_module, user_module
 
 PACKAGES = ("blocks", "hal")
-"""Our packages that hold blocks."""
+"""The packages of aloft that hold blocks."""
 ENTRY_POINTS = "aloft.blocks"
 """The group in which other packages announce blocks."""
 
@@ -41,7 +41,7 @@ MOVED = {
     "runtime.Sum": "blocks.Sum",
     "runtime.UnitDelay": "blocks.UnitDelay",
 }
-"""What blocks were called before version 0.2, and what they are called now."""
+"""The names of blocks before version 0.2, and their names now."""
 
 _OURS = __name__.rpartition(".runtime.")[0]
 _ROOT = Path(__file__).parents[2]
@@ -55,7 +55,7 @@ def snake_case(name: str) -> str:
 
 @lru_cache(maxsize=1)
 def _own_blocks() -> Mapping[str, Path]:
-    """Our blocks and their files, by reading the files and importing none."""
+    """The blocks of aloft and their files, found by parsing the files without importing them."""
     return blocks_in_packages(_ROOT, PACKAGES)
 
 
@@ -65,7 +65,7 @@ def _entry_points() -> Mapping[str, str]:
 
 
 def known_names() -> tuple[str, ...]:
-    """The names of all blocks of ours and of installed packages, sorted; imports none of them."""
+    """The names of all blocks of aloft and of installed packages, sorted; none is imported."""
     return tuple(sorted({**_own_blocks(), **_entry_points()}))
 
 
@@ -79,7 +79,7 @@ def all_blocks() -> dict[str, type[Block]]:
 
 
 def block_name(block_type: type[Block]) -> str:
-    """The name a graph file may use for that class."""
+    """The name that a graph file may use for a block's class."""
     module = block_type.__module__
     package = module.removeprefix(f"{_OURS}.").partition(".")[0]
     if module.startswith(f"{_OURS}.") and package in PACKAGES:
@@ -115,8 +115,8 @@ def find_block(name: str, folder: Path | None = None) -> type[Block]:
 
 
 def find_class(name: str, folder: Path | None = None) -> object:
-    """What ``module:Class`` names; files in ``folder`` and in the current folder can be imported
-    as modules.
+    """The object that ``module:Class`` names; files in ``folder`` and in the current folder can be
+    imported as modules.
 
     Raises:
         UnknownBlockError: there is no such module, or it has no such name.
@@ -131,12 +131,12 @@ def find_class(name: str, folder: Path | None = None) -> object:
 
 
 def _places(folder: Path | None) -> tuple[Path, ...]:
-    """Where a user's modules are looked for, in this order."""
+    """The folders in which a user's modules are searched for, in this order."""
     return (folder, Path()) if folder is not None else (Path(),)
 
 
 def _own_module(package: str, class_name: str) -> ModuleType | None:
-    """The module of ours that has the class: the one by convention, or any other."""
+    """The module of aloft that has the class: first the one that convention gives, then any."""
     stem = snake_case(class_name)
     for path in files_of(_ROOT / package):
         if path.stem == stem:
@@ -168,10 +168,10 @@ def _class_of(module: ModuleType, class_name: str, name: str) -> type[Block]:
 
 
 def nearest_names(name: str, folder: Path | None = None, count: int = 3) -> tuple[str, ...]:
-    """Blocks whose names are like an unknown one, the likeliest first; the class counts most.
+    """Blocks whose names resemble an unknown one, the most similar first; the class counts most.
 
-    Who writes ``module:Class`` means a block of their own: one of ours is only proposed where the
-    class is called almost alike.
+    A name of the form ``module:Class`` means a user's own block, so a block of aloft is proposed
+    only if its class has almost the same name.
     """
     if name in MOVED:
         return (MOVED[name],)
@@ -180,7 +180,7 @@ def nearest_names(name: str, folder: Path | None = None, count: int = 3) -> tupl
     candidates = [(each, 0.85 if own else 0.6) for each in known_names()]
     for place in _places(folder):
         if place.resolve() == _ROOT:
-            continue  # these are known by shorter names
+            continue  # the blocks of aloft have shorter names
         candidates += [(each, 0.6) for each in blocks_in_folder(place)]
     candidates += [(each, 0.6) for each in _names_loaded(name)]
     scored: dict[str, float] = {}

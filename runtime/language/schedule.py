@@ -1,9 +1,10 @@
-"""The order in which blocks run: topological over ports, ties by file order, no sets, no hashing.
+"""The order in which blocks run: topological over ports, with ties broken by the order in the file.
 
 An output of a Mealy block depends on all inputs of that block in the same tick; an output of a
 Moore block depends on none. So Moore blocks come first, in file order, and every other block comes
-after the sources of its inputs; among those that could run next, the first in the file does. A
-ring of wires through Mealy blocks alone has no order: it is found and reported whole.
+after the sources of its inputs; of several blocks that could run next, the first in the file does.
+A ring of wires through Mealy blocks alone has no order; it is found and reported as a whole. The
+order depends neither on sets nor on hashes, so it is the same on every machine.
 """
 
 from __future__ import annotations
@@ -17,15 +18,15 @@ from math import lcm
 from .errors import AloftError
 
 MAXIMAL_HYPERPERIOD = 100_000
-"""Ticks. Rates whose pattern takes longer to repeat are taken for a mistake."""
+"""The longest allowed hyperperiod [ticks]. A longer one is taken for a mistake in the rates."""
 
 
 @dataclass(frozen=True)
 class ScheduleBlock:
-    """What ordering needs to know of a block.
+    """The properties of a block that determine the order.
 
-    ``sources`` names for each wired input the output that feeds it, ``block.port``. A delayed wire
-    does not appear here: it depends on nothing in this tick.
+    ``sources`` names for each wired input the output ``block.port`` that feeds it. A delayed wire
+    does not appear in it, because it depends on nothing in this tick.
     """
 
     path: str
@@ -52,7 +53,7 @@ class Loop:
 
 
 class LoopError(AloftError):
-    """Some blocks have no order; ``loops`` has every ring."""
+    """Some blocks have no order; ``loops`` holds the rings of wires that prevent it."""
 
     def __init__(self, loops: Sequence[Loop]) -> None:
         rings = "; ".join(str(loop) for loop in loops)
@@ -119,10 +120,10 @@ def order_blocks(blocks: Iterable[ScheduleBlock]) -> tuple[str, ...]:
 
 
 def find_loops(blocks: Iterable[ScheduleBlock]) -> tuple[Loop, ...]:
-    """Rings without a delay: together they hold every wire that lies on any ring.
+    """The rings without a delay; together they contain every wire that lies on any ring.
 
-    Each is a shortest ring through a wire that no earlier one holds, and starts at its first block
-    in the file.
+    Each is a shortest ring through a wire that no earlier ring contains. It starts at that of its
+    blocks which comes first in the file.
     """
     nodes = tuple(blocks)
     edges = _edges(nodes)
@@ -148,7 +149,10 @@ def find_loops(blocks: Iterable[ScheduleBlock]) -> tuple[Loop, ...]:
 def _shortest_path(
     leaving: Sequence[Sequence[_Edge]], start: int, goal: int
 ) -> tuple[_Edge, ...] | None:
-    """Edges from ``start`` to ``goal``, fewest first; none if they are the same block."""
+    """The edges of a shortest path from ``start`` to ``goal``, or ``None`` if there is none.
+
+    The path is empty if both are the same block.
+    """
     if start == goal:
         return ()
     arrived: dict[int, _Edge] = {}
@@ -169,15 +173,15 @@ def _shortest_path(
 
 
 def runs_at(tick: int, period: int, offset: int) -> bool:
-    """Whether a block of that period and offset [ticks] runs in ``tick``."""
+    """Whether a block with this period and offset [ticks] runs in ``tick``."""
     return tick % period == offset % period
 
 
 def hyperperiod(periods: Iterable[int]) -> int:
-    """The ticks after which the pattern of who runs repeats.
+    """The number of ticks after which the pattern of running blocks repeats.
 
     Raises:
-        AloftError: it is too long to be meant.
+        AloftError: it is longer than ``MAXIMAL_HYPERPERIOD``.
     """
     numbers = tuple(periods)
     length = lcm(*numbers) if numbers else 1
@@ -191,9 +195,9 @@ def hyperperiod(periods: Iterable[int]) -> int:
 
 
 def phases(rates: Sequence[tuple[int, int]]) -> tuple[tuple[int, ...], ...]:
-    """For each tick of the hyperperiod which of ``rates`` (period, offset) run, by index.
+    """For each tick of the hyperperiod the indices of those ``rates`` (period, offset) that run.
 
-    Equal phases are one object, so there are few of them however long the hyperperiod is.
+    Equal phases are one object, so that a long hyperperiod has few of them, too.
     """
     known: dict[tuple[int, ...], tuple[int, ...]] = {}
     table = []

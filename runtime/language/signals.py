@@ -1,4 +1,4 @@
-"""Signals: fixed-layout records that travel on the wires of a graph.
+"""Signals are the records of fixed layout that travel on the wires of a graph.
 
 A signal is declared once as a class whose attributes are fields::
 
@@ -27,7 +27,7 @@ from .errors import DeclarationError
 from .units import Unit, parse_unit
 
 Dimension = int | str
-"""A size, or the name of one that the graph resolves."""
+"""A size, or the name of a dimension whose size the graph gives."""
 
 DTYPES: Mapping[str, np.dtype[Any]] = {
     "float64": np.dtype(np.float64),
@@ -122,23 +122,24 @@ class Signal:
     def bind(cls, views: Mapping[str, NDArray[Any]]) -> Self:
         """An instance whose fields are the given arrays, themselves not copied."""
         signal = cls.__new__(cls)
-        for name, view in views.items():  # not through __dict__, which would slow every access
+        for name, view in views.items():  # using __dict__ would slow down every later access
             object.__setattr__(signal, name, view)
         return signal
 
-    if not TYPE_CHECKING:  # a type checker would take it for leave to assign any name
+    if not TYPE_CHECKING:  # a type checker would conclude that any name may be assigned
 
         def __setattr__(self, name: str, value: Any) -> None:
-            """Refuse to replace a field, which would leave the graph's memory as it was, unnoticed.
+            """Refuse to replace a field, which would silently leave the graph's memory unchanged.
 
             Raises:
-                AttributeError: always, but for what ``signal.field += x`` assigns: the view itself.
+                AttributeError: always, unless the value is the field's own view, which is what
+                    ``signal.field += x`` assigns.
             """
             if name in type(self).fields and getattr(self, name, None) is value:
                 return
             raise AttributeError(
-                f"{type(self).__name__}.{name} cannot be assigned: a field is a view of the graph's "
-                f"memory; write into it, as in .{name}[...] = value"
+                f"{type(self).__name__}.{name} cannot be assigned: a field is a view of the "
+                f"graph's memory; write into it, as in .{name}[...] = value"
                 if name in type(self).fields
                 else f"{type(self).__name__} has no field {name!r}; it has "
                 + ", ".join(type(self).fields)
@@ -164,7 +165,7 @@ class Signal:
 
 @dataclass(frozen=True)
 class Slot:
-    """Where one field lies: in which section of a buffer, from which element on, how shaped."""
+    """The place of one field in a buffer: its section, its first element there, and its shape."""
 
     section: str
     start: int

@@ -1,8 +1,9 @@
-"""The stages a graph goes through, each an immutable type that can be printed and tested alone.
+"""The stages a graph goes through; each is an immutable type that can be printed and tested alone.
 
-written (what the user wrote, with the place of every key) -> flat (includes and sub-graphs
-expanded, overrides applied) -> checked (this module's ``CheckedGraph``: types, units, frames, rates
-and order are known to be right) -> bound (``memory.BoundGraph``: buffers and block instances).
+They are: written (what the user wrote, with the place of every key) -> flat (includes and
+sub-graphs expanded, overrides applied) -> checked (this module's ``CheckedGraph``: types, units,
+frames, rates and order are known to be right) -> bound (``memory.BoundGraph``: buffers and
+instances of blocks).
 """
 
 from __future__ import annotations
@@ -33,7 +34,7 @@ class Position:
 
 
 class HasSource:
-    """What every stage's wire has: the output it comes from, ``source``, as ``block.port``."""
+    """The base of every stage's wire, which has a ``source``: an output ``block.port``."""
 
     source: str
 
@@ -82,18 +83,18 @@ class BlockSpec:
 
 @dataclass(frozen=True)
 class ClockSpec:
-    """How a run is paced: ``free`` (as fast as possible), ``paced`` (wall time) or ``robot``
-    (the robot says when); and what an overrun of a paced run does."""
+    """How a run is paced: ``free`` (as fast as possible), ``paced`` (by wall time) or ``robot``
+    (the robot says when a tick begins), and what an overrun of a paced run leads to."""
 
     kind: Literal["free", "paced", "robot"] = "free"
     overrun: Literal["skip", "stop"] = "skip"
     stop_after: int = 1
-    """With ``stop``: how many overruns in a row end the run."""
+    """The number of overruns in a row that end the run, if the overrun policy is ``stop``."""
 
 
 @dataclass(frozen=True)
 class CheckedGraph:
-    """A graph that may run: blocks in file order and the order they execute in."""
+    """A graph that may run: its blocks in file order, and the order in which they execute."""
 
     name: str
     base_rate: float
@@ -102,18 +103,18 @@ class CheckedGraph:
     order: tuple[str, ...]
     """Paths of all blocks, in the order of execution within a tick."""
     ticks: int | None = None
-    """How long the graph runs by itself; ``None``: until stopped."""
+    """The duration of a run in ticks; ``None`` if it runs until it is stopped."""
     robot: RobotDescription | None = None
     clock: ClockSpec = ClockSpec()
     file: str = ""
-    """The graph file, as it was given; what the graph names is relative to where it lies."""
+    """The graph file, as it was given; files that the graph names are relative to its folder."""
     text: str = ""
-    """The flattened graph as YAML: what ran, after includes and overrides."""
+    """The flattened graph as YAML, with includes expanded and overrides applied."""
     overrides: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def base_period(self) -> float:
-        """The seconds one tick takes."""
+        """The duration of one tick [s]."""
         return 1.0 / self.base_rate
 
     def block(self, path: str) -> BlockSpec:

@@ -1,4 +1,4 @@
-"""The ground that a block knows of, such as a simulated world's: for pictures, never for control."""
+"""The ground of a block's world, such as a simulator's: for pictures, never for control."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Ground:
-    """A block of ground with faces along the world's axes: its ``least`` and ``most`` corners
-    [m, world] as x, y, z."""
+    """A box of ground whose faces are normal to the world's axes, given by its ``least`` and
+    ``most`` corners x, y, z [m, world]."""
 
     least: tuple[float, float, float]
     most: tuple[float, float, float]
@@ -16,7 +16,7 @@ class Ground:
 
 @dataclass(frozen=True)
 class Terrain:
-    """A level floor at height ``floor`` [m, world], and blocks that stand on it."""
+    """A level floor at height ``floor`` [m, world], and boxes that stand on it."""
 
     floor: float = 0.0
     blocks: tuple[Ground, ...] = ()

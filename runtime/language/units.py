@@ -1,8 +1,8 @@
 """Physical units as SI exponents and a scale, parsed from text such as ``N m`` or ``rad/s``.
 
-A unit is checked when a graph is loaded and never touched while it runs. Angles are dimensionless
-in SI, but a graph that feeds radians where metres are meant is wrong, so ``rad`` keeps an exponent
-of its own.
+Units are checked when a graph is loaded and not used while it runs. Angles are dimensionless in SI,
+but a graph that feeds radians where plain numbers or metres are expected is wrong, so ``rad`` has
+an exponent of its own.
 """
 
 from __future__ import annotations
@@ -77,6 +77,7 @@ _SYMBOLS: dict[str, Unit] = {
     "us": _derived(1e-6, s=1),
     "ns": _derived(1e-9, s=1),
     "min": _derived(60.0, s=1),
+    "h": _derived(3600.0, s=1),
     "deg": _derived(math.pi / 180, rad=1),
     "mrad": _derived(1e-3, rad=1),
     "rev": _derived(2 * math.pi, rad=1),
@@ -98,15 +99,18 @@ _SYMBOLS: dict[str, Unit] = {
 _TOKEN = re.compile(
     r"\s*(?:(?P<symbol>[A-Za-z%]+|1)(?:\s*(?:\^|\*\*)\s*(?P<power>[+-]?\d+))?|(?P<op>[*/·()]))"
 )
-_QUANTITY = re.compile(r"^\s*(?P<number>[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(?P<unit>.*)$")
+_NUMBER = r"(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
+_QUANTITY = re.compile(
+    rf"^\s*(?P<number>[+-]?{_NUMBER})(?:\s*/\s*(?P<divisor>{_NUMBER}))?\s*(?P<unit>.*)$"
+)
 
 
 @lru_cache(maxsize=512)
 def parse_unit(text: str) -> Unit:
     """The unit that ``text`` names.
 
-    A space or ``*`` multiplies; ``/`` divides by the one factor or bracket behind it; ``^`` raises
-    to an integer power. The empty text and ``1`` are dimensionless.
+    A space or ``*`` multiplies; ``/`` divides by the single factor or bracket that follows it;
+    ``^`` raises to an integer power. The empty text and ``1`` are dimensionless.
 
     Raises:
         UnitError: the text is not a product of known symbols.
@@ -165,7 +169,9 @@ def _product(
 
 
 def parse_quantity(text: str, unit: str) -> float:
-    """The value of a text such as ``70 N`` or ``10 ms`` in ``unit``; a bare number is taken as is.
+    """The value in ``unit`` of a text such as ``70 N``, ``10 ms`` or ``1/3 kHz``.
+
+    A number without a unit is taken as it is.
 
     Raises:
         UnitError: there is no number, or its unit has another dimension.
@@ -174,6 +180,11 @@ def parse_quantity(text: str, unit: str) -> float:
     if match is None:
         raise UnitError(f"cannot read {text!r} as a number with a unit")
     number = float(match["number"])
+    if match["divisor"]:
+        divisor = float(match["divisor"])
+        if divisor == 0.0:
+            raise UnitError(f"cannot read {text!r}: it divides by zero")
+        number /= divisor
     if not match["unit"].strip():
         return number
     found, expected = parse_unit(match["unit"]), parse_unit(unit)

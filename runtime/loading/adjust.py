@@ -1,4 +1,4 @@
-"""Checks what somebody sets on a running graph, with the same words as when a graph is loaded."""
+"""Checks changes of a running graph's parameters, with the same messages as at loading."""
 
 from __future__ import annotations
 
@@ -48,19 +48,19 @@ def entries(blocks: Mapping[str, Block]) -> tuple[ParameterEntry, ...]:
 
 
 def plain_parameters(params: Parameters) -> dict[str, Any]:
-    """Parameters as a graph file would have them; the same when they are read back."""
+    """Parameters as plain data, as a graph file has them; reading them back gives the same."""
     return params.model_dump(mode="json", round_trip=True)
 
 
 def adjust(blocks: Mapping[str, Block], settings: Overrides) -> Adjustment:
-    """What to hand to a running graph in order to change its parameters.
+    """Check new values of parameters and make the adjustment to hand to the running graph.
 
     Args:
-        blocks: those of the graph, by path.
+        blocks: the blocks of the graph, by path.
         settings: ``{"landing.w_c": 0.05}`` or ``["landing.w_c=0.05"]``.
 
     Raises:
-        LoadError: something is wrong; it carries the report of everything that is.
+        LoadError: a setting is wrong; the error carries the report of all problems.
     """
     problems = Problems()
     by_block: dict[str, list[Override]] = {}
@@ -110,7 +110,7 @@ def _may_be_set(override: Override, blocks: Mapping[str, Block], problems: Probl
     fields = type(blocks[override.block].params).model_fields
     name = override.path[0]
     if name not in fields or is_live(fields[name]):
-        return True  # an unknown one is reported with all others by the check of parameters
+        return True  # check_parameters reports an unknown parameter
     live = [key for key, info in fields.items() if is_live(info)]
     problems.add(
         Code.OVERRIDE,
@@ -131,8 +131,10 @@ def _flat(path: str, block: Block, parameters: MapNode) -> FlatBlock:
 
 
 def _fits(path: str, block: Block, params: Parameters, where: Position, problems: Problems) -> bool:
-    """Whether the block still fits its robot and no port changes its size, which would need other
-    memory."""
+    """Whether the block still fits its robot, and all its ports keep their sizes.
+
+    A port of another size would need another layout of the graph's memory.
+    """
     kind, context = type(block), block.context
     sizes = {**context.dimensions, **kind.local_dimensions(params, context.robot)}
     for misfit in find_misfits(kind, params, context):

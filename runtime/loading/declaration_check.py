@@ -1,4 +1,4 @@
-"""Checks how a block that a graph uses is declared in Python, as far as a graph shows it."""
+"""Checks how the blocks that a graph uses are declared in Python: ``emit`` and input defaults."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def check_emit(draft: Draft, problems: Problems) -> None:
 
 
 def check_defaults(draft: Draft, problems: Problems) -> None:
-    """Report defaults of unwired inputs that name no field of the input, or have another shape."""
+    """Report defaults of unwired inputs that name an unknown field or have the wrong shape."""
     flat = draft.flat
     for name, port in draft.inputs.items():
         if name in flat.wires:

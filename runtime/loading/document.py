@@ -1,13 +1,14 @@
 """Reads a YAML file into a tree with positions.
 
-YAML as in its version 1.2, which is what people mean: ``1e-3`` is a number, ``on``, ``off``,
-``yes`` and ``no`` are text (a parameter that is true or false takes them as such), ``010`` is ten,
-``12:30`` is text. Anchors, aliases and merge keys (``<<``) work as usual. A key that is there twice
-is a problem, and so is every syntax error.
+Scalars are read as in YAML 1.2, which is what people expect: ``1e-3`` is a number, ``010`` is ten,
+``12:30``, ``on``, ``off``, ``yes`` and ``no`` are texts (the last four may also be given to a
+parameter that is true or false). Anchors, aliases and merge keys (``<<``) work as usual. A repeated
+key is a problem, and so is every syntax error.
 """
 
 from __future__ import annotations
 
+import codecs
 import re
 from pathlib import Path
 from typing import Any
@@ -19,13 +20,13 @@ from .nodes import Entry, ListNode, MapNode, Node, Plain, ScalarNode
 from .problems import Code, Problems, nearest
 
 _PREFIX = "tag:yaml.org,2002:"
-_LIMIT = 200_000  # values in one file, aliases counted as often as they are used
+_LIMIT = 200_000  # values in one file, counting an alias each time it is used
 _DEPTH = 100  # levels of nesting; PyYAML's own composer overflows the stack on a hostile file
 _BaseLoader: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 
 
 class _GraphLoader(_BaseLoader):  # type: ignore[misc]
-    """The safe loader with YAML 1.2's idea of what a plain scalar is."""
+    """The safe loader, resolving plain scalars as in YAML 1.2."""
 
     yaml_implicit_resolvers: dict[Any, Any] = {}
 
@@ -59,25 +60,46 @@ def read_file(
 ) -> MapNode | None:
     """The mapping in a file, which messages call ``shown``; ``None`` after a problem.
 
-    ``kind_of_file`` is what messages call such a file, and some of its keys.
+    ``kind_of_file`` holds two texts for messages: the name of such a file and some of its keys.
     """
     try:
-        text = path.read_text(encoding="utf-8")
+        data = path.read_bytes()
+        text = data.decode("utf-8-sig")
     except OSError as error:
         reason = error.strerror or str(error)
         problems.add(Code.FILE, f"cannot read {shown}: {reason}", Position(shown, 0, 0))
         return None
     except UnicodeDecodeError as error:
-        message = f"{shown} is not UTF-8 text (byte {error.start})"
-        problems.add(Code.FILE, message, Position(shown, 0, 0))
+        _report_encoding(data, error, shown, problems)
         return None
     return read_mapping(text, shown, problems, kind_of_file)
+
+
+def _report_encoding(
+    data: bytes, error: UnicodeDecodeError, shown: str, problems: Problems
+) -> None:
+    """Say which encoding a file seems to have, and where it is not UTF-8."""
+    before = data[: error.start]
+    line = before.count(b"\n") + 1
+    column = len(before.rpartition(b"\n")[2].decode("utf-8", "replace")) + 1
+    where, name = Position(shown, line, column), "ISO-8859-1"
+    found = f"byte 0x{data[error.start]:02x}, in Latin-1 {chr(data[error.start])!r}"
+    if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)) or b"\0" in data[:64]:
+        where, name, found = Position(shown, 1, 1), "UTF-16", "UTF-16"
+    problems.add(
+        Code.FILE,
+        f"{shown} is not UTF-8 text",
+        where,
+        expected="text in UTF-8",
+        found=found,
+        fix=f"save it as UTF-8, or: iconv -f {name} -t UTF-8 {shown} > new.yaml",
+    )
 
 
 def read_mapping(
     text: str, shown: str, problems: Problems, kind_of_file: tuple[str, str] = GRAPH_FILE
 ) -> MapNode | None:
-    """The mapping that a text is; ``None`` after a problem."""
+    """The mapping in a YAML text; ``None`` after a problem."""
     before = len(problems)
     node = read_value(text, shown, problems)
     if isinstance(node, MapNode):
@@ -97,7 +119,7 @@ def read_mapping(
 
 
 def read_value(text: str, shown: str, problems: Problems) -> Node | None:
-    """The one value that a text is; ``None`` for an empty text and after a problem."""
+    """The one value in a YAML text; ``None`` for an empty text and after a problem."""
     try:
         loader = _GraphLoader(text)
         try:
@@ -154,7 +176,7 @@ class _Rejected(Exception):
 
 
 class _Composer:
-    """Makes our trees from libyaml's events; an anchored node is made once and shared."""
+    """Makes trees of nodes from libyaml's events; a node with an anchor is made once and shared."""
 
     def __init__(self, loader: Any, shown: str, problems: Problems) -> None:
         self.loader = loader
@@ -282,7 +304,7 @@ class _Composer:
                     Code.WRONG_KIND, "a key must be text, not a collection", key_where
                 )
                 continue
-            # The text as it is written: a key called `on`, `null` or `1` is that text.
+            # A key is always the text as it is written, also if that is `on`, `null` or `1`.
             written = isinstance(key_event, yaml.ScalarEvent)
             key = str(key_event.value if written else key_node.value)
             if key == "<<" and written and key_event.implicit[0]:
@@ -299,7 +321,7 @@ class _Composer:
             else:
                 entries[key] = Entry(key, key_where, value)
         self.loader.get_event()
-        # What is written wins over what is merged; merged keys come after, in their own order.
+        # A written key wins over a merged one; merged keys come last, in their own order.
         combined = entries | {k: e for k, e in merged.items() if k not in entries}
         return MapNode(tuple(combined.values()), where), size
 

@@ -1,10 +1,10 @@
-"""What graphs of earlier versions say otherwise: errors that give the new form, and old graphs read.
+"""Graphs of earlier versions: fixes that give the new form, and translation of recorded graphs.
 
 Since version 0.2 some blocks have other names, the actuator profile is said once for the graph
 (``actuators: relaxed``) instead of at every block that uses it, gains of joints are given by name
 instead of by position, the paper's estimator, which was the other ``law`` of
-``blocks.StateEstimator``, is ``blocks.ComplementaryFilter``, and some defaults follow from the robot
-instead of being those of one robot.
+``blocks.StateEstimator``, is ``blocks.ComplementaryFilter``, and some defaults follow from the
+robot instead of being those of one robot.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ EARLIER_DEFAULTS: Mapping[str, Mapping[str, Any]] = {
 
 
 def fix_of_parameter(use: str, parameter: str, value: Node) -> str:
-    """What to write for a parameter that a block had before version 0.2; empty for any other."""
+    """The fix for a parameter that a block had before version 0.2; empty for any other."""
     text = text_of(plain(value))
     if PROFILE_PARAMETERS.get(use) == parameter:
         return f"said once for the graph since 0.2, beside 'robot': actuators: {text}"
@@ -60,15 +60,15 @@ def fix_of_parameter(use: str, parameter: str, value: Node) -> str:
 
 
 def in_present_form(text: str, version: str = "", robot: RobotDescription | None = None) -> str:
-    """The flattened graph that an earlier version has kept, as this version would have written it.
+    """Translate a flattened graph that an earlier version has recorded into this version's form.
 
-    Only a graph that version 0.1 kept changes, and one with names that mean nothing since.
+    Only a graph recorded by version 0.1, or one with names that were removed since, is changed.
 
     Args:
-        text: the graph; one that cannot be read comes back as it is.
-        version: the version of aloft that kept it, where that is known.
-        robot: the graph's robot, whose joints gains by position were for; by default one of ours
-            of the name in the graph.
+        text: the graph; one that cannot be read is returned unchanged.
+        version: the version of aloft that recorded it, where that is known.
+        robot: the graph's robot, which gives the joint names for gains that were listed by
+            position; by default the shipped robot that the graph names.
     """
     problems = Problems()
     node = read_value(text, "a kept graph", problems)
@@ -98,13 +98,13 @@ def in_present_form(text: str, version: str = "", robot: RobotDescription | None
 
 
 def _robot_of(data: Mapping[str, Any]) -> RobotDescription | None:
-    """The robot that a graph names, if it is one of ours."""
+    """The robot that a graph names, if it is one of the shipped robots."""
     name = data.get("robot")
     return find_robot(name) if name in robot_names() else None
 
 
 def _is_early(block: Mapping[str, Any]) -> bool:
-    """Whether a block has a name or a parameter that means nothing since version 0.2."""
+    """Whether a block has a name or a parameter that version 0.2 removed."""
     use, given = str(block.get("use")), block.get("with")
     early = {"blocks.StateEstimator": "law", **PROFILE_PARAMETERS}
     if not isinstance(given, dict):
@@ -114,7 +114,7 @@ def _is_early(block: Mapping[str, Any]) -> bool:
 
 
 def _take_profiles(blocks: list[Any]) -> Iterator[str]:
-    """Remove the profiles that blocks name; those of the most telling block come first."""
+    """Remove the profiles that blocks name and yield them, the most telling block's first."""
     for use, parameter in PROFILE_PARAMETERS.items():
         for block in blocks:
             if block["use"] == use and parameter in block["with"]:
@@ -122,7 +122,7 @@ def _take_profiles(blocks: list[Any]) -> Iterator[str]:
 
 
 def _split_estimators(block: Any) -> None:
-    """Two estimators were one block, with a parameter ``law`` that chose between them."""
+    """Name the estimator: two were one block before, with a parameter ``law`` to choose one."""
     if block["use"] != "blocks.StateEstimator":
         return
     if block["with"].pop("law", "weighted") == "complementary":
@@ -132,7 +132,7 @@ def _split_estimators(block: Any) -> None:
 
 
 def _behind(data: Mapping[str, Any], key: str, new_key: str, value: Any) -> dict[str, Any]:
-    """The mapping with a new entry behind the one of that key, or at its start."""
+    """The mapping with a new entry after the entry ``key``, or at the start if that is missing."""
     result: dict[str, Any] = {} if key in data else {new_key: value}
     for each, old in data.items():
         result[each] = old

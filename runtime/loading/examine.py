@@ -1,4 +1,4 @@
-"""From the flat graph to the checked one, every check in one pass."""
+"""Makes the checked graph from the flat one, with all checks in one pass."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ from .wire_check import Draft, WireCheck
 
 
 def examine(graph: FlatGraph, problems: Problems) -> CheckedGraph | None:
-    """Check everything; the checked graph if nothing is wrong, now or before."""
+    """Check the whole graph. Returns ``None`` if there is any problem, also one noted before."""
     settings = read_settings(graph, problems)
     if graph.empty:
         where = Position(graph.file, 1, 1)
@@ -80,7 +80,7 @@ def _draft(flat: FlatBlock, graph: FlatGraph, settings: Settings, problems: Prob
         return draft
     draft.dimensions = {**settings.dimensions, **local}
     if settings.robot_known and lacks_robot(draft, settings):
-        check_fit(draft, settings, problems)  # this explains missing dimensions, too
+        check_fit(draft, settings, problems)  # this also explains missing dimensions
         return draft
     draft.complete = _check_dimensions(draft, settings, problems)
     if draft.complete:
@@ -153,7 +153,7 @@ def _check_dimensions(draft: Draft, settings: Settings, problems: Problems) -> b
     flat = draft.flat
     for name, field_path in missing.items():
         if not settings.robot_known:
-            continue  # the robot would have had it
+            continue  # it would come from the robot, whose problem is reported
         value = draft.dimensions.get(name)
         near = nearest(name, draft.dimensions)
         fix = f"dimensions: {{{name}: 3}}"
@@ -197,7 +197,7 @@ def _read_values(
 
 
 def _machines(drafts: Mapping[str, Draft]) -> list[ScheduleBlock]:
-    """What ordering needs; wires whose ends do not exist are left out."""
+    """The blocks as the schedule needs them; wires whose ends do not exist are left out."""
     outputs = {f"{path}.{name}" for path, draft in drafts.items() for name in draft.outputs}
     return [
         ScheduleBlock(
@@ -216,7 +216,7 @@ def _machines(drafts: Mapping[str, Draft]) -> list[ScheduleBlock]:
 
 def _report_loops(drafts: Mapping[str, Draft], problems: Problems) -> None:
     for loop in find_loops(_machines(drafts)):
-        # The last wire leads back to the ring's first block in the file: the feedback, mostly.
+        # The last wire leads back to the first block of the ring: usually that is the feedback.
         source, target = loop.ports[-2:]
         block, _, name = target.rpartition(".")
         reader = drafts[block].flat

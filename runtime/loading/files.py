@@ -1,4 +1,4 @@
-"""The files of a graph: reading each once, finding includes, noticing rings."""
+"""Reads the files of a graph, each once, finds its includes and reports rings of includes."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from .problems import Code, Problems, nearest
 from .written import WrittenGraph, read_graph
 
 Stack = tuple[tuple[Path, str], ...]
-"""The files that are open, outermost first: the real path and the name shown."""
+"""The files being read, outermost first; for each its real path and the name shown in messages."""
 
 
 class FileTree:
-    """Reads graph files. ``incomplete``: one that is included could not be read."""
+    """Reads graph files. ``incomplete`` is true if an included file could not be read."""
 
     def __init__(self, problems: Problems) -> None:
         self.problems = problems
@@ -40,7 +40,7 @@ class FileTree:
         try:
             path = (file.folder / name).resolve()
             present = path.is_file()
-        except (OSError, ValueError):  # a name that no file can have
+        except (OSError, ValueError):  # the name is one that no file can have
             path, present = Path(), False
         if not present:
             self._missing(node, path, shown)
@@ -83,7 +83,7 @@ class FileTree:
         subgraph: bool = False,
         seen: dict[Path, None] | None = None,
     ) -> list[WrittenGraph]:
-        """A file behind all that it includes, each once: later ones win over earlier ones."""
+        """All files that a file includes, each once, then the file itself; later ones win."""
         found: list[WrittenGraph] = []
         seen = {} if seen is None else seen
         for node in file.include:

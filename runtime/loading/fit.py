@@ -13,16 +13,16 @@ from .wire_check import Draft
 
 
 def lacks_robot(draft: Draft, settings: Settings) -> bool:
-    """Whether the block needs something of a robot that the graph's does not have."""
+    """Whether the block needs something of a robot that the graph's robot does not have."""
     assert draft.block_type is not None
     return bool(unmet_needs(draft.block_type, settings.robot))
 
 
 def check_fit(draft: Draft, settings: Settings, problems: Problems) -> Mapping[str, str]:
-    """Report every misfit of one block, whose parameters are known to be right.
+    """Report every misfit of one block, whose parameters have been checked.
 
     Returns:
-        The outputs that mean nothing for this robot, and why.
+        The outputs that this robot cannot have, each with the reason.
     """
     assert draft.block_type is not None and draft.params is not None
     flat = draft.flat
@@ -44,7 +44,7 @@ def check_fit(draft: Draft, settings: Settings, problems: Problems) -> Mapping[s
 
 
 def report_misfit(draft: Draft, misfit: Misfit, problems: Problems) -> None:
-    """Note a misfit at the parameter it is about, or at the block."""
+    """Report a misfit at the parameter it concerns, or else at the block."""
     flat = draft.flat
     steps = misfit.parameter.split(".") if misfit.parameter else []
     node: Node = flat.parameters

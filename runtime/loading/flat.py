@@ -1,4 +1,4 @@
-"""The second stage: one graph without includes and sub-graphs, overrides applied."""
+"""The second stage: one graph with its includes and sub-graphs expanded and overrides applied."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from .nodes import Entry, MapNode, Node, plain, text_of
 
 _WIDTH = 100
 ROBOT_FILES = (".yaml", ".yml", ".urdf", ".xml", ".mjcf")
-"""What the name of a robot ends with that is a file, relative to the graph."""
+"""The endings by which the name of a robot is taken for a file, relative to the graph."""
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,7 @@ class FlatWire(HasSource):
 
 @dataclass(frozen=True)
 class FlatBlock:
-    """One block; ``excused`` inputs are not wired because of a problem already reported."""
+    """One block. ``excused`` inputs are unwired because of a problem that is already reported."""
 
     path: str
     where: Position
@@ -73,8 +73,11 @@ class FlatBlock:
 
 @dataclass(frozen=True)
 class FlatGraph:
-    """The whole graph. ``incomplete``: some file could not be read, so names may be missing;
-    ``broken``: sub-graph blocks that could not be expanded."""
+    """The whole graph.
+
+    ``incomplete`` is true if some file could not be read, so that names may be missing. ``broken``
+    holds the paths of the sub-graph blocks that could not be expanded.
+    """
 
     name: str
     file: str
@@ -97,7 +100,7 @@ class FlatGraph:
 
     @property
     def text(self) -> str:
-        """The graph as a file that loads to the same graph, in ``folder``."""
+        """The graph as the text of a file that, lying in ``folder``, loads to the same graph."""
         lines = []
         for entry in (self.rate, self.duration):
             if entry is not None:
@@ -118,7 +121,7 @@ class FlatGraph:
 
 
 def _section(key: str, data: Mapping[str, Any]) -> list[str]:
-    """A mapping inside a block: on one line where it fits."""
+    """The lines of a mapping inside a block: one line where it fits."""
     if not data:
         return []
     line = f"    {key}: {text_of(data)}"
@@ -128,7 +131,7 @@ def _section(key: str, data: Mapping[str, Any]) -> list[str]:
 
 
 def _escape(value: Any) -> Any:
-    """The value with every leading ``$`` of a text doubled, which reads back as one."""
+    """The value with the leading ``$`` of every text doubled, which a file reads as one ``$``."""
     if isinstance(value, str):
         return f"${value}" if value.startswith("$") else value
     if isinstance(value, list):

@@ -1,4 +1,5 @@
-"""From written files to one flat graph: includes, sub-graphs, parameters and overrides."""
+"""Makes one flat graph from the written files: expands includes, sub-graphs and their parameters,
+and applies overrides."""
 
 from __future__ import annotations
 
@@ -10,11 +11,15 @@ from ..language.stages import Position
 from .document import read_file, read_mapping
 from .files import FileTree, Stack
 from .flat import FlatBlock, FlatGraph, FlatWire
+from .graph_keys import as_entry, is_graph_key, merge
+from .kinds_of_files import is_another_kind
 from .links import Link, read_link
 from .nodes import Entry, MapNode, Node, ScalarNode, plain, text_of
 from .overrides import Override, Overrides, read_overrides, read_sets
 from .problems import Code, Problems, instead, listing, nearest
+from .rates import wrap_offset
 from .references import Bindings, report_unused
+from .shipped import addresses_like
 from .subgraphs import Instance, Resolver
 from .written import WrittenBlock, WrittenGraph, read_graph, wrong_kind
 
@@ -31,9 +36,11 @@ class _Scope:
     stack: Stack = ()
     rate: Node | None = None
     offset: Node | None = None
+    shifted: bool = False
+    """Whether the offset is said further out than the rate, so that it may exceed a period."""
     sets: tuple[Override, ...] = ()
     wires: Mapping[str, tuple[Link | None, Position, str]] = field(default_factory=dict)
-    """From outside, by ``block.input``: the link, its place and its file."""
+    """Wires that other files give, by ``block.input``: the link, its place and its file."""
 
     @property
     def prefix(self) -> str:
@@ -47,10 +54,22 @@ class _Draft:
 
     block: FlatBlock
     links: dict[str, Link | None]
+    shifted: bool = False
+    """Whether the offset is inherited from further out than the rate."""
 
 
 def flatten_file(path: Path, overrides: Overrides, problems: Problems) -> FlatGraph:
-    """The flat graph of a file; what is wrong is noted and left out."""
+    """The flat graph of a file; what is wrong is reported to ``problems`` and left out."""
+    similar = () if path.exists() else addresses_like(path)
+    if similar:
+        problems.add(
+            Code.FILE,
+            f"cannot read {path}: no such file",
+            Position(str(path), 0, 0),
+            nearest=similar,
+            fix=f"{similar[0]}, which is shipped; 'aloft graphs' lists all",
+        )
+        return _Flattener(problems).run(path, None, overrides)
     return _Flattener(problems).run(path, read_file(path, str(path), problems), overrides)
 
 
@@ -71,6 +90,8 @@ class _Flattener:
         commands = read_overrides(overrides, self.problems)
         graph: dict[str, tuple[Entry, Path]] = {}
         empty = False
+        if tree is not None and is_another_kind(tree, shown, self.problems):
+            tree = None
         if tree is None:
             self.files.incomplete = True
         if tree is not None:
@@ -79,16 +100,22 @@ class _Flattener:
             files = self.files.gather(root, scope.stack)
             empty = not any(_has_blocks(file) for file in files)
             names = [block.name for file in files for block in file.blocks]
-            own = tuple(o for o in commands if not _is_graph_key(o, names))
+            own = tuple(o for o in commands if not is_graph_key(o, names))
             for file in files:
                 for entry in file.graph:
-                    _merge(graph, entry, file.folder)
+                    merge(graph, entry, file.folder)
             for command in commands:
-                if _is_graph_key(command, names):
-                    _merge(graph, _as_entry(command), path.parent)
+                if is_graph_key(command, names):
+                    merge(graph, as_entry(command), path.parent)
             self._expand(files, replace(scope, sets=own))
         resolver = Resolver(self.instances, self.problems)
-        blocks = tuple(_finish(draft, resolver) for draft in self.drafts.values())
+        base_rate = graph["rate"][0].value if "rate" in graph else None
+        blocks = tuple(
+            wrap_offset(_finish(draft, resolver), base_rate)
+            if draft.shifted
+            else _finish(draft, resolver)
+            for draft in self.drafts.values()
+        )
 
         def written(key: str) -> Entry | None:
             return graph[key][0] if key in graph else None
@@ -148,7 +175,7 @@ class _Flattener:
         wires: Mapping[str, tuple[Link | None, Position, str]],
         scope: _Scope,
     ) -> None:
-        """Note overrides and wires of blocks that do not exist."""
+        """Report overrides and wires of blocks that do not exist."""
         lost = [(o.block, o.key, o.where, Code.OVERRIDE) for o in sets]
         if scope.instance is None:
             lost += [(o.block, o.key, o.where, Code.OVERRIDE) for o in scope.sets]
@@ -224,6 +251,7 @@ class _Flattener:
         links, places = self._links(block, file, scope, path)
         rate = substitute(block.rate) if block.rate else scope.rate
         offset = substitute(block.offset) if block.offset else scope.offset
+        shifted = block.offset is None and (block.rate is not None or scope.shifted)
         draft = _Draft(
             FlatBlock(
                 path,
@@ -237,13 +265,16 @@ class _Flattener:
                 input_places=places,
             ),
             links,
+            shifted,
         )
         if use is None or not (isinstance(use, ScalarNode) and isinstance(use.value, str)):
             if use is not None:
                 expected = "a block such as blocks.JointPD, module:Class, or a file.yaml"
                 wrong_kind(use, "'use'", expected, self.problems, at=path)
         elif use.value.endswith(_SUFFIXES):
-            self._instance(draft, use, file, replace(scope, rate=rate, offset=offset))
+            self._instance(
+                draft, use, file, replace(scope, rate=rate, offset=offset, shifted=shifted)
+            )
             return
         else:
             draft.block = replace(draft.block, use=use.value, use_where=use.where)
@@ -301,7 +332,7 @@ class _Flattener:
         self._expand(files, inner)
 
     def _parameters(self, block: FlatBlock, subgraph: WrittenGraph) -> dict[str, Node] | None:
-        """The values of a sub-graph's parameters for one use; none if one is missing."""
+        """The values of a sub-graph's parameters for one use; ``None`` if one is missing."""
         declared = {entry.key: entry for entry in subgraph.parameters}
         misspelt: dict[str, None] = {}
         for entry in block.parameters:
@@ -346,7 +377,7 @@ class _Flattener:
 
 
 def _finish(draft: _Draft, resolver: Resolver) -> FlatBlock:
-    """The block with its wires led to real outputs."""
+    """The block, every wire of which comes from an output of a block that is no sub-graph."""
     wires: dict[str, FlatWire] = {}
     excused = []
     for name, link in draft.links.items():
@@ -362,30 +393,3 @@ def _has_blocks(file: WrittenGraph) -> bool:
     """Whether anything is written under ``blocks``, even if it is wrong."""
     entry = file.tree.get("blocks")
     return entry is not None and bool(plain(entry.value))
-
-
-def _is_graph_key(override: Override, names: Iterable[str]) -> bool:
-    """Whether an override sets a key of the graph itself, such as ``rate`` or ``clock.kind``."""
-    if not override.block:
-        return True
-    return override.block in ("clock", "dimensions") and override.block not in names
-
-
-def _as_entry(override: Override) -> Entry:
-    path = (override.block, *override.path) if override.block else override.path
-    if len(path) == 1:
-        return Entry(path[0], override.where, override.value)
-    value = MapNode((), override.where).assign(path[1:], override.value, override.where)
-    return Entry(path[0], override.where, value)
-
-
-def _merge(graph: dict[str, tuple[Entry, Path]], entry: Entry, folder: Path) -> None:
-    """Let a later entry win; mappings are merged key by key."""
-    old = graph.get(entry.key)
-    if old is not None and isinstance(entry.value, MapNode):
-        merged = old[0].value
-        if isinstance(merged, MapNode):
-            for item in entry.value:
-                merged = merged.assign((item.key,), item.value, item.key_where)
-            entry = replace(entry, value=merged)
-    graph[entry.key] = (entry, folder)

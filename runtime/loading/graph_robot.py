@@ -1,4 +1,4 @@
-"""Reads the robot of a graph and puts the actuator profile in use that the graph names."""
+"""Reads the robot of a graph and selects the actuator profile that the graph names."""
 
 from __future__ import annotations
 
@@ -14,8 +14,11 @@ from .problems import Code, Problems, listing, nearest
 
 
 def read_robot(graph: FlatGraph, problems: Problems) -> RobotDescription | None:
-    """The robot that the graph names, with the named profile in use; ``None`` where it names none,
-    and after a problem with the robot itself. Every fault of its description is a problem."""
+    """The robot that the graph names, with the named actuator profile in use.
+
+    Returns ``None`` where the graph names no robot, and where the robot itself has a problem. Every
+    fault of the robot's description is reported.
+    """
     robot = None
     if graph.robot is not None:
         robot = _find(graph.robot, graph, problems)
@@ -59,7 +62,7 @@ def _find(entry: Entry, graph: FlatGraph, problems: Problems) -> RobotDescriptio
 
 
 def _report_faults(error: RobotError, where: Position, problems: Problems) -> None:
-    """Note every fault of a robot's description at its place in the robot's file."""
+    """Report every fault of a robot's description at its place in the robot's file."""
     for fault in error.faults:
         problems.add(
             Code.ROBOT,

@@ -1,4 +1,4 @@
-"""The blocks that loading inserts: a delay behind a delayed wire, a constant behind a value."""
+"""The blocks that loading inserts: a delay for each delayed wire, a constant for each value."""
 
 from __future__ import annotations
 
@@ -28,23 +28,23 @@ class ConstantParameters(Parameters):
 
 
 class ConstantSignal(Block):
-    """The same values for ever, y[n] = value, zero for fields not named.
+    """Holds constant values: y[n] = value, and zero in the fields that are not named.
 
-    Stands for ``{value: {field: number}}`` in place of a source. Subclasses made by
-    ``constant_block_type`` fix the signal. Raises nothing: values are checked at load.
+    A graph makes it by ``{value: {field: number}}`` in place of a source. Subclasses made by
+    ``constant_block_type`` fix the signal. It raises no errors: the values are checked at load.
     """
 
     Params = ConstantParameters
     params: ConstantParameters
 
     def setup(self) -> None:
-        """Write the values, once: nobody else writes there."""
+        """Write the values once; no other code writes to the output."""
         signal: Signal = self.__dict__["y"]
         for name, value in self.params.value.items():
             signal.views()[name][...] = value
 
     def step(self) -> None:
-        """Nothing changes."""
+        """Do nothing: the output is constant."""
 
 
 @lru_cache(maxsize=256)
@@ -56,7 +56,7 @@ def constant_block_type(signal: type[Signal]) -> type[ConstantSignal]:
 
 
 def insert_delay(reader: Draft, name: str, wire: FlatWire, source: Draft, values: Any) -> BlockSpec:
-    """The block behind a delayed wire; it runs when the source's block does."""
+    """The block that delays a wire; it runs in the same ticks as the wire's source."""
     signal = source.outputs[wire.source_port].signal
     return BlockSpec(
         path=f"{reader.flat.path}/{name}~delay",
@@ -71,7 +71,7 @@ def insert_delay(reader: Draft, name: str, wire: FlatWire, source: Draft, values
 
 
 def insert_constant(reader: Draft, name: str, wire: FlatWire, values: Any) -> BlockSpec:
-    """The block behind a constant in place of a source."""
+    """The block that writes a constant which stands in place of a source."""
     signal: type[Any] = reader.inputs[name].signal
     return BlockSpec(
         path=f"{reader.flat.path}/{name}~constant",
@@ -121,7 +121,7 @@ def read_values(
 
 
 def _array(node: Node, field: Field, owner: Draft) -> tuple[Any, str]:
-    """The value and nothing, or nothing and what was expected in its place."""
+    """The value and an empty text, or ``None`` and a text that says what was expected."""
     shape = owner.shape(field)
     unit = f" in {field.unit}" if field.unit is not None and str(field.unit) != "1" else ""
     types: tuple[type, ...]

@@ -1,4 +1,4 @@
-"""What an input's value says: its source, delay and leave to read simulation truth."""
+"""Reads the value of an input: its source, its delay, and its leave to read simulation truth."""
 
 from __future__ import annotations
 

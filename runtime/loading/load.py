@@ -1,4 +1,4 @@
-"""The entrances: a file or a text to a checked graph, or to the report of what is wrong."""
+"""The public functions that load a graph file or text: into a checked graph, or a report."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from .flat import FlatGraph
 from .flatten import flatten_file, flatten_text
 from .overrides import Overrides
 from .problems import LoadError, Problems, Report
+from .shipped import graph_path
 
 
 def load(path: str | Path, overrides: Overrides = ()) -> CheckedGraph:
@@ -20,18 +21,18 @@ def load(path: str | Path, overrides: Overrides = ()) -> CheckedGraph:
         overrides: ``{"landing.w_l": [0.03, 0.04]}`` or ``["landing.w_l=[0.03, 0.04]"]``.
 
     Raises:
-        LoadError: something is wrong; it carries the report of everything that is.
+        LoadError: the graph is wrong; the error carries the report of all problems.
     """
     problems = Problems()
-    graph = examine(flatten_file(Path(path), overrides, problems), problems)
+    graph = examine(flatten_file(graph_path(path), overrides, problems), problems)
     return _result(graph, problems, str(path))
 
 
 def load_text(text: str, path: str | Path, overrides: Overrides = ()) -> CheckedGraph:
-    """The graph in a text that stands for the file ``path``; what it names is found beside that.
+    """The graph in a text; files it names are searched for as if the text were the file ``path``.
 
     Raises:
-        LoadError: something is wrong; it carries the report of everything that is.
+        LoadError: the graph is wrong; the error carries the report of all problems.
     """
     problems = Problems()
     graph = examine(flatten_text(text, Path(path), overrides, problems), problems)
@@ -41,7 +42,7 @@ def load_text(text: str, path: str | Path, overrides: Overrides = ()) -> Checked
 def check(path: str | Path, overrides: Overrides = ()) -> Report:
     """The report on a graph file; ``ok`` when it may run."""
     problems = Problems()
-    examine(flatten_file(Path(path), overrides, problems), problems)
+    examine(flatten_file(graph_path(path), overrides, problems), problems)
     return problems.report(str(path))
 
 
@@ -52,7 +53,7 @@ def flatten(path: str | Path, overrides: Overrides = ()) -> FlatGraph:
         LoadError: some file cannot be read or expanded. Wires and values are not checked here.
     """
     problems = Problems()
-    graph = flatten_file(Path(path), overrides, problems)
+    graph = flatten_file(graph_path(path), overrides, problems)
     if len(problems):
         raise LoadError(problems.report(str(path)))
     return graph

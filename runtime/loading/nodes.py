@@ -1,4 +1,4 @@
-"""The values of a graph file as immutable trees in which every key and value knows its place."""
+"""The values of a graph file as immutable trees; every key and value has its place in the file."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ Node = ScalarNode | ListNode | MapNode
 
 
 def plain(node: Node) -> Any:
-    """The tree as plain Python data."""
+    """The tree as plain Python data, without places."""
     if isinstance(node, ScalarNode):
         return node.value
     if isinstance(node, ListNode):
@@ -86,7 +86,7 @@ def plain(node: Node) -> Any:
 
 
 def from_plain(value: Any, where: Position) -> Node:
-    """Plain Python data (also NumPy arrays and scalars) as a tree that is all at one place."""
+    """A tree of plain Python data (also NumPy arrays and scalars), all of it at one place."""
     if hasattr(value, "tolist"):
         value = value.tolist()
     if isinstance(value, Mapping):
@@ -100,7 +100,7 @@ def from_plain(value: Any, where: Position) -> Node:
 
 
 def move(node: Node, where: Position) -> Node:
-    """The same tree with every place replaced by one."""
+    """The same tree with every place replaced by ``where``."""
     return from_plain(plain(node), where)
 
 
@@ -122,7 +122,7 @@ def kind(node: Node) -> str:
 
 _PLAIN_TEXT = re.compile(r"[A-Za-z_$][A-Za-z0-9_./$~-]*(?: [A-Za-z0-9_./^$~-]+)*$")
 _QUANTITY_TEXT = re.compile(r"[-+]?[0-9.]+(?:[eE][-+]?[0-9]+)? [A-Za-z%][A-Za-z0-9 /^%]*$")
-# Words that YAML 1.1 readers take for something else than text.
+# Words that readers of YAML 1.1 do not take for texts.
 _WORDS = frozenset({"true", "false", "null", "yes", "no", "on", "off"})
 _ESCAPES = {"\\": "\\\\", '"': '\\"', "\n": "\\n", "\t": "\\t", "\r": "\\r"}
 
@@ -136,7 +136,7 @@ def _quoted(text: str) -> str:
         elif code < 32 or 0x7F <= code < 0xA0 or code in (0x85, 0x2028, 0x2029, 0xFEFF):
             out.append(f"\\u{code:04x}")
         elif 0xD800 <= code < 0xE000 or code in (0xFFFE, 0xFFFF):
-            out.append("\\ufffd")  # has no place in a YAML file
+            out.append("\\ufffd")  # a YAML file cannot hold this character
         else:
             out.append(character)
     return '"' + "".join(out) + '"'

@@ -1,4 +1,4 @@
-"""Overrides: ``block.parameter=value`` from the command line, from Python and from ``set``."""
+"""Reads overrides, ``block.parameter=value``, of the command line, of Python and of ``set``."""
 
 from __future__ import annotations
 

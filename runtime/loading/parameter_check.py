@@ -1,4 +1,4 @@
-"""Checks a block's parameters with pydantic and leads every error to its place in the file."""
+"""Checks a block's parameters with pydantic and reports every error at its place in the file."""
 
 from __future__ import annotations
 
@@ -47,7 +47,10 @@ def check_parameters(
     problems: Problems,
     robot: RobotDescription | None = None,
 ) -> Parameters | None:
-    """The block's parameters; ``None`` after a problem. The robot's joints are named in fixes."""
+    """The block's parameters; ``None`` after a problem.
+
+    Fixes of gains by joint use the joint names of ``robot``.
+    """
     model = block_type.Params
     ok = _refuse_truth_values(flat, model, problems)
     try:
@@ -67,7 +70,7 @@ def check_parameters(
 
 
 def _refuse_truth_values(flat: FlatBlock, model: type[Parameters], problems: Problems) -> bool:
-    """Pydantic takes ``true`` for the number 1, which nobody means."""
+    """Report ``true`` or ``false`` in place of a number, which pydantic would take for 1 or 0."""
     ok = True
     for entry in flat.parameters:
         info = model.model_fields.get(entry.key)
@@ -87,7 +90,7 @@ def _refuse_truth_values(flat: FlatBlock, model: type[Parameters], problems: Pro
 
 @dataclass
 class _Mistake:
-    """Errors of pydantic about one place: several where the type is a union."""
+    """All errors of pydantic about one place; there are several where the type is a union."""
 
     code: Code
     place: str
@@ -159,7 +162,7 @@ def _report(
 
 
 def _by_name(node: Node, robot: RobotDescription | None) -> str:
-    """What a list of values by position may have meant, as a mapping with joint names."""
+    """The fix for a list of values by position: a mapping with joint names."""
     values = plain(node)
     named = by_name(values, robot) if robot is not None and isinstance(values, list) else {}
     if named:
@@ -175,15 +178,18 @@ def _right_name(entry: Entry, near: Sequence[str]) -> str:
 
 
 def _is_explained(mistake: _Mistake, others: Iterable[_Mistake]) -> bool:
-    """Whether a collection was refused for what others say of its elements: where a number or a
-    mapping may stand, pydantic reports a wrong element and that the mapping is no number."""
+    """Whether a collection was refused only because of elements that other mistakes are about.
+
+    Where the type is a number or a mapping, pydantic reports the wrong element of a mapping, and
+    also that the mapping is not a number; the latter says nothing new.
+    """
     return isinstance(mistake.node, (MapNode, ListNode)) and any(
         other.place.startswith((f"{mistake.place}.", f"{mistake.place}[")) for other in others
     )
 
 
 def _is_meant(missing: _Mistake, mistakes: Iterable[_Mistake]) -> bool:
-    """Whether a missing parameter is there under a misspelt name."""
+    """Whether a missing parameter is given under a misspelt name."""
     parent = missing.place.rpartition(".")[0]
     return any(
         other.code is Code.UNKNOWN_PARAMETER
@@ -224,7 +230,8 @@ def _add(flat: FlatBlock, model: type[Parameters], mistake: _Mistake, problems: 
 
 
 def _locate(root: MapNode, location: Sequence[str | int]) -> tuple[list[str], Node, Entry | None]:
-    """Follow a location of pydantic as far as the file goes; it also names types of unions."""
+    """Follow a location of pydantic as far as the file has it; such a location also names the
+    members of unions, which are no keys of the file."""
     node: Node = root
     entry = None
     steps: list[str] = []

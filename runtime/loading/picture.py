@@ -1,4 +1,4 @@
-"""What a graph looks like: a table of its blocks and wires, and a Mermaid diagram."""
+"""Shows a graph as a table of its blocks and wires, or as a Mermaid diagram."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from .inserted import ConstantSignal
 
 @dataclass(frozen=True)
 class InputRow:
-    """One input: where it comes from and what happens on the way."""
+    """One input: its source, and delays and changes of rate between the source and the input."""
 
     name: str
     source: str
@@ -56,7 +56,7 @@ class BlockRow:
 
 
 def table(graph: CheckedGraph) -> tuple[BlockRow, ...]:
-    """All blocks of a graph in the order they run, also those that loading has inserted."""
+    """All blocks of a graph in their order of execution, also those that loading has inserted."""
     specs = {spec.path: spec for spec in graph.blocks}
     return tuple(
         _row(graph, specs, number, specs[path]) for number, path in enumerate(graph.order, 1)

@@ -60,12 +60,15 @@ class Code(StrEnum):
     OVERRIDE = "override"
 
 
+MOST_SHOWN = 20
+"""Problems of one kind that are printed."""
+
 _UNREADABLE = (Code.YAML, Code.UNKNOWN_REFERENCE)
 
 
 @dataclass(frozen=True)
 class Problem:
-    """One mistake: what, where, both ends, what would be right, and how to get there."""
+    """One mistake: what is wrong, where (both ends of a wire), what was expected, and the fix."""
 
     code: Code
     message: str
@@ -78,7 +81,7 @@ class Problem:
     expected: str = ""
     found: str = ""
     nearest: tuple[str, ...] = ()
-    """Legal names like the one found, the likeliest first."""
+    """Legal names that resemble the one found, the most similar first."""
     fix: str = ""
 
     def lines(self) -> list[tuple[str, str]]:
@@ -142,9 +145,25 @@ class Report:
         count = len(self.problems)
         return f"{self.file}: {count or 'no'} problem{'s' if count != 1 else ''}"
 
+    def shown(self) -> tuple[list[Problem], list[str]]:
+        """The problems to print, the first ``MOST_SHOWN`` of each kind, and a line on the others."""
+        counts: dict[Code, int] = {}
+        kept = []
+        for problem in self.problems:
+            counts[problem.code] = counts.get(problem.code, 0) + 1
+            if counts[problem.code] <= MOST_SHOWN:
+                kept.append(problem)
+        more = [
+            f"{count - MOST_SHOWN} more problems of the kind {code}; --json has all of them"
+            for code, count in counts.items()
+            if count > MOST_SHOWN
+        ]
+        return kept, more
+
     def text(self) -> str:
-        """The whole report as plain text."""
-        return "\n\n".join([*(p.text() for p in self.problems), self.headline()])
+        """The report as plain text; of very many problems of one kind the first ones."""
+        kept, more = self.shown()
+        return "\n\n".join([*(p.text() for p in kept), *more, self.headline()])
 
     def rich(self) -> Text:
         """The whole report for a terminal, in colour."""
@@ -152,7 +171,8 @@ class Report:
 
         styles = {"expected": "green", "found": "red", "nearest": "cyan", "fix": "bold green"}
         out = Text()
-        for problem in self.problems:
+        kept, more = self.shown()
+        for problem in kept:
             out.append(f"{problem.where}: ", "bold")
             out.append(f"{problem.code}: ", "bold red")
             out.append(f"{problem.message}\n")
@@ -160,6 +180,8 @@ class Report:
                 out.append(f"    {label:<9}  ", "dim")
                 out.append(f"{text}\n", styles.get(label, ""))
             out.append("\n")
+        for line in more:
+            out.append(f"{line}\n\n")
         out.append(self.headline(), "bold green" if self.ok else "bold red")
         return out
 
@@ -174,7 +196,7 @@ class Report:
 
 
 class LoadError(AloftError):
-    """A graph that may not run; its text is the whole report."""
+    """A graph has problems and cannot run; the text of the error is the whole report."""
 
     exit_code = ExitCode.BAD_INPUT
 
@@ -184,22 +206,22 @@ class LoadError(AloftError):
 
 
 class Problems:
-    """Collects problems while a graph is loaded; the same one is kept once."""
+    """Collects problems while a graph is loaded; a problem that is noted twice is kept once."""
 
     def __init__(self) -> None:
         self._found: dict[Problem, None] = {}
 
     def add(self, code: Code, message: str, where: Position, **details: Any) -> None:
-        """Note a problem; ``details`` are the further fields of ``Problem``."""
+        """Note a problem; ``details`` are the other fields of ``Problem``."""
         self._found.setdefault(Problem(code, message, where, **details))
 
     def __len__(self) -> int:
         return len(self._found)
 
     def report(self, file: str) -> Report:
-        """Everything noted so far, sorted by position; ties as they were found.
+        """All problems so far, sorted by position; those at one position in the order of finding.
 
-        What is wrong at a place that could not even be read follows from that, and is left out.
+        Where a place has a syntax error, its other problems follow from that and are left out.
         """
         unread = {p.where: p for p in self._found if p.code in _UNREADABLE}
         kept = [p for p in self._found if unread.get(p.where, p) is p]
@@ -207,7 +229,7 @@ class Problems:
 
 
 def nearest(name: str, legal: Iterable[str], count: int = 3) -> tuple[str, ...]:
-    """The legal names most like ``name``, the likeliest first; none if nothing is alike."""
+    """The legal names most similar to ``name``, the most similar first; empty if none is."""
     names = list(dict.fromkeys(legal))
     lowered: dict[str, str] = {}
     for candidate in names:
@@ -217,7 +239,7 @@ def nearest(name: str, legal: Iterable[str], count: int = 3) -> tuple[str, ...]:
 
 
 def instead(key: str, value: str, where: Position, right: str) -> str:
-    """What to paste for a misspelt key: the override again, or the key with its value."""
+    """The fix to paste for a misspelt key: the corrected override, or the key with its value."""
     if not where.line:
         start, dot, rest = where.file.rpartition(f".{key}")
         return f"{start}.{right}{rest}" if dot else where.file
@@ -225,7 +247,7 @@ def instead(key: str, value: str, where: Position, right: str) -> str:
 
 
 def listing(names: Iterable[str], limit: int = 12) -> str:
-    """Names in one line, cut off where there are many."""
+    """Names in one line, cut off after ``limit`` names."""
     all_names = list(names)
     shown = ", ".join(all_names[:limit])
     if len(all_names) > limit:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 
 from ..language.errors import AloftError
 from ..language.schedule import hyperperiod
 from ..language.stages import Position
 from .flat import FlatBlock
-from .nodes import ScalarNode, kind
+from .nodes import Node, ScalarNode, kind
 from .problems import Code, Problems
 from .settings import read_quantity
 from .wire_check import Draft
@@ -26,7 +27,7 @@ def read_period(flat: FlatBlock, base_rate: float, problems: Problems) -> int:
     if period >= 1 and abs(ratio - period) <= 1e-9 * period:
         return period
     periods = [1] if ratio < 1 else [int(ratio), int(ratio) + 1]
-    legal = tuple(f"{base_rate / p:.12g} Hz" for p in periods)
+    legal = tuple(_rate_text(base_rate, p) for p in periods)
     problems.add(
         Code.RATE,
         f"{flat.path} cannot run at {rate:.12g} Hz in a graph of {base_rate:.12g} Hz",
@@ -38,6 +39,14 @@ def read_period(flat: FlatBlock, base_rate: float, problems: Problems) -> int:
         fix=f"rate: {legal[0]}",
     )
     return 1
+
+
+def _rate_text(base_rate: float, period: int) -> str:
+    """A rate to paste: as a decimal number where that is exact, else as a fraction."""
+    decimal = f"{base_rate / period:.6g}"
+    if abs(float(decimal) * period - base_rate) <= 1e-12 * base_rate:
+        return f"{decimal} Hz"
+    return f"{base_rate:.12g}/{period} Hz"
 
 
 def read_offset(flat: FlatBlock, period: int, problems: Problems) -> int:
@@ -64,8 +73,25 @@ def read_offset(flat: FlatBlock, period: int, problems: Problems) -> int:
     return 0
 
 
+def wrap_offset(flat: FlatBlock, base_rate: Node | None) -> FlatBlock:
+    """A block of a sub-graph whose use gives the offset, while the rate is the block's own.
+
+    The whole sub-graph is shifted by that offset. Where this is longer than the block's period,
+    what is left of it after whole periods says the same.
+    """
+    node, unheard = flat.offset, Problems()
+    offset = node.value if isinstance(node, ScalarNode) else None
+    if node is None or not isinstance(offset, int) or isinstance(offset, bool) or offset < 0:
+        return flat
+    base = read_quantity(base_rate, "rate", "Hz", unheard) if base_rate is not None else None
+    period = read_period(flat, base, unheard) if base is not None else 1
+    if len(unheard) or base is None:
+        return flat  # what is wrong is reported when the rates are read
+    return replace(flat, offset=ScalarNode(offset % period, node.where))
+
+
 def check_hyperperiod(drafts: Iterable[Draft], where: Position, problems: Problems) -> None:
-    """Note rates whose common pattern takes too long to repeat."""
+    """Report rates whose hyperperiod, the number of ticks after which they repeat, is too long."""
     try:
         hyperperiod(draft.period_ticks for draft in drafts)
     except AloftError as error:

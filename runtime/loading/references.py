@@ -15,7 +15,7 @@ _INPUT = re.compile(r"inputs\.([A-Za-z_][A-Za-z0-9_]*)$")
 
 @dataclass(frozen=True)
 class Bindings:
-    """The values of a sub-graph's parameters; ``None`` for ``values``: not in a sub-graph."""
+    """The values of a sub-graph's parameters; ``values`` is ``None`` outside of a sub-graph."""
 
     values: Mapping[str, Node] | None
     problems: Problems
@@ -62,7 +62,7 @@ class Bindings:
 def report_unused(
     subgraph: WrittenGraph, files: Iterable[WrittenGraph], problems: Problems
 ) -> None:
-    """Note parameters and inputs of a sub-graph that nothing in its ``files`` refers to."""
+    """Report parameters and inputs of a sub-graph that nothing in its ``files`` refers to."""
     texts: dict[str, None] = {}
     for file in files:
         for entry in file.tree:

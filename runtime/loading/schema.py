@@ -1,7 +1,7 @@
 """The JSON Schema of graph files, for completion and checks in editors.
 
-It knows the names of all blocks, and of each its parameters and inputs. It is less strict than the
-loader on purpose: a parameter or a wire may come from another file, so none is required here.
+It has the names of all blocks with their parameters and inputs. It is less strict than the loader
+on purpose: a parameter or a wire may come from another file, so none is required here.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ _REFERENCE: Schema = {"type": "string", "pattern": "^\\$", "description": "a par
 _RATE: Schema = {
     "anyOf": [
         {"type": "number", "exclusiveMinimum": 0},
-        {"type": "string", "pattern": "^[0-9.]+([eE][-+]?[0-9]+)? *k?Hz$"},
+        {"type": "string", "pattern": "^[0-9.]+([eE][-+]?[0-9]+)?( */ *[0-9.]+)? *k?Hz$"},
         _REFERENCE,
     ]
 }
@@ -55,7 +55,7 @@ _WIRE: Schema = {
 
 
 def graph_schema(blocks: Mapping[str, type[Block]] | None = None) -> Schema:
-    """The schema for graphs of these blocks; by default of all that are known."""
+    """The schema for graphs of these blocks; by default for all registered blocks."""
     known = dict(blocks) if blocks is not None else all_blocks()
     definitions: Schema = {"wire": _WIRE, "block": _block_schema(known)}
     for name, block_type in known.items():
@@ -176,7 +176,7 @@ def _block_schema(known: Mapping[str, type[Block]]) -> Schema:
 
 
 def _particular_schema(name: str, block_type: type[Block], definitions: Schema) -> Schema:
-    """What only blocks of this type have: their parameters and inputs."""
+    """The part of the schema that only blocks of this type have: their parameters and inputs."""
     model = block_type.Params.model_json_schema()
     for inner, schema in model.pop("$defs", {}).items():
         definitions[f"{name}.{inner}"] = _relocate(schema, name)
@@ -185,7 +185,7 @@ def _particular_schema(name: str, block_type: type[Block], definitions: Schema) 
         schema.pop("live", None)
         description = " ".join(filter(None, [schema.pop("description", ""), _unit_text(schema)]))
         options = [schema, _REFERENCE]
-        if schema.pop("unit", ""):  # then a text with a unit is a number, also inside a collection
+        if schema.pop("unit", ""):  # a text with a unit may stand for each number, also in a list
             per_joint = "PerJoint" in json.dumps(schema)
             inside = {"type": "object"} if per_joint else {"type": "array"}
             options += [{"type": "string", "pattern": "^[-+0-9.]"}, inside]
@@ -219,7 +219,7 @@ def _unit_text(schema: Mapping[str, Any]) -> str:
 
 
 def _relocate(schema: Any, name: str) -> Any:
-    """The schema with its references led to the common definitions."""
+    """The schema with its references pointing to the common definitions."""
     if isinstance(schema, dict):
         return {
             key: f"#/definitions/{name}.{value.rpartition('/')[2]}"

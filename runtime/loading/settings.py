@@ -1,4 +1,4 @@
-"""Checks what a graph says about itself: rate, duration, robot, dimensions and clock."""
+"""Checks the settings of the graph as a whole: rate, duration, robot, dimensions and clock."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ _CLOCK_WORDS: Mapping[str, tuple[str, ...]] = {
 
 @dataclass(frozen=True)
 class Settings:
-    """The graph's own settings; ``None`` where a problem was found or nothing is said."""
+    """The settings of the graph; one is ``None`` if it is not given or has a problem."""
 
     base_rate: float | None = None
     ticks: int | None = None
     robot: RobotDescription | None = None
     robot_known: bool = True
-    """False where a robot is named but could not be read."""
+    """False if the graph names a robot that could not be read."""
     dimensions: Mapping[str, int] = field(default_factory=dict)
     clock: ClockSpec = field(default_factory=ClockSpec)
     folder: Path = Path()
@@ -40,7 +40,7 @@ class Settings:
 
 
 def read_settings(graph: FlatGraph, problems: Problems) -> Settings:
-    """All settings of a graph; what is wrong is noted."""
+    """All settings of a graph; what is wrong is reported to ``problems``."""
     rate = None
     if graph.rate is not None:
         rate = read_quantity(graph.rate.value, "rate", "Hz", problems)

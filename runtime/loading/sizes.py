@@ -17,14 +17,14 @@ from .wire_check import Draft
 
 @dataclass(frozen=True)
 class _Array:
-    """One array that a block makes the graph need."""
+    """One array of memory that a block needs."""
 
     port: str
     field: Field
     size: int
     """Bytes."""
     where: Position | None = None
-    """The wire, where it is the array of a delay."""
+    """The place of the wire, if the array belongs to a delay."""
 
     @property
     def name(self) -> str:
@@ -33,7 +33,7 @@ class _Array:
 
 
 def check_sizes(graph: FlatGraph, drafts: Mapping[str, Draft], problems: Problems) -> bool:
-    """Report every block whose signals are too large; whether those of all blocks fit."""
+    """Report every block whose signals are too large. Returns whether all signals fit in memory."""
     total, found = 0, len(problems)
     for draft in drafts.values():
         arrays = list(_arrays(draft, drafts))
@@ -54,8 +54,8 @@ def check_sizes(graph: FlatGraph, drafts: Mapping[str, Draft], problems: Problem
 
 
 def _arrays(draft: Draft, drafts: Mapping[str, Draft]) -> Iterator[_Array]:
-    """What the graph needs for a block: its outputs, its states whose shapes are known before it is
-    set up, constants for inputs that no block writes, and the rings of delayed wires."""
+    """The arrays that a block needs: its outputs, its states whose shapes are known before it is
+    set up, constants for its unwired inputs, and the buffers of delayed wires."""
     states = draft.block_type.states if draft.block_type is not None else {}
     for ports in (draft.outputs, states):
         for name, port in ports.items():
@@ -85,7 +85,7 @@ def _of_signal(
 
 
 def _report(graph: FlatGraph, draft: Draft, largest: _Array, size: int, problems: Problems) -> None:
-    """Note one block's size at the number that makes it so large: a parameter, a dimension."""
+    """Report one block's size at the number that makes it so large: a parameter or a dimension."""
     flat = draft.flat
     shape = draft.shape(largest.field) or ()
     names = [name for name in largest.field.shape if isinstance(name, str)]

@@ -1,4 +1,4 @@
-"""Uses of sub-graphs, and following wires through them to real outputs."""
+"""Uses of sub-graphs, and the resolution of wires through them to the outputs of blocks."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from .problems import Code, Problems, listing, nearest
 from .written import WrittenGraph
 
 UNWIRED = "unwired"
-"""What a wire resolves to that ends at an optional, unwired input of a sub-graph."""
+"""The result for a wire that comes from an optional, unwired input of a sub-graph."""
 
 
 @dataclass
 class Instance:
-    """One use of a sub-graph. ``broken``: it could not be expanded, and that is reported."""
+    """One use of a sub-graph. ``broken`` is true if it could not be expanded, which is reported."""
 
     path: str
     where: Position
@@ -32,7 +32,7 @@ class Instance:
     def declare_inputs(
         self, subgraph: WrittenGraph, places: Mapping[str, Position], problems: Problems
     ) -> None:
-        """Take the interface of the sub-graph's file; check what is wired against it."""
+        """Take the inputs that the sub-graph's file declares, and check the wires against them."""
         for entry in subgraph.inputs:
             value = entry.value
             text = value.value if isinstance(value, ScalarNode) else ""
@@ -89,7 +89,7 @@ class Resolver:
         self.problems = problems
 
     def resolve(self, link: Link | None, at: str) -> FlatWire | str | None:
-        """The wire behind a link, ``UNWIRED``, or ``None`` after a problem."""
+        """The wire that a link stands for, ``UNWIRED``, or ``None`` after a problem."""
         if link is None:
             return None
         start, seen = link, {}  # type: Link, dict[str, None]

@@ -1,4 +1,4 @@
-"""Checks every wire: both ends exist, and what is written is what is read."""
+"""Checks every wire: both ends exist, and the signal written is the signal that is read."""
 
 from __future__ import annotations
 
@@ -16,8 +16,11 @@ from .problems import Code, Problems, listing, nearest
 
 @dataclass
 class Draft:
-    """A block while it is checked: ``complete`` where its dimensions are all known, ``absent`` with
-    the outputs that mean nothing here and why."""
+    """A block while it is checked.
+
+    ``complete`` is true if all its dimensions are known. ``absent`` holds the outputs that it
+    cannot have with the graph's robot, each with the reason.
+    """
 
     flat: FlatBlock
     block_type: type[Block] | None = None
@@ -133,7 +136,7 @@ def fits(output: Output[Any], port: Input[Any], source: Draft, target: Draft) ->
 
 
 class WireCheck:
-    """All wires of a graph, with every end in reach."""
+    """Checks the wires of a graph, one block at a time."""
 
     def __init__(self, graph: FlatGraph, drafts: Mapping[str, Draft], problems: Problems) -> None:
         self.graph = graph
@@ -141,11 +144,12 @@ class WireCheck:
         self.problems = problems
 
     def check(self, draft: Draft) -> None:
-        """Note every problem of the wires into one block."""
+        """Report every problem of the wires into one block."""
         if draft.block_type is None:
             return
         flat = draft.flat
         meant: dict[str, None] = {}
+        proposed: dict[str, None] = {}
         for name, wire in flat.wires.items():
             port = draft.inputs.get(name)
             if port is None:
@@ -155,7 +159,8 @@ class WireCheck:
         for name, port in draft.inputs.items():
             wired = name in flat.wires or name in flat.excused or name in meant
             if not wired and not port.optional:
-                candidates = self._candidates(draft, port)
+                candidates = self._candidates(draft, port, proposed)
+                proposed.update(dict.fromkeys(candidates[:1]))
                 self.problems.add(
                     Code.UNWIRED_INPUT,
                     f"input {name!r} of {flat.path} is not wired",
@@ -167,12 +172,12 @@ class WireCheck:
                 )
 
     def _unknown_input(self, draft: Draft, name: str, wire: FlatWire) -> str:
-        """Note an input that is not there; return the one that was meant, if that is clear."""
+        """Report an unknown input. Returns the input that was meant, if that is clear."""
         flat = draft.flat
         free = [n for n in draft.inputs if n not in flat.wires]
         similar = nearest(name, draft.inputs)
         best = next((n for n in similar if n in free), similar[0] if similar else "")
-        if not best:  # another name altogether: what could take that signal?
+        if not best:  # the name resembles none: is there one input that takes this signal?
             source = self.drafts.get(wire.source_block)
             output = source.outputs.get(wire.source_port) if source else None
             if source is not None and output is not None:
@@ -250,7 +255,7 @@ class WireCheck:
             )
 
     def check_output(self, at: str, wire: FlatWire) -> None:
-        """Note a sub-graph's output that comes from nowhere."""
+        """Report a sub-graph's output whose source does not exist."""
         if wire.constant is None:
             self._source(at, wire, None, None)
 
@@ -289,7 +294,7 @@ class WireCheck:
         return None
 
     def _local(self, names: Iterable[str], at: str, wire: FlatWire) -> tuple[str, ...]:
-        """Paths as the file of the wire writes them: within a sub-graph, without its own path."""
+        """Paths as the wire's own file writes them: without the path of the sub-graph it is in."""
         owner = at.rpartition(".")[0]
         scope = owner if owner in self.graph.subgraphs else owner.rpartition("/")[0]
         if not scope or wire.where.file == self.graph.file:
@@ -300,7 +305,7 @@ class WireCheck:
         block = wire.source_block
         prefixes = [f"{path}/" for path in self.graph.broken]
         if self.graph.incomplete or any(f"{block}/".startswith(prefix) for prefix in prefixes):
-            return  # it may be in a file that could not be read, and that is reported
+            return  # it may be in a file that could not be read, which is reported
         similar = nearest(block, [*self.drafts, *self.graph.subgraphs])
         names = [f"{match}.{wire.source_port}" for match in similar]
         candidates = self._local(names or candidates, at, wire)
@@ -315,17 +320,27 @@ class WireCheck:
             fix=f"{at.rpartition('.')[2]}: {candidates[0]}" if candidates else "",
         )
 
-    def _candidates(self, target: Draft, port: Input[Any]) -> tuple[str, ...]:
-        """Outputs that could feed an input; those of the very same signal first."""
+    def _candidates(
+        self, target: Draft, port: Input[Any], proposed: Iterable[str] = ()
+    ) -> tuple[str, ...]:
+        """Outputs that could feed an input; those with the same type of signal come first.
+
+        What feeds another input of the block, or is ``proposed`` for one, is hardly meant twice.
+        """
+        taken = {wire.source: None for wire in target.flat.wires.values()}
+        taken.update(dict.fromkeys(proposed))
         exact: list[str] = []
         other: list[str] = []
         for source in self.drafts.values():
             if source is target:
                 continue
             for name, output in source.outputs.items():
-                if name not in source.absent and fits(output, port, source, target):
+                path = f"{source.flat.path}.{name}"
+                if path in taken or name in source.absent:
+                    continue
+                if fits(output, port, source, target):
                     same = output.signal is port.signal
-                    (exact if same else other).append(f"{source.flat.path}.{name}")
+                    (exact if same else other).append(path)
         return tuple([*exact, *other][:3])
 
 

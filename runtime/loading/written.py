@@ -1,8 +1,9 @@
-"""The first stage: one file as the user wrote it, its keys checked, its values untouched."""
+"""The first stage: one file as the user wrote it; its keys are checked, its values unchanged."""
 
 from __future__ import annotations
 
 import re
+import unicodedata
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -25,7 +26,7 @@ _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*(?:/[A-Za-z][A-Za-z0-9_]*)*$")
 
 @dataclass(frozen=True)
 class WrittenBlock:
-    """One entry of ``blocks``; ``None`` where a key is not there."""
+    """One entry of ``blocks``; an attribute is ``None`` if its key is missing."""
 
     name: str
     where: Position
@@ -38,7 +39,7 @@ class WrittenBlock:
 
 @dataclass(frozen=True)
 class WrittenGraph:
-    """One file. ``graph`` has the entries of ``GRAPH_KEYS`` that are there."""
+    """One file. ``graph`` has the entries of the file whose keys are ``GRAPH_KEYS``."""
 
     file: str
     folder: Path
@@ -54,14 +55,14 @@ class WrittenGraph:
 
     @property
     def text(self) -> str:
-        """The file's content as YAML: anchors and merges resolved, comments gone."""
+        """The file's content as YAML, with anchors and merges resolved, and without comments."""
         return "\n".join(f"{e.key}: {text_of(plain(e.value))}" for e in self.tree) + "\n"
 
 
 def read_graph(
     tree: MapNode, file: str, folder: Path, problems: Problems, *, subgraph: bool
 ) -> WrittenGraph:
-    """Check the keys of a file; what is wrong is noted and left out."""
+    """Check the keys of a file; what is wrong is reported to ``problems`` and left out."""
     keys = {entry.key: entry for entry in tree if not entry.key.startswith("_")}
     mine = SUBGRAPH_KEYS if subgraph else GRAPH_KEYS
     others = GRAPH_KEYS if subgraph else SUBGRAPH_KEYS
@@ -105,7 +106,7 @@ def read_graph(
 
 
 def unknown_key(entry: Entry, legal: Iterable[str], of: str, problems: Problems) -> str:
-    """Note a key that means nothing there; return the one that was meant, if that is clear."""
+    """Report an unknown key. Returns the key that was meant, if that is clear."""
     names = tuple(legal)
     similar = nearest(entry.key, names)
     problems.add(
@@ -123,7 +124,7 @@ def unknown_key(entry: Entry, legal: Iterable[str], of: str, problems: Problems)
 
 
 def wrong_kind(node: Node, what: str, expected: str, problems: Problems, **details: str) -> None:
-    """Note a value of the wrong kind."""
+    """Report a value of the wrong kind."""
     problems.add(
         Code.WRONG_KIND,
         f"{what} cannot be {kind(node)}",
@@ -138,7 +139,7 @@ def _mapping(entry: Entry | None, problems: Problems) -> MapNode | None:
     if entry is None or isinstance(entry.value, MapNode):
         return entry.value if entry else None  # type: ignore[return-value]
     if isinstance(entry.value, ScalarNode) and entry.value.value is None:
-        return None  # an empty section, all of it commented out perhaps
+        return None  # an empty section; perhaps all its lines are commented out
     wrong_kind(entry.value, repr(entry.key), "a mapping", problems)
     return None
 
@@ -156,6 +157,14 @@ def _read_include(entry: Entry | None, problems: Problems) -> tuple[ScalarNode, 
     return tuple(files)
 
 
+def _ascii(name: str) -> str:
+    """A name like this one in the letters that names may have; empty where there is none."""
+    for letters, instead_of in (("ae", "ä"), ("oe", "ö"), ("ue", "ü"), ("ss", "ß")):
+        name = name.replace(instead_of, letters)
+    name = unicodedata.normalize("NFKD", name).encode("ascii", "ignore").decode()
+    return name if _NAME.match(name) else ""
+
+
 def _read_block(entry: Entry, problems: Problems) -> WrittenBlock | None:
     name, where = entry.key, entry.key_where
     if name == "inputs" or not _NAME.match(name):
@@ -165,8 +174,9 @@ def _read_block(entry: Entry, problems: Problems) -> WrittenBlock | None:
             if name == "inputs"
             else f"{name!r} cannot name a block",
             where,
-            expected="a letter, then letters, digits and _",
+            expected="a letter from a to z or A to Z, then such letters, digits and _",
             found=name,
+            fix=_ascii(name) if not name.isascii() else "",
         )
         return None
     if not isinstance(entry.value, MapNode):

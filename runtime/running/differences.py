@@ -1,5 +1,5 @@
-"""Two runs of one graph compared byte by byte: which field of which block differs first, and by
-how many units in the last place (ULP)."""
+"""Compares two runs of one graph byte by byte: finds which field of which block differs first, and
+by how many units in the last place (ULP)."""
 
 from __future__ import annotations
 
@@ -20,8 +20,11 @@ _SIGN = np.int64(-(2**63))
 
 @dataclass(frozen=True)
 class Difference:
-    """One element that differs. ``ulps`` is the number of float64 values between the two, plus
-    one; zero for -0.0 and 0.0, ``None`` where one is not a number or the field holds no floats."""
+    """One element that differs.
+
+    ``ulps`` is the distance of the two numbers in float64 steps: 1 for neighbours, 0 for -0.0 and
+    0.0. It is ``None`` where one of them is NaN or the field holds no floats.
+    """
 
     tick: int
     name: str
@@ -31,7 +34,7 @@ class Difference:
     replayed: float | int | bool
     ulps: int | None
     part: str = "signal"
-    """``signal``, or ``state`` where what is remembered differs at a keyframe."""
+    """``signal``, or ``state`` where a block's declared state differs at a keyframe."""
 
     @property
     def place(self) -> str:
@@ -71,14 +74,15 @@ class FieldDifference:
 
 @dataclass
 class Comparison:
-    """Compares rows of a bus, or of state, that are laid out as ``layout`` says.
+    """Compares recorded and replayed rows of the bus, or of the state.
 
     Attributes:
-        layout: of the replayed rows.
-        order: the blocks in the order of execution, by which the first difference is chosen.
-        names: the fields that are compared; all by default.
-        fields: by name, those that differ.
-        compared: rows compared.
+        layout: how the rows are laid out in memory; it is the layout of the replayed graph.
+        order: the paths of the blocks in their order of execution. Of two differences in one tick
+            the one of the block that runs earlier is the first.
+        names: the fields to compare; all fields by default.
+        fields: the fields that differ, by name.
+        compared: the number of rows compared so far.
     """
 
     layout: Layout
@@ -135,7 +139,7 @@ class Comparison:
 
     @property
     def first(self) -> Difference | None:
-        """What differs first: in the earliest tick, in the block that runs first."""
+        """The first difference: in the earliest tick, and there in the block that runs first."""
         rank = {name: i for i, name in enumerate(self._names)}
         found = [each.first for each in self.fields.values()]
         return min(found, key=lambda d: (d.tick, rank[d.name])) if found else None
@@ -158,14 +162,14 @@ def block_of(name: str) -> str:
 def bits(values: NDArray[Any]) -> NDArray[Any]:
     """The numbers' bit patterns, so that NaN equals itself and -0.0 differs from 0.0."""
     patterns = np.ascontiguousarray(values).view(f"u{values.dtype.itemsize}")
-    return patterns.reshape(values.shape)  # which a scalar has lost
+    return patterns.reshape(values.shape)  # ascontiguousarray makes an array of a scalar
 
 
 def ulp_distances(one: NDArray[np.float64], other: NDArray[np.float64]) -> NDArray[np.uint64]:
     """How many float64 values lie from each number to the other, neither being NaN."""
     first, second = _ranks(one), _ranks(other)
     low, high = np.minimum(first, second), np.maximum(first, second)
-    # in unsigned numbers, as the distance of two large ones of different sign has 65 bits less one
+    # unsigned, because the distance of two large numbers of different sign overflows int64
     return high.view(np.uint64) - low.view(np.uint64)
 
 
@@ -183,7 +187,7 @@ def _ranks(values: NDArray[np.float64]) -> NDArray[np.int64]:
 
 
 def common_names(one: Layout, other: Layout) -> tuple[list[str], list[str]]:
-    """Fields that both layouts have with one type and shape; and, as texts, what is different."""
+    """The fields that both layouts have with equal type and shape, and a text for each other."""
     same, notes = [], []
     for name, slot in one.slots.items():
         there = other.slots.get(name)

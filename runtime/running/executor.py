@@ -1,6 +1,6 @@
-"""The executor: takes a graph through its whole life, and ends every run in good order.
+"""The executor takes a graph through its whole life cycle and ends every run in good order.
 
-While a run goes on the garbage collector is off and what exists is frozen.
+During a run the garbage collector is off, so that it interrupts no tick.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from typing import Any
 from ..language.block import Metric
 from ..language.errors import AloftError, ExitCode, RunError
 from ..language.stages import CheckedGraph, ClockSpec
-from .failures import describe
+from .failures import describe, locate
 from .interrupts import Interrupts
 from .life_cycle import LifeCycle, LifeState
 from .memory import BoundGraph
@@ -37,7 +37,7 @@ class Executor:
         run_hash: whether to hash every tick.
         timing: whether to time every block. Only benchmarks switch it off.
         finite_check: whether to check every tick. Only benchmarks switch it off.
-        time_source: what time is; tests have one of their own.
+        time_source: where the time comes from; by default the system's monotonic clock.
         on_ready: called once all blocks have started, before the first tick; a replay restores a
             keyframe here.
 
@@ -80,11 +80,11 @@ class Executor:
         self._cautions: list[str] = []
 
     def run(self, ticks: int | None = None) -> RunResult:
-        """The whole life of the graph, once: start, tick, stop cycles, close.
+        """Take the graph once through its whole life: start, ticks, stop cycles, close.
 
-        Runs for ``ticks``, by default as long as the graph says. SIGINT and SIGTERM stop it after
-        the present tick, and so does a block that asks for it. Whatever ended the run is in the
-        result, an error too: see ``RunResult.raise_if_failed``.
+        The run lasts ``ticks`` ticks, by default the graph's duration. SIGINT, SIGTERM and a block
+        that asks for it end the run after the present tick. The result says what ended the run,
+        also if it was an error: see ``RunResult.raise_if_failed``.
 
         Raises:
             AloftError: the graph has run already.
@@ -94,7 +94,7 @@ class Executor:
         clock, graph = self.bound.clock, self.bound.graph
         limit = ticks
         if ticks is None and graph.ticks is not None:
-            limit = max(0, graph.ticks - clock.tick)  # a restored graph runs only what is left
+            limit = max(0, graph.ticks - clock.tick)  # a restored graph runs only the rest
         error: RunError | None = None
         problems: list[str] = []
         start_time = end_time = self._time.now()
@@ -123,7 +123,7 @@ class Executor:
             finally:
                 end_time = self._time.now()
                 if error is not None:
-                    self._note("fault", str(error), "ERROR")
+                    self._note_error(locate(error))
                 self._note("life", f"stopping: {clock.stop_reason or 'the end'}")
                 self.life.stop(self._pause if self.ticker.pacer is not None else None)
                 problems += self.life.problems
@@ -140,7 +140,7 @@ class Executor:
         if self._log is not None:
             self._log.expect(ticks)
         for sink in self._sinks:
-            self._opened.append(sink)  # before, as a failed open may have opened something
+            self._opened.append(sink)  # before the call, as a failed open may have opened a file
             sink.open(self.bound)
             self.ticker.records.append(sink.record)
             if isinstance(sink, TakesNotes):
@@ -168,6 +168,12 @@ class Executor:
     def _note(self, kind: str, text: str, level: str = "INFO") -> None:
         self.ticker.tell(Note(self.bound.clock.tick, kind, text, level))
 
+    def _note_error(self, error: RunError) -> None:
+        """Note what ended the run: where it was raised, and for machines the whole traceback."""
+        place = f" (at {error.where})" if error.where else ""
+        note = Note(self.bound.clock.tick, "fault", f"{error}{place}", "ERROR", error.to_json())
+        self.ticker.tell(note)
+
     def _ask_for_cautions(self) -> None:
         for path, block in self.bound.blocks.items():
             self._cautions += [f"{path}: {text}" for text in block.cautions()]
@@ -175,7 +181,7 @@ class Executor:
             self._note("caution", caution, "WARN")
 
     def _pause(self) -> None:
-        """The time between stop cycles: a period, so that a bus can carry each."""
+        """Wait for one period between two stop cycles, so that a bus has time to carry each."""
         self._time.sleep(self.bound.clock.base_period)
 
     def _result(
@@ -193,6 +199,8 @@ class Executor:
             except Exception as failure:  # noqa: BLE001  # the other blocks' metrics still count
                 problems.append(f"block '{path}' failed in metrics: {describe(failure)}")
         metrics, unmet, praise = merge_metrics(by_block)
+        judges = [path for path, of_block in by_block.items() if of_block.get("reason")]
+        unmet, praise = self._with_stop(unmet, judges), self._with_stop(praise, judges)
         code, reason = self._verdict(error, problems, interrupts, unmet, praise)
         for program in self.ticker.programs:
             program.fold()
@@ -220,6 +228,13 @@ class Executor:
             graph=self.bound.graph,
         )
 
+    def _with_stop(self, verdict: str | None, judges: Sequence[str]) -> str | None:
+        """What a score says, with why another block ended the run; a score knows its own reason."""
+        clock = self.bound.clock
+        if verdict is None or not clock.stop_reason or clock.stopped_by in ("", *judges):
+            return verdict
+        return f"{verdict}; block '{clock.stopped_by}' ended the run: {clock.stop_reason}"
+
     def _verdict(
         self,
         error: RunError | None,
@@ -228,7 +243,7 @@ class Executor:
         unmet: str | None,
         praise: str | None,
     ) -> tuple[ExitCode, str]:
-        """The exit code and the reason: the first that applies, gravest first."""
+        """The exit code and the reason; of several reasons, the gravest."""
         stopped = self.bound.clock.stop_reason
         if error is not None and not isinstance(error.__cause__, KeyboardInterrupt):
             return ExitCode.RUN_FAILED, str(error)
@@ -246,7 +261,8 @@ class Executor:
 
 @contextmanager
 def _quiet_collector() -> Iterator[None]:
-    """No garbage collection within, and what exists now is never looked at: no pauses."""
+    """Switch the garbage collector off within, and exempt all existing objects from later
+    collections, so that no collection interrupts a tick."""
     enabled = gc.isenabled()
     with ExitStack() as after:
         gc.collect()

@@ -1,10 +1,12 @@
-"""What went wrong in a block, in one line: which block, in what, the error, and where it was raised."""
+"""Describes a block's failure in one line: block, method, error, and where it was raised."""
 
 from __future__ import annotations
 
+import sysconfig
 import traceback
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 
 from ..language.errors import AloftError, RunError
 from ..language.stages import BlockSpec
@@ -18,9 +20,36 @@ def describe(error: BaseException) -> str:
 
 
 def place_of(error: BaseException) -> str:
-    """``file:line`` of the statement that raised an error; empty where that is not known."""
+    """``file:line`` of the user's statement that raised an error; empty where that is not known.
+
+    An error raised inside a library, such as NumPy, is placed where the block called it.
+    """
     frames = traceback.extract_tb(error.__traceback__)
-    return f"{frames[-1].filename}:{frames[-1].lineno}" if frames else ""
+    own = [frame for frame in frames if not _is_installed(frame.filename)]
+    best = (own or frames)[-1:]
+    return f"{best[0].filename}:{best[0].lineno}" if best else ""
+
+
+def _is_installed(file: str) -> bool:
+    """Whether a file belongs to Python, to an installed package or to the runtime itself."""
+    return file.startswith(_INSTALLED) or "site-packages" in Path(file).parts
+
+
+def locate(error: RunError) -> RunError:
+    """Note in an error where its cause was raised, and the whole traceback; give it back."""
+    cause = error.__cause__
+    if cause is not None and not error.traceback:
+        error.where = place_of(cause)
+        error.traceback = "".join(traceback.format_exception(cause))
+    return error
+
+
+_INSTALLED = (
+    "<",
+    sysconfig.get_path("stdlib"),
+    sysconfig.get_path("platstdlib"),
+    str(Path(__file__).parents[1]),
+)
 
 
 @contextmanager
@@ -40,6 +69,8 @@ def blame(spec: BlockSpec, what: str) -> Iterator[None]:
         reason = describe(error)
         if not isinstance(error, AloftError):
             reason = f"{' '.join(reason.split())} (at {place_of(error)})"
-        raise RunError(
+        failure = RunError(
             f"{place}block '{spec.path}' failed in {what}: {reason}", block=spec.path
-        ) from error
+        )
+        failure.__cause__ = error
+        raise locate(failure) from error

@@ -17,10 +17,11 @@ from .memory import BoundGraph
 
 
 class Fed(Block):
-    """Stands in for a block: same ports, same machine, no state, nothing of its own happens.
+    """Stands in for a block: it has the same ports and the same kind of machine, but no state.
 
-    Subclasses made by ``fed_block_type`` have the ports. When the block would run, its outputs
-    become what was recorded for this tick. It opens nothing and moves nothing.
+    Subclasses made by ``fed_block_type`` declare the ports. Whenever the block would have run, its
+    stand-in writes the outputs that were recorded for this tick. It opens no device and moves
+    nothing.
     """
 
     _pairs: list[tuple[NDArray[Any], NDArray[Any]]] = []
@@ -85,7 +86,7 @@ class Feed:
 
     Args:
         bound: the graph.
-        layout: that of the recorded rows.
+        layout: the layout of the recorded rows.
 
     Raises:
         KeyError: the recording lacks a field that a stand-in must write; its text names it.

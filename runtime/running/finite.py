@@ -1,4 +1,7 @@
-"""One check of all floats of the bus, a tick: cheap while all is well, exact when it is not."""
+"""Checks once a tick that every float of the bus is finite.
+
+The usual check is one cheap product; only if it fails is the element searched.
+"""
 
 from __future__ import annotations
 
@@ -10,9 +13,10 @@ from ..language.errors import AloftError
 from .memory import Region
 
 _PIECE = 8192
-"""Elements a product is taken of at once: below what makes a BLAS library start threads."""
+"""Elements in one product: fewer than make a BLAS library start threads."""
 _TINY = 1e-150
-"""So small that no sum overflows, so large that no usual product is subnormal and thus slow."""
+"""The factor of every element: so small that no sum of finite products overflows, yet so large that
+usual products are not subnormal, which would be slow."""
 
 
 class NotFiniteError(AloftError):
@@ -27,8 +31,8 @@ class NotFiniteError(AloftError):
 class FiniteCheck:
     """Checks that every float of a region is finite.
 
-    The product with a vector of tiny numbers is finite unless an element is not, whatever the size
-    of the others, and takes one call. (Zeros would do but for NumPy's warning on infinity.)
+    The scalar product of the region with a vector of tiny numbers is finite exactly if all elements
+    are, and takes one call. (A vector of zeros would do, but NumPy warns of zero times infinity.)
     """
 
     def __init__(self, region: Region) -> None:
@@ -40,7 +44,7 @@ class FiniteCheck:
             for i in range(0, floats.size, _PIECE)
         ]
         self._product = np.zeros(())
-        self._value = self._product.reshape(1).data  # read through this, no array is made
+        self._value = self._product.reshape(1).data  # reading through this allocates no array
 
     def check(self) -> None:
         """Raise ``NotFiniteError`` for the first element that is not finite."""

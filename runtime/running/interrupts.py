@@ -1,23 +1,28 @@
-"""SIGINT and SIGTERM end a run cleanly: after the present tick, with the stop cycles."""
+"""SIGINT and SIGTERM end a run cleanly: the present tick is finished, then the stop cycles run."""
 
 from __future__ import annotations
 
+import os
 import signal
 import threading
+from contextlib import suppress
 from types import FrameType, TracebackType
 from typing import Any, Self
 
 from ..language.block import Clock
 from .life_cycle import LifeCycle
 
+_SAID = b"\nstopping after this tick, the robot in damping; Ctrl-C again ends a block that hangs\n"
+
 
 class Interrupts:
-    """Handles the two signals within a ``with``; elsewhere than in the main thread does nothing.
+    """Handles the two signals in a ``with`` statement of the main thread; elsewhere does nothing.
 
-    The first signal asks for the run to end after the tick. A further one raises
-    ``KeyboardInterrupt``, for a block that hangs, but only where that is caught: while ``armed``,
-    which the executor sets while blocks start and tick, or inside a guarded call while stopping.
-    Raising disarms, so no error can hit who deals with the one before.
+    The first signal asks for the run to end after the present tick. A further signal raises
+    ``KeyboardInterrupt``, so that a block that hangs can be interrupted, but only where that error
+    is caught: while ``armed``, which the executor sets while blocks start and tick, or inside a
+    guarded call while stopping. Raising resets ``armed``, so that no second error interrupts the
+    code that handles the first.
     """
 
     def __init__(self, clock: Clock, life: LifeCycle) -> None:
@@ -47,6 +52,9 @@ class Interrupts:
             self.received = signal.Signals(number)
             if self._clock.stop_reason is None:
                 self._clock.stop_reason = f"stopped by {self.received.name}"
+            if self.received is signal.SIGINT:
+                with suppress(OSError, ValueError):
+                    os.write(2, _SAID)
         elif self.armed or self._life.guarding:
             self.armed = self._life.guarding = False
             raise KeyboardInterrupt

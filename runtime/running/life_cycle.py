@@ -1,7 +1,7 @@
-"""The life of a graph: idle -> ready -> running -> stopping -> stopped, and never past stopping.
+"""The life of a graph: idle -> ready -> running -> stopping -> stopped; no run leaves out stopping.
 
-Whatever ends a run, the blocks that were started get their stop cycles, in which a robot commands
-damping, and are closed. Nothing a block does there keeps the others from theirs.
+Whatever ends a run, every block that was started gets its stop cycles, in which a robot commands
+damping, and is then closed. An error of one block there does not keep the others from theirs.
 """
 
 from __future__ import annotations
@@ -43,8 +43,9 @@ _NEXT: Mapping[LifeState, tuple[LifeState, ...]] = {
 class LifeCycle:
     """Starts and stops the blocks of a graph, in file order.
 
-    ``problems`` collects what went wrong while stopping, one text each. ``guarding`` is true while
-    a stop cycle or a close runs, where an interrupt may raise without harm to the others.
+    ``problems`` collects one text for everything that went wrong while stopping. ``guarding`` is
+    true while a stop cycle or ``close`` of one block runs: an interrupt may raise an error there
+    without harm to the other blocks.
     """
 
     def __init__(self, blocks: Mapping[str, Block]) -> None:
@@ -65,7 +66,7 @@ class LifeCycle:
         if self.state is not LifeState.IDLE:
             raise AloftError(f"a graph that is {self.state.value} cannot be started")
         for path, block in self._blocks.items():
-            self._started.append(path)  # before, as a failed start may have opened something
+            self._started.append(path)  # before the call, as a failed start may have opened devices
             try:
                 block.start()
             except Exception as error:
@@ -75,7 +76,7 @@ class LifeCycle:
         self.move(LifeState.READY)
 
     def stop(self, pause: Callable[[], None] | None = None) -> None:
-        """Stop cycles, ``pause`` after each round, then close: any state -> stopped."""
+        """Run the stop cycles, with ``pause`` after each round, and close: any state -> stopped."""
         if self.state is LifeState.STOPPED:
             return
         self.move(LifeState.STOPPING)

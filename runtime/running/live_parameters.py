@@ -1,9 +1,9 @@
-"""Parameters that change while a graph runs: handed over in one slot, taken at a tick boundary.
+"""Changes parameters while a graph runs: they are handed over in one slot and taken between ticks.
 
-Whoever wants a change (another thread, a replay) has it checked first, ``loading.adjust``, and
-hands over an ``Adjustment``. The control thread looks at the slot once a tick; it never waits, and
-an empty slot costs it tens of nanoseconds. All of an adjustment takes effect in the same tick, or
-none of it.
+Whoever wants a change (another thread, a replay) first has it checked by ``loading.adjust``, and
+then hands over the ``Adjustment``. The control thread looks at the slot once a tick; it never
+waits, and an empty slot costs it tens of nanoseconds. All changes of an adjustment take effect in
+the same tick, or none does.
 """
 
 from __future__ import annotations
@@ -27,8 +27,8 @@ class LiveParameters:
 
     Attributes:
         requests: the slot. It holds one adjustment, which the control thread takes out.
-        changes: everything changed so far, in order.
-        listeners: called on the control thread with every change, before the tick it counts for.
+        changes: all changes so far, in order.
+        listeners: called on the control thread with every change, before its first tick.
     """
 
     def __init__(self, blocks: Mapping[str, Block]) -> None:
@@ -38,7 +38,7 @@ class LiveParameters:
         self.listeners: list[Callable[[ParameterChange], None]] = []
 
     def answer(self, tick: int) -> None:
-        """Take over what is in the slot, for ``tick`` and those after it; control thread only."""
+        """Apply the adjustment in the slot, from ``tick`` on; only the control thread does this."""
         try:
             adjustment = self.requests.popleft()
         except IndexError:  # withdrawn in this very moment
@@ -50,10 +50,10 @@ class LiveParameters:
         adjustment.answered = True
 
     def apply(self, adjustment: Adjustment, tick: int) -> None:
-        """Change the parameters, for ``tick`` and those after it.
+        """Change the parameters, from ``tick`` on.
 
         Raises:
-            AloftError: a block refused; everything is as it was.
+            AloftError: a block refused its new parameters; then all blocks keep the old ones.
         """
         before = {path: self.blocks[path].params for path in adjustment.params}
         for path, params in adjustment.params.items():
@@ -77,8 +77,8 @@ class LiveParameters:
         Called from any other thread.
 
         Raises:
-            AloftError: a block refused it, another one is waiting, or no tick came in time; then
-                nothing has changed.
+            AloftError: a block refused it, another adjustment is waiting, or no tick came in
+                time. In all these cases nothing has changed.
         """
         if self.requests:
             raise AloftError("another change is waiting for its tick; try again")
@@ -89,7 +89,7 @@ class LiveParameters:
                 try:
                     self.requests.remove(adjustment)
                 except ValueError:
-                    end = time.monotonic() + timeout  # taken just now: the answer is on its way
+                    end = time.monotonic() + timeout  # it was taken just now: wait for the answer
                     continue
                 raise AloftError(f"no tick came within {timeout:g} s; nothing was changed")
             time.sleep(_POLL)

@@ -1,7 +1,7 @@
-"""The memory of a graph: one buffer for all signals (the bus), one for all declared state.
+"""The memory of a graph: one buffer for all signals (the bus) and one for all declared state.
 
-Ports are views of these buffers, bound once; so recording a tick, taking a snapshot, hashing a run
-and comparing two runs are each one memory copy. Input views cannot be written.
+Ports are views of these buffers and are bound once. Therefore recording a tick, taking a snapshot,
+hashing a run and comparing two runs each take one memory copy. Views of inputs are read-only.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from .live_parameters import LiveParameters
 
 
 class Region:
-    """One aligned, zeroed buffer of a layout, with one flat array a section."""
+    """One aligned buffer for a layout, zero at first, with a flat array for each section."""
 
     def __init__(self, layout: Layout) -> None:
         self.layout = layout
@@ -57,7 +57,7 @@ class Region:
 
 
 def _allocate(layout: Layout, what: str) -> Region:
-    """The memory of a layout. Raises ``RunError`` where that is more than a graph may need."""
+    """The memory of a layout. Raises ``RunError`` if it needs more than a graph may have."""
     try:
         if layout.size <= LARGEST:
             return Region(layout)
@@ -81,11 +81,13 @@ class Snapshot:
 
 
 class Memory:
-    """The bus and the state of some blocks. Raises ``RunError`` where a block cannot say how large
-    its state is, or the machine has not enough memory.
+    """The bus and the state of some blocks.
 
-    The bus holds all outputs in file order, and behind them one constant for every input without a
-    wire: its declared default, zero where it says nothing.
+    The bus holds all outputs in file order and, after them, one constant for every unwired input:
+    its declared default, with zero for the fields that the default does not name.
+
+    Raises:
+        RunError: a block cannot say how large its state is, or there is not enough memory.
     """
 
     def __init__(self, blocks: Iterable[BlockSpec], robot: RobotDescription | None = None) -> None:
@@ -128,7 +130,7 @@ class Memory:
 
     def bind(self, block: Block, spec: BlockSpec) -> None:
         """Give a block its ports and state as attributes; inputs cannot be written."""
-        # setattr, as touching __dict__ makes CPython's attribute access slower for good
+        # setattr, because after any use of __dict__ CPython's attribute access stays slower
         for name, port in spec.block_type.inputs.items():
             wire = spec.wires.get(name)
             source = wire.source if wire is not None else ""
@@ -145,10 +147,10 @@ class Memory:
         return Snapshot(tick, self.bus.buffer.tobytes(), self.state.buffer.tobytes())
 
     def restore(self, snapshot: Snapshot) -> None:
-        """Take both buffers back.
+        """Set both buffers to the snapshot's.
 
         Raises:
-            ValueError: the snapshot is of another graph, by its sizes.
+            ValueError: the snapshot's sizes show that it is of another graph.
         """
         for region, data in ((self.bus, snapshot.bus), (self.state, snapshot.state)):
             if len(data) != region.buffer.size:
@@ -196,13 +198,14 @@ class BoundGraph:
         return self.memory.snapshot(self.clock.tick)
 
     def restore(self, snapshot: Snapshot) -> None:
-        """Go back to a snapshot, ending with every block's ``thaw``; the graph may run on from it.
+        """Go back to a snapshot and call every block's ``thaw``; the graph may run on from there.
 
         Raises:
-            ValueError: the snapshot is of another graph, by its sizes.
+            ValueError: the snapshot's sizes show that it is of another graph.
         """
         self.memory.restore(snapshot)
         self.clock.tick = snapshot.tick
         self.clock.stop_reason = None
+        self.clock.stopped_by = ""
         for block in self.blocks.values():
             block.thaw()

@@ -1,8 +1,8 @@
-"""Notes: what happens in a run beside its signals, as said by the runtime to whoever keeps the run.
+"""Notes: events of a run that are not signals, which the runtime gives to all recorders.
 
-Kinds the runtime writes: ``life`` (a change of the life cycle), ``overrun`` (a late tick),
-``fault`` (what ended a run before its time), ``caution`` (what a block wants its readers to know)
-and ``parameter`` (a live change). Recorders add ``dropped`` (ticks that were not kept).
+The runtime writes these kinds: ``life`` (a change of the life cycle), ``overrun`` (a late tick),
+``fault`` (the error that ended a run early), ``caution`` (a block's warning to those who read the
+result) and ``parameter`` (a live change). Recorders add ``dropped`` (ticks that were not kept).
 """
 
 from __future__ import annotations
@@ -34,13 +34,13 @@ class Note:
 
 @runtime_checkable
 class TakesNotes(Protocol):
-    """What a sink has beside ``record`` that wants to be told."""
+    """The method that a sink has, beside ``record``, if it wants to receive notes."""
 
     def note(self, note: Note) -> None:
-        """Keep a note; called on the control thread, so without waiting."""
+        """Keep a note. The control thread calls this, so it must not wait."""
 
 
 def parameter_note(change: ParameterChange) -> Note:
-    """What is noted of a live change; its ``data`` are the change's own attributes."""
+    """The note of a live change; its ``data`` are the attributes of the change."""
     text = f"{change.path}: {change.old} -> {change.new}"
     return Note(change.tick, "parameter", text, data=asdict(change))

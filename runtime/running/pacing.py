@@ -1,4 +1,4 @@
-"""When a tick may begin: at once, by wall time, or when the robot says so."""
+"""Decides when a tick may begin: at once, at a deadline of wall time, or when the robot says so."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from ..language.stages import ClockSpec
 from .memory import BoundGraph
 
 SPIN = 200e-6
-"""Seconds before a deadline at which sleeping ends and polling begins: more than a usual wake-up
-takes, little enough to leave the processor to others."""
+"""Seconds before a deadline at which sleeping ends and polling begins: longer than waking up
+usually takes, and short enough to leave the processor to others most of the time."""
 
 
 class TimeSource(Protocol):
@@ -23,7 +23,7 @@ class TimeSource(Protocol):
         """Nanoseconds since some fixed instant."""
 
     def sleep(self, seconds: float) -> None:
-        """Return about that much later."""
+        """Return after about ``seconds``."""
 
 
 class WallTime:
@@ -41,19 +41,20 @@ class Pacer(Protocol):
     skipped_periods: int
     """Periods that were left out to catch up."""
     in_a_row: int
-    """Overruns up to now without a tick in time between."""
+    """The number of overruns since the last tick that was in time."""
     missed_deadline: int
     """The deadline [ns] of the latest overrun; zero where only the robot knows."""
 
     def wait(self, tick: int) -> int:
-        """Return when ``tick`` may begin; the nanoseconds it is late by, zero if it is not."""
+        """Wait until ``tick`` may begin. Returns by how many nanoseconds it is late, or zero."""
 
 
 class Paced:
-    """Ticks at absolute deadlines of wall time: sleep, then spin.
+    """Lets ticks begin at absolute deadlines of wall time: it sleeps first, then polls the clock.
 
-    A tick that cannot begin in time is an overrun: it begins at the next whole period from the
-    start, and those after it follow on. So no time is made up by hurrying, and the phase stays.
+    A tick that cannot begin in time is an overrun: it begins at the next deadline, and all later
+    ticks are delayed with it. So lost time is never made up by faster ticks, and the phase of the
+    deadlines stays.
     """
 
     def __init__(self, rate: float, source: TimeSource) -> None:
@@ -88,20 +89,20 @@ class Paced:
         return late
 
     def _deadline(self, start: int, tick: int) -> int:
-        # from the whole count, so that a period of no whole nanoseconds does not add up errors
+        # computed from the count of periods, so that rounding errors do not add up
         periods = tick - self._first_tick + self.skipped_periods
         return start + int(periods * 1e9 / self._rate)
 
 
 class DrivesClock(Protocol):
-    """What a block has that can drive the clock: a robot or its simulator."""
+    """The method of a block that can drive the clock, such as a robot or its simulator."""
 
     def wait(self) -> int:
-        """Return when the next cycle begins; the number of cycles missed since the last call."""
+        """Wait for the next cycle. Returns how many cycles were missed since the last call."""
 
 
 class RobotDriven:
-    """Ticks when a block of the graph says so: the only one with a ``wait`` method."""
+    """Lets ticks begin when the robot says so: the graph's only block with a ``wait`` method."""
 
     def __init__(self, block: Block, rate: float) -> None:
         self.overruns = self.skipped_periods = self.in_a_row = self.missed_deadline = 0

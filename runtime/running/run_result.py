@@ -1,4 +1,4 @@
-"""What a run gives back: whether it succeeded and why, its metrics, times and signals."""
+"""The result of a run: whether it succeeded and why, its metrics, times and signals."""
 
 from __future__ import annotations
 
@@ -19,16 +19,18 @@ from .sinks import MemoryLog
 from .timing import BlockTimes
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class RunResult:
     """The outcome of one run.
 
-    ``success`` is true only if the run ended as its graph meant it to (its time was over, or a
-    block asked to stop), nothing failed, not even while stopping, and no block's metrics say
-    ``success`` is false. A run that a signal or an error ended never is a success.
+    ``success`` is true only if the run ended as its graph intends (its duration was over, or a
+    block asked to stop), nothing failed, not even while stopping, and no block has a metric
+    ``success`` that is false. A run that was ended by an error or a signal (SIGINT, SIGTERM) is
+    never a success.
 
-    ``metrics`` are those of all blocks but for ``success`` and ``reason``; where two blocks have
-    one name, each is called ``block.name``. ``log`` holds every tick, unless it was switched off.
+    ``metrics`` are the metrics of all blocks except ``success`` and ``reason``; where two blocks
+    have a metric of one name, each is called ``block.name``. ``log`` holds every tick, unless it
+    was switched off.
     """
 
     success: bool
@@ -45,17 +47,25 @@ class RunResult:
     error: RunError | None = None
     stop_problems: tuple[str, ...] = ()
     cautions: tuple[str, ...] = ()
-    """What a block says that whoever reads the result must know, such as a check that was waived."""
+    """What the blocks warn readers of the result of, such as a check that was waived."""
     parameter_changes: tuple[ParameterChange, ...] = ()
     warnings: tuple[str, ...] = ()
-    """What does not touch the run itself, such as a recording that is not whole."""
+    """Problems beside the run itself, such as a recording that is not complete."""
     log: MemoryLog | None = None
     graph: CheckedGraph | None = None
-    """What ran; ``None`` only in a result made by hand."""
+    """The graph that ran; ``None`` only in a result made by hand."""
+
+    def __repr__(self) -> str:
+        outcome = "success" if self.success else "no success"
+        logged = f", {len(self.log.ticks)} ticks logged" if self.log is not None else ""
+        return (
+            f"<RunResult: {outcome}: {self.reason}; {self.ticks} ticks, {self.duration_s:.6g} s"
+            f"{logged}, {len(self.metrics)} metrics, hash {self.run_hash or 'none'}>"
+        )
 
     @property
     def duration_s(self) -> float:
-        """The time of the graph that passed [s]."""
+        """The simulated or real time that the graph ran for [s]."""
         return self.ticks * self.period
 
     @property
@@ -107,6 +117,7 @@ class RunResult:
             "skipped_periods": self.skipped_periods,
             "metrics": {name: _plain(value) for name, value in self.metrics.items()},
             "blocks": {path: asdict(times) for path, times in self.blocks.items()},
+            "error": None if self.error is None else self.error.to_json(),
             "stop_problems": list(self.stop_problems),
             "cautions": list(self.cautions),
             "warnings": list(self.warnings),
@@ -123,11 +134,14 @@ def _plain(value: Any) -> Any:
 def merge_metrics(
     by_block: Mapping[str, Mapping[str, Metric]],
 ) -> tuple[dict[str, Metric], str | None, str | None]:
-    """All blocks' metrics as one, and what the blocks that judge the run say.
+    """Merge the metrics of all blocks, and find the verdicts of the blocks that judge the run.
+
+    A block judges the run if it has a metric ``success``.
 
     Returns:
-        The metrics, those of blocks with a metric ``success`` first; the ``reason`` of the first
-        of these that says no; and that of the first that says yes.
+        The merged metrics, in which those of judging blocks come first; the ``reason`` of the first
+        block whose ``success`` is false, or ``None``; and the ``reason`` of the first block whose
+        ``success`` is true, or ``None``.
     """
     by_block = dict(sorted(by_block.items(), key=lambda item: "success" not in item[1]))
     owners: dict[str, list[str]] = {}
@@ -150,7 +164,7 @@ def merge_metrics(
 
 @runtime_checkable
 class TakesResult(Protocol):
-    """What a sink has beside that wants to know what came of the run."""
+    """The method that a sink has, beside ``record``, if it wants the result of the run."""
 
     def finish(self, result: RunResult) -> list[str]:
-        """Take the result, last of all; gives warnings for the user."""
+        """Take the result, after everything else is closed. Returns warnings for the user."""

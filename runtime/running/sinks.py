@@ -1,9 +1,9 @@
-"""What is kept of a run: sinks get one call a tick and take one copy of the bus."""
+"""Sinks keep what happens in a run: each is called once a tick and may take one copy of the bus."""
 
 from __future__ import annotations
 
 from hashlib import blake2b
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,14 +20,17 @@ class Sink(Protocol):
         """Prepare, once, before the first tick."""
 
     def record(self, tick: int) -> None:
-        """Take the bus of this tick; called on the control thread, so one copy and no more."""
+        """Copy the bus of this tick. The control thread calls this, so it must do no more."""
 
     def close(self) -> None:
         """Finish, once, also after a failure."""
 
 
 class RunHash:
-    """BLAKE2b over the bytes of the bus of every tick: equal for equal runs, everywhere."""
+    """The run hash: BLAKE2b over the bytes of the bus after every tick.
+
+    Two runs have the same hash exactly if all their signals have the same bytes in every tick.
+    """
 
     def __init__(self) -> None:
         self._hash = blake2b(digest_size=16)
@@ -53,7 +56,7 @@ class MemoryLog:
     """Every tick of the bus in memory."""
 
     CHUNK = 1024
-    """Ticks that room is made for when ``ticks`` are not known or used up."""
+    """Ticks to make room for whenever the number of ticks is not known or has been exceeded."""
 
     def __init__(self) -> None:
         self._expected: int | None = None
@@ -64,11 +67,11 @@ class MemoryLog:
         self.layout: Layout | None = None
 
     def expect(self, ticks: int | None) -> None:
-        """Say, before ``open``, how many ticks to make room for at once; more are no error."""
+        """Say, before ``open``, how many ticks to make room for; recording more is no error."""
         self._expected = ticks
 
     def open(self, bound: BoundGraph) -> None:
-        """Make room and forget what was there."""
+        """Make room for the ticks and forget those of an earlier run."""
         self.layout = bound.memory.bus.layout
         self._bus = bound.memory.bus.buffer.data
         self._size = bound.memory.bus.buffer.size
@@ -92,11 +95,16 @@ class MemoryLog:
         self.ticks.append(tick)
 
     def note(self, note: Note) -> None:
-        """Keep it."""
+        """Keep the note."""
         self.notes.append(note)
 
     def close(self) -> None:
         """Nothing to do."""
+
+    def __getstate__(self) -> dict[str, Any]:
+        """What was recorded, without the views of memory that only a run needs."""
+        kept = {"_expected": None, "_chunks": [self.rows()], "_used": len(self.ticks)}
+        return {**kept, "ticks": self.ticks, "notes": self.notes, "layout": self.layout}
 
     def rows(self) -> NDArray[np.uint8]:
         """All recorded ticks, (ticks, bytes)."""

@@ -1,8 +1,9 @@
-"""The control loop: which calls a tick makes, in which order, and what it does when one fails.
+"""The control loop: which calls a tick makes, in which order, and what happens when one fails.
 
-A tick: all ``emit`` and ``step`` in the computed order, one finite check of the whole bus, all
-``update``, then one call of each recorder. For every phase of the hyperperiod these calls are one
-flat list made beforehand. Between two ticks changed parameters are taken over.
+A tick calls ``emit`` and ``step`` of the blocks in the computed order, checks once that the whole
+bus is finite, calls every ``update``, and then each recorder. For every phase of the hyperperiod
+these calls are one flat list that is made beforehand. Changed parameters are taken over between two
+ticks.
 """
 
 from __future__ import annotations
@@ -24,19 +25,20 @@ from .timing import Program
 
 
 class Ticker:
-    """Ticks a bound graph; who starts and stops its blocks is not its concern.
+    """Runs the ticks of a bound graph; its caller starts and stops the blocks.
 
     Args:
         bound: the graph.
         clock: how to pace it.
-        time_source: what time is.
+        time_source: where the time comes from.
         timing: whether to time every block.
         finite_check: whether to check every tick.
 
     Attributes:
-        records: called with the tick after each tick, and also after one that is not finite.
-        notes: called with what is to be noted beside: overruns, and what others ``tell``.
-        overruns_by_block: deadlines that passed while a block ran.
+        records: called with the tick after each tick, also after one with a value that is not
+            finite.
+        notes: called with every note: of overruns, and those given to ``tell``.
+        overruns_by_block: for each block, the number of deadlines that passed while it ran.
     """
 
     def __init__(
@@ -61,7 +63,7 @@ class Ticker:
         self._previous: Program | None = None
 
     def _make_programs(self) -> tuple[list[Program], list[Program]]:
-        """The different programs, and the one of each tick of the hyperperiod."""
+        """The different programs, and for each tick of the hyperperiod the program it runs."""
         graph = self.bound.graph
         specs = [graph.block(path) for path in graph.order]
         programs: dict[tuple[int, ...], Program] = {}
@@ -93,10 +95,10 @@ class Ticker:
         return Program(calls, owners)
 
     def advance(self, ticks: int | None = None) -> int:
-        """Run up to that many ticks (or until stopped) and nothing else; how many were run.
+        """Run up to ``ticks`` ticks, or without a limit until stopped. Returns how many were run.
 
-        The life cycle is the caller's: blocks must have been started. Ends early when a block
-        asks to stop or a signal does.
+        The blocks must have been started by the caller. The run ends early when a block or a
+        signal (SIGINT, SIGTERM) asks it to stop.
 
         Raises:
             RunError: a block failed, a value is not finite or the overrun policy says stop.
@@ -146,7 +148,7 @@ class Ticker:
         return tick - first
 
     def _record_last(self, tick: int) -> None:
-        """Keep the tick whose values are wrong, which is the one that somebody will look at."""
+        """Record the tick whose values are wrong, because it is the one to be looked at."""
         for record in self.records:
             record(tick)
 
@@ -172,13 +174,16 @@ class Ticker:
         return f"tick {tick} ({tick * self.bound.clock.base_period:.3f} s)"
 
     def tell(self, note: Note) -> None:
-        """Have a note kept by all who keep notes; one that fails to is no reason to stop."""
+        """Give a note to every keeper of notes; an error of a keeper does not stop the run."""
         for take in self.notes:
             with suppress(Exception):
                 take(note)
 
     def _count_overrun(self, tick: int, late: int) -> None:
-        """Blame the block that ran when the deadline of ``tick`` passed; maybe stop the run."""
+        """Count an overrun for the block that ran when the deadline of ``tick`` passed.
+
+        Raises ``RunError`` where the overrun policy says to stop.
+        """
         pacer = self.pacer
         assert pacer is not None
         block = ""

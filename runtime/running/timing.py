@@ -1,7 +1,8 @@
-"""Per-block times of a run: stamps into preallocated buffers, folded into statistics now and then.
+"""Measures the time that each block takes: time stamps go into buffers made beforehand, and are
+folded into statistics every ``STAMPED_TICKS`` ticks.
 
-The executor takes one stamp before the first call of a tick and one after each, so a call's time
-is the difference of two neighbours. Nothing here allocates an array while the run goes on.
+The executor takes one stamp before the first call of a tick and one after each call, so the time of
+a call is the difference of two neighbouring stamps. Nothing here allocates an array during a run.
 """
 
 from __future__ import annotations
@@ -17,13 +18,16 @@ from numpy.typing import NDArray
 STAMPED_TICKS = 128
 """Ticks that are stamped before they are folded; folding takes tens of microseconds."""
 KEPT_TICKS = 2048
-"""Ticks of a phase that percentiles are taken of: the last ones."""
+"""The number of last ticks of each phase from which the percentiles are computed."""
 
 
 @dataclass(frozen=True)
 class BlockTimes:
-    """What one block cost: its runs and the microseconds of one run; ``overruns`` counts the
-    deadlines that passed while it ran. Percentiles are over the last runs, the rest over all."""
+    """The number of runs of one block and the time of one run [us].
+
+    ``overruns`` counts the deadlines that passed while the block ran. Percentiles are taken over
+    the last runs, all other figures over all runs.
+    """
 
     calls: int = 0
     mean_us: float = 0.0
@@ -36,8 +40,8 @@ class BlockTimes:
 class Program:
     """The calls of one phase of the hyperperiod, in order, and the times they took.
 
-    ``owners`` gives the block's path of each call, empty for the runtime's own. A block that is
-    called twice in a tick (``emit`` and ``update``) counts as run once.
+    ``owners`` gives the path of the block that each call belongs to; it is empty for a call of the
+    runtime. A block that is called twice in a tick (``emit`` and ``update``) counts as one run.
     """
 
     def __init__(self, calls: Sequence[Callable[[], Any]], owners: Sequence[str]) -> None:
@@ -62,14 +66,14 @@ class Program:
         self.columns = {owner: column for owner, column in first.items() if owner}
 
     def keep(self, stamps: Sequence[int]) -> None:
-        """Keep the stamps [ns] of one tick: one before the first call and one after each."""
+        """Keep the stamps [ns] of one tick: one before the first call and one after each call."""
         self._pack(self._bytes, self._cursor, *stamps)
         self._cursor += 8 * self.width
         if self._cursor == len(self._bytes):
             self.fold()
 
     def fold(self) -> None:
-        """Take the kept stamps into the statistics, and start over."""
+        """Add the kept stamps to the statistics and empty their buffer."""
         rows = self._cursor // (8 * self.width)
         self._cursor = 0
         if rows == 0 or not self.calls:
@@ -88,19 +92,22 @@ class Program:
         self.ticks += rows
 
     def running_at(self, instant: int) -> str:
-        """The owner of the call that was running at ``instant`` in the last stamped tick."""
+        """The owner of the call that ran at ``instant`` [ns] of the last stamped tick."""
         ends = self._stamps[self._cursor // (8 * self.width) - 1, 1:].tolist()
         return next((o for o, end in zip(self.owners, ends, strict=True) if end > instant), "")
 
     def times(self, block: str) -> tuple[int, int, int, NDArray[np.int64]]:
-        """Runs, total and longest [ns] of a block in this phase, and the kept single times."""
+        """A block's times in this phase: runs, total and longest [ns], and the kept times [ns]."""
         column = self.columns[block]
         kept = self._kept[: min(self.ticks, KEPT_TICKS), column]
         return self.ticks, int(self._total[column]), int(self._maximum[column]), kept
 
 
 def block_times(programs: Sequence[Program], block: str, overruns: int = 0) -> BlockTimes:
-    """One block's times over all phases; each phase's kept runs weigh as all its runs."""
+    """One block's times over all phases.
+
+    In the percentiles the kept runs of a phase have the weight of all runs of that phase.
+    """
     parts = [p.times(block) for p in programs if block in p.columns and p.ticks]
     if not parts:
         return BlockTimes(overruns=overruns)

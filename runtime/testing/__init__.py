@@ -1,4 +1,5 @@
-"""For tests of blocks and graphs: a bench for one block, conformance checks, counted arrays."""
+"""Tools for tests of blocks and graphs: a bench for one block, a conformance suite for any block,
+and a counter of allocated arrays."""
 
 from .allocations import count_array_allocations
 from .bench import BlockBench

@@ -1,19 +1,19 @@
-"""Counts every array that NumPy allocates, also those that live for one expression.
+"""Counts every array that NumPy allocates, also those that live only within one expression.
 
-Through NumPy's own hook for memory handlers (NEP 49): within a ``with`` our handler counts and then
-lets the default one do the work. Views cost nothing and are not counted. Only the present thread is
-counted.
+It uses NumPy's hook for memory handlers (NEP 49): within a ``with`` statement our handler counts
+and then calls the default handler. Views allocate no data and are not counted. Only the arrays of
+the present thread are counted.
 
 NumPy offers the hook to C only, so it is reached with ctypes through the table of functions that is
-part of NumPy's binary interface. What could be had without that sees less:
+part of NumPy's binary interface. Ways without ctypes would miss arrays:
 
 * ``tracemalloc`` knows which arrays are alive when a snapshot is taken. An array that lives for one
   expression, as in ``a + b * c``, is gone by then: after a hundred of them it counts none.
-* A subclass of ``ndarray`` sees only operations on its own instances: neither ``np.zeros(3)`` nor what
-  a library makes inside, and the blocks would not run as they do without it.
+* A subclass of ``ndarray`` sees only operations on its own instances: neither ``np.zeros(3)`` nor
+  arrays made inside a library; and the blocks would not run as they do without it.
 
-Should a release of NumPy change what is relied on here, the counter says so when it is first used,
-and does not count wrongly.
+If a release of NumPy changes this interface, the counter raises an error when it is first used; it
+does not count wrongly.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ _SET_HANDLER, _GET_HANDLER, _DEFAULT_HANDLER = 304, 305, 306
 """Places in NumPy's table of C functions, which are fixed by its binary interface."""
 _PLACES_KEPT = 5
 _BOXED = 8
-"""Bytes of a single number."""
+"""The most bytes that count as a single number."""
 
 _Malloc = ctypes.CFUNCTYPE(ctypes.c_void_p, ctypes.c_void_p, ctypes.c_size_t)
 _Calloc = ctypes.CFUNCTYPE(ctypes.c_void_p, ctypes.c_void_p, ctypes.c_size_t, ctypes.c_size_t)
@@ -60,11 +60,12 @@ class _Handler(ctypes.Structure):
 
 @dataclass
 class Allocations:
-    """What was counted: arrays, their bytes, and where the first few were made.
+    """The number of arrays that were allocated, their bytes, and where the first few were made.
 
-    ``boxed`` counts apart what NumPy makes of single numbers, such as the factor in
-    ``np.multiply(u, 0.5, out=y)`` or the result of ``np.dot(u, u)``: up to eight bytes from its
-    cache, no more than a Python float costs. A 0-d array for the factor and ``out=`` avoid them.
+    ``boxed`` counts separately the small objects that NumPy makes for single numbers, such as the
+    factor in ``np.multiply(u, 0.5, out=y)`` or the result of ``np.dot(u, u)``. They take up to
+    eight bytes of a cache and cost no more than a Python float. A 0-d array for the factor, and
+    ``out=``, avoid them.
     """
 
     count: int = 0
@@ -74,7 +75,8 @@ class Allocations:
 
 
 class _Counter:
-    """The handler; one for the life of the process, as arrays keep what they came from."""
+    """The memory handler. There is one for the life of the process, because every array keeps a
+    reference to the handler that allocated it."""
 
     def __init__(self) -> None:
         core: Any = import_module("numpy._core._multiarray_umath")
@@ -87,7 +89,7 @@ class _Counter:
         base = _Handler.from_address(pointer(default.value, b"mem_handler"))
         self._base_malloc = _HeldMalloc(base.malloc)
         self._base_calloc = _HeldCalloc(base.calloc)
-        # free and realloc stay the default's own: arrays may outlive the interpreter's good health
+        # free and realloc stay the default's: arrays may be freed while the interpreter shuts down
         self._malloc = _Malloc(self._count_malloc)
         self._calloc = _Calloc(self._count_calloc)
         self._handler = _Handler(
@@ -145,7 +147,7 @@ class _Counter:
         return self._base_calloc(context, count, size)
 
     def install(self) -> Any:
-        """Make it the handler; the one before."""
+        """Make this NumPy's handler. Returns the handler that was in use."""
         return self._set(self._capsule)
 
     def restore(self, before: Any) -> None:

@@ -26,17 +26,18 @@ class BlockBench(Generic[B]):
 
     Args:
         block_type: the block's class.
-        params: its parameters as a graph file would give them, or a ready object.
+        params: its parameters as a graph file would give them, or as an object of ``Params``.
         robot: a robot's name, a description, or nothing.
-        rate: of the ticks [Hz].
+        rate: the base rate, of the ticks [Hz].
         period_ticks: ticks from one run of the block to the next; one step is one run.
-        folder: to which files that a parameter names are relative.
+        folder: the folder that files named by a parameter are relative to.
         dimensions: named sizes; they win over the robot's, and the block's own win over them.
-        wired: which inputs the block is told are wired; all by default. The others read their
-            defaults and cannot be set.
+        wired: the inputs that are wired; all by default. The others read their defaults and cannot
+            be set.
 
     Raises:
-        BlockError: the block cannot work with the robot, or with the rate; as a load report has it.
+        BlockError: the block cannot work with the robot or the rate; the message is the one that a
+            load report would have.
         KeyError: ``wired`` names an input that the block does not have.
 
     Example::
@@ -132,10 +133,10 @@ class BlockBench(Generic[B]):
         return getattr(self.block, port)
 
     def step(self, runs: int = 1) -> None:
-        """Run the block: ``step``, or ``emit`` and then ``update``; its period passes.
+        """Run the block, ``step``, or ``emit`` and then ``update``, and advance by its period.
 
-        After a step of a Moore block its outputs are what ``emit`` wrote before ``update``; call
-        ``bench.block.emit()`` to see what the new state says.
+        After a step of a Moore block its outputs are those that ``emit`` wrote before ``update``;
+        call ``bench.block.emit()`` for the outputs that follow from the new state.
         """
         block: Any = self.block
         for _ in range(runs):
@@ -152,7 +153,7 @@ class BlockBench(Generic[B]):
         return self.clock.stop_reason
 
     def snapshot(self) -> Snapshot:
-        """Everything the block remembers, its ports and the tick."""
+        """A copy of the block's state and ports, and the tick."""
         self.block.freeze()
         return self.memory.snapshot(self.clock.tick)
 

@@ -1,18 +1,18 @@
-"""What every block promises, as checks that need nothing but the block's class.
+"""Checks of what every block promises, which need nothing but the block's class.
 
-For a block of your own, one parametrised test::
+For a block of your own, write one parametrised test::
 
     @pytest.mark.parametrize("case", conformance_cases())
     def test_conformance(case: str) -> None:
         check_block(MyBlock, {"gain": 2.0}, cases=[case])
 
-A block that works with robots is checked with each it fits::
+A block that works with robots is checked with each robot that it fits::
 
     if not misfits(MyBlock, robot="go2"):
         check_block(MyBlock, robot="go2")
 
-Parameters and inputs come from ``Block.example_parameters`` and ``Block.example_inputs``, and where
-those say nothing inputs are random, finite and of order one.
+Parameters and inputs come from ``Block.example_parameters`` and ``Block.example_inputs``; inputs
+that these do not give are random, finite and of order one.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ from .examples import live_changes, random_inputs
 TICKS = 12
 """Ticks of each check: enough to fill most delays."""
 WARM_UP = 3
-"""Ticks before arrays are counted: libraries allocate what they keep in their first calls."""
+"""Ticks before arrays are counted: libraries allocate their lasting memory in their first calls."""
 
 
 class ConformanceError(AssertionError):
@@ -47,7 +47,7 @@ class ConformanceError(AssertionError):
 
 @dataclass(frozen=True)
 class Subject:
-    """A block under test and how to make one."""
+    """A block under test, with what is needed to make an instance of it."""
 
     block_type: type[Block]
     params: Mapping[str, Any]
@@ -57,7 +57,7 @@ class Subject:
     seed: int
 
     def bench(self) -> BlockBench[Block]:
-        """A new instance, on a bench of its own."""
+        """A new instance of the block, on a bench of its own."""
         return BlockBench(
             self.block_type,
             self.params,
@@ -67,7 +67,7 @@ class Subject:
         )
 
     def feed(self, bench: BlockBench[Block], ticks: int, seed: int = 0) -> Iterator[int]:
-        """Set new inputs for each tick, the same for the same seed; the caller steps."""
+        """Set new inputs for each tick, equal ones for equal seeds; the caller steps the block."""
         rng = np.random.default_rng([self.seed, seed])
         for tick in range(ticks):
             inputs = random_inputs(self.block_type, bench.block.context.dimensions, rng)
@@ -76,7 +76,7 @@ class Subject:
             yield tick
 
     def trace(self, bench: BlockBench[Block], ticks: int = TICKS, seed: int = 0) -> list[bytes]:
-        """Step with fed inputs; all memory after each tick."""
+        """Step the block with new inputs in each tick; returns its whole memory after each."""
         result = []
         for _ in self.feed(bench, ticks, seed):
             bench.step()
@@ -85,13 +85,13 @@ class Subject:
         return result
 
     def expect(self, holds: bool, message: str) -> None:
-        """Raise ``ConformanceError`` unless it holds."""
+        """Raise ``ConformanceError`` with the message unless ``holds`` is true."""
         if not holds:
             raise ConformanceError(f"{self.block_type.__name__}: {message}")
 
 
 def _documented(subject: Subject) -> None:
-    """The docstring is its own, and every port and parameter has a text."""
+    """The block has a docstring of its own, and every port and parameter has a text."""
     kind = subject.block_type
     subject.expect(bool((kind.__doc__ or "").strip()), "no docstring")
     subject.expect(kind.__doc__ != Block.__doc__, "no docstring of its own")
@@ -124,7 +124,7 @@ def _ports_used(subject: Subject) -> None:
 
 
 def _outputs_written(subject: Subject) -> None:
-    """Every run writes every output, whatever was in it; so nothing is remembered there."""
+    """Every run writes every output and does not depend on its old value, which is no state."""
     kind = subject.block_type
     clean, spoiled = subject.bench(), subject.bench()
     feed = zip(subject.feed(clean, TICKS), subject.feed(spoiled, TICKS), strict=True)
@@ -144,7 +144,7 @@ def _outputs_written(subject: Subject) -> None:
 
 
 def _inputs_kept(subject: Subject) -> None:
-    """Inputs are not written."""
+    """The block does not write its inputs."""
     bench = subject.bench()
     for _ in subject.feed(bench, TICKS):
         before = {port: [v.tobytes() for _, v in bench.get(port)] for port in bench.block.inputs}
@@ -155,7 +155,7 @@ def _inputs_kept(subject: Subject) -> None:
 
 
 def _machine(subject: Subject) -> None:
-    """A Moore block emits what follows from its state alone, and updates no output."""
+    """The outputs of a Moore block follow from its state alone, and ``update`` writes no output."""
     if not subject.block_type.is_moore():
         return
     one, other = subject.bench(), subject.bench()
@@ -182,14 +182,14 @@ def _machine(subject: Subject) -> None:
 
 
 def _deterministic(subject: Subject) -> None:
-    """Two instances with the same inputs do the same, to the last bit."""
+    """Two instances with the same inputs give the same outputs and states, to the last bit."""
     first, second = subject.trace(subject.bench()), subject.trace(subject.bench())
     for tick, (one, other) in enumerate(zip(first, second, strict=True)):
         subject.expect(one == other, f"two instances with equal inputs differ in tick {tick}")
 
 
 def _restored(subject: Subject) -> None:
-    """A restored block goes on as it did, and so does a new one restored to the same."""
+    """A block restored from a snapshot goes on as it did then, and so does a new instance."""
     bench = subject.bench()
     subject.trace(bench)
     snapshot = bench.snapshot()
@@ -210,7 +210,7 @@ def _live_parameters(subject: Subject) -> None:
     for name, params in live_changes(subject.bench().block.params):
         given = params.model_dump(round_trip=True)
         if misfits(subject.block_type, given, robot=subject.robot, rate=subject.rate):
-            continue  # a change that this robot does not bear
+            continue  # the block cannot work with this robot after the change
         changed = subject.bench()
         subject.trace(changed, WARM_UP)
         before = changed.snapshot()
@@ -230,7 +230,7 @@ def _live_parameters(subject: Subject) -> None:
 
 
 def _array_allocations(subject: Subject) -> None:
-    """No tick allocates more arrays than declared, and a budget has its reason."""
+    """No tick allocates more arrays than the block declares, and it gives a reason for any."""
     kind = subject.block_type
     subject.expect(
         kind.array_allocations == 0 or bool(kind.allocation_reason),
@@ -301,8 +301,10 @@ def misfits(
     robot: str | RobotDescription | None = None,
     rate: float = 500.0,
 ) -> tuple[str, ...]:
-    """Why the block cannot work with that robot, as a graph's load report would say it; empty where
-    it can. The arguments are those of ``check_block``."""
+    """Why the block cannot work with the robot, as a graph's load report would say it.
+
+    The result is empty if it can. The arguments are those of ``check_block``.
+    """
     given = block_type.example_parameters() if params is None else params
     ready = block_type.Params.model_validate(dict(given))
     description = find_robot(robot) if isinstance(robot, str) else robot
@@ -326,7 +328,7 @@ def check_block(
     seed: int = 0,
     cases: Iterable[str] | None = None,
 ) -> None:
-    """Check a block, all cases or those named.
+    """Check a block for all cases, or for those in ``cases``.
 
     Args:
         block_type: the block's class.
@@ -334,8 +336,8 @@ def check_block(
         robot: a robot's name or description, for blocks that need one.
         rate: how often it runs [Hz].
         dimensions: named sizes.
-        seed: of the random inputs.
-        cases: names from ``conformance_cases``.
+        seed: the seed of the random inputs.
+        cases: names from ``conformance_cases``; by default all of them.
 
     Raises:
         ConformanceError: the block breaks a promise.

@@ -1,4 +1,4 @@
-"""Random legal inputs for a block, from what its fields are called, shaped and allowed to be."""
+"""Random legal inputs for a block, chosen by the name, shape and allowed values of each field."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from ..language.signals import Field
 def random_value(
     name: str, field: Field, shape: tuple[int, ...], rng: np.random.Generator
 ) -> NDArray[Any]:
-    """A legal value of a field, all finite and of order one."""
+    """A random legal value of a field, whose elements are finite and of order one."""
     if field.dtype_name == "bool":
         return rng.random(shape) < 0.5
     if field.dtype_name == "int64":
@@ -51,7 +51,7 @@ def random_rotation(shape: tuple[int, ...], rng: np.random.Generator) -> NDArray
 def random_inputs(
     block_type: type[Block], dimensions: Mapping[str, int], rng: np.random.Generator
 ) -> dict[str, dict[str, Any]]:
-    """Values for all inputs of a block, by input and field; its own examples win."""
+    """Values for all inputs of a block, by input and field; the block's own examples win."""
     values: dict[str, dict[str, Any]] = {}
     for port, declared in block_type.inputs.items():
         values[port] = {
@@ -64,8 +64,8 @@ def random_inputs(
 
 
 def live_changes(params: Parameters) -> Iterator[tuple[str, Parameters]]:
-    """For every live parameter, and everything inside one, its path and parameters in which it
-    alone has another legal value."""
+    """For every live parameter, and every value inside one, its path and a set of parameters in
+    which it alone is changed to another legal value."""
     for name, info in type(params).model_fields.items():
         if is_live(info):
             for path, value in _others(getattr(params, name), info.annotation):
@@ -75,7 +75,7 @@ def live_changes(params: Parameters) -> Iterator[tuple[str, Parameters]]:
 
 
 def _with(params: Any, name: str, value: Any) -> Any:
-    """The model with one value replaced, or ``None`` where that is not legal or no other."""
+    """The model with one value replaced, or ``None`` if that is not legal or changes nothing."""
     data = {**params.model_dump(round_trip=True), name: value}
     try:
         changed = type(params).model_validate(data)
@@ -85,7 +85,7 @@ def _with(params: Any, name: str, value: Any) -> Any:
 
 
 def _others(value: Any, annotation: Any) -> Iterator[tuple[str, Any]]:
-    """Other values than this one, the first of which is usually legal, with the path inside it."""
+    """Values that differ from ``value``, usually legal ones first, each with the path inside it."""
     if isinstance(value, RootModel):
         yield from _others(value.root, None)
     elif isinstance(value, dict):

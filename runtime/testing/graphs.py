@@ -1,4 +1,4 @@
-"""Checked graphs made in Python, for tests of what runs them."""
+"""Makes checked graphs in Python, for tests of the code that runs graphs."""
 
 from __future__ import annotations
 
@@ -35,10 +35,10 @@ def checked_graph(
     clock: ClockSpec | None = None,
     name: str = "test",
 ) -> CheckedGraph:
-    """A graph from blocks by path; what it is made of is not checked.
+    """A graph from blocks by path; neither the blocks nor their wires are checked.
 
-    A wire is the source's ``block.port``, or a ``Wire``, whose ``delay`` becomes a delay block
-    called ``block/input_delay`` that runs when the source does.
+    A wire is the source's ``block.port``, or a ``Wire`` with a ``delay``, which becomes a delay
+    block called ``block/input_delay`` that runs in the same ticks as the source.
 
     Raises:
         LoopError: the blocks have no order.

@@ -1,4 +1,4 @@
-"""A stretch of a recorded run as a test of one block: state before it, inputs, expected outputs.
+"""A stretch of a recorded run as a test of one block: its first state, inputs and expected outputs.
 
 ``aloft test --from RECORDING --block NAME --ticks A:B`` writes such a test and the data beside it.
 """
@@ -26,15 +26,16 @@ Arrays = Mapping[str, NDArray[Any]]
 
 
 class StretchError(AssertionError):
-    """A block does not do what was recorded; the message says where first."""
+    """A block's outputs differ from the recorded ones; the message names the first difference."""
 
 
 @dataclass(frozen=True)
 class Setting:
-    """What a block was in, beside its parameters.
+    """What a block's outputs depend on besides its parameters and inputs.
 
-    ``rate`` [Hz] of the ticks, ``period_ticks`` between two runs, resolved ``dimensions``, the
-    ``wired`` inputs, the ``robot`` as plain data; and parameters that were changed live, by tick.
+    These are the base ``rate`` [Hz], the ``period_ticks`` between two runs, the sizes of the
+    ``dimensions``, the names of the ``wired`` inputs, the ``robot`` as plain data, and the
+    parameters that were changed live, by tick.
     """
 
     rate: float
@@ -50,9 +51,9 @@ class Stretch:
     """One block in some ticks of a run.
 
     Attributes:
-        ticks: those in which it ran, (n,).
-        state: every field of its state before the first of them, by ``port.field``.
-        before: its outputs before the first of them, by ``port.field``.
+        ticks: the ticks in which the block ran, (n,).
+        state: every field of its state before the first of these ticks, by ``port.field``.
+        before: its outputs before the first of these ticks, by ``port.field``.
         inputs, outputs: every field of its wired inputs and of its outputs, (n, ...).
     """
 
@@ -75,7 +76,7 @@ class Stretch:
 
     @classmethod
     def read(cls, path: Path) -> Self:
-        """What ``write`` has written. Raises ``OSError``."""
+        """Read a file that ``write`` has written. Raises ``OSError``."""
         groups: dict[str, dict[str, NDArray[Any]]] = {}
         with np.load(path, allow_pickle=False) as file:
             data = json.loads(str(file["setting"]))
@@ -108,11 +109,11 @@ class Stretch:
 
         Args:
             block_type: the block's class.
-            parameters: as a graph file would give them.
+            parameters: its parameters, as a graph file would give them.
             robot: the robot's name or description; by default the recorded description.
-            folder: to which files that a parameter names are relative.
-            rtol, atol: for floats, |found - expected| <= atol + rtol |expected|; with both zero
-                every bit must be the same. Whole numbers and flags always are.
+            folder: the folder that files named by a parameter are relative to.
+            rtol, atol: floats must satisfy |found - expected| <= atol + rtol |expected|; with both
+                zero every bit must be the same. Integers and booleans must always be equal.
 
         Raises:
             StretchError: an output differs; the message names the first one and its distance.
@@ -172,7 +173,7 @@ class Stretch:
 
 
 def _change(bench: BlockBench[Block], tick: int, name: str, value: Any) -> None:
-    """Change a parameter as it was changed in the run."""
+    """Change a parameter between two ticks, as it was changed in the run."""
     path = bench.block.context.path
     adjustment: Adjustment = adjust({path: bench.block}, {f"{path}.{name}": value})
     LiveParameters({path: bench.block}).apply(adjustment, tick)

@@ -59,11 +59,12 @@ def test_the_whole_way(recorded: Path, call: Call, call_json: CallJson) -> None:
     assert "is whole: nothing was done" in call("log", "repair", "count.rrd").stdout
     data = Path("count.rrd").read_bytes()
     Path("count.rrd").write_bytes(data[: len(data) * 2 // 3])
-    assert "aloft log repair count.rrd" in call_json("log", "info", "count.rrd", code=2)["reason"]
+    found = call_json("log", "info", "count.rrd")
+    assert found["whole"] is False and found["damage"] == []
     done = call("log", "repair", "count.rrd").stdout
-    assert "bytes of an incomplete message were removed" in done
+    assert "count.rrd is mended: it was not closed by who wrote it" in done
     done = call_json("log", "repair", "count.rrd")
-    assert done["closed"] is False and done["removed_bytes"] == 0
+    assert done["closed"] is True and done["removed_bytes"] == 0
     assert call_json("log", "info", "count.rrd")["ticks"] == done["ticks"] <= 100
 
 
@@ -76,12 +77,30 @@ def test_mcap(recorded: Path, call: Call) -> None:
     with open("count.mcap", "rb") as file:
         for schema, channel, message in make_reader(file).iter_messages():
             assert schema is not None and schema.encoding == "jsonschema"
+            assert channel.topic != "/log" or schema.name == "foxglove.Log"
             found.setdefault(channel.topic, []).append((message.log_time, json.loads(message.data)))
     name = next(iter(run.signals()))
     port, _, field = name.rpartition(".")
     messages = found[port.replace(".", "/")]
     assert [values[field] for _, values in messages] == run[name].tolist()
     assert [instant for instant, _ in messages] == [k * 10_000_000 for k in range(100)]
+
+
+def test_a_run_is_compared_with_itself_and_another(
+    recorded: Path, call: Call, call_json: CallJson
+) -> None:
+    said = call("log", "compare", "count.rrd", "count.rrd").stdout
+    assert "signals are equal in 100 ticks" in said
+    found = call_json("log", "compare", "count.rrd", "count.rrd")
+    assert found["align"] == "start" and found["signals"] == [] and found["equal"] >= 1
+    problem = call_json(
+        "log", "compare", "count.rrd", "count.rrd", "--align", "lift-off", code=2
+    )  # fmt: skip
+    assert problem["reason"] == "count.rrd has no lift-off; compare with --align start"
+    assert (
+        "none.rrd cannot be read"
+        in call_json("log", "compare", "count.rrd", "none.rrd", code=2)["reason"]
+    )
 
 
 def test_without_mcap_it_says_what_to_install(

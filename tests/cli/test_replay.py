@@ -125,4 +125,4 @@ def test_what_is_refused(recording: Path, folder: Path, call_json: CallJson) -> 
         name, "--from", "70", "--until", "60"
     )
     (folder / "other.rrd").write_bytes(b"RRF2 nothing")
-    assert "other.rrd cannot be read" in reason("other.rrd")
+    assert "other.rrd was cut off before its beginning was written" in reason("other.rrd")

@@ -212,3 +212,27 @@ def test_a_signal_between_two_runs_stops_all_seeds(folder: Path, start: Start) -
     assert process.returncode == 130, output + errors
     assert json.loads(output)["reason"].startswith("stopped by SIGINT after ")
     assert "Traceback" not in errors
+
+
+def test_a_block_that_raises_is_placed_in_the_users_file(
+    folder: Path, call: Call, call_json: CallJson
+) -> None:
+    block = (folder / "counter.py").read_text()
+    helper = "\n\ndef look_up():\n    return [1, 2][5]\n"
+    changed = block.replace("        self.count.value += 1.0", "        look_up()")
+    (folder / "counter.py").write_text(changed + helper)
+    line = len((changed + helper).splitlines())
+    place = f"{folder / 'counter.py'}:{line}"
+    data = call_json("run", "count.yaml", code=3)
+    assert data["error"]["where"] == place
+    assert data["error"]["block"] == "counter"
+    assert "in look_up" in data["error"]["traceback"]
+    notes = call_json("log", "info", data["recording"])["notes"]
+    (fault,) = [note for note in notes if note["kind"] == "fault"]
+    assert fault["text"].endswith(f"IndexError: list index out of range (at {place})")
+    short = call("run", "count.yaml", "--no-record", code=3).stderr
+    assert f"raised at {place}" in short
+    assert "Traceback" not in short
+    whole = call("run", "count.yaml", "--no-record", "--traceback", code=3).stderr
+    assert "Traceback (most recent call last)" in whole
+    assert "return [1, 2][5]" in whole

@@ -3,12 +3,14 @@
 import json
 import resource
 import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+import aloft
 import aloft.benchmarks
 import aloft.runtime.loading
 
@@ -71,6 +73,25 @@ def test_blocks_lists_and_describes(call: Call, call_json: CallJson) -> None:
 def test_blocks_names_what_is_alike(call: Call) -> None:
     done = call("blocks", "blocks.Gian", code=2)
     assert "there is no block called 'blocks.Gian'; the nearest are blocks.Gain" in done.stderr
+
+
+def test_shipped_graphs_have_addresses(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, call: Call, call_json: CallJson
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    listed = {row["graph"]: row for row in call_json("graphs")["graphs"]}
+    assert {"aloft:jump", "aloft:push", "aloft:robots/go2_jump"} <= set(listed)
+    assert all(row["summary"] for row in listed.values())
+    assert "aloft:jump" in call("graphs").stdout
+    assert "no problems" in call("check", "aloft:jump").stdout
+    assert aloft.load("aloft:jump").checked.name == "jump"
+    for wrong in ("jump.yaml", "graphs/jump.yaml", "aloft:jmp"):
+        (problem,) = call_json("run", wrong, code=2)["problems"]
+        assert problem["fix"].startswith("aloft:jump, which is shipped")
+
+
+def test_blocks_names_those_of_that_class(call: Call) -> None:
+    assert "the nearest are blocks.Gain" in call("blocks", "Gain", code=2).stderr
 
 
 def test_a_block_beside_the_graph_is_described(folder: Path, call: Call) -> None:
@@ -188,3 +209,15 @@ def test_a_bug_does_not_look_like_a_fall(
     result = call_json("check", "count.yaml", code=3)
     assert result == {"success": False, "reason": "bug: ZeroDivisionError: by zero"}
     assert "Traceback" in call("check", "count.yaml", code=3).stderr
+
+
+def test_a_verb_imports_no_other_verbs_file() -> None:
+    code = (
+        "import sys; sys.argv = ['aloft', 'check', 'nothing.yaml']\n"
+        "from aloft.cli import main\n"
+        "try: main()\n"
+        "except SystemExit: pass\n"
+        "print(sorted(m for m in sys.modules if m in ('aloft.cli.run', 'aloft.cli.plan')))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines()[-1] == "[]"

@@ -5,13 +5,13 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from aloft.cli.app import app
+from aloft.cli import make_app
 
 ROOT = Path(__file__).parent.parent.parent
 
 
 def view(*arguments: str | Path) -> tuple[int, str]:
-    result = CliRunner().invoke(app, ["view", *map(str, arguments)])
+    result = CliRunner().invoke(make_app(), ["view", *map(str, arguments)])
     return result.exit_code, result.output
 
 
@@ -31,7 +31,7 @@ def test_a_comparison_of_what_is_no_recording(tmp_path: Path) -> None:
     path = tmp_path / "a.rrd"
     path.write_text("nothing")
     code, text = view(path, "--with", path, "--save", tmp_path / "both.rrd", "--no-show")
-    assert code == 2 and "cannot be read" in text
+    assert code == 2 and "is not a recording: it does not begin like" in text
 
 
 def test_two_runs_become_one_file(tmp_path: Path) -> None:
@@ -40,7 +40,7 @@ def test_two_runs_become_one_file(tmp_path: Path) -> None:
     for path, seed in zip(paths, ("0", "1"), strict=True):
         arguments = [str(ROOT / "graphs" / "jump.yaml"), "--record", str(path), "-q"]
         runner.invoke(
-            app, ["run", *arguments, "--duration", "0.05 s", "--set", f"robot.seed={seed}"]
+            make_app(), ["run", *arguments, "--duration", "0.05 s", "--set", f"robot.seed={seed}"]
         )
     both = tmp_path / "both.rrd"
     code, _ = view(paths[0], "--with", paths[1], "--save", both, "--no-show")
@@ -55,7 +55,7 @@ def test_two_runs_become_one_file(tmp_path: Path) -> None:
 
 def test_many_seeds_are_not_shown() -> None:
     arguments = ["run", str(ROOT / "graphs" / "jump.yaml"), "--seeds", "0:2", "--rerun", "web"]
-    result = CliRunner().invoke(app, arguments)
+    result = CliRunner().invoke(make_app(), arguments)
     assert result.exit_code == 2 and "--rerun is for one run" in result.output
 
 
@@ -64,7 +64,7 @@ def test_without_a_screen_the_run_goes_on(monkeypatch: pytest.MonkeyPatch, tmp_p
         monkeypatch.delenv(name, raising=False)
     monkeypatch.chdir(ROOT)
     arguments = ["run", str(ROOT / "tests/cli/count.yaml"), "--rerun", "live", "--no-record"]
-    result = CliRunner().invoke(app, arguments)
+    result = CliRunner().invoke(make_app(), arguments)
     assert result.exit_code == 0
     assert (
         "the run is not shown: the Rerun viewer cannot be shown: there is no screen"

@@ -1,5 +1,6 @@
 """The facade: load once, run as often as you like, every signal of every tick at hand."""
 
+import pickle
 from pathlib import Path
 
 import numpy as np
@@ -72,3 +73,21 @@ def test_the_package_offers_what_users_need_and_nothing_else() -> None:
     assert set(aloft.__all__) <= set(dir(aloft))
     with pytest.raises(AttributeError, match="has no attribute 'laod'"):
         aloft.laod  # noqa: B018
+
+
+def test_short_texts_for_a_notebook(path: Path) -> None:
+    graph = aloft.load(path)
+    assert repr(graph) == "<Graph 'wave': 2 blocks at 100 Hz, 0.5 s>"
+    shown = repr(graph.run())
+    assert shown.startswith("<RunResult: success: ran to its end; 50 ticks, 0.5 s, 50 ticks logged")
+    assert len(shown) < 200
+
+
+def test_a_result_can_be_pickled(path: Path) -> None:
+    result = aloft.load(path).run()
+    again = pickle.loads(pickle.dumps(result))
+    assert again.to_json() == result.to_json()
+    np.testing.assert_array_equal(again.signal("wave.y.value"), result.signal("wave.y.value"))
+    np.testing.assert_array_equal(again.time, result.time)
+    empty = pickle.loads(pickle.dumps(aloft.load(path).run(log=False)))
+    assert empty.log is None

@@ -1,4 +1,4 @@
-"""Angular momentum about the centre of mass: damped, or as planned."""
+"""The task for the angular momentum about the centre of mass: it is damped, or follows the plan."""
 
 from __future__ import annotations
 
@@ -51,8 +51,8 @@ class AngularMomentum(Task[Feedback]):
     ``track_angular_momentum``, k_ref' + K_d (k_ref - k).
 
     The rows are the angular rows of the centroidal momentum matrix, in N m. The torso's error is in
-    rad/s^2; for equal say the weight here must be larger by 1/I^2, with I the inertia of the whole
-    robot: about 160 for a robot of 5 kg, and below one for a robot of 30 kg.
+    rad/s^2; for an equal effect the weight here must be larger by the factor 1/I^2, with I the
+    inertia of the whole robot: about 160 for a robot of 5 kg, and below one for a robot of 30 kg.
     """
 
     Gains = AngularGains
@@ -87,7 +87,8 @@ def angular_rows(
 
     Args:
         matrix: centroidal momentum matrix (6, n_velocities).
-        measured: its ``rate`` is the drift, the rate at zero acceleration.
+        measured: the measured momentum; its ``rate`` is the drift, the rate at zero acceleration.
+        target: the planned momentum and its rate.
     """
     rows.jacobian[:, :] = matrix[3:6]
     for i in range(3):

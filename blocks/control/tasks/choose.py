@@ -1,4 +1,4 @@
-"""From the list of tasks in a graph to task classes with their gains."""
+"""Finds the task classes for the list of tasks in a graph, with their gains."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class ChosenTask:
     entry: TaskChoice
 
     def gains(self, phase: str, shared: Parameters) -> Parameters:
-        """The task's gains in the phases called ``phase``, of which ``shared`` are the controller's.
+        """The task's gains in the phases called ``phase``; ``shared`` are the controller's gains.
 
         Raises:
             TaskChoiceError: the entry sets a gain that the task does not have, or a wrong value.
@@ -65,7 +65,7 @@ def choose_tasks(
     """The tasks of a list, in its order.
 
     Args:
-        folders: where modules of the user's may lie, the first choice first.
+        folders: the folders in which a user's modules are searched for, in this order.
 
     Raises:
         TaskChoiceError: there is no such task, or it is not a task.

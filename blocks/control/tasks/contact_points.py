@@ -1,4 +1,4 @@
-"""The contact points: at rest where they carry load, else on their way down or up."""
+"""The task for the contact points: at rest in stance, otherwise going down or lifting off."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class ContactGains(Parameters):
     """Weights and gains of the contact points."""
 
     stance_weight: float = parameter(
-        1e3, ge=0.0, text="weight of the rest of points in stance, per m/s^2"
+        1e3, ge=0.0, text="weight of the zero acceleration of points in stance, per m/s^2"
     )
     stance_damping: float = parameter(
         0.0, unit="1/s", ge=0.0, text="damping of the velocity of points in stance"
@@ -32,8 +32,8 @@ class ContactGains(Parameters):
     swing_weight: float = parameter(
         10.0,
         ge=0.0,
-        text="weight of points without load, per m/s^2: they go to the ground; in the thrust they "
-        "are damped across the foot",
+        text="weight of points without load, per m/s^2: they are pulled to the ground; in the "
+        "thrust they are damped across the foot",
     )
     swing_stiffness: float = parameter(
         3000.0, unit="1/s^2", ge=0.0, text="stiffness that pulls points without load to the ground"
@@ -62,8 +62,8 @@ class Points(NamedTuple):
 
 
 class Ankles(NamedTuple):
-    """The joint each foot rolls with: its place in the generalised velocity, -1 for none, and the
-    acceleration it should have [rad/s^2], (n_feet,) each."""
+    """The joint that each foot rolls with: its index in the generalised velocity, -1 for none, and
+    its desired acceleration [rad/s^2], (n_feet,) each."""
 
     place: Indices
     acceleration: Array
@@ -81,11 +81,11 @@ class ContactPoints(Task[ContactGains]):
     """Points in stance do not accelerate (paper, V, task 1): J a + drift = -damping velocity.
 
     Points that are not in stance while others are go to the ground, at the mean height of the
-    others: a task of zero acceleration never closes a gap, and a program that believes in a
-    hovering heel pushes with nothing. In THRUST such points are leaving the ground: those of a foot
-    with an ankle are free to rise, as the heels do while the toes still push, and damped across
-    their foot, while the ankle follows the plan with feedforward and feedback. A foot without
-    an ankle (see ``foot_joints.rolling_joint``) only has its velocity damped.
+    points in stance: a task of zero acceleration would never close a gap, and the program would
+    rely on the force of a heel that hovers. In THRUST such points are lifting off. Those of a foot
+    with an ankle are free to rise, as the heels do while the toes still push, and are damped across
+    their foot, while the ankle follows the plan with feedforward and feedback. The points of a foot
+    without an ankle (see ``foot_joints.rolling_joint``) only have their velocity damped.
     """
 
     Gains = ContactGains
@@ -138,10 +138,10 @@ def contact_rows(
     swing_damping: float,
     rows: TaskRows,
 ) -> None:
-    """Three rows a contact point: rest in stance, else a fall to the ground under the others.
+    """Three rows for each contact point: zero acceleration in stance, else a pull to the ground.
 
-    Elsewhere the height falls to the mean height of the points in stance as a spring and damper
-    would bring it there, and the velocity along the ground is damped.
+    A spring and a damper bring the height of a point that is not in stance to the mean height of
+    the points in stance, and its horizontal velocity is damped.
     """
     count = stance.shape[0]
     ground, loaded = 0.0, 0
@@ -175,7 +175,7 @@ def follow_plan(
     damping: float,
     ankles: Ankles,
 ) -> None:
-    """The acceleration that keeps every ankle on the plan: feedforward and feedback.
+    """Compute the acceleration that keeps every ankle on the plan: feedforward and feedback.
 
     Args:
         position: measured joint angles, (n_joints,).
@@ -205,15 +205,16 @@ def lifting_rows(
     ankle_weight: float,
     rows: TaskRows,
 ) -> None:
-    """Points that leave the ground before lift-off, over what ``contact_rows`` wrote for them.
+    """Replace the rows of ``contact_rows`` for points that leave the ground before lift-off.
 
-    They are free to rise; their velocity across the foot is damped, so that the foot rolls over its
-    other points and does not turn about them. How fast it rolls is the ankle's task, since the
-    motion of centre of mass and torso leaves it open. Points of a foot without an ankle have all
-    of their velocity damped.
+    These points are free to rise. Their velocity across the foot is damped, so that the foot rolls
+    over its other points and does not rotate about the vertical. A row for the ankle controls how
+    fast it rolls, because the motion of the centre of mass and the torso does not determine that.
+    Points of a foot without an ankle have all of their velocity damped.
 
     Args:
-        foot: the foot of every point; foot_rotation: from foot to world, (n_feet, 3, 3).
+        foot: the foot of every point, (n_contacts,).
+        foot_rotation: rotations from foot to world, (n_feet, 3, 3).
     """
     for i in range(stance.shape[0]):
         if stance[i]:

@@ -1,4 +1,4 @@
-"""Which joints belong to a leg, and which of them a foot rolls with."""
+"""The joints that belong to a leg, and the one among them that a foot rolls with."""
 
 from __future__ import annotations
 

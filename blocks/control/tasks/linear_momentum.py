@@ -1,4 +1,4 @@
-"""The centre of mass: linear momentum by feedforward and feedback."""
+"""The task for the centre of mass: linear momentum with feedforward and feedback."""
 
 from __future__ import annotations
 
@@ -50,8 +50,8 @@ class Centre(NamedTuple):
 class LinearMomentum(Task[Feedback]):
     """The centre of mass accelerates by a_ref + K_p (p_ref - p) + K_d (v_ref - v) (paper, V, task 2).
 
-    With the linear rows A_l of the centroidal momentum matrix and their drift, the rows are
-    A_l / m a = that - drift / m, in m/s^2.
+    With the linear rows A_l of the centroidal momentum matrix, their drift and the desired
+    acceleration c'' above, the rows are A_l / m a = c'' - drift / m, in m/s^2.
     """
 
     Gains = LinearGains
@@ -88,9 +88,9 @@ def linear_rows(
 
     Args:
         matrix: centroidal momentum matrix (6, n_velocities).
-        mass: of the robot [kg].
-        measured: its ``acceleration`` is the drift of the momentum [N], of which the first three
-            elements count.
+        mass: the mass of the robot [kg].
+        measured: the measured motion; its ``acceleration`` holds the drift of the momentum [N], of
+            which the first three elements are used.
     """
     np.divide(matrix[0:3], mass, rows.jacobian)
     for i in range(3):

@@ -1,4 +1,4 @@
-"""Joint angles: arms, waist and other joints that no other task says enough about."""
+"""The task for joint angles: arms, waist and other joints that no other task determines."""
 
 from __future__ import annotations
 
@@ -60,9 +60,9 @@ class Posture(Task[Feedback]):
     """Joints accelerate by q_ref'' + K_p (q_ref - q) + K_d (q_ref' - q'), one row a joint.
 
     Joints that the robot's description holds stand still at their angle; others follow the
-    target's joint angles. By default the joints are those of no leg, so that the program does not
-    swing arms to balance; with ``joints: ["*"]`` and a small weight it says which of many solutions
-    a redundant robot takes.
+    target's joint angles. By default the task is for the joints that belong to no leg, so that the
+    program does not swing the arms to balance. With ``joints: ["*"]`` and a small weight it chooses
+    one of the many solutions of a redundant robot.
     """
 
     Gains = PostureChoice

@@ -1,4 +1,4 @@
-"""What a task of the whole-body controller is, and how a graph chooses tasks."""
+"""The base class of the whole-body controller's tasks, and the entry by which graphs choose one."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ G = TypeVar("G")
 
 @dataclass(frozen=True)
 class Situation:
-    """What a task may look at. The signals are the controller's inputs: their arrays stay the same
-    and hold the values of the present tick."""
+    """The signals that a task may read. They are the controller's inputs: their arrays stay the
+    same objects and hold the values of the present tick."""
 
     robot: RobotDescription
     terms: DynamicsTerms
@@ -28,7 +28,7 @@ class Situation:
 
 
 class Task(ABC, Generic[G]):
-    """Something the whole-body controller wants of the generalised acceleration a: J a = d.
+    """A desired value of some function of the generalised acceleration a: J a = d.
 
     A task has a number of rows, fixed when the graph is loaded. In every tick with a point in
     stance it writes their Jacobian J (n, n_velocities), their desired values d (n,) and their
@@ -45,7 +45,7 @@ class Task(ABC, Generic[G]):
     under the same name are taken from there unless the task's entry in the list sets them."""
 
     def __init__(self, situation: Situation, rows: TaskRows) -> None:
-        """Keep what the task works with; a derived class may allocate its scratch memory here."""
+        """Keep the situation and the rows; a derived class may allocate its scratch memory here."""
         self.situation = situation
         self.rows = rows
 
@@ -56,14 +56,14 @@ class Task(ABC, Generic[G]):
 
     @classmethod
     def misfits(cls, robot: RobotDescription, gains: Any) -> Iterable[str]:
-        """What about that robot does not fit these ``Gains``, such as a joint that it does not have.
+        """Sentences about misfits of these ``Gains`` and the robot, such as an unknown joint.
 
-        Asked at load, once for each kind of phase; the sentences become problems of the load report.
+        Called at load, once for each kind of phase; the load report contains the sentences.
         """
         return ()
 
     def prepare(self, gains: Any) -> G:
-        """What ``update`` gets for these ``Gains``; called when they are set, not in the tick."""
+        """Convert ``Gains`` to the argument of ``update``; called only when the gains are set."""
         return gains  # type: ignore[no-any-return]
 
     @abstractmethod
@@ -74,7 +74,7 @@ class Task(ABC, Generic[G]):
 class TaskChoice(Parameters):
     """An entry in the controller's list of tasks: a task with gains of its own."""
 
-    task: str = parameter(text="a task of ours by its name, or module:Class")
+    task: str = parameter(text="the name of one of aloft's tasks, or module:Class")
     gains: dict[str, Any] = parameter({}, text="the task's gains in all phases")
     stand: dict[str, Any] = parameter({}, text="other gains while standing and squatting")
     thrust: dict[str, Any] = parameter({}, text="other gains in the thrust")

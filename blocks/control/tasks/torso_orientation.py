@@ -1,4 +1,4 @@
-"""The torso's orientation."""
+"""The task for the torso's orientation."""
 
 from __future__ import annotations
 
@@ -46,9 +46,9 @@ class Attitude(NamedTuple):
 
 
 class TorsoOrientation(Task[Feedback]):
-    """The base turns by K_p Log(R' R_ref) + K_d (w_ref - w), body frame (paper, V, task 3).
+    """The base's angular acceleration is K_p Log(R' R_ref) + K_d (w_ref - w) (paper, V, task 3).
 
-    The rows pick the base's angular acceleration [rad/s^2, body].
+    The rows select the base's angular acceleration [rad/s^2, body].
     """
 
     Gains = TorsoGains

@@ -156,13 +156,13 @@ def test_every_signal_of_every_tick_is_read_back_exactly(
 def test_states_and_events_are_said_by_name(recorded: tuple[CheckedGraph, RunResult, Path]) -> None:
     *_, path = recorded
     states = batches(path, "/states/**")
-    batch = states["states/robot/truth/stage"]
+    batch = states["states/robot.stage"]
     assert batch["StateChange:state"].flatten().to_pylist() == ["ground", "air", "ground"]
     assert batch["tick"].to_pylist() == [0, 100, 200]
-    fields = ("stage", "closed/toe", "closed/heel")
-    robots = ("robot", "leg/robot")
-    assert set(states) == {f"states/{robot}/truth/{f}" for robot in robots for f in fields}
-    toe = states["states/robot/truth/closed/toe"]
+    fields = ("stage", "closed.toe", "closed.heel")
+    robots = ("robot", "leg.robot")
+    assert set(states) == {f"states/{robot}.{field}" for robot in robots for field in fields}
+    toe = states["states/robot.closed.toe"]
     assert toe["StateChange:state"].flatten().to_pylist() == ["closed", "no", "closed"]
     from rerun.chunk import RrdReader
 
@@ -182,7 +182,7 @@ def test_the_robot_is_posed_in_space(recorded: tuple[CheckedGraph, RunResult, Pa
     assert port_with_pose(make_header(graph, result.log.layout, b"")) == "robot.truth"
     found = batches(path, "/world/**")
     links = {f"world/robot/{name}" for name in ("body", "thigh", "shank")}
-    others = ("contact_forces", "com", "com_projection", "support_polygon")
+    others = ("contact_forces", "com", "com_projection", "eye", "support_polygon")
     assert set(found) == links | {f"world/{name}" for name in others}
     lines = found["world/support_polygon"]["LineStrips3D:strips"]
     assert [len(row) for row in lines] == [0] * 60  # both points are in one place

@@ -89,7 +89,7 @@ def ticks_in(path: Path) -> list[int]:
     """What a file that is being written has by now."""
     try:
         return read(path).ticks.tolist()
-    except RecordingError:
+    except (RecordingError, FileNotFoundError):
         return []
 
 
@@ -172,10 +172,10 @@ def test_a_recorder_that_is_stuck_for_very_long_is_given_up(
         os.kill(process_of(recorder), signal.SIGKILL)
     assert result.success and result.ticks == 20_000
     assert recorder.dropped > 10_000
-    waits, dropped, stuck = result.warnings
+    waits, stuck = result.warnings
     assert waits.endswith("the run waits for it")
-    assert dropped == f"{recorder.dropped} ticks were run but not recorded"
     assert "the recording is not whole: the recorder has been stuck for" in stuck
+    assert f"{recorder.missing} were run but are not recorded" in stuck
 
 
 def test_what_finds_no_room_is_counted_and_noted(tmp_path: Path) -> None:
@@ -198,13 +198,19 @@ def test_what_finds_no_room_is_counted_and_noted(tmp_path: Path) -> None:
 
 def test_the_run_goes_on_when_the_recorder_is_killed(tmp_path: Path) -> None:
     recorder = Recorder(tmp_path / "a.rrd", flush_period=0.05)
-    wait = At(999, lambda: until(lambda: len(ticks_in(tmp_path / "a.rrd")) >= 1000))
+    wait = At(999, lambda: until(lambda: len(ticks_in(tmp_path / "a.part.rrd")) >= 1000))
     kill = At(2000, lambda: os.kill(process_of(recorder), signal.SIGKILL))
     result = run(graph(5000), sinks=[recorder, wait, kill])
     assert result.success and result.ticks == 5000
-    assert "is not whole: the recorder was killed by signal 9" in result.warnings[-1]
-    recorded = read(tmp_path / "a.rrd")
+    recorded = read(tmp_path / "a.part.rrd")
     count = len(recorded.ticks)
+    warning = result.warnings[-1]
+    assert "is not whole: the recorder was killed by signal 9" in warning
+    # every tick is accounted for, also those that waited in the ring
+    assert f"{count} ticks are in" in warning
+    assert f"{5000 - count} were run but are not recorded" in warning
+    assert recorder.missing == 5000 - count
+    assert recorder.recording == tmp_path / "a.part.rrd"
     assert count >= 1000  # what was flushed
     assert result.log is not None
     assert recorded.rows.tobytes() == result.log.rows()[:count].tobytes()
@@ -216,7 +222,7 @@ def test_a_full_disk_is_a_warning(tmp_path: Path) -> None:
     recorder = Recorder(tmp_path / "a.rrd", on_warning=told.append)
 
     def fill() -> None:
-        limit = 600_000
+        limit = 500_000
         resource.prlimit(process_of(recorder), resource.RLIMIT_FSIZE, (limit, limit))
 
     result = run(graph(20_000), sinks=[recorder, At(10, fill)])
@@ -310,3 +316,59 @@ def test_overruns_and_faults_are_noted(tmp_path: Path) -> None:
     assert len(overruns) == result.overruns
     (fault,) = [note for note in recorded.notes if note.kind == "fault"]
     assert fault.level == "ERROR" and "the spring broke" in fault.text and fault.tick == 40
+
+
+def test_two_runs_into_one_file_spoil_nothing(tmp_path: Path) -> None:
+    path = tmp_path / "a.rrd"
+    second = Recorder(path)
+    results: list[RunResult] = []
+    other = At(50, lambda: results.append(run(graph(300), sinks=[second])))
+    first = Recorder(path)
+    result = run(graph(1000), sinks=[first, other])
+    assert result.warnings == ()
+    (warning,) = results[0].warnings
+    assert (
+        warning
+        == f"another run is being recorded in {path}; this one goes to {path.parent}/a-2.rrd"
+    )
+    assert first.recording == path and second.recording == tmp_path / "a-2.rrd"
+    assert_whole(read(path), result)
+    assert_whole(read(tmp_path / "a-2.rrd"), results[0])
+    assert sorted(file.name for file in tmp_path.iterdir()) == ["a-2.rrd", "a.rrd"]
+
+
+def test_a_file_that_somebody_removes_is_written_again(tmp_path: Path) -> None:
+    recorder = Recorder(tmp_path / "a.rrd")
+    remove = At(500, lambda: (tmp_path / "a.part.rrd").unlink())
+    result = run(graph(1000), sinks=[recorder, remove])
+    (warning,) = result.warnings
+    assert "somebody removed" in warning and "a.part.rrd while the run went on" in warning
+    run_again = read(tmp_path / "a.rrd")
+    assert result.log is not None
+    assert run_again.whole and run_again.rows.tobytes() == result.log.rows().tobytes()
+
+
+def test_earlier_recordings_are_kept_if_that_is_wished(tmp_path: Path) -> None:
+    path = tmp_path / "a.rrd"
+    for ticks in (10, 20, 30):
+        recorder = Recorder(path, keep=1)
+        run(graph(ticks), sinks=[recorder])
+    assert "is kept as" in recorder.before and "a.1.rrd" in recorder.before
+    assert len(read(path).ticks) == 30
+    assert len(read(tmp_path / "a.1.rrd").ticks) == 20
+    recorder = Recorder(path)
+    run(graph(5), sinks=[recorder])
+    assert "it replaces the one of 20" in recorder.before
+    assert len(read(path).ticks) == 5
+
+
+def test_what_a_killed_recorder_left_is_kept(tmp_path: Path) -> None:
+    recorder = Recorder(tmp_path / "a.rrd", flush_period=0.05)
+    wait = At(999, lambda: until(lambda: len(ticks_in(tmp_path / "a.part.rrd")) >= 1000))
+    kill = At(1000, lambda: os.kill(process_of(recorder), signal.SIGKILL))
+    run(graph(1100), sinks=[recorder, wait, kill])
+    result = run(graph(10), sinks=[Recorder(tmp_path / "a.rrd")])
+    (warning,) = result.warnings
+    assert "a.part.rrd was left by a run whose recorder was killed; it is kept as" in warning
+    assert len(read(tmp_path / "a-cut.rrd").ticks) >= 1000
+    assert len(read(tmp_path / "a.rrd").ticks) == 10

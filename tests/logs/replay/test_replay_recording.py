@@ -7,7 +7,7 @@ import pytest
 
 from aloft.blocks.general.gain import Gain
 from aloft.blocks.general.sine_wave import SineWave
-from aloft.logs.file.reader import _stream
+from aloft.logs.file.contents import all_tables
 from aloft.logs.replay.replay import ReplayError, replay
 from aloft.logs.replay.replay_recording import write_replay
 from aloft.logs.replay.replayable import KeptRun, Keyframes
@@ -29,7 +29,7 @@ def test_both_are_in_the_file(tmp_path: Path) -> None:
     path = write_replay(tmp_path / "new" / "both.rrd", recorded, done)
     found: dict[str, list[np.ndarray]] = {}
     ticks: dict[str, list[np.ndarray]] = {}
-    for entity, batch in _stream(path, "/**"):
+    for entity, batch in all_tables(path, "/**"):
         if "Scalars:scalars" in batch.schema.names:
             values = batch["Scalars:scalars"].flatten().to_numpy().reshape(-1, 2)
             found.setdefault(entity, []).append(values)

@@ -37,5 +37,5 @@ def test_a_link_without_shapes_has_bones_to_its_joints_and_contact_points() -> N
 def test_a_robot_is_measured_by_its_reach() -> None:
     assert 0.3 < reach_of(BRUCE) < 0.6
     weight = 9.81 * BRUCE.total_mass
-    assert weight * force_scale(BRUCE) == pytest.approx(0.2 * reach_of(BRUCE), rel=0.03)
+    assert weight * force_scale(BRUCE) == pytest.approx(0.6 * reach_of(BRUCE), rel=0.03)
     assert np.isfinite(reach_of(BRUCE.changed(joints=(), links=BRUCE.links[:1])))

@@ -55,7 +55,12 @@ def test_all_of_the_jump_is_found() -> None:
     assert (ports.plan, ports.feet, ports.push) == ("plan.reference", "landing.feet", "push.push")
     assert ports.friction == header.parameters["wbc.friction"]
     lanes = {lane.entity for lane in main_lanes(header)}
-    assert {"states/phase/phase/phase", "states/wbc/command/solved"} <= lanes
+    assert {
+        "states/phase",
+        "states/plan.phase",
+        "states/solved",
+        "states/active.left_heel",
+    } <= lanes
     fields = {field.name: field for field in header.bus.fields}
     limits = dict(limits_of(fields["robot.truth.motor_torque"], header))
     peak = find_robot("bruce").profiles["koala"].peak_torque

@@ -131,3 +131,12 @@ def test_conversion_there_and_back_is_the_identity(
 
 
 BASE = ("m", "kg", "s", "A", "K", "mol", "cd", "rad")
+
+
+def test_fractions_and_hours() -> None:
+    assert parse_quantity("1/3 kHz", "Hz") == pytest.approx(1000.0 / 3.0, rel=1e-15)
+    assert parse_quantity("100/3", "Hz") == pytest.approx(100.0 / 3.0, rel=1e-15)
+    assert parse_quantity("1 h", "s") == 3600.0
+    assert parse_quantity("1 /s", "Hz") == 1.0
+    with pytest.raises(UnitError, match="divides by zero"):
+        parse_quantity("1/0 kHz", "Hz")

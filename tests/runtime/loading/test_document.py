@@ -1,6 +1,7 @@
 """YAML as people mean it, with the place of every value, and its mistakes as problems."""
 
 import math
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -8,7 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from aloft.runtime.language.stages import Position
-from aloft.runtime.loading.document import read_mapping, read_value
+from aloft.runtime.loading import check
+from aloft.runtime.loading.document import read_file, read_mapping, read_value
 from aloft.runtime.loading.nodes import MapNode, ScalarNode, plain, text_of
 from aloft.runtime.loading.problems import Problems
 
@@ -173,3 +175,38 @@ def test_no_text_crashes_the_reader(text: str) -> None:
     problems = Problems()
     read_mapping(text, "f", problems)
     problems.report("f").text()
+
+
+@pytest.mark.parametrize(
+    ("encoding", "where", "found", "fix"),
+    [
+        ("latin-1", "2:5", "byte 0xf6, in Latin-1 'ö'", "ISO-8859-1"),
+        ("utf-16", "1:1", "UTF-16", "UTF-16"),
+    ],
+)
+def test_a_file_that_is_not_utf_8(
+    tmp_path: Path, encoding: str, where: str, found: str, fix: str
+) -> None:
+    path = tmp_path / "graph.yaml"
+    path.write_bytes("rate: 1\n# grö\n".encode(encoding))
+    problems = Problems()
+    assert read_file(path, "graph.yaml", problems) is None
+    (problem,) = problems.report("graph.yaml").problems
+    assert str(problem.where) == f"graph.yaml:{where}"
+    assert problem.found == found
+    assert f"iconv -f {fix} -t UTF-8 graph.yaml" in problem.fix
+
+
+def test_a_byte_order_mark_is_no_mistake(tmp_path: Path) -> None:
+    (tmp_path / "graph.yaml").write_text("rate: 1\n", encoding="utf-8-sig")
+    problems = Problems()
+    tree = read_file(tmp_path / "graph.yaml", "graph.yaml", problems)
+    assert tree is not None and tree.entries[0].key == "rate"
+
+
+def test_letters_that_a_name_cannot_have(tmp_path: Path) -> None:
+    path = tmp_path / "graph.yaml"
+    path.write_text("rate: 100 Hz\nblocks:\n  größe: {use: blocks.SineWave}\n")
+    (problem,) = check(path).problems
+    assert problem.expected.startswith("a letter from a to z or A to Z")
+    assert problem.fix == "groesse"

@@ -216,3 +216,49 @@ def test_a_missing_file_and_a_folder_are_problems(tmp_path: Path) -> None:
     assert [p.code for p in check(tmp_path).problems] == ["file"]
     (tmp_path / "latin.yaml").write_bytes(b"rate: \xe9")
     assert "not UTF-8" in check(tmp_path / "latin.yaml").problems[0].message
+
+
+def test_the_fix_of_a_rate_is_a_fraction_where_decimals_are_endless() -> None:
+    block = "  one: {{use: blocks.Constant, with: {{value: [1.0]}}, rate: {}}}\n"
+    with pytest.raises(LoadError) as caught:
+        graph_of(block.format("34 Hz"))
+    (problem,) = caught.value.report.problems
+    assert problem.fix == "rate: 50 Hz"
+    assert problem.nearest == ("50 Hz", "100/3 Hz")
+    assert graph_of(block.format("100/3 Hz")).blocks[0].period_ticks == 3
+
+
+def test_one_source_is_not_proposed_twice() -> None:
+    wave = "  {}: {{use: blocks.SineWave}}\n"
+    total = "  total: {use: blocks.Sum, in: {a: first.y}}\n"
+    with pytest.raises(LoadError) as caught:
+        graph_of(wave.format("first") + wave.format("second") + total)
+    (problem,) = caught.value.report.problems
+    assert problem.fix == "in: {b: second.y}"
+    with pytest.raises(LoadError) as caught:
+        graph_of(wave.format("first") + "  total: {use: blocks.Sum}\n")
+    fixes = [problem.fix for problem in caught.value.report.problems]
+    assert fixes == ["in: {a: first.y}", "in: {b: block.port}"]
+    with pytest.raises(LoadError) as caught:
+        graph_of(wave.format("first") + total)
+    assert caught.value.report.problems[0].fix == "in: {b: block.port}"
+
+
+def test_the_offset_of_a_use_shifts_faster_blocks_within_it(tmp_path: Path) -> None:
+    inner = """
+outputs: {y: fast.y}
+blocks:
+  slow: {use: blocks.SineWave}
+  fast: {use: blocks.SineWave, rate: 50 Hz}
+"""
+    (tmp_path / "part.yaml").write_text(inner)
+    use = "rate: 100 Hz\nblocks:\n  part: {use: part.yaml, rate: 10 Hz, offset: OFFSET}\n"
+    graph = load_text(use.replace("OFFSET", "5"), tmp_path / "graph.yaml")
+    times = {spec.path: (spec.period_ticks, spec.offset_ticks) for spec in graph.blocks}
+    assert times == {"part/slow": (10, 5), "part/fast": (2, 1)}
+    again = load_text(graph.text, tmp_path / "again.yaml")
+    assert {s.path: (s.period_ticks, s.offset_ticks) for s in again.blocks} == times
+    with pytest.raises(LoadError, match="part/slow runs every 10 ticks"):
+        load_text(use.replace("OFFSET", "10"), tmp_path / "graph.yaml")
+    with pytest.raises(LoadError, match="offset"):
+        load_text(use.replace("OFFSET", "-1"), tmp_path / "graph.yaml")

@@ -11,9 +11,11 @@ from typing import Any
 import numpy as np
 
 from ...runtime.language.errors import AloftError
-from .format import RecordedField, nanoseconds
-from .reader import RecordedRun
-from .table import chosen, flat_columns, units
+from ..file.format import RecordedField, nanoseconds
+from ..file.reader import RecordedRun
+from ..file.table import chosen
+from .known_channels import known_channels
+from .named_columns import NamedColumn, named_columns
 
 
 class ExportError(AloftError):
@@ -23,24 +25,27 @@ class ExportError(AloftError):
 def export_csv(run: RecordedRun, path: Path, names: Sequence[str] = ()) -> None:
     """Write one line for each tick and one column for each number.
 
+    Columns are called after joints, contact points and axes, as ``robot.joints.position[hip]``.
     Floats have as many digits as are needed to read back the same number.
 
     Raises:
         KeyError: no signal has such a name.
         OSError: the file cannot be written.
     """
-    columns = flat_columns(run, names)
+    columns = named_columns(run, names)
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
-        writer.writerow(columns)
-        lists = [values.tolist() for values in columns.values()]
+        writer.writerow([column.name for column in columns])
+        lists = [column.values.tolist() for column in columns]
         writer.writerows(zip(*lists, strict=True))
 
 
 def export_parquet(run: RecordedRun, path: Path, names: Sequence[str] = ()) -> None:
     """Write one row for each tick and one column for each number.
 
-    Each column has its unit as metadata, and the table has the graph's name and text.
+    The columns are called as in ``export_csv``. The metadata of each column has its ``unit``,
+    ``frame``, the ``signal``, the ``element`` (such as the joint) and ``text``, as far as there are
+    any; that of the table has the graph's name and text, its rate, and the robot's joints.
 
     Raises:
         KeyError: no signal has such a name.
@@ -49,21 +54,35 @@ def export_parquet(run: RecordedRun, path: Path, names: Sequence[str] = ()) -> N
     import pyarrow as pa  # comes with Rerun
     from pyarrow import parquet
 
-    found = units(run, names)
-    columns = flat_columns(run, names)
-    arrays = [pa.array(np.ascontiguousarray(values)) for values in columns.values()]
+    columns = named_columns(run, names)
+    arrays = [pa.array(np.ascontiguousarray(column.values)) for column in columns]
+    robot = run.header.robot
+    about = {
+        "aloft.graph": run.header.graph,
+        "aloft.name": run.header.name,
+        "aloft.rate_hz": repr(run.header.base_rate),
+        "aloft.robot": robot.name if robot else "",
+        "aloft.joints": json.dumps([joint.name for joint in robot.joints] if robot else []),
+    }
     schema = pa.schema(
         [
-            pa.field(name, array.type, metadata={"unit": found[name]} if name in found else None)
-            for name, array in zip(columns, arrays, strict=True)
+            pa.field(column.name, array.type, metadata=_metadata(column))
+            for column, array in zip(columns, arrays, strict=True)
         ],
-        metadata={"aloft.graph": run.header.graph, "aloft.name": run.header.name},
+        metadata=about,
     )
     parquet.write_table(pa.Table.from_arrays(arrays, schema=schema), path)
 
 
+def _metadata(column: NamedColumn) -> dict[str, str] | None:
+    return {key: value for key, value in column.about.items() if value} or None
+
+
 def export_mcap(run: RecordedRun, path: Path, names: Sequence[str] = ()) -> None:
-    """Write one channel for each port, with one JSON message for each tick, for Foxglove and others.
+    """Write what Foxglove, PlotJuggler and ROS 2's tools know, and every signal as JSON.
+
+    The first are the channels of ``known_channels``, left out if only some signals are asked for.
+    Each port has a channel of its own, with one JSON message for each tick.
 
     Raises:
         ExportError: the library ``mcap`` is not installed.
@@ -82,6 +101,13 @@ def export_mcap(run: RecordedRun, path: Path, names: Sequence[str] = ()) -> None
         writer = Writer(file)
         writer.start(library="aloft")
         writer.add_metadata("aloft", {"graph": run.header.graph, "name": run.header.name})
+        for known in () if names else known_channels(run):
+            schema_id = writer.register_schema(
+                known.type, known.schema_encoding, known.schema.encode()
+            )
+            channel = writer.register_channel(known.topic, known.encoding, schema_id)
+            for instant, data in known.messages:
+                writer.add_message(channel, instant, data, instant)
         for port, fields in ports.items():
             schema = json.dumps(_json_schema(port, fields)).encode()
             schema_id = writer.register_schema(port, "jsonschema", schema)

@@ -1,0 +1,1 @@
+"""Recordings for other programs, and the differences between two of them."""

@@ -1,0 +1,356 @@
+"""The messages of a recording's file: framed, sealed with a checksum, and found again in any damage.
+
+An ``.rrd`` file has a head of twelve bytes and then messages. A message has its kind and its
+length, eight bytes each, and then that many bytes, which are a protobuf message. A message of kind
+zero closes the file.
+
+Every message that aloft writes ends with a seal: one more protobuf field, which Rerun skips. It has
+the number of the message, what the message holds (``Content``), the first and the last tick that it
+speaks of, and the CRC-32 of the whole message. The seal of the first message covers the file's head
+too. So every byte before the closing message is under a checksum, and nothing is given to Rerun or
+Arrow unless its checksum is right: neither of them survives every damaged message.
+
+Recordings of versions before 0.2 have no seals; of these only the framing can be checked.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from enum import IntEnum
+from pathlib import Path
+from struct import Struct
+from typing import Any, BinaryIO
+from zlib import crc32
+
+FILE_HEAD = 12
+MAGIC = b"RRF2"
+HEAD = Struct("<QQ")
+END = 0
+"""The kind of the message that closes a file."""
+CLOSING = HEAD.pack(END, 0)
+ARROW = 2
+"""The kind of a message that holds an Arrow table."""
+_LAST_KIND = 3
+_KEY = b"\x82\xf4\x03\x2c"
+"""The protobuf field 8000, 44 bytes long."""
+_MARK = _KEY + b"aloft-seal\x01"
+_SEAL = Struct("<QBqqII")
+_CHECKED = _SEAL.size - 4
+SEAL_SIZE = len(_MARK) + _SEAL.size
+_SEARCHED = 1 << 20
+
+
+class Content(IntEnum):
+    """What a message holds."""
+
+    PICTURE = 0
+    """What only the viewer shows."""
+    START = 1
+    """The header."""
+    ROWS = 2
+    KEYFRAME = 3
+    NOTES = 4
+    OUTCOME = 5
+    UNKNOWN = 6
+    """Any of these, in a file without seals."""
+
+
+@dataclass(frozen=True)
+class Message:
+    """One message: where it begins, its size with its head, its kind, and what its seal says."""
+
+    place: int
+    size: int
+    kind: int
+    content: Content = Content.UNKNOWN
+    number: int = -1
+    first: int = 0
+    last: int = -1
+
+    @property
+    def end(self) -> int:
+        """The place of the next message."""
+        return self.place + self.size
+
+
+@dataclass(frozen=True)
+class Damage:
+    """Bytes from ``begin`` to ``end`` that are not what was written.
+
+    ``after`` and ``before`` are the last recorded tick before them and the first behind them.
+    """
+
+    begin: int
+    end: int
+    after: int | None = None
+    before: int | None = None
+
+    def __str__(self) -> str:
+        where = f"bytes {self.begin} to {self.end - 1}"
+        if self.end <= self.begin:
+            where = f"messages are missing at byte {self.begin}"
+        if self.after is not None and self.before is not None and self.before <= self.after + 1:
+            return f"{where}; no tick is lost"
+        low = "the first tick" if self.after is None else f"tick {self.after + 1}"
+        high = "the last tick" if self.before is None else f"tick {self.before - 1}"
+        return f"{where}; of the ticks, those from {low} to {high} may be lost"
+
+
+@dataclass(frozen=True)
+class Scan:
+    """What a file consists of.
+
+    Attributes:
+        path: the file.
+        size: its size [bytes].
+        messages: all that are intact, in order.
+        damage: what is not.
+        sealed: whether it has checksums.
+        closed: whether it was closed by who wrote it.
+        end: where the last intact message ends.
+    """
+
+    path: Path
+    size: int
+    messages: tuple[Message, ...]
+    damage: tuple[Damage, ...]
+    sealed: bool
+    closed: bool
+    end: int
+
+    def of(self, content: Content) -> list[Message]:
+        """The messages with that content; in a file without seals all messages with tables."""
+        wanted = (content, Content.UNKNOWN)
+        return [m for m in self.messages if m.kind == ARROW and m.content in wanted]
+
+
+def sealed(head: bytes, body: bytes, seal: Message, begun: int = 0) -> bytes:
+    """A message with its seal: ``head`` and ``body`` as Rerun made them, ``begun`` the CRC-32 of the
+    file's head for the first message of a file and else zero."""
+    kind, length = HEAD.unpack(head)
+    fields = (seal.number, int(seal.content), seal.first, seal.last, 0)
+    whole = HEAD.pack(kind, length + SEAL_SIZE) + body + _MARK + _SEAL.pack(*fields, 0)[:_CHECKED]
+    return whole + crc32(whole, begun).to_bytes(4, "little")
+
+
+def split(data: bytes) -> Iterator[tuple[bytes, bytes]]:
+    """Heads and bodies of the messages of a Rerun file in memory, without the closing one."""
+    place = FILE_HEAD
+    while place + HEAD.size <= len(data):
+        kind, length = HEAD.unpack_from(data, place)
+        if kind == END:
+            return
+        body = place + HEAD.size
+        yield data[place:body], data[body : body + length]
+        place = body + length
+
+
+def scan(path: Path) -> Scan:
+    """Look through a whole file, and verify every checksum; a message at a time is in memory.
+
+    Raises:
+        OSError: the file cannot be read.
+        ValueError: it is not a Rerun file of this format.
+    """
+    with path.open("rb") as file:
+        return _Scanner(path, file).scan()
+
+
+class _Scanner:
+    def __init__(self, path: Path, file: BinaryIO) -> None:
+        self._path, self._file = path, file
+        self._size = path.stat().st_size
+        self._head = file.read(FILE_HEAD)
+        file.seek(0)
+        self._sealed = _MARK in file.read(_SEARCHED)
+
+    def scan(self) -> Scan:
+        if self._head[:4] != MAGIC and not self._sealed:
+            raise ValueError(f"{self._path} is not a Rerun file of this format")
+        found: list[Message] = []
+        damage: list[Damage] = []
+        place, closed = FILE_HEAD, False
+        expected = 0
+        while place < self._size:
+            message = self._at(place, first=not found and not damage)
+            if message is None:
+                beyond = self._next_after(place)
+                if beyond is None:
+                    closed = self._closes(place)
+                    if not closed and self._is_damage(place):
+                        damage.append(Damage(place, self._size))
+                    break
+                damage.append(Damage(place, beyond))
+                place = beyond
+                expected = -1
+                continue
+            if self._sealed and message.number != expected >= 0:
+                damage.append(Damage(place, place))
+            expected = message.number + 1
+            found.append(message)
+            place = message.end
+        end = found[-1].end if found else FILE_HEAD
+        named = tuple(_named(each, found) for each in damage)
+        return Scan(self._path, self._size, tuple(found), named, self._sealed, closed, end)
+
+    def _at(self, place: int, *, first: bool) -> Message | None:
+        """The intact message at ``place``."""
+        if place + HEAD.size > self._size:
+            return None
+        self._file.seek(place)
+        head = self._file.read(HEAD.size)
+        kind, length = HEAD.unpack(head)
+        if not END < kind <= _LAST_KIND or place + HEAD.size + length > self._size:
+            return None
+        if not self._sealed:
+            return Message(place, HEAD.size + length, kind)
+        if length < SEAL_SIZE:
+            return None
+        body = self._file.read(length)
+        known = crc32(self._head) if first else 0
+        return _checked(place, head, body, known)
+
+    def _closes(self, place: int) -> bool:
+        """Whether the file is closed at ``place`` and ends there."""
+        self._file.seek(place)
+        if self._sealed:
+            return self._file.read() == CLOSING
+        head = self._file.read(HEAD.size)  # an index follows it
+        return len(head) == HEAD.size and HEAD.unpack(head)[0] == END
+
+    def _is_damage(self, place: int) -> bool:
+        """Whether what is at ``place``, behind which nothing is intact, is no message cut short."""
+        if self._sealed and self._size - place > len(CLOSING):
+            self._file.seek(self._size - len(CLOSING))
+            if self._file.read() == CLOSING:
+                return True
+        self._file.seek(place)
+        head = self._file.read(HEAD.size)
+        if len(head) < HEAD.size:
+            return False
+        kind, length = HEAD.unpack(head)
+        return not END < kind <= _LAST_KIND or place + HEAD.size + length <= self._size
+
+    def _next_after(self, place: int) -> int | None:
+        """The place of the next intact message: behind a seal that stands behind ``place``."""
+        if not self._sealed:
+            return None
+        at = place
+        while at < self._size:
+            self._file.seek(at)
+            piece = self._file.read(_SEARCHED + SEAL_SIZE)
+            mark = piece.find(_MARK)
+            if mark < 0:
+                at += _SEARCHED
+                continue
+            beyond = at + mark + SEAL_SIZE
+            if self._at(beyond, first=False) is not None:
+                return beyond
+            at += mark + 1
+        return None
+
+
+def _checked(place: int, head: bytes, body: bytes, known: int) -> Message | None:
+    """The message, if its seal is right."""
+    if body[-SEAL_SIZE : -_SEAL.size] != _MARK:
+        return None
+    number, content, first, last, _, crc = _SEAL.unpack_from(body, len(body) - _SEAL.size)
+    if crc32(body[:-4], crc32(head, known)) != crc:
+        return None
+    kind = HEAD.unpack(head)[0]
+    return Message(place, HEAD.size + len(body), kind, Content(content), number, first, last)
+
+
+def _named(damage: Damage, found: list[Message]) -> Damage:
+    """The damage with the ticks around it."""
+    rows = [m for m in found if m.content is Content.ROWS]
+    after = max((m.last for m in rows if m.place < damage.begin), default=None)
+    before = min((m.first for m in rows if m.place >= damage.end), default=None)
+    return replace(damage, after=after, before=before)
+
+
+def body_of(file: BinaryIO, message: Message) -> bytes:
+    """The body of a message, read and verified once more.
+
+    Raises:
+        ValueError: it has changed since the file was looked through.
+    """
+    file.seek(message.place)
+    head, body = file.read(HEAD.size), file.read(message.size - HEAD.size)
+    if message.number >= 0:
+        known = 0
+        if message.number == 0:
+            file.seek(0)
+            known = crc32(file.read(FILE_HEAD))
+        if _checked(message.place, head, body, known) is None:
+            raise ValueError(f"the message at byte {message.place} has changed while it was read")
+    return body
+
+
+def renumbered(file: BinaryIO, message: Message, number: int) -> bytes:
+    """A sealed message with another number. Raises ``ValueError`` as ``body_of`` does."""
+    file.seek(0)
+    known = crc32(file.read(FILE_HEAD)) if number == 0 else 0
+    body = body_of(file, message)[:-SEAL_SIZE]
+    head = HEAD.pack(message.kind, len(body))
+    return sealed(head, body, replace(message, number=number), known)
+
+
+def table_of(body: bytes) -> tuple[str, Any]:
+    """Entity and Arrow record batch that a message of kind ``ARROW`` holds.
+
+    Raises:
+        ValueError: it is not what Rerun writes.
+    """
+    import pyarrow as pa  # comes with Rerun
+
+    try:
+        fields = dict(_fields(body))
+        data: Any = fields[5]
+        if fields.get(2) == 2:
+            data = pa.decompress(data, fields[3], codec="lz4_raw")
+        with pa.ipc.open_stream(data) as reader:
+            batch = reader.read_next_batch()
+        batch.validate(full=True)
+    except (KeyError, IndexError, TypeError, OSError, StopIteration, pa.ArrowException) as error:
+        raise ValueError(f"a message holds no table ({error})") from error
+    entity = (batch.schema.metadata or {}).get(b"rerun:entity_path", b"").decode()
+    # Rerun escapes what is no letter, as in the names of blocks that loading inserts
+    return entity.replace("\\", ""), batch
+
+
+def is_static(batch: Any) -> bool:
+    """Whether a table has no timelines."""
+    return not any((f.metadata or {}).get(b"rerun:kind") == b"index" for f in batch.schema)
+
+
+def _fields(body: bytes) -> Iterator[tuple[int, Any]]:
+    """Number and value of every field of a protobuf message."""
+    place = 0
+    while place < len(body):
+        key, place = _number(body, place)
+        if key & 7 == 0:
+            value, place = _number(body, place)
+            yield key >> 3, value
+        elif key & 7 == 2:
+            size, place = _number(body, place)
+            if size > len(body) - place:
+                raise IndexError("a field is longer than its message")
+            yield key >> 3, body[place : place + size]
+            place += size
+        elif key & 7 in (1, 5):
+            place += 8 if key & 7 == 1 else 4
+        else:
+            raise IndexError("no protobuf")
+
+
+def _number(body: bytes, place: int) -> tuple[int, int]:
+    value = shift = 0
+    while True:
+        byte = body[place]
+        place += 1
+        value |= (byte & 127) << shift
+        shift += 7
+        if byte < 128:
+            return value, place

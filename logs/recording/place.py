@@ -1,0 +1,195 @@
+"""The place of a recording: written under a name of its own that is locked, then renamed.
+
+While ``jump.rrd`` is written it is called ``jump.part.rrd``, and whoever writes it holds an
+exclusive lock on it. Anybody may read it meanwhile. What was called ``jump.rrd`` before stays there
+until the new recording is complete.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+from contextlib import suppress
+from dataclasses import dataclass
+from datetime import datetime
+from pathlib import Path
+
+try:
+    import fcntl
+except ImportError:  # on Windows; there another writer is not noticed
+    fcntl = None  # type: ignore[assignment]
+
+PART = ".part"
+_MOST_NAMES = 100
+
+
+def part_of(path: Path) -> Path:
+    """The name under which the recording ``path`` is written."""
+    return path.with_name(f"{path.stem}{PART}{path.suffix}")
+
+
+def whole_of(path: Path) -> Path | None:
+    """The recording that is written under the name ``path``; ``None`` if it is no such name."""
+    if not path.stem.endswith(PART):
+        return None
+    return path.with_name(f"{path.stem.removesuffix(PART)}{path.suffix}")
+
+
+def is_being_written(path: Path) -> bool:
+    """Whether somebody writes the file ``path`` just now. Raises ``OSError`` if it is not there."""
+    descriptor = os.open(path, os.O_RDONLY)
+    try:
+        return not _lock(descriptor)
+    finally:
+        os.close(descriptor)
+
+
+def _lock(descriptor: int) -> bool:
+    if fcntl is None:
+        return True
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    except OSError as error:
+        if error.errno in (errno.ENOLCK, errno.EOPNOTSUPP, errno.EINVAL):
+            return True  # a file system without locks
+        raise
+    return True
+
+
+@dataclass
+class Place:
+    """A recording's place, locked by this process and by those that inherit ``descriptor``.
+
+    Attributes:
+        target: the name that the recording will have.
+        descriptor: the open file under its private name.
+        keep: how many earlier recordings of that name are kept, as ``jump.1.rrd`` (the newest) ...
+        said: what the user must know, one text each.
+    """
+
+    target: Path
+    descriptor: int
+    keep: int
+    said: tuple[str, ...] = ()
+
+    @property
+    def part(self) -> Path:
+        """The private name."""
+        return part_of(self.target)
+
+    def close(self) -> None:
+        """Close the file; the lock goes when the last process has closed it."""
+        with suppress(OSError):
+            os.close(self.descriptor)
+
+    def publish(self) -> str:
+        """Give the file its name. Returns a warning if somebody had removed it, else nothing.
+
+        Raises:
+            OSError: it cannot be renamed, or a removed file cannot be written again.
+        """
+        warning = ""
+        if not self._is_there():
+            self._write_again()
+            warning = (
+                f"somebody removed {self.part} while the run went on; it was written again when "
+                "the run ended"
+            )
+        for number in range(self.keep, 0, -1):
+            older = self.target if number == 1 else _numbered(self.target, number - 1)
+            if older.exists():
+                os.replace(older, _numbered(self.target, number))
+        os.replace(self.part, self.target)
+        return warning
+
+    def _is_there(self) -> bool:
+        try:
+            return os.path.samestat(os.fstat(self.descriptor), os.stat(self.part))
+        except FileNotFoundError:
+            return False
+
+    def _write_again(self) -> None:
+        """Copy the file, which has no name any more, to its private name."""
+        self.part.parent.mkdir(parents=True, exist_ok=True)
+        with self.part.open("wb") as file:
+            place = 0
+            while piece := os.pread(self.descriptor, 1 << 20, place):
+                file.write(piece)
+                place += len(piece)
+
+
+def _numbered(path: Path, number: int) -> Path:
+    return path.with_name(f"{path.stem}.{number}{path.suffix}")
+
+
+def take_place(path: Path, keep: int = 0) -> Place:
+    """Make and lock the file in which the recording ``path`` is written.
+
+    If another run writes that recording, this one gets the next free name, ``jump-2.rrd``. A file
+    that a killed recorder has left there is kept under another name.
+
+    Raises:
+        OSError: the file cannot be written.
+    """
+    if path.is_dir():
+        raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
+    path.parent.mkdir(parents=True, exist_ok=True)
+    for number in range(1, _MOST_NAMES):
+        target = path if number == 1 else path.with_name(f"{path.stem}-{number}{path.suffix}")
+        place = _take(target, keep)
+        if place is not None:
+            if number > 1:
+                text = f"another run is being recorded in {path}; this one goes to {target}"
+                place.said = (text, *place.said)
+            return place
+    raise OSError(errno.EBUSY, f"{_MOST_NAMES} runs are being recorded under this name", str(path))
+
+
+def _take(target: Path, keep: int) -> Place | None:
+    """The place of ``target``, or ``None`` if another run has it."""
+    part, said = part_of(target), ""
+    while True:
+        descriptor = os.open(part, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666)
+        try:
+            if not _lock(descriptor):
+                os.close(descriptor)
+                return None
+            there = part.exists() and os.path.samestat(os.fstat(descriptor), os.stat(part))
+            if there and not os.fstat(descriptor).st_size:
+                return Place(target, descriptor, keep, (said,) if said else ())
+            if there:
+                moved = _free(target)
+                os.replace(part, moved)
+                said = (
+                    f"{part} was left by a run whose recorder was killed; it is kept as {moved} "
+                    f"('aloft log repair {moved}' mends it)"
+                )
+        except BaseException:
+            os.close(descriptor)
+            raise
+        os.close(descriptor)
+
+
+def _free(target: Path) -> Path:
+    """A name beside ``target`` that nothing has."""
+    number = 1
+    while True:
+        suffix = "" if number == 1 else f"-{number}"
+        found = target.with_name(f"{target.stem}-cut{suffix}{target.suffix}")
+        if not found.exists():
+            return found
+        number += 1
+
+
+def replaced(path: Path, keep: int = 0) -> str:
+    """What becomes of the recording that has the name ``path`` now, in words; empty without one."""
+    try:
+        made = datetime.fromtimestamp(path.stat().st_mtime)
+    except OSError:
+        return ""
+    when = f"{made:%Y-%m-%d %H:%M:%S}"
+    if keep:
+        return f"the one of {when} is kept as {_numbered(path, 1)}"
+    return f"it replaces the one of {when}; --keep N keeps as many"
