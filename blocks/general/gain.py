@@ -11,9 +11,9 @@ from .vector import Vector
 
 
 class Gain(Block):
-    """The input times a constant: y = gain u. There may be one gain for each element.
+    """The input times a constant: y = gain u.
 
-    ``MatrixGain`` multiplies by a matrix.
+    There may be one gain for each element. ``MatrixGain`` multiplies by a matrix.
     """
 
     class Params(Elements):
