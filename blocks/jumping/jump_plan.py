@@ -177,6 +177,7 @@ class JumpPlan(Block):
     def _plan(self, task: JumpTask, robot: RobotDescription) -> Plan:
         from ...planner.library.library import PlanLibrary
         from ...planner.task.errors import TaskError
+        from ...planner.task.plan import PlanFileError
 
         folder = Path(self.params.library) if self.params.library else None
         library = PlanLibrary(robot, folder)
@@ -187,10 +188,13 @@ class JumpPlan(Block):
             )
         try:
             if self.params.check == "reported":
-                return library.attempt(task)
-            plan, _ = library.plan(task)
-        except TaskError as error:
+                plan = library.attempt(task)
+            else:
+                plan, _ = library.plan(task)
+        except (TaskError, PlanFileError) as error:
             raise BlockError(str(error)) from error
+        kept = library.path_of(task)
+        self.files_read = (kept,) if kept is not None else ()
         return plan
 
 
