@@ -213,6 +213,8 @@ def summary(run: RecordedRun) -> dict[str, Any]:
         "seeds": dict(header.seeds),
         "versions": dict(header.versions),
         "machine": dict(header.machine),
+        "files": dict(header.files),
+        "project": header.project,
         "schema_hashes": header.schema_hashes,
         "signals": [
             {"name": f.name, "dtype": f.dtype, "shape": list(f.shape), "unit": f.unit,

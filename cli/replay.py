@@ -83,14 +83,13 @@ def replay(
         done = execute(opened, changed, inputs, first, until, output is not None, out)
         done.result.raise_if_failed() if not done.signals.compared else None
         written = write(output, opened, done) if output is not None else None
-    other = opened.what_is_other_now()
+    other = opened.what_is_other_now() if done.first is not None else []
     verdict = describe(opened, done)
     print_differences(out, done)
     for note in done.notes:
         print_warning(note)
-    if done.first is not None:
-        for difference in other:
-            print_warning(f"since the recording was made: {difference}")
+    for difference in other:
+        print_warning(f"since the recording was made: {difference}")
     if written is not None:
         say(out, f"recorded and replayed side by side: {written}")
     if as_json:

@@ -27,6 +27,10 @@ def view(
         Path | None,
         typer.Option(help="With --with: also keep what is shown, as one .rrd file."),
     ] = None,
+    layout: Annotated[
+        Path | None,
+        typer.Option(help="Your own tabs of plots; by default view.yaml beside the run's graph."),
+    ] = None,
     no_show: Annotated[
         bool, typer.Option("--no-show", help="With --save: only write the file.")
     ] = False,
@@ -35,6 +39,8 @@ def view(
     with errors_reported(False):
         if other is None and (save is not None or no_show):
             raise AloftError("--save and --no-show belong to a comparison; add --with OTHER.rrd")
+        if layout is not None and other is not None:
+            raise AloftError("--layout is for one recording; leave out --with")
         if no_show and save is None:
             raise AloftError("--no-show would do nothing; add --save FILE.rrd")
         for path in (recording, *((other,) if other else ())):
@@ -45,7 +51,8 @@ def view(
             if other is not None:
                 shown = compare(recording, other, save or Path(folder) / "comparison.rrd")
             if not no_show:
-                show(shown, web=web)
+                own = None if other else own_layout(recording, layout, Path(folder))
+                show(shown, web=web, layout=own)
     raise typer.Exit(ExitCode.SUCCESS)
 
 
@@ -60,11 +67,25 @@ def compare(first: Path, second: Path, path: Path) -> Path:
         raise AloftError(f"{path} cannot be written ({error.strerror or error})") from error
 
 
-def show(recording: Path, *, web: bool) -> None:
+def own_layout(recording: Path, layout: Path | None, folder: Path) -> Path | None:
+    """The user's layout for a recording, as a file in ``folder`` for the viewer, if there is one."""
+    from ..logs.file.reader import read
+    from ..logs.viewing.layout_file import blueprint_with, layout_beside, read_layout
+
+    header = read(recording).header
+    chosen = layout or layout_beside(header)
+    if chosen is None:
+        return None
+    path = folder / "layout.rbl"
+    blueprint_with(read_layout(chosen, header), header).save("aloft", path)
+    return path
+
+
+def show(recording: Path, *, web: bool, layout: Path | None = None) -> None:
     """Show a file until the window is closed or Ctrl-C is pressed."""
     from ..logs.viewing.viewer import start_viewer
 
-    viewer = start_viewer("web" if web else "window", [recording])
+    viewer = start_viewer("web" if web else "window", [recording, *((layout,) if layout else ())])
     keep_open(viewer)
 
 

@@ -1,1 +1,1 @@
-"""What a robot is: its description, kinematics and rigid-body models, and the robots that ship."""
+"""Descriptions of robots, their kinematics and rigid-body models, and the robots that ship."""

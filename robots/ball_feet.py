@@ -1,8 +1,8 @@
 """Feet that are balls: those with one contact point, which roll on the ground.
 
-The contact point of such a foot, and its sole, are the ball's lowest point in the world, however
-the foot is turned: its centre less its radius straight down. The positions that the description
-gives are where these are at the zero pose. Contact points of other feet are fixed to the foot.
+The contact point of such a foot, and its sole, are the ball's lowest point in the world, whatever
+the foot's orientation: the point one radius straight below the centre. The description gives the
+positions of these points at the zero pose. Contact points of other feet are fixed to the foot.
 """
 
 from __future__ import annotations

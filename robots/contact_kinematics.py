@@ -1,4 +1,4 @@
-"""What stands on the ground, seen from the base: places and rates of the contact points."""
+"""Positions and velocities of the contact points relative to the base."""
 
 from __future__ import annotations
 
@@ -31,13 +31,14 @@ class ContactKinematics:
         forward: the sum of the feet's forward directions [body], (3,); of feet that are balls
             the direction in which their pattern points, x where they stand as in the standing pose.
         com_velocity: of the centre of mass relative to the base's origin [m/s, body], (3,).
-        centres: of the contacts' round rubber [m, body], (n_contacts, 3).
+        centres: the centres of the contacts' round rubber [m, body], (n_contacts, 3).
         jacobians: of the centres by the joints [m, body], (n_contacts, 3, n_joints).
-        heading_levers: places of the contact points about a middle that turn with the feet's heading
-            [m], (n_contacts, 2): within each foot, or in the pattern that feet of one point make. They
-            are constant, and zero where the points show no heading.
+        heading_levers: horizontal positions of the contact points relative to a middle, which
+            rotate with the feet's heading [m], (n_contacts, 2): the middle of each foot, or of the
+            pattern that feet of one point make. They are constant, and zero where the points have
+            no heading.
 
-    ``centres`` and ``jacobians`` are brought up to date by ``differentiate`` only.
+    ``centres`` and ``jacobians`` are updated by ``differentiate`` only.
     """
 
     def __init__(self, robot: RobotDescription) -> None:
@@ -96,12 +97,12 @@ class ContactKinematics:
     def evaluate(
         self, orientation: Array, angular_velocity: Array, position: Array, velocity: Array
     ) -> None:
-        """Bring all attributes up to date.
+        """Update all attributes but ``centres`` and ``jacobians``.
 
         Args:
-            orientation: of the base, quaternion x, y, z, w; it says where down is.
-            angular_velocity: of the base [rad/s, body].
-            position, velocity: of the joints [rad, rad/s].
+            orientation: the base's quaternion x, y, z, w, which gives the vertical.
+            angular_velocity: of the base [rad/s, body], (3,).
+            position, velocity: of the joints [rad, rad/s], (n_joints,).
         """
         self._position[7:] = position
         self._velocity[3:6] = angular_velocity
@@ -134,7 +135,7 @@ class ContactKinematics:
         np.divide(self._momentum, self._mass, out=self.com_velocity)
 
     def differentiate(self) -> None:
-        """Bring ``centres`` and ``jacobians`` up to date with the joints of the last ``evaluate``.
+        """Update ``centres`` and ``jacobians`` for the joints of the last ``evaluate``.
 
         The centre of the rubber is its radius above the ground, whatever the base's orientation.
         """

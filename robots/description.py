@@ -1,4 +1,4 @@
-"""A robot's description: what it is made of, and how one is found by name or file."""
+"""Finds the description of a robot by name, or reads it from a file."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ __all__ = [
 
 
 def find_robot(name: str, folder: Path | None = None) -> RobotDescription:
-    """The description called ``name``: one of ours, or a file relative to ``folder``.
+    """The description called ``name``: a shipped robot, or a file relative to ``folder``.
 
     The file is a description in YAML, or a URDF or MJCF file with a short YAML of the same name
     beside it for what these formats lack, or such a YAML that names its URDF or MJCF ``file``.

@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 Poses = Mapping[str, tuple[Array, Array]]
 
 VIEWS = (("from the right", 0, 1.0), ("from behind", 1, -1.0))
-"""What is seen, the base's axis along the picture's bottom, and its sign there."""
+"""The views: title, the base's axis that is horizontal in the picture, and its sign there."""
 WIDTH, HEIGHT = 9.0, 5.5
 """The picture's size [inch]."""
 ROUND = np.linspace(0.0, np.pi, 13)

@@ -30,7 +30,7 @@ Array = NDArray[np.float64]
 _AXES = ("yaw", 2), ("pitch", 1), ("roll", 0), ("knee", 1), ("ankle", 1)
 _CANONICAL = np.array([1.0, -1.0, 1.0, -1.0, -1.0])
 _FAR = 10.0
-"""Targets are brought within this distance [m], so that no square overflows."""
+"""Targets are limited to this distance [m], so that no square overflows."""
 _SLANT = 1e-3
 """Below this sine of the angle between the foot's line and the line from hip to sole, the leg
 plane is undefined and blends into the upright one."""
@@ -91,7 +91,7 @@ def find_leg(robot: RobotDescription, foot: int) -> Leg | None:
 
 
 def _mismatch(robot: RobotDescription, foot: int, chain: tuple[int, ...]) -> str:
-    """What keeps a chain of joints from being a leg of this kind; empty if nothing does."""
+    """The reason why a chain of joints is no leg of this kind; empty if it is one."""
     joints = [robot.joints[i] for i in chain]
     if len(joints) != len(_AXES):
         return f"expected 5 joints from {robot.base}, found {len(joints)}"
@@ -190,19 +190,19 @@ def inverse(
     """The joint angles (5,) that bring the sole centre to ``sole`` and its line along ``line``.
 
     The leg plane contains the hip, the sole and the line; in it the knee follows from the law of
-    cosines and the ankle from the line's slope. What cannot be reached is given up in this order:
-    the line's slope (the ankle stays at its limit, the sole still exact), then the distance from
-    the hip (of the ankle, or of the sole; its direction still exact), then what the hip's limits
-    cut off. The knee of a leg
-    that stretches at a steady speed becomes ever faster; within ``softness`` of the full length d
-    the distance therefore approaches it as d - softness exp(-(x - d + softness) / softness).
+    cosines and the ankle from the line's slope. For a target out of reach errors are allowed in
+    this order: of the line's slope (the ankle stays at its limit, the sole is still exact), then of
+    the distance from the hip (of the ankle, or of the sole; its direction is still exact), then
+    those that the hip's limits cause. The knee of a leg that stretches at a steady speed becomes
+    ever faster; therefore, within ``softness`` of the full length d, the distance approaches d as
+    d - softness exp(-(x - d + softness) / softness).
 
     Args:
         hip, plane, signs, limits: of the ``Leg``; limits with any margin already taken off.
         sole: where the sole centre should be [m, base frame].
         line: the direction from heel to toe [base frame], of any length.
-        softness: of the full stretch [m]; zero: none.
-        present_yaw: the robot's angle to stay near where the hip is in gimbal lock [rad].
+        softness: see above [m]; zero for none.
+        present_yaw: the yaw angle that is kept where the hip is in gimbal lock [rad].
         out: the robot's angles [rad].
 
     Returns:
@@ -297,8 +297,8 @@ def inverse_velocity(
         rotation: the foot's, from ``forward``.
         velocity: of the sole [m/s, base frame].
         line_rate: the time derivative of the line's unit direction [1/s, base frame].
-        length: how much distance a turn of 1 rad counts as [m].
-        damping: in m; 1e-4 changes nothing until a leg is stretched to within 1e-4 rad.
+        length: the distance that a rotation by 1 rad is equal to [m].
+        damping: in m; 1e-4 has no effect until a leg is within 1e-4 rad of full stretch.
         rows, turns, normal: scratch of shapes (5, 5), (3, 5) and (5, 5).
     """
     np.dot(rotation.T, sole_jacobian[3:6, :], turns)
@@ -373,8 +373,9 @@ def _two_links(
 ) -> tuple[float, float, float, bool]:
     """The knee's and the first link's angle that bring the end of two links to (x, z).
 
-    Of the two answers the one on the side of the middle of the robot's limits. Also returns how
-    much the distance follows the target's, and whether the target is met.
+    Of the two solutions it is the one on the side of the middle of the robot's limits. Also returns
+    how far the distance follows the target's (1, or less near full stretch), and whether the target
+    is met.
     """
     first = math.sqrt(first_x * first_x + first_z * first_z)
     second = math.sqrt(second_x * second_x + second_z * second_z)

@@ -1,8 +1,8 @@
-"""What a five-joint leg does for a target beyond its reach, and how fast its target moves.
+"""Targets beyond the reach of a five-joint leg, and the velocity of its targets.
 
-These kernels complete ``five_joint_leg``: they draw a foot's target back into reach in the plane
-of its sole, slow a leg down that stretches, and differentiate the foot's line. Everything is in
-the base's frame, in m and rad.
+These kernels complete ``five_joint_leg``: they move a foot's target into reach in the plane of its
+sole, slow down a leg that stretches, and differentiate the foot's line. All quantities are in the
+base's frame, in m and rad.
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ Array = NDArray[np.float64]
 _LEVEL = 0.3
 """A sole whose normal has less than this along the base's z axis does not slide."""
 _HALVINGS = 8
-"""The place in reach is found to within a 256th of the way."""
+"""The number of bisections: the place in reach is found to within a 256th of the way."""
 _FARTHEST = 10.0
-"""Places [m] are brought within this distance before they slide."""
+"""Places are limited to this distance [m] before they slide."""
 _JUMP = 0.1
-"""A line that turns by more than this [rad] in a tick has been given anew."""
+"""A line that rotates by more than this [rad] in a tick is a new target, not a motion."""
 
 
 @kernel
@@ -48,12 +48,12 @@ def slide(
     place: Array,
     angles: Array,
 ) -> tuple[bool, float]:
-    """Draw a ``sole`` out of reach, in its own plane, towards a place that is in reach.
+    """Move a ``sole`` out of reach, in its own plane, towards a place that is in reach.
 
-    That is the one straight below the hip, seen from the sole, or where even that is out of reach
-    the one on the base's z axis through the hip, where every angle of the hip is small. The place
-    in reach that is nearest to the target on this way is found by bisection, to within a 256th
-    of the way.
+    That place is the foot of the perpendicular from the hip to the plane of the sole, or if even
+    this is out of reach the plane's point on the base's z axis through the hip, where every angle
+    of the hip is small. The place in reach that is nearest to the target on the line between both
+    is found by bisection, to within a 256th of their distance.
 
     Args:
         hip, plane, signs, limits, softness, present_yaw: as for ``five_joint_leg.inverse``.
@@ -102,7 +102,7 @@ def slide(
 
 @kernel
 def keep_along(axis: Array, vector: Array) -> None:
-    """Keep of ``vector`` (3,) only its part along ``axis`` (3,), of unit length."""
+    """Replace ``vector`` (3,) by its component along ``axis`` (3,), which has unit length."""
     part = 0.0
     for i in range(3):
         part += float(axis[i]) * float(vector[i])
@@ -140,7 +140,7 @@ def slow_stretch(
 
 @kernel
 def line_rate(line: Array, last: Array, period: float, known: bool, out: Array) -> None:
-    """How fast the direction of ``line`` turns [1/s]; ``last`` becomes its direction now."""
+    """The time derivative (3,) of the direction of ``line`` [1/s]; updates ``last``."""
     x, y, z = float(line[0]), float(line[1]), float(line[2])
     largest = max(abs(x), abs(y), abs(z))
     if largest < 1e-300:

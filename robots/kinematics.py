@@ -1,4 +1,4 @@
-"""Where the links of a robot are: forward kinematics from its description, for many instants.
+"""The forward kinematics of a robot from its description, for many instants at once.
 
 For pictures and tests, not for control: plain NumPy, vectorised over the instants and
 independent of the libraries that the controller and the simulator use.
@@ -58,7 +58,7 @@ def from_base_outwards(robot: RobotDescription) -> list[tuple[int, Joint]]:
     """The joints with their index, each behind the one that carries its parent link.
 
     Raises:
-        ValueError: some joints do not hang on the base.
+        ValueError: some joints are not connected to the base.
     """
     reached = {robot.base}
     remaining = list(enumerate(robot.joints))

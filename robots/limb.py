@@ -23,14 +23,14 @@ _COLLINEAR = 1e-6
 
 
 class FootKind(IntEnum):
-    """What a foot's contact points can hold of its pose on the ground."""
+    """The kind of a foot: what its contact points constrain of its pose on the ground."""
 
     POINT = 0
-    """One contact point: its place."""
+    """One contact point: it constrains the position."""
     LINE = 1
-    """Two, or several in a line: the place and the direction of the line."""
+    """Two points, or several in a line: they constrain position and direction of the line."""
     FLAT = 2
-    """Three or more that are not in a line: the place and the whole orientation."""
+    """Three or more points not in a line: they constrain position and orientation."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +53,7 @@ class Limb:
 
     @property
     def kind(self) -> FootKind:
-        """What the foot's contact points can hold."""
+        """The kind of the foot."""
         return FootKind(int(self.tip[6]))
 
 
@@ -126,7 +126,7 @@ def read_limb(robot: RobotDescription, foot: int, margin: float = 0.0) -> Limb:
 
 @kernel
 def place_limb(links: Array, tip: Array, angles: Array, anchors: Array, pose: Array) -> None:
-    """The foot's pose, and where the joints are, from the joint angles.
+    """Compute the pose of the foot and of the joints from the joint angles.
 
     Args:
         links, tip: of the ``Limb``.

@@ -1,4 +1,4 @@
-"""How far a foot is from its target, as far as the foot's kind counts, and how fast targets turn.
+"""The error of a foot's pose, as far as the foot's kind counts it, and the rotation of targets.
 
 How much of a target's orientation counts follows from the kind of the foot: nothing for a point
 foot, the direction of its line for a line foot, all of it for a flat one. A pose is an array
@@ -18,7 +18,7 @@ from ..mathematics.kernel import kernel
 Array = NDArray[np.float64]
 
 _FAR = 10.0
-"""Targets are brought within this distance [m], so that no square overflows."""
+"""Targets are limited to this distance [m], so that no square overflows."""
 
 
 @kernel
@@ -40,7 +40,7 @@ def aim(position: Array, rotation: Array, target: Array) -> None:
     )
     part = x0 * y0 + x1 * y1 + x2 * y2
     if abs(part) > 0.999999:
-        # The second axis is of no use: take the base's axis that is farthest from the first.
+        # The second axis is parallel to the first: take the base's axis farthest from that.
         y0, y1, y2 = 0.0, 0.0, 0.0
         if abs(x1) <= abs(x0) and abs(x1) <= abs(x2):
             y1 = 1.0
@@ -151,7 +151,7 @@ def turning(
     """The angular velocity (3,) [rad/s] of a target, from its orientation one period before.
 
     It is that of a line's direction for a line foot and zero for a point foot. A target that has
-    turned by more than ``limit`` [rad] has been given anew and does not turn.
+    turned by more than ``limit`` [rad] is a new target and has no angular velocity.
 
     Args:
         last, target: places and rows of rotation matrices, (4, 3).
@@ -189,7 +189,7 @@ def _along(pose: Array, tip: Array) -> tuple[float, float, float]:
 
 @kernel
 def _product(first: Array, second: Array, row: int, column: int) -> float:
-    """An element of a rotation matrix times another's transpose; rows count from 1."""
+    """An element of a rotation matrix times the transpose of another; row 0 is the position."""
     return (
         float(first[row, 0]) * float(second[column, 0])
         + float(first[row, 1]) * float(second[column, 1])

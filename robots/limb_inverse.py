@@ -7,13 +7,14 @@ joint angles solve
 
     min |e(q)|^2   within the limits,
 
-by Levenberg and Marquardt's method: from the present angles, with L = mu |e|^2,
+by the Levenberg-Marquardt method: from the present angles, with L = mu |e|^2,
 
     dq = (J'J + L I)^-1 J'e,
 
-the step is cut off at the limits and taken if it makes the error smaller; mu shrinks or grows with
-how much of the promised gain came true (Nielsen's rule), and grows where there was none. A joint that stands at its limit and would have to go beyond it is left out. Damping
-by the squared error makes the last steps Newton's, so the error's digits double with each of them.
+the step is cut off at the limits and taken if it reduces the error. mu changes with the ratio of
+the actual to the predicted reduction (Nielsen's rule), and grows if there was no reduction. A joint
+that stands at its limit and would have to go beyond it is left out. As the damping is proportional
+to the squared error, the last steps are those of Newton's method and converge quadratically.
 
 Vectors are in the base's frame, in m and rad. The kernels allocate nothing, take a bounded number
 of steps and return finite numbers for all finite arguments. They share one scratch array
@@ -39,13 +40,13 @@ FOUND = 1e-22
 REACHED = 1e-18
 """A squared error [m^2] below which the target counts as reached: a nanometre."""
 _FLOOR = 1e-13
-"""Damping [m^2] that is always there; it keeps the steps finite where a limb is singular."""
+"""The least damping [m^2]; it keeps the steps finite where a limb is singular."""
 _STILL = 1e-18
-"""A squared gradient by the squared error [m^2] below which the error no longer gets smaller."""
+"""Squared gradient over squared error [m^2] below which the error is at its minimum."""
 
 
 def limb_scratch(joints: int) -> Array:
-    """The scratch array that the kernels of this file need for a limb of so many joints."""
+    """The scratch array that the kernels of this file need for a limb with that many joints."""
     return np.zeros((2 * joints + 16, max(joints, 6)))
 
 
@@ -60,7 +61,7 @@ def approach(
     work: Array,
     angles: Array,
 ) -> float:
-    """Bring the foot as near to its target as it goes from the present joint angles.
+    """Bring the foot as near to its target as possible, starting from the present joint angles.
 
     Args:
         links, tip, limits: of the ``Limb``.
@@ -124,7 +125,7 @@ def approach(
         found = foot_error(tip, pose, target, weights, error)
         fresh = found < square
         if fresh:
-            # What the linear model promised came true, or less of it (Nielsen's rule).
+            # Nielsen's rule, by the ratio of the actual to the predicted reduction.
             ratio = 2.0 * min((square - found) / max(promised, 1e-300), 1.0) - 1.0
             ease, square = ease * max(0.1, 1.0 - ratio * ratio * ratio), found
             for j in range(n):

@@ -1,4 +1,4 @@
-"""Where the links of a robot are at given joint positions, in plain arithmetic.
+"""The poses of a robot's links at given joint positions, in plain arithmetic.
 
 For set-up and checks: it needs no rigid-body library. During a run use ``PinocchioModel``.
 """

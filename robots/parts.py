@@ -1,4 +1,4 @@
-"""What a robot is made of: links, joints, feet, contact points, actuators, sensors.
+"""The parts of a robot's description: links, joints, feet, contact points, actuators, sensors.
 
 All frames are parallel to the base's at the zero pose; quantities are in SI.
 """
@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 
 
 class Part(BaseModel):
-    """Unchangeable data with no keys but those declared."""
+    """Immutable data that refuses unknown keys."""
 
     model_config = ConfigDict(
         extra="forbid", frozen=True, ignored_types=(cached_property,), defer_build=True
@@ -98,7 +98,7 @@ class ContactPoint(Part):
 
 
 class MotorRating(Part):
-    """What one motor can do, at the gearbox output, where it differs from its profile's others.
+    """The values of one motor, at the gearbox output, that differ from those of its profile.
 
     The meaning of each value is that of ``ActuatorProfile``; ``None`` is the profile's own value.
     """
@@ -113,10 +113,12 @@ class MotorRating(Part):
 
 
 class ActuatorProfile(Part):
-    """What the motors can do, at the gearbox output. ``peak_torque`` [N m] holds up to
-    ``corner_speed`` and falls linearly to zero at ``no_load_speed`` [rad/s]; braking torque is
-    ``peak_torque`` at any speed. ``rotor_inertia`` [kg m^2] counts at the gearbox output;
-    ``friction`` [N m] and ``damping`` [N m s/rad] act at each joint's side of the gearbox.
+    """The limits of the motors, at the gearbox output.
+
+    ``peak_torque`` [N m] is available up to ``corner_speed`` and falls linearly to zero at
+    ``no_load_speed`` [rad/s]; braking torque is ``peak_torque`` at any speed. ``rotor_inertia``
+    [kg m^2] is that at the gearbox output; ``friction`` [N m] and ``damping`` [N m s/rad] act at
+    each joint's side of the gearbox.
 
     ``motors`` gives other values for motors by name or by a shell pattern such as ``*_knee_*``;
     later entries win. For a motor that drives a slide, N stands for N m and m for rad.

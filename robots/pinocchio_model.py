@@ -1,6 +1,6 @@
 """The controller's model, built from the robot's description with Pinocchio.
 
-The same links, joints and rotors as the simulator's model, so that the two agree to rounding.
+It has the same links, joints and rotors as the simulator's model, so that both agree to rounding.
 Joints and velocities are in the description's order after those of the base: none for a fixed base,
 a planar joint in the x-z plane for a planar one, a free-flyer for a floating one. Frames: every
 contact point under its own name, every sole centre as ``<foot>_sole``.

@@ -1,4 +1,4 @@
-"""A YAML file as plain data of which every key and value knows its line and column."""
+"""Reads a YAML file as plain data, with the line and column of every key and value."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a description says, as plain data: for people who look at a robot, and for programs."""
+"""A summary of a description as plain data, for people who look at a robot and for programs."""
 
 from __future__ import annotations
 

@@ -29,7 +29,7 @@ from .parts import (
 )
 
 BASE_VELOCITIES = {"floating": 6, "planar": 3, "fixed": 0}
-"""How many velocities the base has."""
+"""The number of velocities of each kind of base."""
 
 
 class RobotDescription(Part):
@@ -76,7 +76,7 @@ class RobotDescription(Part):
 
     @property
     def base_velocities(self) -> int:
-        """How many velocities the base has: 6 floating, 3 planar, 0 fixed."""
+        """The number of velocities of the base: 6 if floating, 3 if planar, 0 if fixed."""
         return BASE_VELOCITIES[self.base_joint]
 
     def with_profile(self, name: str) -> Self:
@@ -100,7 +100,7 @@ class RobotDescription(Part):
 
     @cached_property
     def motors(self) -> Motors:
-        """What every motor of the profile in use can do."""
+        """The values of every motor in the profile in use, one element for each motor."""
         name = self.profile or next(iter(self.profiles))
         profile = self.profiles[name]
 

@@ -30,7 +30,7 @@ PLACE = 1e-2
 WIDEST = 1.6
 """How far from zero a joint starts at most [rad], where its limits' middle is farther."""
 SHARPEST = 1e-4
-"""What must hold holds within this [m, rad]."""
+"""The tolerance of the conditions that must hold [m, rad]."""
 MARGIN = 0.02
 """The share of a joint's range that is kept free at each limit."""
 
@@ -167,18 +167,18 @@ class _Search:
         return level, flatness, balance, wanted
 
     def residuals(self, angles: Array) -> Array:
-        """Everything that is to be small, weighted, (n, some)."""
+        """All weighted residuals, whose squares are minimised, (n, some)."""
         level, flatness, balance, wanted = self.parts(angles)
         pull = PULL * (angles - self.start)[:, self.free]
         return np.concatenate([level, flatness, balance, PLACE * wanted, pull], axis=1)
 
     def failure(self, angles: Array) -> tuple[float, float, float]:
-        """The largest of what must be zero."""
+        """The largest residual of the conditions that must hold."""
         level, flatness, balance, _ = self.parts(angles[None])
         return tuple(float(np.abs(part).max()) for part in (level, flatness, balance))  # type: ignore[return-value]
 
     def run(self) -> Array:
-        """The pose in which the residuals' squares have their least sum, near the start."""
+        """The pose near the start that minimises the sum of the squared residuals."""
         angles, damping = self.start.copy(), 1e-3
         angles[self.free] = np.clip(angles[self.free], self.lower[self.free], self.upper[self.free])
         cost = float(np.square(self.residuals(angles[None])).sum())
@@ -205,7 +205,7 @@ class _Search:
         return self._settled(angles)
 
     def _settled(self, angles: Array) -> Array:
-        """The nearest angles at which what must hold holds to rounding, if the limits let it."""
+        """The nearest angles at which the conditions hold exactly, if the limits allow it."""
         for _ in range(5):
             values, jacobian = self._linearised(angles, self._must)
             move = np.linalg.lstsq(jacobian, -values, rcond=1e-8)[0]

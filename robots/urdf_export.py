@@ -46,7 +46,7 @@ def urdf_of(robot: RobotDescription) -> str:
 
 
 def _fastest(robot: RobotDescription) -> Array:
-    """How fast each joint alone can turn [rad/s, m/s]: until its first motor is at its limit."""
+    """The largest speed of each joint alone [rad/s, m/s], which its first motor limits."""
     gears = np.abs(robot.joint_to_motor)
     allowed = robot.motors.no_load_speed[:, None] / np.where(gears > 0.0, gears, np.nan)
     return np.asarray(np.nanmin(allowed, axis=0)) if len(robot.joints) else np.zeros(0)

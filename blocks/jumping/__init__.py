@@ -1,1 +1,1 @@
-"""Blocks that know what a jump is: plans, phases, landing."""
+"""Blocks for jumps: references from plans, the phase of a jump, and the landing heuristic."""

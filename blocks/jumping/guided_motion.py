@@ -1,9 +1,9 @@
-"""Motions of the whole body that follow from what its feet, centre and rotation are to do.
+"""Motions of the whole body that follow from those of its feet, centre of mass and base.
 
-In stance the feet stand still, as far as their contact points can hold them: a point foot its
-place, a line foot its place and the direction of its line, a flat foot its whole pose. What is
-left is how the centre of mass moves and, axis by axis, either how the base turns or what angular
-momentum there is. So the velocities v of all joints and the base follow from::
+In stance the feet stand still as far as their contact points can hold them: a point foot keeps its
+position, a line foot its position and the direction of its line, a flat foot its whole pose. Given
+as well are the velocity of the centre of mass and, for each axis, either the base's angular
+velocity or the angular momentum. So the velocities v of all joints and the base follow from::
 
     [ A_l / m          ]       [ velocity of the centre of mass              ]
     [ A_k  or  base    ]  v  = [ angular momentum  or  turning rate          ]
@@ -36,19 +36,19 @@ Array = NDArray[np.float64]
 _STEP = 0.002
 """Longest step of the integration [s]."""
 _RETURN_RATE = 2.0
-"""How fast joints that have a choice go back to where they stand [1/s]."""
+"""The rate at which redundant joints return to their standing position [1/s]."""
 ROWS_OF_FOOT = {FootKind.POINT: 3, FootKind.LINE: 5, FootKind.FLAT: 6}
-"""How many velocities a foot on the ground fixes."""
+"""The number of velocities that a foot on the ground constrains."""
 
 
 @dataclass
 class Motion:
-    """What the body is to do at one instant.
+    """The desired motion of the body at one instant.
 
     ``rotation`` is, axis by axis, the angular momentum about the centre of mass [N m s, world]
-    where ``by_momentum`` says so, else the base's rate [rad/s, body frame]. ``foot_velocity`` is
-    that of the feet on the ground, so zero for feet that stand, or of the sole centres when
-    ``flying``.
+    where ``by_momentum`` is true, otherwise the base's angular velocity [rad/s, body frame].
+    ``foot_velocity`` is the velocity of the feet on the ground, zero for feet that stand, or of the
+    sole centres when ``flying``.
     """
 
     com: Array
@@ -62,13 +62,13 @@ class Motion:
 
 
 def missing_joints(robot: RobotDescription) -> int:
-    """How many joints a robot lacks to move its centre of mass and its base as it is told."""
+    """The number of joints that a robot lacks to control its centre of mass and its base."""
     rows = sum(ROWS_OF_FOOT[foot_shape(robot, foot)[0]] for foot in range(len(robot.feet)))
     return max(0, rows - (len(robot.joints) - len(robot.held)))
 
 
 class GuidedBody:
-    """The robot's model, asked for the velocity that a motion needs."""
+    """The robot's model, which computes the generalised velocity of a motion."""
 
     def __init__(self, built: PinocchioModel, robot: RobotDescription) -> None:
         import pinocchio
@@ -110,7 +110,7 @@ class GuidedBody:
         return q
 
     def feet(self, q: Array) -> Array:
-        """The sole centres (n_feet, 3); of a ball foot its lowest point."""
+        """The sole centres (n_feet, 3) [m]; for a ball foot its lowest point."""
         self.pinocchio.framesForwardKinematics(self.model, self.data, q)
         return np.array([self._sole(foot) for foot in range(len(self.soles))])
 
@@ -130,7 +130,7 @@ class GuidedBody:
         return 2.0 * math.atan2(float(q[4]), float(q[6]))
 
     def angular_momentum(self, q: Array, v: Array) -> Array:
-        """About the centre of mass (3,)."""
+        """The angular momentum about the centre of mass [N m s, world], (3,)."""
         self.pinocchio.computeCentroidalMomentum(self.model, self.data, q, v)
         return np.array(self.data.hg.angular)
 
@@ -166,12 +166,12 @@ class GuidedBody:
         return np.asarray(choice + found)
 
     def _place_rows(self, foot: int, jacobian: Array, flying: bool) -> Array:
-        """The rows (3, n) of a foot's velocity; jacobian: of its sole's frame, (6, n)."""
+        """The rows (3, n) of a foot's velocity, from the Jacobian (6, n) of its sole's frame."""
         ball = self._balls.get(foot)
         if ball is None:
             return jacobian[0:3]
         # A ball rolls: on the ground the material at its lowest point stands still, while that
-        # point moves along with the ball's centre, which is what is guided in flight.
+        # point moves along with the ball's centre, whose velocity is prescribed in flight.
         place = self.data.oMf[self.soles[foot]].translation
         lever = self._sole(foot) - place
         if flying:
@@ -181,7 +181,7 @@ class GuidedBody:
         return np.asarray(jacobian[0:3] - skew @ jacobian[3:6])
 
     def _turning_rows(self, foot: int, turning: Array) -> Array:
-        """Of the rows (3, n) of a foot's turning in the world those that it holds."""
+        """Those rows of a foot's angular velocity (3, n) in the world that contacts constrain."""
         kind, line = self._shapes[foot]
         if kind == FootKind.POINT:
             return turning[:0]
@@ -190,7 +190,7 @@ class GuidedBody:
         ahead: Array = self.data.oMf[self.soles[foot]].rotation @ line
         if abs(float(ahead[0])) > 1.0 - 1e-9:
             return turning[1:]
-        # Two directions at right angles to the line, which the foot cannot turn about.
+        # The two directions at right angles to the line, about which the foot cannot rotate.
         first = np.cross(ahead, np.eye(3)[int(np.abs(ahead).argmin())])
         first /= np.linalg.norm(first)
         return np.asarray(np.stack([first, np.cross(ahead, first)]) @ turning)
@@ -201,7 +201,7 @@ class GuidedBody:
 
 
 class MotionRecorder:
-    """Rows of the plan as they are found."""
+    """Integrates a motion and records the rows of the plan."""
 
     def __init__(self, body: GuidedBody, q: Array) -> None:
         self.body = body
@@ -211,7 +211,7 @@ class MotionRecorder:
         self.rows: dict[str, list[Array]] = {}
 
     def run(self, duration: float, motion: Callable[[float], Motion], keep: bool = True) -> None:
-        """Follow a motion for a while, by Runge and Kutta's method of order four."""
+        """Integrate a motion over ``duration`` [s], by the Runge-Kutta method of order four."""
         body, count = self.body, max(2, math.ceil(duration / _STEP))
         h = duration / count
         for i in range(count + 1):
@@ -250,10 +250,10 @@ class MotionRecorder:
 
 
 def check_limits(robot: RobotDescription, columns: dict[str, Array]) -> None:
-    """Refuse a motion that no such robot can make.
+    """Refuse a motion that exceeds the robot's limits.
 
     Args:
-        robot: whose joint limits and motor speeds count.
+        robot: the robot with its joint limits and motor speeds.
         columns: from ``MotionRecorder.rows``, as arrays.
 
     Raises:

@@ -1,4 +1,4 @@
-"""Which phase of the jump the robot is really in."""
+"""Determines which phase of the jump the robot is really in."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from .phase_table import (
 
 
 class PhaseMemory(Signal):
-    """What the phase machine remembers."""
+    """The state of ``JumpPhase``."""
 
     phase = Field(dtype="int64", values=Phase, text="see Phase")
     began = Field(unit="s", text="plan time at which the phase began")
@@ -60,16 +60,16 @@ class JumpPhase(Block):
     has had contact for ``lost_contact`` while the robot should stand, or where the flight has
     lasted that much longer than the plan predicted at its start.
 
-    The stance points, of any number of feet and points: before lift-off those that carry load in
-    the plan, so that heels may rise while the toes still push; where the plan has none of them,
-    those of the tick before. In flight there are none. After touchdown they are every point that
-    had contact within the last ``contact_hold``, and those of the same foot that are less than
-    ``flat_height`` above the lowest of these; if that leaves none, those of the tick before. (A
-    controller that may push with a heel a hair above the ground brings it down by doing so; one
-    that may not lets the robot teeter on its toes.)
+    The stance points may belong to any number of feet. Before lift-off they are those that carry
+    load in the plan, so that heels may rise while the toes still push; if the plan has none they
+    stay those of the tick before. In flight there are none. After touchdown they are all points
+    that had contact within the last ``contact_hold``, and points of the same foot that are less
+    than ``flat_height`` above the lowest of these; if there is none they stay those of the tick
+    before. (A controller that may push with a heel slightly above the ground brings it down by
+    that; otherwise the robot would rock on its toes.)
 
-    The time to touchdown is the ballistic fall of the measured centre of mass to the height it is
-    planned to touch down at: z + v s - g s^2 / 2 = z_td.
+    The time s to touchdown is that of the ballistic fall of the measured centre of mass to its
+    planned height at touchdown: z + v s - g s^2 / 2 = z_td.
 
     The block does not judge tilt, torques or sensors (``SafetyMonitor`` does), and it never goes
     back to an earlier phase except for another planned flight.
@@ -80,22 +80,28 @@ class JumpPhase(Block):
             0.0, unit="s", ge=0.0, text="how long to wait for the feet to leave the ground"
         )
         early_lift_off: float = live_parameter(
-            0.01, unit="s", gt=0.0, text="without any contact for this long the robot flies"
+            0.01,
+            unit="s",
+            gt=0.0,
+            text="time without any contact after which the robot is in flight",
         )
         touchdown_share: float = live_parameter(
-            0.5, ge=0.0, le=1.0, text="share of the predicted flight before touchdown counts"
+            0.5,
+            ge=0.0,
+            le=1.0,
+            text="share of the predicted flight before which a contact is no touchdown",
         )
         landing_time: float = live_parameter(
-            0.35, unit="s", ge=0.0, text="from touchdown until the robot rises again"
+            0.35, unit="s", ge=0.0, text="time from touchdown until the robot rises again"
         )
         contact_hold: float = live_parameter(
             0.0, unit="s", ge=0.0, text="how long a point stays in stance after its contact ends"
         )
         flat_height: float = live_parameter(
-            0.006, unit="m", ge=0.0, text="how far a foot's other points may be from the ground"
+            0.006, unit="m", ge=0.0, text="height up to which a foot's other points are in stance"
         )
         lost_contact: float = live_parameter(
-            0.2, unit="s", gt=0.0, text="how long without contact before it is a fault"
+            0.2, unit="s", gt=0.0, text="time without contact after which it is a fault"
         )
 
     needs = ("feet",)
@@ -168,7 +174,7 @@ class JumpPhase(Block):
 def count_unloaded(
     active: NDArray[np.bool_], period: float, unloaded: NDArray[np.float64]
 ) -> float:
-    """Count on how long each point has been without contact; the shortest of these times [s]."""
+    """Update how long each point has been without contact; returns the shortest time [s]."""
     shortest = math.inf
     for i in range(active.shape[0]):
         unloaded[i] = 0.0 if active[i] else float(unloaded[i]) + period
@@ -178,13 +184,17 @@ def count_unloaded(
 
 @kernel
 def planned_touchdown_height(height: float, velocity: float, remaining: float) -> float:
-    """Where a body at ``height`` with ``velocity`` will be after falling for ``remaining``."""
+    """The height [m] of a body after a free fall of ``remaining`` [s] from ``height`` [m] with the
+    upward ``velocity`` [m/s]."""
     return height + remaining * (velocity - 0.5 * GRAVITY * remaining)
 
 
 @kernel
 def time_to_height(height: float, velocity: float, goal: float) -> float:
-    """The time [s] until a falling body comes down to ``goal``; its apex where it is below that."""
+    """The time [s] until a falling body comes down to ``goal`` [m].
+
+    If it never reaches that height, the time until its apex.
+    """
     square = velocity * velocity + 2.0 * GRAVITY * (height - goal)
     return max(0.0, (velocity + math.sqrt(max(square, 0.0))) / GRAVITY)
 
@@ -200,12 +210,12 @@ def choose_stance(
     flat_height: float,
     stance: NDArray[np.bool_],
 ) -> None:
-    """The points in stance, written over those of the tick before; see the block's text.
+    """Update the points in ``stance``, which holds those of the tick before; see ``JumpPhase``.
 
     Args:
         planned: the points that carry load in the plan.
         unloaded: how long each point has been without contact [s].
-        position: of the points [m, world], (n, 3).
+        position: the positions of the points [m, world], (n, 3).
         foot: the foot of each point.
     """
     if phase < Phase.FLIGHT:

@@ -1,4 +1,4 @@
-"""A planned jump, played back: the whole-body plan of a task from the library or the planner."""
+"""Plays back a planned jump: the whole-body plan of a task, from the library or the planner."""
 
 from __future__ import annotations
 
@@ -21,26 +21,27 @@ if TYPE_CHECKING:
 
 
 class JumpPlan(Block):
-    """The motion of a jump that the kino-dynamic planner found (section III): what to follow.
+    """The reference motion of a jump, found by the kino-dynamic planner (paper, III).
 
     The task is a file (``tasks/in_situ.yaml``; looked for beside the graph, then among the shipped
     graphs) or the task itself (``{rise: 12 cm, distance_x: 5 cm}``). Its plan comes from the plan
-    library under the task's hash: the shipped plans need no solver. Where there is none it is
-    solved while the graph loads, from the nearest plan of the library, and kept.
+    library, where the task's hash is its key: the shipped plans need no solver. If there is none it
+    is solved while the graph loads, starting from the nearest plan of the library, and kept.
 
-    Every plan, also a kept one, first passes the validity check
-    (``planner/checking/validity``) with exact dynamics. With ``check: reported`` a plan that fails
-    it is followed all the same, to compare the formulations ``paper`` and ``srbm``, whose plans
-    always fail: then the run's cautions say so with every test that failed, and the metrics have
-    ``plan_valid`` and ``plan_tests_failed``. For those formulations the reference has the centre of
-    mass and momentum that the plan believes in. ``formulation`` plans the same task in another one,
-    without what only ``full`` has: impacts, margins and limits of the motors.
+    Every plan, also one from the library, must pass the validity check with exact dynamics
+    (``planner/checking/validity``). With ``check: reported`` a plan that fails it is followed all
+    the same, to compare the formulations ``paper`` and ``srbm``, whose plans always fail. Then the
+    run's cautions name every test that failed, and the metrics have ``plan_valid`` and
+    ``plan_tests_failed``. For those formulations the reference has the centre of mass and momentum
+    of the plan's own simplified model. ``formulation`` plans the same task in another formulation,
+    without the features that only ``full`` has: impacts, margins and limits of the motors.
 
     At the start the robot stands still for ``stand_time``; at the end it stays where the plan
     ended. Between the plan's knots the reference is read from a table of 2 ms steps
-    (``planner/library/reference_table``); what is fed forward is read ``lead`` ahead of time.
+    (``planner/library/reference_table``); accelerations and torques are read ``lead`` ahead of
+    time, because they are fed forward.
 
-    The block follows time alone and knows nothing of what the robot really does. It raises
+    The block follows time alone and does not depend on what the robot really does. It raises
     ``BlockError`` at load where the task cannot be read or is for another robot, where it cannot be
     planned, or where its plan must be valid and is not; the message says which constraint or test.
     """
@@ -57,17 +58,17 @@ class JumpPlan(Block):
             unit="s",
             ge=0.0,
             le=0.02,
-            text="delay from sensing to torque that is made up for",
+            text="delay from sensing to torque that is compensated",
         )
         library: str = parameter(
             "", text="folder where new plans are kept; the user's cache if empty"
         )
-        solve: bool = parameter(True, text="whether a plan that is not there may be solved")
+        solve: bool = parameter(True, text="whether a missing plan may be solved")
         check: Literal["required", "reported"] = parameter(
             "required", text="whether the plan must be valid, or is followed and called invalid"
         )
         formulation: Literal["full", "paper", "srbm"] | None = parameter(
-            None, text="which one plans, in place of the task's"
+            None, text="the planner's formulation, in place of the task's"
         )
 
     needs = ("floating base", "feet")
@@ -76,7 +77,7 @@ class JumpPlan(Block):
 
     @classmethod
     def requires_of_graph(cls, params: Parameters, context: Context) -> Iterable[Misfit]:
-        """A task that can be read, for the graph's robot and with its actuator profile."""
+        """Report a task that cannot be read, or is for another robot or actuator profile."""
         from ...planner.library.shipped import shipped_graphs
         from ...planner.task.task import TaskError
 
@@ -132,7 +133,7 @@ class JumpPlan(Block):
 
         robot, task = self.robot, self._task()
         plan = self._plan(task, robot)
-        self._report = self._look_at(plan)
+        self._report = self._report_validity(plan)
         self._reader = JumpTableReader(reference_table(plan, robot, self.params.stand_time))
 
     def step(self) -> None:
@@ -153,8 +154,8 @@ class JumpPlan(Block):
             + report.explain(),
         )
 
-    def _look_at(self, plan: Plan) -> ValidityReport | None:
-        """What the check says of a plan that need not be valid; ``None`` where it must be."""
+    def _report_validity(self, plan: Plan) -> ValidityReport | None:
+        """The validity report of a plan that need not be valid; ``None`` if it must be valid."""
         if self.params.check == "required":
             return None
         from ...planner.checking.validity import PlanTest, ValidityReport
@@ -176,6 +177,7 @@ class JumpPlan(Block):
     def _plan(self, task: JumpTask, robot: RobotDescription) -> Plan:
         from ...planner.library.library import PlanLibrary
         from ...planner.task.errors import TaskError
+        from ...planner.task.plan import PlanFileError
 
         folder = Path(self.params.library) if self.params.library else None
         library = PlanLibrary(robot, folder)
@@ -186,15 +188,18 @@ class JumpPlan(Block):
             )
         try:
             if self.params.check == "reported":
-                return library.attempt(task)
-            plan, _ = library.plan(task)
-        except TaskError as error:
+                plan = library.attempt(task)
+            else:
+                plan, _ = library.plan(task)
+        except (TaskError, PlanFileError) as error:
             raise BlockError(str(error)) from error
+        kept = library.path_of(task)
+        self.files_read = (kept,) if kept is not None else ()
         return plan
 
 
 def read_or_make_task(wanted: str | Mapping[str, Any], context: Context) -> JumpTask:
-    """The task that a graph names or spells out.
+    """The task of a graph, which gives the name of its file or its parameters.
 
     Raises:
         LookupError: there is no file of that name beside the graph or among the shipped tasks.

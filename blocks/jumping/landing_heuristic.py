@@ -1,4 +1,4 @@
-"""Where the feet should land, from the momentum in flight."""
+"""Computes from the momentum in flight where the feet should land."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ Shares = Annotated[tuple[Share, Share, Share], pydantic.BeforeValidator(_three)]
 
 
 class LandingMemory(Signal):
-    """What the landing heuristic remembers of lift-off."""
+    """The state of ``LandingHeuristic``."""
 
     flying = Field(dtype="bool", text="whether the robot flew at the last tick")
     offset = Field(
@@ -72,28 +72,29 @@ class LandingHeuristic(Block):
     the foot's place below a standing robot with ``limits_about: stance``, for robots whose feet
     stand far from the centre of mass, such as quadrupeds.
 
-    With ``law: paper`` l and k are the measured momenta. With ``law: deviation`` they are what
-    the measured ones deviate from the plan's: the plan's footholds already fit its own momentum,
-    so a forward jump is not answered twice.
+    With ``law: paper`` l and k are the measured momenta. With ``law: deviation`` they are the
+    measured momenta minus the planned ones: the planned footholds already fit the planned momentum,
+    so feeding back the whole momentum of a forward jump would count it twice.
 
-    The foot goes there from where it was at lift-off, along x and y with least jerk over
-    ``reach_share`` of the predicted flight; z follows the plan (paper, V), and near touchdown
-    moves at ``retraction`` upwards, to land softly.
+    The foot moves there from its position at lift-off, along x and y with minimum jerk over
+    ``reach_share`` of the predicted flight. Its height follows the plan (paper, V), and near
+    touchdown the foot moves upwards at the speed ``retraction``, to land softly.
 
-    The target turns into the body's frame by R_ref Exp(alpha Log(R_ref' R)): with ``alpha`` 1 it
-    is fixed in the world, whatever the torso does; with 0 it is fixed in the planned body, as the
-    paper has it. The sole's target is flat, heading as planned.
+    The target is rotated into the body's frame by R_ref Exp(alpha Log(R_ref' R)). With ``alpha`` 1
+    it is fixed in the world, whatever the torso does; with 0 it is fixed in the planned body, as in
+    the paper. The target of the sole is flat, with the planned heading.
 
-    With z up a push along +x gives l^x > 0 and k^y > 0, and along +y l^y > 0 and k^x < 0: so the
-    helpful signs are W_l > 0, W_k^x > 0 and W_k^y < 0. In LANDING a foot that is still in the air
-    goes on to where it last aimed, at the height of the lowest sole; else the target is the plan.
-    A flight longer than planned goes on with the plan's last instant before touchdown.
-    Does not ask whether a leg can reach the target (its inverse kinematics does).
+    With z up a push along +x gives l^x > 0 and k^y > 0, and along +y l^y > 0 and k^x < 0, so the
+    stabilising signs are W_l > 0, W_k^x > 0 and W_k^y < 0. In LANDING a foot that is still in the
+    air moves on to its last target, at the height of the lowest sole; otherwise the target is the
+    plan. In a flight that is longer than planned the plan stays at its last instant before
+    touchdown. Whether a leg can reach the target is left to its inverse kinematics.
     """
 
     class Params(Parameters):
         law: Literal["paper", "deviation"] = parameter(
-            "deviation", text="which momentum is fed back: all of it, or what was not planned"
+            "deviation",
+            text="the momentum fed back: the measured one, or its deviation from the plan",
         )
         w_l: tuple[float, float] = live_parameter(
             (0.03, 0.04), unit="s/kg", text="W_l: metres per linear momentum along x and y"
@@ -108,11 +109,11 @@ class LandingHeuristic(Block):
             (0.15, 0.16), unit="m", text="farthest places ahead and aside the leg can reach"
         )
         limits_about: Literal["com", "stance"] = parameter(
-            "com", text="from where p_max counts: the centre of mass, or where each foot stands"
+            "com", text="the centre of the limits p_max: the centre of mass, or each foot's stance"
         )
         alpha: Shares = live_parameter(
             (1.0, 1.0, 1.0),
-            text="share of the torso's rotation about x, y and z that the legs make up for",
+            text="share of the torso's rotation about x, y and z that the legs compensate",
         )
         reach_share: float = live_parameter(
             0.7, gt=0.0, le=1.0, text="share of the predicted flight by which the feet are there"
@@ -134,7 +135,7 @@ class LandingHeuristic(Block):
 
     @classmethod
     def requires(cls, params: Parameters, robot: RobotDescription | None) -> Iterable[Misfit]:
-        """Limits within which the robot can stand."""
+        """Report limits within which the robot cannot stand."""
         assert isinstance(params, cls.Params) and robot is not None
         if params.limits_about == "stance":
             return
@@ -220,7 +221,7 @@ class LandingHeuristic(Block):
             self._to_body(foot)
 
     def _remember_plan(self) -> None:
-        """The plan of this instant, for as long as it is not past its touchdown."""
+        """Keep the plan of this instant, unless it is past its touchdown."""
         reference, memory = self.reference, self.memory
         np.subtract(reference.foot_position, reference.com, out=memory.planned)
         np.multiply(reference.com_velocity, self._mass, out=memory.linear)
@@ -228,7 +229,7 @@ class LandingHeuristic(Block):
         memory.orientation[...] = reference.orientation
 
     def _feed_back(self) -> None:
-        """The momenta that the law answers."""
+        """Compute the momenta that the law feeds back."""
         self._linear[:] = self.terms.linear_momentum
         self._angular[:] = self.terms.angular_momentum
         if self.params.law == "deviation":
@@ -236,7 +237,7 @@ class LandingHeuristic(Block):
             np.subtract(self._angular, self.memory.angular, out=self._angular)
 
     def _turn_frame(self, overdue: bool) -> None:
-        """The frame the targets are fixed in, its rate, and the centre of mass in the body's."""
+        """Compute the frame that the targets are fixed in, its rate, and the CoM in the body."""
         terms, planned, turn = self.terms, self.memory.orientation, self._other
         from_matrix(terms.base_rotation, self._quaternion)
         conjugate(planned, turn)
@@ -254,7 +255,7 @@ class LandingHeuristic(Block):
         np.dot(terms.base_rotation.T, self._vector, self._com_body)
 
     def _to_body(self, foot: int) -> None:
-        """Place and speed relative to the centre of mass, seen from the moving base."""
+        """Convert position and velocity relative to the CoM into those relative to the base."""
         terms, feet, vector, scratch = self.terms, self.feet, self._vector, self._scratch
         turn = self._rotation.T
         np.dot(turn, self._place[foot], vector)
@@ -304,12 +305,12 @@ def landing_place(
     centre: Array,
     out: Array,
 ) -> None:
-    """The paper's law: the place (3,) from the nominal one (3,); z stays.
+    """The paper's law (IV): the landing place (3,) from the nominal one (3,); z is unchanged.
 
     Args:
         side: 1 for a foot on the left, -1 on the right, 0 in the middle.
         linear, angular: the momenta l and k fed back.
-        p_max, centre: how far ahead and aside the place may be from where (3,).
+        p_max: the largest distance of the place from ``centre`` (3,), ahead and aside [m].
     """
     x = float(nominal[0]) + float(w_l[0]) * float(linear[0]) + float(w_k[0]) * float(angular[1])
     y = float(nominal[1]) + float(w_l[1]) * float(linear[1]) + float(w_k[1]) * float(angular[0])
@@ -323,7 +324,7 @@ def landing_place(
 
 @kernel
 def turn_places(places: Array, angle: float, out: Array) -> None:
-    """Places (n, 3) turned about the vertical by ``angle`` [rad]."""
+    """Rotate places (n, 3) about the vertical by ``angle`` [rad]."""
     cosine, sine = math.cos(angle), math.sin(angle)
     for i in range(places.shape[0]):
         x, y = float(places[i, 0]), float(places[i, 1])
@@ -343,12 +344,15 @@ def lowest_height(points: Array) -> float:
 def swing(
     planned: Array, place: Array, offset: Array, share: float, rate: float, out: Array, speed: Array
 ) -> None:
-    """The foot on its way: the plan, the offset of lift-off fading, the correction growing.
+    """The motion of a foot from its offset at lift-off to its corrected landing place.
 
     Args:
-        planned, place: relative to the centre of mass, without and with the correction.
-        share, rate: of the way, from 0 to 1, and its time derivative [1/s].
-        out: the foot's place; speed: in, the plan's; out, the foot's.
+        planned, place: the positions relative to the centre of mass [m, world] without and with the
+            correction, (3,).
+        offset: the measured minus the planned position at lift-off [m, world], (3,).
+        share, rate: the share of the way, from 0 to 1, and its time derivative [1/s].
+        out: becomes the foot's position.
+        speed: the planned velocity [m/s], which becomes the foot's.
     """
     for k in range(3):
         goal = float(place[k]) - float(planned[k])

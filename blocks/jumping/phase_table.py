@@ -1,4 +1,4 @@
-"""The phases of a jump as a table: from which phase, on which condition, to which other."""
+"""The phases of a jump as a table of transitions: a phase, a condition, and the next phase."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ Array = NDArray[np.float64]
 
 
 class Condition(IntEnum):
-    """What may hold in a tick and lead to another phase."""
+    """A condition of a tick that may lead to another phase."""
 
     PLAN_SQUATS = 0
     """The plan is in its squat or beyond."""
@@ -63,8 +63,8 @@ TRANSITIONS = (
     Transition(Phase.LANDING, Condition.RESTED, Phase.RECOVER),
     Transition(Phase.RECOVER, Condition.LOST_CONTACT, Phase.FAULT),
 )
-"""All transitions. Of those of one phase the first whose condition holds is taken; a phase that
-none leads out of, such as FAULT, stays."""
+"""All transitions. In each phase the first transition whose condition holds is taken; a phase
+without transitions, such as FAULT, lasts to the end of the run."""
 
 TABLE = np.array([[int(value) for value in row] for row in TRANSITIONS])
 """The transitions as an array (n, 3), for the kernel."""
@@ -87,8 +87,8 @@ def find_conditions(
     Args:
         times, limits: see ``NOW`` and ``LATE_LIFT_OFF``.
         planned: the phase that the plan is in.
-        another: whether the plan has a flight behind the one that ``times`` is about.
-        holds: out, one element for each ``Condition``.
+        another: whether the plan has a flight after the one that ``times`` is about.
+        holds: becomes true for each ``Condition`` that holds.
     """
     now, in_phase = float(times[NOW]), float(times[IN_PHASE])
     lift_off, unloaded = float(times[LIFT_OFF]), float(times[UNLOADED])

@@ -27,16 +27,17 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class SquatJumpTask:
-    """What jump is asked for. Heights are the centre of mass's, drops and depths below standing.
+    """The parameters of a jump. Heights are those of the centre of mass; drops and depths are below
+    its height in standing.
 
     Attributes:
         rise: apex above standing [m].
         squat_depth, lift_off_drop, touchdown_drop, landing_depth: heights below standing [m] at
             the bottom of the squat, at lift-off, at touchdown and where the landing comes to rest.
         lean: forward pitch of the torso at the bottom of the squat [rad].
-        touchdown_pitch: the same at touchdown [rad].
+        touchdown_pitch: forward pitch of the torso at touchdown [rad].
         distance: how far ahead the feet land [m].
-        unloading: how far the feet are unloaded at lift-off: 1 when they carry nothing.
+        unloading: the share of the weight taken off the feet at lift-off; 1 for no load.
         settle_time: how long after lift-off the legs take to their landing posture [s].
         stand_time, squat_time, pause_time, landing_time, recover_time: durations [s].
     """
@@ -91,7 +92,7 @@ def plan_squat_jump(
 
 
 def _lift_off_momentum(jump: _Jump, body: GuidedBody, bottom: Array, start: float) -> float:
-    """The pitching momentum at lift-off with which the torso lands as asked, by secants."""
+    """The pitching momentum at lift-off with which the torso lands as asked, by secant steps."""
 
     def error(momentum: float) -> float:
         trial = MotionRecorder(body, bottom)
@@ -141,11 +142,11 @@ class _Jump:
         self._plan_legs()
 
     def _aim(self) -> None:
-        """The forward take-off speed, and how far the squat leans the body ahead for it.
+        """Compute the forward take-off speed, and the forward offset of the squat that it needs.
 
-        At lift-off the body has moved by half the thrust time times its speed, and it lands
-        behind its feet by what stops it, the capture distance v sqrt(z/g). The squat's offset is
-        the one that keeps the centre of pressure in the middle of the feet, within 30 mm.
+        At lift-off the body has moved by half the thrust's duration times its speed. At touchdown
+        it is behind its feet by the capture distance v sqrt(z/g), which stops it. The offset of the
+        squat keeps the centre of pressure in the middle of the feet, within 30 mm.
         """
         height = 0.5 * (self.low + self.high)
         lift = GRAVITY + self.speed / self.thrust_time
@@ -190,7 +191,7 @@ class _Jump:
         return self._motion(self.home)
 
     def squat(self, t: float) -> Motion:
-        """Down and leaning, with least jerk."""
+        """Going down and leaning forward, with minimum jerk."""
         motion = self._rise_or_sink(self.home, self.bottom, t / self.task.squat_time,
                                     self.task.squat_time)  # fmt: skip
         rate = minimum_jerk(t / self.task.squat_time)[1] / self.task.squat_time
@@ -202,7 +203,7 @@ class _Jump:
         return self._motion(self.bottom)
 
     def thrust(self, t: float, momentum: float) -> Motion:
-        """Up, the pitching momentum growing to that of lift-off."""
+        """Going up, while the pitching momentum grows to that of lift-off."""
         total = self.thrust_time
         u = t / total
         share, rate, way = 3.0 * u**2 - 2.0 * u**3, 6.0 * u * (1.0 - u), u**3 - 0.5 * u**4
@@ -218,7 +219,7 @@ class _Jump:
         return motion
 
     def flight(self, t: float, momentum: float) -> Motion:
-        """Ballistic, the legs taking their landing posture."""
+        """Ballistic flight, in which the legs go to their landing posture."""
         fall = np.array([0.0, 0.0, -GRAVITY])
         motion = self._motion(self.lift_off_com + t * self.take_off + 0.5 * t**2 * fall)
         motion.com_velocity = self.take_off + t * fall
@@ -232,11 +233,11 @@ class _Jump:
         return motion
 
     def landing(self, t: float, pitch: float) -> Motion:
-        """Down to rest over the feet, the torso turning upright from ``pitch``."""
+        """Going down to rest over the feet, while the torso turns upright from ``pitch``."""
         duration = self.task.landing_time
         speed = np.array([self.forward, 0.0, -self.fall])
         goal = np.array([self.task.distance, 0.0, self.rest_height])
-        # A quintic that begins with speed passes its end unless it is given this short a time.
+        # A quintic with an initial velocity overshoots unless its duration is this short.
         stop = min(duration, 2.5 * (float(self.touch_com[2]) - self.rest_height) / self.fall)
         times = (duration, duration, max(stop, 0.02))
         paths = [
@@ -258,7 +259,7 @@ class _Jump:
         return motion
 
     def recover(self, t: float) -> Motion:
-        """Up to standing height, with least jerk."""
+        """Going up to standing height, with minimum jerk."""
         low = np.array([self.task.distance, 0.0, self.rest_height])
         high = np.array([self.task.distance, 0.0, float(self.home[2])])
         duration = self.task.recover_time

@@ -1,4 +1,4 @@
-"""A planned squat jump, played back: what the other blocks follow."""
+"""Plans a squat jump from a few numbers and plays it back as the reference of other blocks."""
 
 from __future__ import annotations
 
@@ -39,8 +39,8 @@ class SquatJumpReference(Block):
     The plan is made at load (about 0.2 s) and read by the time since the run began; after its end
     the reference stands still. The block knows nothing of what the robot really does, plans no
     lateral jump and no twist, and leaves forces and torque limits to the controller. The load
-    report has a problem for a robot with too few joints; ``setup`` raises ``BlockError`` where a
-    joint would pass its limit or a motor its speed.
+    report names a robot with too few joints; ``setup`` raises ``BlockError`` where a joint would
+    exceed its limit or a motor its speed.
     """
 
     class Params(Parameters):
@@ -86,7 +86,7 @@ class SquatJumpReference(Block):
             unit="s",
             ge=0.0,
             le=0.02,
-            text="delay from sensing to torque that is made up for",
+            text="delay from sensing to torque that is compensated",
         )
 
     needs = ("floating base", "feet")
@@ -95,7 +95,7 @@ class SquatJumpReference(Block):
 
     @classmethod
     def requires(cls, params: Parameters, robot: RobotDescription | None) -> Iterable[Misfit]:
-        """Joints enough to move the centre of mass and the base with all feet on the ground."""
+        """Report too few joints to move the centre of mass and the base with all feet standing."""
         assert robot is not None
         missing = missing_joints(robot)
         if missing:
@@ -118,6 +118,6 @@ class SquatJumpReference(Block):
 
 @lru_cache(maxsize=8)
 def _plan(robot: str, task: SquatJumpTask) -> JumpTable:
-    """The plan for a robot given as JSON: the same for all runs of a process."""
+    """The plan for a robot given as JSON; it is computed once for all runs of a process."""
     description = RobotDescription.model_validate_json(robot)
     return plan_squat_jump(build_pinocchio_model(description), description, task)

@@ -1,4 +1,4 @@
-"""Standing still, and if asked for a squat: what any robot with feet can follow without a plan."""
+"""A reference for standing still, or for a squat, of any robot with feet; it needs no plan."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ NEVER = 1e6
 
 
 class StandReference(Block):
-    """The whole body standing as its description says; if asked for, it squats and rises again.
+    """The whole body stands as its description says, and with a ``squat_depth`` squats and rises.
 
     The feet stand still and the base stays level. For ``stand_time`` the robot stands in its
     standing pose. With a ``squat_depth`` above zero its centre of mass then goes down by that much
     with least jerk within ``squat_time``, and over the middle of the feet; it waits there for
-    ``pause_time`` and rises within ``rise_time`` to the height it stood at. Then it stands for
-    ever. All joints follow from the feet, the centre of mass and the base (see ``guided_motion``);
+    ``pause_time`` and rises within ``rise_time`` to the height it stood at. Then it goes on
+    standing. All joints follow from feet, centre of mass and base (see ``guided_motion``);
     joints that the description holds stay at their held angle.
 
     The phase is STAND, and SQUAT from the squat on; no lift-off is ever planned. The reference is
@@ -41,7 +41,7 @@ class StandReference(Block):
 
     class Params(Parameters):
         squat_depth: float = parameter(
-            0.0, unit="m", ge=0.0, le=0.5, text="how far the centre of mass goes down; 0: not"
+            0.0, unit="m", ge=0.0, le=0.5, text="how far the centre of mass goes down; 0: no squat"
         )
         stand_time: float = parameter(
             0.5, unit="s", gt=0.0, text="standing before the squat, for the estimator to settle"
@@ -54,7 +54,7 @@ class StandReference(Block):
             unit="s",
             ge=0.0,
             le=0.02,
-            text="delay from sensing to torque that is made up for",
+            text="delay from sensing to torque that is compensated",
         )
 
     needs = ("floating base", "feet")
@@ -63,7 +63,7 @@ class StandReference(Block):
 
     @classmethod
     def requires(cls, params: Parameters, robot: RobotDescription | None) -> Iterable[Misfit]:
-        """Joints enough to move the centre of mass and the base with all feet on the ground."""
+        """Report too few joints to move the centre of mass and the base with all feet standing."""
         assert robot is not None
         missing = missing_joints(robot)
         if missing:
@@ -87,7 +87,7 @@ class StandReference(Block):
 
 @lru_cache(maxsize=8)
 def _plan(robot: str, depth: float, times: tuple[float, float, float, float]) -> JumpTable:
-    """The motion for a robot given as JSON: the same for all runs of a process."""
+    """The motion for a robot given as JSON; it is computed once for all runs of a process."""
     description = RobotDescription.model_validate_json(robot)
     return plan_stand(description, depth, times)
 
@@ -98,7 +98,7 @@ def plan_stand(
     """The stance, and with a ``depth`` above zero [m] the squat, as a table.
 
     Args:
-        robot: who stands.
+        robot: the robot that stands.
         depth: how far the centre of mass goes down [m].
         times: standing, going down, waiting and rising [s].
 

@@ -1,1 +1,1 @@
-"""Blocks that judge a run from what only a simulator knows."""
+"""Blocks that judge a run by the simulation truth."""

@@ -1,5 +1,4 @@
-"""How far the estimated base is from the true one: at lift-off, in flight, at touchdown, at the
-end."""
+"""Measures the errors of the estimated base: at lift-off, in flight, at touchdown, at the end."""
 
 from __future__ import annotations
 
@@ -24,16 +23,16 @@ class EstimatorRecord(Signal):
     """Errors so far, each an array of position [m], velocity [m/s], attitude, tilt, yaw [rad]."""
 
     ticks = Field(dtype="int64", text="ticks compared")
-    square_sum = Field(KINDS, text="of all squared errors")
+    square_sum = Field(KINDS, text="sum of all squared errors")
     peak = Field(KINDS, text="largest errors")
     last = Field(KINDS, text="errors of the present tick")
     unloaded_ticks = Field(dtype="int64", text="ticks in a row in which no point was loaded")
-    unloaded_error = Field(KINDS, text="errors in the first of them")
-    unloaded_square_sum = Field(KINDS, text="of the squared errors in them")
-    unloaded_peak = Field(KINDS, text="largest errors in them")
+    unloaded_error = Field(KINDS, text="errors in the first of these ticks")
+    unloaded_square_sum = Field(KINDS, text="sum of the squared errors in these ticks")
+    unloaded_peak = Field(KINDS, text="largest errors in these ticks")
     flights = Field(dtype="int64", text="flights that have begun")
     flight_ticks = Field(dtype="int64", text="ticks in ended flights")
-    flight_square_sum = Field(KINDS, text="of the squared errors in ended flights")
+    flight_square_sum = Field(KINDS, text="sum of the squared errors in ended flights")
     flight_peak = Field(KINDS, text="largest errors in ended flights")
     lift_off = Field(KINDS, text="errors at the last lift-off")
     touchdown = Field(KINDS, text="errors at the last touchdown")
@@ -99,7 +98,7 @@ class EstimatorScore(Block):
         if self._confirmed() and not before:
             record.flights += 1
             record.lift_off[:] = record.unloaded_error
-        # The last of these before a point is loaded again is what touchdown is.
+        # The last tick before a point is loaded again is the touchdown.
         if self._confirmed():
             record.touchdown[:] = last
 

@@ -1,4 +1,4 @@
-"""How a robot of any kind stands on its feet: what the scores need to know of it."""
+"""The feet of a robot of any kind: the quantities that the scores measure on them."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 FALL_SHARE = 0.315
-"""A base below this share of the height it stands at has fallen: 0.12 m for BRUCE."""
+"""A base below this share of its standing height counts as fallen: 0.12 m for BRUCE."""
 LOAD_SHARE = 0.4
-"""Least load of a foot at rest, by the load of a foot where all carry the same."""
+"""Least load of a foot at rest, as a share of its load when all feet carry the same."""
 PLANE = 3
-"""So many loaded points show that a sole with at least as many is flat on the ground."""
+"""The number of loaded points by which a sole with at least as many is flat on the ground."""
 
 
 class Footing:
@@ -60,15 +60,15 @@ class Footing:
         return LOAD_SHARE / len(self.points_of_foot)
 
     def measure(self, points: Array, orientation: Array, middle: Array, direction: Array) -> None:
-        """Where every foot is and which way it points, seen from above.
+        """Measure the horizontal position and direction of every foot.
 
         Args:
             points: the contact points [m, world], (n_contacts, 3).
-            orientation: of the base, quaternion x, y, z, w.
-            middle: out, the middle of every foot's points (n_feet, 2).
-            direction: out, from a foot's last point to its first (n_feet, 2). For a foot of one
-                point it leads there from the middle of all feet, and for a robot with a single
-                such foot it is where the base heads. What counts is how far it turns.
+            orientation: the base's quaternion x, y, z, w.
+            middle: becomes the middle of every foot's points [m], (n_feet, 2).
+            direction: becomes the vector from a foot's last point to its first (n_feet, 2). For a
+                foot of one point it is the vector from the middle of all feet to the foot, and for
+                a robot with a single such foot the heading of the base. Only its rotation counts.
         """
         count = len(self.points_of_foot)
         for number, indices in enumerate(self.points_of_foot):
@@ -88,11 +88,10 @@ class Footing:
                 direction[number, axis] = middle[number].item(axis) - mean
 
     def unroll(self, joints: Array, orientation: Array, middle: Array) -> None:
-        """Take from where ball feet are how far they have rolled there.
+        """Subtract from the positions of ball feet how far they have rolled.
 
         A ball that rolls without sliding moves by its radius times the angle by which its foot
-        leans, the way it leans. What is left is where it would stand upright: that moves only if
-        the foot slides.
+        leans, in the direction of the lean. The remaining position changes only if the foot slides.
 
         Args:
             joints: positions of the joints [rad or m], (n_joints,).
@@ -111,9 +110,9 @@ class Footing:
             middle[ball.foot, 1] -= way * y
 
     def points_missing(self, touched: Flags) -> int:
-        """How many more points would have to carry load for every sole to be flat on the ground.
+        """The number of further points that must carry load for every sole to be flat.
 
-        All points of a point or line foot; of a foot with more points, three.
+        A point or line foot needs all of its points, a foot with more points needs three.
         """
         loaded = touched.tolist()
         return sum(

@@ -1,4 +1,4 @@
-"""Several jumps in a row: what is kept of each of them when the next begins, and the judgement.
+"""Several jumps in a row: the record of those that are over, and their judgement.
 
 The last jump of a row is judged like any jump; those before it by their flight, their lift-off speed,
 their apex and where they land.
@@ -13,11 +13,11 @@ from .jump_criteria import JumpCriteria, JumpRecord, feet_turned
 from .stand_criteria import NEVER
 
 EARLY_LIFT_OFF = 0.1
-"""Feet that leave the ground longer than this [s] before the planned lift-off bounce."""
+"""Feet that leave the ground more than this time [s] before the planned lift-off have bounced."""
 
 
 class JumpSeries(Signal):
-    """The jumps of a row that are over. Every figure is that of the worst of them."""
+    """The jumps of a row that are over. Every figure is that of the worst of these jumps."""
 
     made = Field(dtype="int64", text="number of jumps that have touched down")
     landed_time = Field(unit="s", text="when the last of them touched down")
@@ -44,7 +44,7 @@ def goes_on(series: JumpSeries, limits: JumpCriteria) -> bool:
 
 
 def note_landing(record: JumpRecord, series: JumpSeries, planned: bool) -> None:
-    """Keep a jump that has touched down, and be ready for the next lift-off."""
+    """Record a jump that has touched down, and prepare for the next lift-off."""
     series.made += 1
     series.landed_time[()] = record.touchdown_time
     if series.made == 1:
@@ -69,7 +69,7 @@ def note_landing(record: JumpRecord, series: JumpSeries, planned: bool) -> None:
 
 
 def note_place(record: JumpRecord, series: JumpSeries) -> None:
-    """Between two jumps: how far the feet are from where the plan has them."""
+    """Between two jumps: note how far the feet are from their planned position."""
     off = [0.0, 0.0]
     for foot in range(record.foot.shape[0]):
         for axis in range(2):
@@ -82,7 +82,7 @@ def note_place(record: JumpRecord, series: JumpSeries) -> None:
 
 
 def keep_place(series: JumpSeries) -> None:
-    """The next jump lifts off: where the last one landed is settled."""
+    """When the next jump lifts off: keep the last landing's error if it is the largest."""
     jump = int(series.made)
     if series.place_now > series.place_error:
         series.place_error[()], series.place_jump[()] = series.place_now, jump
@@ -91,8 +91,10 @@ def keep_place(series: JumpSeries) -> None:
 
 
 def series_failure(series: JumpSeries, limits: JumpCriteria, made: int) -> str | None:
-    """The first criterion of a row of jumps that does not hold, in words, or ``None``; ``made`` of
-    them are over, the last included."""
+    """The first criterion of a row of jumps that does not hold, in words, or ``None``.
+
+    ``made`` is the number of jumps that are over, including the last.
+    """
     s, c = series, limits
     verdicts = (
         (made == c.jumps, f"made {made} of {c.jumps} jumps"),

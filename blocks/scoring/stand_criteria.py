@@ -1,4 +1,4 @@
-"""When a robot counts as standing: the tolerances that all scores share, and their judgement."""
+"""The criteria of standing: the tolerances that all scores share, and their judgement."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from ...runtime.language.signals import Field, Signal
 from .footing import Footing
 
 NEVER = -1.0
-"""The value of an instant that has not come."""
+"""The value of a time that has not come yet."""
 Verdict = tuple[Any, str]
-"""Whether a criterion holds (Python's truth value or NumPy's), and what to say if it does not."""
+"""Whether a criterion holds (as Python's or NumPy's bool), and the reason if it does not."""
 
 
 class StandRecord(Signal):
@@ -79,7 +79,7 @@ class StandCriteria(Parameters):
     )
 
     def for_robot(self, footing: Footing) -> StandCriteria:
-        """The same tolerances, those that are not given filled in from the robot."""
+        """The tolerances, in which those that are not given follow from the robot."""
         given: dict[str, float] = {}
         if self.fall_height is None:
             given["fall_height"] = footing.fall_height

@@ -1,4 +1,4 @@
-"""What a score notes of a robot on its feet, tick by tick, from the simulator's truth."""
+"""Records how a robot stands on its feet, tick by tick, from the simulation truth."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def begin(record: StandRecord, truth: RobotTruth) -> None:
 
 
 def note_machine(record: StandRecord, truth: RobotTruth) -> None:
-    """Contacts, limits and motors: what must never be exceeded at any time."""
+    """Note forbidden contacts and excesses over the limits of joints and motors."""
     if truth.forbidden_contacts and not record.forbidden:
         record.forbidden_time[()] = record.now
     record.forbidden += truth.forbidden_contacts
@@ -34,7 +34,7 @@ def note_machine(record: StandRecord, truth: RobotTruth) -> None:
 
 
 def note_fall(record: StandRecord, truth: RobotTruth, limits: StandCriteria) -> bool:
-    """Whether the robot falls now; it falls once."""
+    """Note a fall; returns whether the robot falls in this tick, which happens at most once."""
     assert limits.fall_height is not None
     tilted = tilt(truth.base_orientation)
     height = truth.base_position.item(2) - max(truth.ground_height.tolist())
@@ -68,7 +68,7 @@ def note_feet(
 
 
 def note_rest(record: StandRecord, truth: RobotTruth, footing: Footing) -> None:
-    """How the robot stands now."""
+    """Note how the robot stands now, for the judgement of its rest."""
     record.judged_time[()] = record.now
     record.tilt[()] = tilt(truth.base_orientation)
     record.com_speed[()] = sqrt(sum(v * v for v in truth.com_velocity.tolist()))

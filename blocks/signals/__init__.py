@@ -1,4 +1,4 @@
-"""The vocabulary every block speaks: the signals that travel between blocks and the robot.
+"""The signals that travel between blocks and the robot, which all blocks share.
 
 Conventions, the same everywhere:
 

@@ -24,18 +24,18 @@ class BaseState(Signal):
 
 
 class EstimatorHealth(Signal):
-    """How far an estimator believes itself, and what it has to live with.
+    """An estimator's own uncertainty, and the quality of its measurements.
 
     A standard deviation here is that of the error's norm: the root of the covariance's trace.
     """
 
     position_std = Field(unit="m", text="standard deviation of the position's error")
-    velocity_std = Field(unit="m/s", text="of the velocity's error")
-    tilt_std = Field(unit="rad", text="of the orientation's error about the horizontal axes")
-    yaw_std = Field(unit="rad", text="of the orientation's error about the vertical axis")
-    trusted = Field("n_contacts", dtype="bool", text="points that the estimate leans on now")
+    velocity_std = Field(unit="m/s", text="standard deviation of the velocity's error")
+    tilt_std = Field(unit="rad", text="standard deviation of the error about the horizontal axes")
+    yaw_std = Field(unit="rad", text="standard deviation of the error about the vertical axis")
+    trusted = Field("n_contacts", dtype="bool", text="points that correct the estimate now")
     gyro_saturated = Field(dtype="bool", text="an axis of the gyroscope is at the end of its range")
-    accelerometer_saturated = Field(dtype="bool", text="the same of the accelerometer")
+    accelerometer_saturated = Field(dtype="bool", text="an axis of it is at the end of its range")
     saturated_ticks = Field(dtype="int64", text="ticks so far in which any of the two was")
 
 
@@ -66,7 +66,7 @@ class DynamicsTerms(Signal):
 
 
 class WholeBodyTarget(Signal):
-    """What the whole-body controller is to achieve now."""
+    """The targets of the whole-body controller at the present instant."""
 
     com = Field(3, unit="m", frame="world", text="centre of mass")
     com_velocity = Field(3, unit="m/s", frame="world", text="its velocity")
@@ -81,7 +81,7 @@ class WholeBodyTarget(Signal):
 
 
 class WholeBodyCommand(Signal):
-    """The whole-body controller's answer."""
+    """The whole-body controller's solution: torques, accelerations and contact forces."""
 
     torque = Field("n_joints", unit="N m", text="feedforward joint torques")
     acceleration = Field("n_velocities", text="generalised acceleration")

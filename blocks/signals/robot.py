@@ -54,7 +54,7 @@ class JointCommand(Signal):
 
 
 class ExternalForce(Signal):
-    """A force that something outside puts on the robot."""
+    """An external force on the robot."""
 
     force = Field(3, unit="N", frame="world", text="force")
     point = Field(dtype="int64", text="index of the named point it acts at, in file order")

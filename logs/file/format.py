@@ -166,6 +166,8 @@ class Header:
         robot: the robot's description, if the graph has one.
         source: the graph file as it was named for the run.
         terrain: the ground of the simulated world, if there is one.
+        files: the SHA-256 of each file that a parameter names or a block has read, such as plans.
+        project: the git commit of the project that the graph's file belongs to.
     """
 
     name: str
@@ -187,6 +189,8 @@ class Header:
     robot: RobotDescription | None = None
     source: str = ""
     terrain: Terrain | None = None
+    files: Mapping[str, str] = field(default_factory=dict)
+    project: str = ""
     format: int = FORMAT
 
     @property

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import ctypes
 import platform
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
@@ -13,9 +15,14 @@ from ...runtime.language.stages import BlockSpec, CheckedGraph
 from ...runtime.language.terrain import Terrain
 from ...runtime.running.memory import BoundGraph
 from .format import Header, RecordedBlock, RecordedField, RecordedLayout
+from .surroundings import files_read, parameter_files, project_state
 
 RECORDED_VERSIONS = (
     "aloft", "numpy", "numba", "mujoco-core", "pin", "qpsolvers", "daqp", "casadi", "rerun-sdk",
+)  # fmt: skip
+_KERNEL_NAMES = (
+    "scipy_openblas_get_corename64_", "scipy_openblas_get_corename",
+    "openblas_get_corename64_", "openblas_get_corename",
 )  # fmt: skip
 _NOTHING = RecordedLayout((), {}, {}, 0)
 
@@ -23,7 +30,7 @@ _NOTHING = RecordedLayout((), {}, {}, 0)
 def header_of(bound: BoundGraph) -> Header:
     """The header of a run of ``bound``, as its memory is now."""
     memory, graph = bound.memory, bound.graph
-    return make_header(
+    header = make_header(
         graph,
         memory.bus.layout,
         memory.bus.buffer.tobytes(),
@@ -31,6 +38,7 @@ def header_of(bound: BoundGraph) -> Header:
         first_tick=bound.clock.tick,
         clock=bound.clock.kind,
     )
+    return replace(header, files=files_read(bound))
 
 
 def make_header(
@@ -66,6 +74,8 @@ def make_header(
         order=graph.order,
         robot=graph.robot,
         terrain=next((found for spec in graph.blocks if (found := terrain_of(spec))), None),
+        files=parameter_files(graph),
+        project=project_state(Path(graph.file).parent) if graph.file else "",
         source=graph.file or next((spec.where.file for spec in graph.blocks if spec.where), ""),
     )
 
@@ -154,7 +164,7 @@ def versions() -> dict[str, str]:
 
 
 def machine() -> dict[str, str]:
-    """What the bytes of a run may depend on beside versions: processor, system and BLAS."""
+    """What the bytes of a run may depend on beside versions: processor, system, BLAS and its kernel."""
     import numpy as np
 
     try:
@@ -167,7 +177,31 @@ def machine() -> dict[str, str]:
         "processor": _processor(),
         "system": platform.system(),
         "blas": library,
+        "blas kernel": _blas_kernel(),
     }
+
+
+def _blas_kernel() -> str:
+    """The routines that OpenBLAS has chosen for this processor, such as ``SkylakeX``; it rounds
+    otherwise with others. Empty where that cannot be found out."""
+    try:
+        lines = Path("/proc/self/maps").read_text(encoding="utf-8").splitlines()
+    except OSError:
+        return ""
+    paths = dict.fromkeys(line.split()[-1] for line in lines if "openblas" in line)
+    found = []
+    for path in paths:
+        try:
+            library = ctypes.CDLL(path)
+        except OSError:
+            continue
+        for name in _KERNEL_NAMES:
+            if hasattr(library, name):
+                function = getattr(library, name)
+                function.restype = ctypes.c_char_p
+                found.append((function() or b"").decode(errors="replace"))
+                break
+    return ", ".join(dict.fromkeys(found))
 
 
 def _processor() -> str:

@@ -25,7 +25,7 @@ from ..file.format import (
     RecordedRows,
     entity_of,
 )
-from ..file.time_columns import time_columns
+from ..file.time_columns import time_columns, timed
 from ..viewing.block_times import times_table
 from ..viewing.limits import limits_of
 from ..viewing.plot_views import EVERY_VALUE
@@ -138,11 +138,12 @@ class RunStream:
 
         if not notes:
             return
-        times = self._times(np.array([note.tick for note in notes]))
+        ticks = np.array([note.tick for note in notes])
+        times = self._times(ticks)
         texts = [json.dumps(asdict(note)) for note in notes]
         columns = rr.DynamicArchetype.columns("aloft", components={NOTE: texts})
         self.stream.send_columns(f"{self._root}{NOTES}", times, columns)
-        self._write_events(times, [note.text for note in notes], [note.level for note in notes])
+        self._write_events(ticks, [note.text for note in notes], [note.level for note in notes])
 
     def write_rest(self) -> None:
         """Write the last value of the signals that were constant in the end, for the viewer."""
@@ -209,11 +210,12 @@ class RunStream:
             self.stream.send_columns(f"{self._root}{lane.entity}", times, states)
             if lane.told:
                 texts = [f"{lane.field.name}: {label}" for label in change.labels]
-                self._write_events(times, texts, ["INFO"] * len(texts))
+                self._write_events(change.ticks, texts, ["INFO"] * len(texts))
 
-    def _write_events(self, times: Sequence[Any], texts: list[str], levels: list[str]) -> None:
+    def _write_events(self, ticks: NDArray[np.int64], texts: list[str], levels: list[str]) -> None:
         import rerun as rr
 
-        texts = [self._label + text for text in texts]
+        times = self._times(ticks)
+        texts = timed(self.header, ticks, [self._label + text for text in texts])
         columns = rr.TextLog.columns(text=texts, level=levels)
         self.stream.send_columns(f"{self._root}{EVENTS}", times, columns)

@@ -18,9 +18,10 @@ from ...runtime.language.parameter_change import ParameterChange
 from ...runtime.language.stages import CheckedGraph
 from ...runtime.loading import load_text
 from ...runtime.loading.earlier_versions import in_present_form
-from ...runtime.running.memory import Snapshot
+from ...runtime.running.memory import BoundGraph, Snapshot
 from ..file.header import machine, versions
 from ..file.reader import RecordedRun, read
+from ..file.surroundings import files_read, other_files
 
 
 @dataclass(frozen=True)
@@ -102,15 +103,17 @@ class OpenedRun:
         return self.file.snapshot(tick)
 
     def what_is_other_now(self) -> list[str]:
-        """The versions and the processor that computed the run and are different here."""
+        """The versions, the processor, BLAS and its kernel, and the files and plans that computed the run
+        and are different here."""
         header = self.file.header
         now = {**versions(), **machine()}
         then = {**header.versions, **header.machine}
-        return [
+        found = [
             f"{name} was {then[name]} and is {now.get(name, 'not installed')}"
             for name in then
             if then[name] != now.get(name)
         ]
+        return found + other_files(header.files, files_read(BoundGraph(self.graph)))
 
 
 def _folder(recording: Path, source: Path) -> Path:

@@ -22,11 +22,18 @@ HIDDEN_LANES = ("mode",)
 
 
 def recording_blueprint(
-    header: Header, shown: Sequence[Shown] = (Shown(),), *, live: bool = False
+    header: Header,
+    shown: Sequence[Shown] = (Shown(),),
+    *,
+    live: bool = False,
+    first_tabs: Sequence[Any] = (),
+    follow: bool = True,
 ) -> Any:
     """The layout, saved in the file so that it needs no set-up to look at.
 
     ``shown`` are the runs in the stream, by default one; of several, each entity has its root.
+    ``first_tabs`` come before those made from the graph; with ``follow`` the camera goes along with
+    the robot.
     """
     import rerun.blueprint as rrb
 
@@ -34,6 +41,7 @@ def recording_blueprint(
     main = main_plots(header, ports, shown)
     columns = 2 if len(main) > 3 else 1
     right = rrb.Tabs(
+        *first_tabs,
         rrb.Grid(*main, grid_columns=columns, name="Main signals"),
         *block_tabs(header, shown),
         rrb.TextDocumentView(origin=f"{shown[0].root}{TIMES}", name="Block times"),
@@ -42,12 +50,14 @@ def recording_blueprint(
     )
     below = rrb.Tabs(
         states_view(header, shown),
-        rrb.TextLogView(
-            origin="/", contents=[f"{run.root}{EVENTS}" for run in shown], name="Events"
-        ),
+        events_view(shown),
         active_tab=0,
     )
-    left = rrb.Vertical(scene_view(header, shown), below, row_shares=[3, 2]) if ports else below
+    left = (
+        rrb.Vertical(scene_view(header, shown, follow=follow), below, row_shares=[3, 2])
+        if ports
+        else below
+    )
     panel = {"play_state": "following"} if live else {"play_state": "playing", "loop_mode": "all"}
     return rrb.Blueprint(
         rrb.Horizontal(left, right, column_shares=[2, 3]),
@@ -57,7 +67,29 @@ def recording_blueprint(
     )
 
 
-def scene_view(header: Header, shown: Sequence[Shown]) -> Any:
+def events_view(shown: Sequence[Shown]) -> Any:
+    """What happened: each text begins with its time, as the viewer's column cuts times off."""
+    import rerun.blueprint as rrb
+    from rerun.blueprint.encodings import TextLogColumn, TextLogColumnKind, TimelineColumn
+
+    return rrb.TextLogView(
+        origin="/",
+        contents=[f"{run.root}{EVENTS}" for run in shown],
+        name="Events",
+        columns=rrb.TextLogColumns(
+            timeline_columns=[
+                TimelineColumn("t", visible=False),
+                TimelineColumn("tick", visible=False),
+            ],
+            text_log_columns=[
+                TextLogColumn(TextLogColumnKind.LogLevel),
+                TextLogColumn(TextLogColumnKind.Body),
+            ],
+        ),
+    )
+
+
+def scene_view(header: Header, shown: Sequence[Shown], *, follow: bool = True) -> Any:
     """The robot in 3D; of a comparison both robots."""
     import rerun.blueprint as rrb
 
@@ -65,7 +97,9 @@ def scene_view(header: Header, shown: Sequence[Shown]) -> Any:
         origin=WORLD if not shown[0].root else "/",
         contents=[f"/{run.root}{WORLD}/**" for run in shown],
         name="Robot",
-        eye_controls=eye_controls(header.robot, follow=f"/{shown[0].root}{WORLD}/{EYE}"),
+        eye_controls=eye_controls(
+            header.robot, follow=f"/{shown[0].root}{WORLD}/{EYE}" if follow else None
+        ),
         line_grid=rrb.LineGrid3D(visible=True, spacing=0.1),
     )
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from ..file.format import EVENTS, Header, RecordedRows
-from ..file.time_columns import time_columns
+from ..file.time_columns import time_columns, timed
 from .flights import SHORTEST_FLIGHT, TOUCHDOWN, Flights
 from .foot_forces import AFTER_TOUCHDOWN, FootForces, LandingPeaks
 from .scene_contacts import ContactPart
@@ -72,7 +72,8 @@ class Scene:
             touchdowns = [tick for tick, text in events if text == TOUCHDOWN]
             events = sorted(events + self._peaks.add(batch.ticks, force, touchdowns))
         if events:
-            times = time_columns(self._header, np.array([tick for tick, _ in events]))
-            texts = [text for _, text in events]
+            ticks = np.array([tick for tick, _ in events])
+            times = time_columns(self._header, ticks)
+            texts = timed(self._header, ticks, [text for _, text in events])
             columns = rr.TextLog.columns(text=texts, level=["INFO"] * len(texts))
             self._stream.send_columns(f"{self._root}{EVENTS}", times, columns)

@@ -22,6 +22,9 @@ from typing import Literal
 from ...runtime.language.errors import AloftError
 
 ADDRESS = "127.0.0.1"
+SILENT = {"CI": "1"}
+"""What Rerun's program must find in its environment so that it sends no usage statistics: it takes
+itself to be in a test. Its own switch, ``rerun analytics disable``, is a setting of the user's."""
 START_TIME = 60.0
 """Seconds the viewer may take until it listens."""
 STOP_TIME = 5.0
@@ -42,12 +45,14 @@ class Viewer:
         process: its process.
         port: the port on which it receives data.
         web_port: the port of its page, for a viewer in a browser.
+        page_server: the process that serves the page; see ``page_server``.
     """
 
     kind: ViewerKind
     process: subprocess.Popen[bytes]
     port: int
     web_port: int | None = None
+    page_server: subprocess.Popen[bytes] | None = None
 
     @property
     def source(self) -> str:
@@ -70,12 +75,13 @@ class Viewer:
 
     def stop(self) -> None:
         """End the viewer."""
-        self.process.terminate()
-        try:
-            self.process.wait(STOP_TIME)
-        except subprocess.TimeoutExpired:
-            self.process.kill()
-            self.process.wait()
+        for process in filter(None, (self.page_server, self.process)):
+            process.terminate()
+            try:
+                process.wait(STOP_TIME)
+            except subprocess.TimeoutExpired:
+                process.kill()
+                process.wait()
 
 
 def start_viewer(
@@ -90,10 +96,10 @@ def start_viewer(
     screens = ("DISPLAY", "WAYLAND_DISPLAY", "WAYLAND_SOCKET")
     if kind == "window" and sys.platform == "linux" and not any(map(os.environ.get, screens)):
         raise ViewerError(_explained(kind, "there is no screen", b""))
-    port, web_port = free_ports(2)
+    port, inner_port, web_port = free_ports(3)
     command = [str(program), "--bind", ADDRESS, "--port", str(port)]
     if kind == "web":
-        command += ["--serve-web", "--web-viewer-port", str(web_port)]
+        command += ["--serve-web", "--web-viewer-port", str(inner_port)]
     else:
         command += ["--window-size", size, "--hide-welcome-screen"]
     if kind == "headless":
@@ -106,10 +112,14 @@ def start_viewer(
             stderr=subprocess.STDOUT,
             # not ended by a Ctrl-C that means the run
             start_new_session=True,
-            env={**os.environ, "RUST_LOG": "warn", "NO_COLOR": "1"},
+            env={**os.environ, "RUST_LOG": "warn", "NO_COLOR": "1", **SILENT},
         )
-        viewer = Viewer(kind, process, port, web_port if kind == "web" else None)
+        viewer = Viewer(kind, process, port)
         try:
+            if kind == "web":
+                viewer.web_port = web_port
+                viewer.page_server = _serve_page(web_port, inner_port, port)
+                _wait_for(viewer, inner_port, time.monotonic() + START_TIME)
             _wait_until_it_listens(viewer)
         except ViewerError as error:
             viewer.stop()
@@ -124,16 +134,33 @@ def start_viewer(
 def _wait_until_it_listens(viewer: Viewer) -> None:
     end = time.monotonic() + START_TIME
     for port in filter(None, (viewer.port, viewer.web_port)):
-        while not _listens(port):
-            if not viewer.lives():
-                raise ViewerError(f"it ended with code {viewer.process.returncode}")
-            if time.monotonic() > end:
-                raise ViewerError(f"it did not listen within {START_TIME:g} s")
-            time.sleep(0.05)
+        _wait_for(viewer, port, end)
     if viewer.kind == "window":
         time.sleep(0.5)  # it listens before it opens its window, which may end it
         if not viewer.lives():
             raise ViewerError(f"it ended with code {viewer.process.returncode}")
+
+
+def _wait_for(viewer: Viewer, port: int, end: float) -> None:
+    """Wait until the viewer listens on a port, at most until the instant ``end``."""
+    while not _listens(port):
+        if not viewer.lives():
+            raise ViewerError(f"it ended with code {viewer.process.returncode}")
+        if time.monotonic() > end:
+            raise ViewerError(f"it did not listen within {START_TIME:g} s")
+        time.sleep(0.05)
+
+
+def _serve_page(port: int, inner_port: int, data_port: int) -> subprocess.Popen[bytes]:
+    """Start the process that hands on Rerun's page without what calls other machines."""
+    program = Path(__file__).with_name("page_server.py")
+    return subprocess.Popen(
+        [sys.executable, "-I", str(program), str(port), str(inner_port), str(data_port)],
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        start_new_session=True,
+    )
 
 
 def _explained(kind: ViewerKind, what: str, output: bytes) -> str:

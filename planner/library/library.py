@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import os
 import re
-import zipfile
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import Any
@@ -80,7 +79,8 @@ class PlanLibrary:
     """The plans of one robot: those in ``folder``, which new ones are added to, and behind them
     those in other folders, by default the shipped ones.
 
-    A plan is looked up by its task's hash, so a plan never stands for a task it was not made for.
+    Without a ``folder`` the shipped plans come first, and the user's own folder takes what is new:
+    what lies in a cache never changes what a shipped task does. A plan is looked up by its task's hash, so a plan never stands for a task it was not made for.
     Files are written as a whole or not at all; any number of processes may use one folder.
     """
 
@@ -92,7 +92,7 @@ class PlanLibrary:
     ) -> None:
         self.robot = robot
         self.folder = user_folder() if folder is None else folder
-        self._folders = (self.folder, *others)
+        self._folders = (*others, self.folder) if folder is None else (self.folder, *others)
 
     def path_of(self, task: JumpTask) -> Path | None:
         """The file of that very task, or ``None``."""
@@ -109,7 +109,7 @@ class PlanLibrary:
         where ``plan`` and everybody else never look: it must be asked for in this way.
 
         Raises:
-            TaskError, PlanError: as ``plan``.
+            TaskError, PlanFileError, PlanError: as ``plan``.
         """
         invalid = PlanLibrary(self.robot, self.folder / INVALID, ())
         found = self.find(task) or invalid.find(task)
@@ -127,14 +127,20 @@ class PlanLibrary:
         return frozenset(path.stem.rpartition("-")[2] for path in files)
 
     def find(self, task: JumpTask) -> JumpPlan | None:
-        """The plan of that very task, or ``None``. A file that cannot be read counts as none."""
+        """The plan of that very task, or ``None``.
+
+        Raises:
+            PlanFileError: its file is damaged; the message names it.
+        """
         path = self.path_of(task)
         if path is None:
             return None
         try:
             return read_plan(path)
-        except PlanFileError:
-            return None
+        except PlanFileError as error:
+            raise PlanFileError(
+                f"{error}; put the file back, or remove it to have the task planned anew"
+            ) from error
 
     def nearest(self, task: JumpTask) -> tuple[JumpPlan, float] | None:
         """The valid plan of the nearest task that can be started from, and how far it is."""
@@ -170,7 +176,7 @@ class PlanLibrary:
                 try:
                     with np.load(path, allow_pickle=False) as file:
                         yield path, json.loads(str(file["header"]))
-                except (OSError, KeyError, ValueError, EOFError, zipfile.BadZipFile):
+                except Exception:  # noqa: BLE001, S112  # a damaged archive raises nearly anything
                     continue
 
     def prune(self, tasks: Iterable[JumpTask]) -> list[Path]:
@@ -208,6 +214,7 @@ class PlanLibrary:
 
         Raises:
             TaskError: what is asked for contradicts itself or the robot.
+            PlanFileError: the kept plan's file is damaged.
             PlanError: the task cannot be planned.
             InvalidPlanError: it can, but the plan fails the validity check; it is not kept.
         """

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import io
 import json
-import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
@@ -206,8 +205,10 @@ def read_plan(path: str | Path) -> JumpPlan:
             arrays = {name: file[name] for name in ARRAYS}
     except OSError as error:
         raise PlanFileError(f"cannot read {path}: {error.strerror or error}") from error
-    except (KeyError, ValueError, EOFError, zipfile.BadZipFile) as error:
-        raise PlanFileError(f"{path} is no plan file: {error}") from error
+    except Exception as error:  # a damaged archive raises nearly anything: zlib.error, TokenError
+        raise PlanFileError(f"{path} is no plan file: {error or type(error).__name__}") from error
+    if not isinstance(header, dict):
+        raise PlanFileError(f"{path} is no plan file: its header is no object")
     if header.get("format") != FILE_FORMAT:
         raise PlanFileError(
             f"{path} is of format {header.get('format')!r}, expected {FILE_FORMAT!r}; "
@@ -218,5 +219,5 @@ def read_plan(path: str | Path) -> JumpPlan:
         values = {name: header[name] for name in _SCALARS if name != "later_flights"}
         times = [(float(start), float(end)) for start, end in header.get("later_flights", [])]
         return JumpPlan(task=task, **arrays, **values, later_flights=tuple(times))
-    except (KeyError, ValueError, TaskError) as error:
+    except (KeyError, ValueError, TypeError, AttributeError, TaskError) as error:
         raise PlanFileError(f"{path} is no plan file: {error}") from error

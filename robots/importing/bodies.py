@@ -1,4 +1,4 @@
-"""Rigid bodies as they are joined: masses, centres and inertias about different frames."""
+"""Inertial properties of rigid bodies: changes of frame, and several bodies joined into one."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ class Inertial:
     inertia: Array
 
     def moved(self, rotation: Array, position: Array) -> Inertial:
-        """The same body seen from a frame in which its own is turned and displaced so."""
+        """The body in another frame, in which its own frame has this rotation and position."""
         if np.array_equal(rotation, np.eye(3)):
             return Inertial(self.mass, self.com + position, self.inertia)
         inertia = rotation @ self.inertia @ rotation.T
         return Inertial(self.mass, rotation @ self.com + position, 0.5 * (inertia + inertia.T))
 
     def scaled(self, share: float) -> Inertial:
-        """A share of the body, spread as the body is."""
+        """A body of the same distribution with a ``share`` of the mass."""
         return Inertial(self.mass * share, self.com, self.inertia * share)
 
 
@@ -34,7 +34,7 @@ NOTHING = Inertial(0.0, np.zeros(3), np.zeros((3, 3)))
 
 
 def joined(bodies: list[Inertial]) -> Inertial:
-    """Several bodies in one frame as one."""
+    """One body that is made of several bodies, all given in the same frame."""
     bodies = [body for body in bodies if body.mass > 0.0 or np.any(body.inertia)]
     if len(bodies) <= 1:
         return bodies[0] if bodies else NOTHING

@@ -1,4 +1,4 @@
-"""From the bodies of a file to the links and joints of a description.
+"""Makes the links and joints of a description from the bodies of a file.
 
 Bodies that no joint moves become part of the body they are fixed to, and every link's frame is put
 at its joint and turned parallel to the base's at the zero of all joints, so that joint axes may
@@ -30,14 +30,14 @@ SHARE = 1e-3
 
 @dataclass(frozen=True)
 class Frame:
-    """Where a body of the file is: on ``link``, turned and displaced [m] in the link's frame."""
+    """The pose of a body of the file: its ``link``, and rotation and position [m] in its frame."""
 
     link: str
     rotation: Array
     position: Array
 
     def point(self, place: Any) -> list[float]:
-        """A point [m] given in the body's frame, in the link's."""
+        """Convert a point [m] from the body's frame to the link's."""
         return tidy(self.rotation @ np.asarray(place, dtype=float) + self.position)
 
 

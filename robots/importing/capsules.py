@@ -1,4 +1,4 @@
-"""Collision shapes of other kinds as capsules, the one shape that a description has.
+"""Approximates collision shapes by capsules, the one kind of shape that a description has.
 
 A capsule stands for each shape, lying inside it where the shape is round or slender: a sphere is
 a very short capsule, a cylinder loses its edges, a box is filled by up to three capsules side by
@@ -31,13 +31,13 @@ class Capsule:
     radius: float
 
     def moved(self, rotation: Array, position: Array) -> Capsule:
-        """The same capsule seen from a frame in which its own is turned and displaced so."""
+        """The capsule in another frame, in which its own frame has this rotation and position."""
         return Capsule(
             rotation @ self.start + position, rotation @ self.end + position, self.radius
         )
 
     def lowest(self, rotation: Array) -> float:
-        """How low it reaches [m] in a frame in which its own is turned so."""
+        """The height of its lowest point [m] in a frame in which its own has this rotation."""
         return float(min((rotation @ self.start)[2], (rotation @ self.end)[2]) - self.radius)
 
 

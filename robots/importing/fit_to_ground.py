@@ -1,4 +1,4 @@
-"""What follows from the pose in which an imported robot stands."""
+"""Adapts an imported robot to the ground: its standing pose, and shapes that reach the ground."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from ..standing_pose import find_standing_pose
 from .capsules import coarse
 
 CLEARANCE = 0.002
-"""How far above the ground a shape that is no contact point has to end [m]."""
+"""The least height above the ground of a shape that is no contact point [m]."""
 FOOT_CLEARANCE = 0.01
-"""The same for shapes of a link with a foot, which tilts while the robot moves."""
+"""The least height for shapes of a link with a foot, which tilts while the robot moves [m]."""
 
 
 def fit_to_ground(

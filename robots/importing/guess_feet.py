@@ -19,7 +19,7 @@ REACH = 0.1
 LEVEL = 0.01
 """Contact points lie within this height [m]."""
 RADIUS = 0.02
-"""Of a foot whose shape the file does not tell [m]."""
+"""The radius of a foot whose shape the file does not give [m]."""
 
 
 def guess_feet(model: RawModel, built: Built) -> list[dict[str, Any]]:
@@ -52,7 +52,7 @@ def _bodies(built: Built, link: str) -> dict[str, Frame]:
 
 
 def _lowest(model: RawModel, built: Built, link: str) -> float:
-    """How low a link reaches at the zero of all joints [m], with all that is fixed to it."""
+    """The lowest height of a link, with all that is fixed to it, at the zero of all joints [m]."""
     height = _origins(built)[link][2]
     found = [height]
     for name, frame in _bodies(built, link).items():

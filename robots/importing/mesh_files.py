@@ -31,7 +31,7 @@ def mesh_corners(path: Path) -> Array:
 
 
 def _stl_corners(content: bytes) -> Array:
-    """Of binary STL (header, count, 50 bytes a triangle), or of its text form."""
+    """The corners in binary STL (header, count, 50 bytes a triangle), or in its text form."""
     count = int(np.frombuffer(content[80:84], "<u4")[0]) if len(content) >= 84 else 0
     if len(content) == 84 + 50 * count:
         layout = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("extra", "<u2")])

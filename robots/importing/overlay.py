@@ -1,4 +1,4 @@
-"""What a short YAML adds to a URDF or MJCF file, and changes of it.
+"""Applies a short YAML to a URDF or MJCF file: what it adds, and what it changes.
 
 Its keys are those of a full description, but ``links`` and ``joints`` are mappings from a name to
 the values that differ, values in ``profiles`` may be left out where the file has them, and feet
@@ -22,7 +22,7 @@ from .build import Built, Frame, tidy
 OWN_KEYS = ("file", "weld")
 _UP = np.array([0.0, 0.0, 1.0])
 RADIUS = 0.005
-"""Of a contact point where the YAML gives none [m]."""
+"""The radius of a contact point for which the YAML gives none [m]."""
 
 
 class Overlay:
@@ -50,7 +50,7 @@ class Overlay:
         return {str(name): each for name, each in value.items()}
 
     def check_keys(self, legal: list[str]) -> None:
-        """Report keys that there are none of."""
+        """Report unknown keys."""
         for key in self.data:
             if key not in legal and key not in OWN_KEYS:
                 right = nearest(str(key), [*legal, *OWN_KEYS])
@@ -99,7 +99,7 @@ class Overlay:
         }
 
     def frame(self, path: tuple[str | int, ...], name: Any, built: Built) -> Frame | None:
-        """The body of the file of that name; None, and a fault, where there is none."""
+        """The body of the file with that name; ``None``, and a fault, if there is none."""
         if isinstance(name, str) and name in built.frames:
             return built.frames[name]
         self.add(path, f"the file has no link {shown(name)}", listing(list(built.frames), 60),

@@ -1,6 +1,6 @@
 """Finds the files that a robot's description names, also those under ``package://``.
 
-No environment variable is asked, so that the same graph finds the same robot: a package is a
+No environment variable is read, so that the same graph finds the same robot: a package is a
 folder of that name above the file or beside one of these, or it is installed with Python.
 """
 

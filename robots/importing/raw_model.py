@@ -1,4 +1,4 @@
-"""What a URDF or MJCF file holds, read by MuJoCo, with every frame at the zero of all joints."""
+"""The content of a URDF or MJCF file, read by MuJoCo, with all joints at zero."""
 
 from __future__ import annotations
 

@@ -1,9 +1,9 @@
 """Reads a URDF or MJCF file with MuJoCo.
 
-MuJoCo compiles the file, so that defaults, alternative orientations, included files and degrees
-are its business. Two things are kept from it: inertias, which it would refuse or change where a
-link that does not move by itself has an impossible one (published files have such), and meshes,
-of which it reads few formats and needs none here.
+MuJoCo compiles the file, so it handles defaults, alternative orientations, included files and
+degrees. Two things are taken out before: inertias, because MuJoCo refuses or changes impossible
+ones of links that are fixed to others (published files have such), and meshes, because it reads
+only few formats and needs none here.
 """
 
 from __future__ import annotations
@@ -91,7 +91,8 @@ def _one_line(error: Exception) -> str:
 
 
 def _tidy(values: Array) -> Array:
-    """Directions without the rounding of angles such as 1.5707963: what is nearly straight is."""
+    """Directions without the rounding errors of angles such as 1.5707963: nearly straight ones
+    are made straight."""
     values = np.array(values, dtype=float)
     nearest = np.round(values)
     return np.where(np.abs(values - nearest) < 1e-10, nearest, values) + 0.0

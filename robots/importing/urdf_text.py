@@ -1,4 +1,4 @@
-"""What MuJoCo does not keep of a URDF: speed limits, mimic joints, and the lines of everything."""
+"""Reads from a URDF what MuJoCo drops: speed limits, mimic joints, and the lines of elements."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class XmlFile:
         try:
             text = path.read_text(encoding="utf-8")
             self.root = ElementTree.fromstring(text)
-            # What is commented out is blanked, so that it is neither found nor moves the rest.
+            # Comments are blanked: nothing is found in them, and all other positions stay.
             self.text = re.sub(r"<!--.*?-->", _blanked, text, flags=re.DOTALL)
         except OSError as error:
             raise self.error(f"the file cannot be read: {error.strerror}") from error

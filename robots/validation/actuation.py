@@ -13,11 +13,11 @@ from .draft import Draft, read
 from .faults import Path, listing, nearest, number
 
 LARGEST_CONDITION = 1e8
-"""Of a transmission's matrix: beyond this, motor torques are rounding errors."""
+"""The largest condition number of a transmission; beyond it motor torques are rounding errors."""
 
 
 def check_actuation(draft: Draft) -> None:
-    """Report transmissions that cannot be turned round and motors that cannot exist."""
+    """Report transmissions that are singular and motors that cannot exist."""
     transmission = read(Transmission, draft.data.get("transmission"))
     motors = transmission.motors if transmission else ()
     if transmission:

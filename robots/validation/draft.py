@@ -29,7 +29,7 @@ class Draft:
         self.faults.append(RobotFault(path, message, expected, found, fix))
 
     def unknown(self, path: Path, what: str, name: str, kind: str, legal: Sequence[str]) -> None:
-        """Note a name of a link, joint or foot that there is none of."""
+        """Report a name that no link, joint or foot has."""
         if not legal:
             return  # That there are none at all is reported.
         right = nearest(name, legal)

@@ -93,9 +93,9 @@ def files_of(folder: Path) -> tuple[Path, ...]:
 
 
 def _some_files(folder: Path) -> Iterator[Path]:
-    """The Python files in a folder and two levels of folders below it, up to ``_MOST_FILES``."""
+    """The Python files in a folder and in the folders that lie in it, up to ``_MOST_FILES``."""
     count = 0
-    for pattern in ("*.py", "*/*.py", "*/*/*.py"):
+    for pattern in ("*.py", "*/*.py"):
         for path in sorted(folder.glob(pattern)):
             if any(part.startswith(".") for part in path.relative_to(folder).parts):
                 continue  # such as virtual environments and caches

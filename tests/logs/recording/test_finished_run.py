@@ -171,9 +171,9 @@ def test_states_and_events_are_said_by_name(recorded: tuple[CheckedGraph, RunRes
         batch = chunk.to_record_batch()
         texts = batch["TextLog:text"].flatten().to_pylist()
         lines |= set(zip(batch["tick"].to_pylist(), texts, strict=True))
-    assert (100, "robot.truth.stage: air") in lines
-    assert (100, "lift-off") in lines
-    assert (200, "touchdown") in lines
+    assert (100, "0.200 s  robot.truth.stage: air") in lines
+    assert (100, "0.200 s  lift-off") in lines
+    assert (200, "0.400 s  touchdown") in lines
 
 
 def test_the_robot_is_posed_in_space(recorded: tuple[CheckedGraph, RunResult, Path]) -> None:

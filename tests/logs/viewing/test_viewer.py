@@ -5,13 +5,17 @@ import subprocess
 import time
 from pathlib import Path
 from typing import Any
+from urllib.request import urlopen
 
+import numpy as np
 import pytest
+from PIL import Image
 
 from aloft import load
 from aloft.logs.file.reader import read
 from aloft.logs.recording.comparison import write_comparison
 from aloft.logs.recording.recorder import Recorder
+from aloft.logs.viewing.page_server import OUTSIDE, policy
 from aloft.logs.viewing.viewer import ViewerError, find_program, free_ports, start_viewer
 
 from .browser import PROGRAM, Browser
@@ -65,6 +69,47 @@ def test_the_viewer_finds_no_fault(recording: Path, tmp_path: Path) -> None:
         viewer.stop()
 
 
+@pytest.mark.long
+@needs_vulkan
+def test_the_ground_is_drawn_and_forces_are_zero_in_flight(tmp_path: Path) -> None:
+    """What a picture of a jump onto a step must show, counted in pixels of the colours drawn."""
+    from rerun.experimental import ViewerClient
+
+    recording, picture = tmp_path / "up.rrd", tmp_path / "up.png"
+    graph = load(ROOT / "graphs" / "up_5cm.yaml")
+    graph.run(sinks=[Recorder(recording)], log=False)
+    run = read(recording)
+    force = run["robot.truth.contact_force"]
+    flight = np.flatnonzero(~(force != 0.0).any(axis=(1, 2)) & (run.time > 0.5))
+    viewer = start_viewer("headless", [recording], size="1600x900")
+    try:
+        client = ViewerClient.connect(viewer.source)
+        check_views(client, len(run.ticks))
+        client.set_time("t", duration=float(run.time[flight].mean()), play_state="paused")
+        time.sleep(3.0)
+        client.save_screenshot(str(picture))
+    finally:
+        viewer.stop()
+    pixels = np.asarray(Image.open(picture).convert("RGB")).astype(int)
+    scene, plots = pixels[60:530, :635], pixels[:, 645:]
+    assert near(scene, (141, 146, 153), 45).sum() > 2000, "the step is there"
+    assert near(scene, (229, 57, 53), 40).sum() == 0, "no force arrow in flight"
+    view = plots[365:590, 475:]  # the plot of the forces on the feet
+    lines = near(view, (38, 198, 218), 40) | near(view, (255, 167, 38), 40)
+    lines = lines[:, 25:]  # without the numbers of the axis
+    rows = np.array([np.flatnonzero(column)[-1] if column.any() else -1 for column in lines.T])
+    ends = run.time[flight[[0, -1]]] / run.time[-1] * len(rows)
+    within = rows[int(ends[0]) + 6 : int(ends[1]) - 6]
+    within = within[within >= 0]
+    assert len(within) > 20 and np.ptp(within) <= 2, "the curve is flat in flight"
+    assert within.max() >= rows.max() - 1, "and lies on zero, below everything else"
+
+
+def near(pixels: Any, color: tuple[int, int, int], most: int) -> Any:
+    """Which pixels differ from a colour by no more than ``most`` in each part."""
+    return (np.abs(pixels - np.array(color)) <= most).all(axis=-1)
+
+
 def check_views(client: Any, ticks: int) -> None:
     """Wait until a recording of so many ticks is shown; no view may have anything to report."""
     last = round((ticks - 1) / 500 * 1e9)
@@ -97,8 +142,33 @@ def test_a_browser_shows_the_recording(recording: Path, tmp_path: Path) -> None:
                 picture = browser.picture()
             (tmp_path / "page.png").write_bytes(picture)
             assert len(picture) >= 60_000, "the page shows nothing"
+            asked = "performance.getEntriesByType('resource').map(entry => entry.name).join(' ')"
+            answer = browser.ask("Runtime.evaluate", expression=asked)
+            addresses = answer["result"]["value"].split()
+            assert any("re_viewer" in address for address in addresses)
+            outside = [a for a in addresses if not a.startswith("http://127.0.0.1:")]
+            assert outside == [], "the page calls other machines"
+            tried = "fetch('https://example.com').then(() => 'gone out', error => 'refused')"
+            answer = browser.ask("Runtime.evaluate", expression=tried, awaitPromise=True)
+            assert answer["result"]["value"] == "refused"
     finally:
         viewer.stop()
+
+
+def test_the_page_has_no_links_to_other_machines() -> None:
+    viewer = start_viewer("web")
+    try:
+        with urlopen(viewer.page) as answer:
+            page, found = answer.read(), answer.headers["Content-Security-Policy"]
+        assert b"<script" in page and not OUTSIDE.search(page)
+        assert found == policy(viewer.port) and "https:" not in found
+        environment = Path(f"/proc/{viewer.process.pid}/environ").read_bytes().split(b"\0")
+        assert b"CI=1" in environment, "Rerun sends no usage statistics then"
+        server = viewer.page_server
+        assert server is not None and server.poll() is None
+    finally:
+        viewer.stop()
+    assert server.poll() is not None
 
 
 def test_the_viewer_listens_on_the_loopback_only() -> None:

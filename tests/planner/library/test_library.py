@@ -1,6 +1,7 @@
 """The plan library: what is kept is found by its task alone, and only valid plans are kept."""
 
 import shutil
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,7 +11,7 @@ import pytest
 from aloft.planner.checking.validity import InvalidPlanError
 from aloft.planner.library.library import SHIPPED, PlanLibrary, kept_name, task_distance
 from aloft.planner.task.errors import PlanError
-from aloft.planner.task.plan import JumpPlan
+from aloft.planner.task.plan import JumpPlan, PlanFileError
 from aloft.planner.task.read_task import read_task
 from aloft.planner.task.task import JumpTask, make_task
 from aloft.robots.description import RobotDescription, find_robot
@@ -95,13 +96,38 @@ def test_a_kept_plan_that_is_not_valid_is_not_handed_over(tmp_path: Path, good: 
         library.plan(task, Planner(good))
 
 
-def test_broken_files_are_as_if_they_were_not_there(tmp_path: Path, good: JumpPlan) -> None:
+def test_a_damaged_file_is_an_error_that_names_it(tmp_path: Path, good: JumpPlan) -> None:
     library = PlanLibrary(ROBOT, tmp_path, others=())
     path = library.add(replace(good, task=near()))
-    path.write_bytes(path.read_bytes()[:5000])
-    assert library.find(near()) is None
+    whole = path.read_bytes()
+    path.write_bytes(whole[:5000])
+    with pytest.raises(PlanFileError, match=rf"{path.name} is no plan file.*remove it to have"):
+        library.find(near())
+    rng = np.random.default_rng(0)
+    for _ in range(150):  # nothing but that error, whatever is changed
+        data = bytearray(whole)
+        data[rng.integers(len(data))] ^= int(rng.integers(1, 256))
+        path.write_bytes(data)
+        with suppress(PlanFileError):
+            library.find(near())
+        list(library.tasks())
+    path.write_bytes(whole[:5000])
     assert library.nearest(near()) is None
     assert list(library.tasks()) == []
+
+
+def test_a_shipped_plan_wins_over_a_cached_one(
+    tmp_path: Path, good: JumpPlan, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    shipped = PlanLibrary(ROBOT, tmp_path / "shipped", others=())
+    first = shipped.add(replace(good, task=near()))
+    library = PlanLibrary(ROBOT, others=(tmp_path / "shipped",))
+    cached = library.add(replace(good, task=near()))
+    assert cached.is_relative_to(tmp_path / "cache")
+    assert library.path_of(near()) == first
+    chosen = PlanLibrary(ROBOT, cached.parent, others=(tmp_path / "shipped",))
+    assert chosen.path_of(near()) == cached  # a folder that somebody has named
 
 
 def test_the_nearest_is_by_scaled_distance(tmp_path: Path, good: JumpPlan) -> None:

@@ -72,7 +72,7 @@ def test_a_shipped_somersault_turns_over_and_is_exact(
     name: str, profile: str, effort: float, tmp_path: Path
 ) -> None:
     task = read_task(SHIPPED.parent / "tasks" / f"{name}.yaml")
-    assert (task.profile, task.effort) == (profile, effort)
+    assert (task.equipped(ROBOT).motors.profile, task.effort) == (profile, effort)
     plan = PlanLibrary(ROBOT, tmp_path).find(task)
     assert plan is not None
     report = check_plan(plan, ROBOT)

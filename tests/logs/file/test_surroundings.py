@@ -1,0 +1,67 @@
+"""What a recording says of files, plans and the processor's BLAS kernel."""
+
+import subprocess
+from hashlib import sha256
+from pathlib import Path
+
+from aloft.logs.file.header import header_of, machine
+from aloft.logs.file.surroundings import other_files, project_state
+from aloft.runtime.language.block import Block, Output
+from aloft.runtime.language.parameters import Parameters, parameter
+from aloft.runtime.language.signals import Field, Signal
+from aloft.runtime.running.memory import BoundGraph
+from aloft.runtime.testing.graphs import Use, checked_graph
+
+
+class Number(Signal):
+    value = Field()
+
+
+class Reads(Block):
+    """A block that names a file and finds another one itself."""
+
+    y = Output(Number)
+
+    class Params(Parameters):
+        table: str = parameter("", text="a file")
+
+    def setup(self) -> None:
+        self.files_read = (Path(self.params.table).with_name("plan.npz"),)
+
+    def step(self) -> None:
+        """Nothing."""
+
+
+def test_files_are_known_by_their_content(tmp_path: Path) -> None:
+    (tmp_path / "table.csv").write_text("1")
+    (tmp_path / "plan.npz").write_text("2")
+    name = str(tmp_path / "table.csv")
+    bound = BoundGraph(checked_graph({"r": Use(Reads, {"table": name})}))
+    then = header_of(bound).files
+    assert then == {
+        f"r.table: {name}": sha256(b"1").hexdigest(),
+        "r: plan.npz": sha256(b"2").hexdigest(),
+    }
+    (tmp_path / "plan.npz").write_text("another plan")
+    now = header_of(bound).files
+    assert other_files(then, now) == ["the file of r: plan.npz has other content"]
+    assert other_files(then, {}) == [
+        f"the file of r.table: {name} is not there, or is not used any more",
+        "the file of r: plan.npz is not there, or is not used any more",
+    ]
+
+
+def test_the_kernel_of_blas_is_named() -> None:
+    assert machine()["blas kernel"]
+
+
+def test_the_state_of_the_project_is_named(tmp_path: Path) -> None:
+    assert project_state(tmp_path) == ""
+    git = ["git", "-C", str(tmp_path), "-c", "user.name=a", "-c", "user.email=a@b"]
+    (tmp_path / "a").write_text("1")
+    for arguments in (["init", "-q"], ["add", "a"], ["commit", "-qm", "first"]):
+        subprocess.run([*git, *arguments], check=True)
+    clean = project_state(tmp_path)
+    assert len(clean) == 40
+    (tmp_path / "a").write_text("2")
+    assert project_state(tmp_path) == f"{clean} with changes"
