@@ -22,7 +22,7 @@ UFUNCS: Mapping[str, Any] = {
 class Compare(Block):
     """Element by element whether a < b, or another comparison; exact, with no tolerance.
 
-    To compare with a constant, wire the constant: ``in: {a: sensor.y, b: {value: [0.5]}}``.
+    To compare with a constant, wire the constant: ``in: {a: sensor.y, b: {value: {value: 0.5}}}``.
     """
 
     class Params(Elements):
