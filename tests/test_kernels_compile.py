@@ -20,6 +20,7 @@ import pytest
 import aloft
 from aloft.mathematics.joint_feedback import Feedback, Motion, SoftStops
 from aloft.mathematics.kernel import kernel, kernels
+from aloft.mathematics.pid import PidGains, PidMemory
 from aloft.robots.description import find_robot
 from aloft.robots.five_joint_leg import read_leg
 from aloft.robots.limb import read_limb
@@ -45,7 +46,7 @@ NOT_HOT = {
 }
 """Functions of numbers and arrays only that need not compile, and why."""
 
-INEXACT = {"sin", "cos", "atan2", "acos", "exp", "hypot", "dot", "tanh"}
+INEXACT = {"sin", "cos", "atan2", "acos", "exp", "hypot", "dot", "tanh", "tan"}
 """What another library, or another order of sums, may round differently."""
 
 LEG = read_leg(find_robot("bruce"), 0)
@@ -54,6 +55,10 @@ MIDDLE = LIMB.limits.mean(axis=1)
 TARGET = np.array([[0.05, -0.08, -0.3], [0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
 POSE = np.array([[0.02, -0.06, -0.3], [1.0, 0.0, 0.0], [0.0, 0.8, -0.6], [0.0, 0.6, 0.8]])
 CHAIN = (LIMB.links, LIMB.tip, LIMB.limits, TARGET, np.array([1.0, 0.9, 0.3]))
+COEFFICIENTS = np.array([0.2, 0.1, 0.05, -0.5, 0.1])
+GAINS = PidGains(
+    *np.linspace(-0.5, 2.0, 15).reshape(5, 3), -np.ones(3), np.ones(3), 0.01, 0.3, 0.002
+)
 UNUSED = {
     "aloft.blocks.control.balance_target.pattern_turn": (
         POSE, POSE[0], TARGET, np.array([0.01, 0.02, 0.0]),
@@ -131,6 +136,35 @@ UNUSED = {
         np.ones((3, 3)), np.zeros(4), np.zeros((3, 3)), np.zeros(4),
     ),
     "aloft.blocks.control.balance_target.add_quadratic_growth": (np.ones(3), 0.6, 0.25, np.zeros(3), np.zeros(3)),
+    "aloft.blocks.general.periods.first_tick": (0.5, 0.002),
+    "aloft.mathematics.linear.multiply_vector": (POSE, POSE[0], np.zeros(4)),
+    "aloft.mathematics.linear.add_product": (POSE, POSE[0], np.ones(4)),
+    "aloft.mathematics.linear.multiply_matrices": (POSE, TARGET[1:], np.zeros((4, 3))),
+    "aloft.mathematics.discretisation.matrix_exponential": (
+        4.0 * POSE[1:], np.zeros((3, 3)), np.zeros((3, 3)), np.zeros((3, 3)),
+    ),
+    "aloft.mathematics.second_order_filter.first_order": (20.0, 0.002, True, np.zeros(5)),
+    "aloft.mathematics.second_order_filter.second_order": (20.0, 0.7, 0.002, False, np.zeros(5)),
+    "aloft.mathematics.second_order_filter.band_stop": (20.0, 2.0, 0.002, np.zeros(5)),
+    "aloft.mathematics.second_order_filter.settle": (COEFFICIENTS, POSE[0], np.ones((3, 2))),
+    "aloft.mathematics.second_order_filter.advance": (
+        COEFFICIENTS, POSE[0], np.ones((3, 2)), np.zeros(3),
+    ),
+    "aloft.mathematics.pid.start_pid": (GAINS, POSE[0], POSE[2], PidMemory(*np.ones((3, 3)))),
+    "aloft.mathematics.pid.step_pid": (
+        GAINS, POSE[0], POSE[2], POSE[3], PidMemory(*np.ones((3, 3))), np.zeros(3),
+    ),
+    "aloft.mathematics.lookup.interval": (np.linspace(-1.0, 1.0, 9), 0, 9, 0.3),
+    "aloft.mathematics.lookup.interpolate": (np.linspace(-1.0, 1.0, 4), POSE[:, 2], 0.3, True),
+    "aloft.mathematics.lookup.interpolate_grid": (
+        np.array([0.0, 1.0, 2.0, 4.0]), np.array([2, 2]), POSE[:, 1], np.array([0.3, 5.0]), False,
+        np.zeros(2, np.int64), np.zeros(2),
+    ),
+    "aloft.mathematics.transfer_function.advance": (
+        POSE[1:], POSE[0], TARGET[0], 0.5, POSE[:, 0], TARGET, np.zeros(3), np.zeros(4),
+    ),
+    "aloft.mathematics.euler_angles.from_euler": (POSE[1], np.zeros(4)),
+    "aloft.mathematics.euler_angles.to_euler": (np.array([0.1, 0.2, 0.3, 0.92]), np.zeros(3)),
     "aloft.mathematics.whole_body_qp.share_weight": (
         np.array([True, False, True, True]), 50.0, np.zeros((4, 3)),
     ),

@@ -5,16 +5,19 @@ from __future__ import annotations
 import numpy as np
 
 from ...runtime.language.block import Block, Input, Output
-from ...runtime.language.parameters import Parameters, live_parameter, parameter
+from ...runtime.language.parameters import live_parameter
+from .elements import Elements, PerElement
 from .vector import Vector
 
 
 class Gain(Block):
-    """The input times a constant: y = gain u."""
+    """The input times a constant: y = gain u.
 
-    class Params(Parameters):
-        n: int = parameter(1, ge=1, text="elements")
-        gain: float = live_parameter(1.0, text="the factor")
+    There may be one gain for each element. ``MatrixGain`` multiplies by a matrix.
+    """
+
+    class Params(Elements):
+        gain: PerElement = live_parameter(1.0, text="the factor")
 
     params: Params
     u = Input(Vector, text="what is scaled")

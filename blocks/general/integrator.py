@@ -2,9 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 
-from ...runtime.language.block import Block, Input, Output, State
+from ...robots.description import RobotDescription
+from ...runtime.language.block import Block, Input, Misfit, Output, State
+from ...runtime.language.parameters import Parameters, parameter
+from .bounds import crossed_bounds
+from .elements import PerElement, spread_bound
+from .flags import NEVER, Flag
 from .initial_value import InitialParameters
 from .vector import Vector
 
@@ -12,27 +19,47 @@ from .vector import Vector
 class Integrator(Block):
     """The time integral by forward Euler: y[n] = x[n], x[n+1] = x[n] + T u[n], x[0] = initial.
 
-    T is the block's period. A Moore block, so it breaks a loop. Raises ``BlockError`` if
-    ``initial`` has not n elements.
+    T is the block's period. With bounds x[n+1] is kept within them, so nothing winds up beyond.
+    Where ``reset`` holds in tick n, x[n+1] = initial. A Moore block, so it breaks a loop;
+    ``TrapezoidalIntegrator`` is more exact and does not.
     """
 
-    Params = InitialParameters
-    params: InitialParameters
+    class Params(InitialParameters):
+        lower: PerElement | None = parameter(None, text="the least integral")
+        upper: PerElement | None = parameter(None, text="the greatest integral")
+
+    params: Params
     u = Input(Vector, text="the rate")
+    reset = Input(Flag, text="whether to start anew from the initial value", default=NEVER)
     y = Output(Vector, text="its integral")
     x = State(Vector, text="the integral")
 
+    @classmethod
+    def requires(cls, params: Parameters, robot: RobotDescription | None) -> Iterable[Misfit]:
+        """The bounds must not cross."""
+        assert isinstance(params, cls.Params)
+        return crossed_bounds(params.lower, params.upper, params.n)
+
     def setup(self) -> None:
-        """Start from the initial value."""
-        self.x.value[...] = self.params.start_value()
-        self._step = np.zeros(self.params.n)
+        """Start from the initial value, and keep the bounds at hand."""
+        p = self.params
+        self._initial = p.start_value()
+        self._lower = spread_bound(p.lower, p.n, -np.inf)
+        self._upper = spread_bound(p.upper, p.n, np.inf)
+        self._step = np.zeros(p.n)
         self._period = np.array(self.period)
+        np.copyto(self.x.value, self._initial)
 
     def emit(self) -> None:
         """Write the integral so far."""
         np.copyto(self.y.value, self.x.value)
 
     def update(self) -> None:
-        """Take one Euler step."""
+        """Take one Euler step, or start anew."""
+        if self.reset.value:
+            np.copyto(self.x.value, self._initial)
+            return
         np.multiply(self.u.value, self._period, out=self._step)
         np.add(self.x.value, self._step, out=self.x.value)
+        np.maximum(self.x.value, self._lower, out=self.x.value)
+        np.minimum(self.x.value, self._upper, out=self.x.value)

@@ -12,7 +12,7 @@ from .vector import Vector
 class UnitDelay(Block):
     """The input of the run before: y[n] = x[n], x[n+1] = u[n], x[0] = initial.
 
-    A Moore block, so it breaks a loop. Raises ``BlockError`` if ``initial`` has not n elements.
+    A Moore block, so it breaks a loop.
     """
 
     Params = InitialParameters

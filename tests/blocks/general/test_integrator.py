@@ -1,9 +1,9 @@
 """``blocks.Integrator``: exact values."""
 
 import pytest
+from pydantic import ValidationError
 
 from aloft.blocks.general.integrator import Integrator
-from aloft.runtime.language.errors import BlockError
 from aloft.runtime.testing import BlockBench
 
 
@@ -18,5 +18,18 @@ def test_integrator_takes_euler_steps() -> None:
 
 
 def test_an_initial_value_must_have_n_elements() -> None:
-    with pytest.raises(BlockError, match="initial has 2 elements, expected n = 3"):
+    with pytest.raises(ValidationError, match="initial has 2 elements, expected n = 3"):
         BlockBench(Integrator, {"n": 3, "initial": [1.0, 2.0]})
+
+
+def test_bounds_and_reset() -> None:
+    bench = BlockBench(
+        Integrator, {"n": 2, "initial": 1.0, "lower": [0.0, -9.0], "upper": 3.0}, rate=1
+    )
+    outputs = []
+    for value, reset in ((5.0, False), (-7.0, False), (1.0, True), (0.0, False)):
+        bench.set("u", value=value)
+        bench.set("reset", value=reset)
+        bench.step()
+        outputs.append(bench.get("y").value.tolist())
+    assert outputs == [[1.0, 1.0], [3.0, 3.0], [0.0, -4.0], [1.0, 1.0]]

@@ -1,9 +1,9 @@
 """``blocks.UnitDelay``: exact values."""
 
 import pytest
+from pydantic import ValidationError
 
 from aloft.blocks.general.unit_delay import UnitDelay
-from aloft.runtime.language.errors import BlockError
 from aloft.runtime.testing import BlockBench
 
 
@@ -18,5 +18,5 @@ def test_unit_delay_starts_from_its_initial_value() -> None:
 
 
 def test_an_initial_value_must_have_n_elements() -> None:
-    with pytest.raises(BlockError, match="initial has 2 elements, expected n = 3"):
+    with pytest.raises(ValidationError, match="initial has 2 elements, expected n = 3"):
         BlockBench(UnitDelay, {"n": 3, "initial": [1.0, 2.0]})

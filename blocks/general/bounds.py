@@ -1,0 +1,22 @@
+"""Checks of lower and upper bounds that blocks share."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from ...runtime.language.block import Misfit
+from .elements import PerElement, spread_bound
+
+
+def crossed_bounds(lower: PerElement | None, upper: PerElement | None, n: int) -> Iterable[Misfit]:
+    """A misfit where a lower bound is above its upper one."""
+    low, high = spread_bound(lower, n, -np.inf), spread_bound(upper, n, np.inf)
+    for i in np.flatnonzero(low > high)[:1]:
+        yield Misfit(
+            f"the lower bound of element {i} is above the upper one",
+            parameter="lower",
+            expected=f"at most {high[i]:g}",
+            found=f"{low[i]:g}",
+        )

@@ -1,0 +1,35 @@
+"""Two vectors as one."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from ...robots.description import RobotDescription
+from ...runtime.language.block import Block, Input, Output
+from ...runtime.language.parameters import Parameters
+from .pairs import First, Joined, PairSizes, Second
+
+
+class Mux(Block):
+    """Two vectors one behind the other: y = [a, b]. More are joined by several such blocks."""
+
+    Params = PairSizes
+    params: PairSizes
+    a = Input(First, text="the first elements")
+    b = Input(Second, text="the elements behind them")
+    y = Output(Joined, text="all elements")
+
+    @classmethod
+    def local_dimensions(
+        cls, params: Parameters, robot: RobotDescription | None
+    ) -> Mapping[str, int]:
+        """``n`` is the sum of ``n_a`` and ``n_b``."""
+        assert isinstance(params, cls.Params)
+        return params.sizes()
+
+    def step(self) -> None:
+        """Join."""
+        np.copyto(self.y.value[: self.params.n_a], self.a.value)
+        np.copyto(self.y.value[self.params.n_a :], self.b.value)

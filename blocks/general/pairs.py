@@ -1,0 +1,37 @@
+"""Signals of the blocks that join and split vectors."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from ...runtime.language.parameters import Parameters, parameter
+from ...runtime.language.signals import Field, Signal
+
+
+class First(Signal):
+    """A vector of ``n_a`` numbers."""
+
+    value = Field("n_a", text="the first elements")
+
+
+class Second(Signal):
+    """A vector of ``n_b`` numbers."""
+
+    value = Field("n_b", text="the elements behind them")
+
+
+class Joined(Signal):
+    """A vector of ``n_a + n_b`` numbers."""
+
+    value = Field("n", text="first those of a, then those of b")
+
+
+class PairSizes(Parameters):
+    """The sizes of two vectors that make one."""
+
+    n_a: int = parameter(1, ge=1, text="elements of a")
+    n_b: int = parameter(1, ge=1, text="elements of b")
+
+    def sizes(self) -> Mapping[str, int]:
+        """The dimensions ``n_a``, ``n_b`` and their sum ``n``."""
+        return {"n_a": self.n_a, "n_b": self.n_b, "n": self.n_a + self.n_b}

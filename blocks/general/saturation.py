@@ -1,0 +1,49 @@
+"""A vector kept within bounds."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from ...robots.description import RobotDescription
+from ...runtime.language.block import Block, Input, Misfit, Output
+from ...runtime.language.parameters import Parameters, live_parameter
+from .bounds import crossed_bounds
+from .elements import Elements, PerElement, spread_bound
+from .vector import Vector
+
+
+class Saturation(Block):
+    """Every element kept within its bounds: y = min(max(u, lower), upper).
+
+    A bound that is left out does not bind.
+    """
+
+    class Params(Elements):
+        lower: PerElement | None = live_parameter(None, text="the least output")
+        upper: PerElement | None = live_parameter(None, text="the greatest output")
+
+    params: Params
+    u = Input(Vector, text="what is bounded")
+    y = Output(Vector, text="u within the bounds")
+
+    @classmethod
+    def requires(cls, params: Parameters, robot: RobotDescription | None) -> Iterable[Misfit]:
+        """The bounds must not cross."""
+        assert isinstance(params, cls.Params)
+        return crossed_bounds(params.lower, params.upper, params.n)
+
+    def setup(self) -> None:
+        """Keep the bounds at hand."""
+        self.on_parameters()
+
+    def on_parameters(self) -> None:
+        """Keep them as arrays, so that no tick makes them."""
+        self._lower = spread_bound(self.params.lower, self.params.n, -np.inf)
+        self._upper = spread_bound(self.params.upper, self.params.n, np.inf)
+
+    def step(self) -> None:
+        """Apply the bounds."""
+        np.maximum(self.u.value, self._lower, out=self.y.value)
+        np.minimum(self.y.value, self._upper, out=self.y.value)
