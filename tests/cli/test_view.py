@@ -1,5 +1,6 @@
 """``aloft view``: what it refuses; what it shows is tested in tests/logs/test_viewer.py."""
 
+import json
 from pathlib import Path
 
 import pytest
@@ -70,3 +71,12 @@ def test_without_a_screen_the_run_goes_on(monkeypatch: pytest.MonkeyPatch, tmp_p
         "the run is not shown: the Rerun viewer cannot be shown: there is no screen"
         in result.output
     )
+
+
+def test_without_a_screen_json_says_so_too(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    for name in ("DISPLAY", "WAYLAND_DISPLAY", "WAYLAND_SOCKET"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.chdir(ROOT)
+    arguments = ["run", str(ROOT / "tests/cli/count.yaml"), "--rerun", "live", "--no-record"]
+    result = CliRunner().invoke(make_app(), [*arguments, "--json"])
+    assert any("there is no screen" in text for text in json.loads(result.stdout)["warnings"])
