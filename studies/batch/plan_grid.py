@@ -23,7 +23,7 @@ import numpy as np
 
 from ...planner.library.library import PlanLibrary, solve_and_check
 from ...planner.task.placed_file import Key, PlacedFile, read_placed
-from ...planner.task.plan import JumpPlan
+from ...planner.task.plan import JumpPlan, PlanFileError
 from ...planner.task.task import JumpTask, TaskError, make_task
 from ...planner.task.whole_file import remove_abandoned, write_whole
 from ...robots.description import RobotDescription, find_robot
@@ -140,7 +140,7 @@ def fill(
     there, pending = library.hashes(), []
     for task in tasks:
         key = task.hash(library.robot)
-        kept = library.find(task) if key in there else None
+        kept = _found(library, task) if key in there else None
         known = None if again else read_failure(failure_mark(library, task))
         if kept is not None and kept.valid:
             yield GridRow(task, "kept", path=library.path_of(task))
@@ -156,6 +156,15 @@ def fill(
                 yield GridRow(task, "failed", result.error)
             else:
                 yield _keep(library, task, *result.value)
+
+
+def _found(library: PlanLibrary, task: JumpTask) -> JumpPlan | None:
+    """The plan that is kept of a task. One whose file is damaged counts as none: this run makes it
+    anew."""
+    try:
+        return library.find(task)
+    except PlanFileError:
+        return None
 
 
 def _keep(library: PlanLibrary, task: JumpTask, plan: JumpPlan | None, reason: str) -> GridRow:

@@ -119,6 +119,12 @@ def pushed(tick: int) -> Inputs:
 
 
 SCENES: Mapping[str, list[Scene]] = {
+    "blocks.Step": [Scene({"at": 0.1})],
+    "blocks.Timer": [Scene({"duration": 0.1}, lambda tick: {"u": {"value": True}})],
+    "blocks.PID": [
+        Scene({"kd": 0.5, "ki": 2.0}),
+        Scene({"ki": 5.0, "lower": -0.2, "upper": 0.2}),
+    ],
     "blocks.JointPD": [
         Scene({"flight_stiffness": {"*": 40.0}, "flight_damping": 1.0}, hopping),
         Scene({"stance_targets": "acceleration", "friction": 0.1, "stance_stiffness": 1.0}),

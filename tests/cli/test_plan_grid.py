@@ -84,6 +84,7 @@ def test_any_number_of_workers_and_a_cluster_make_the_same_bytes(
     assert one == contents(folder / "dask")
 
 
+@pytest.mark.long
 @pytest.mark.skipif(not Path("/proc/self/task").is_dir(), reason="finds processes in /proc")
 def test_nothing_is_lost_when_workers_and_the_whole_are_killed(
     folder: Path, call_json: CallJson, start: Start

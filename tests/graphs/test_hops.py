@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 import aloft
 from aloft.blocks.signals import Phase
@@ -12,6 +13,7 @@ from aloft.blocks.signals import Phase
 GRAPHS = Path(aloft.__file__).parent / "graphs"
 
 
+@pytest.mark.long
 def test_ten_jumps_each_in_its_place() -> None:
     """In the standard trial; how often it succeeds is a study's matter (studies/sequences.yaml)."""
     run = aloft.load(GRAPHS / "hops.yaml", {"robot.seed": 0}).run()

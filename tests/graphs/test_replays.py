@@ -53,6 +53,7 @@ def run_python(code: str, arguments: list[str], hash_seed: str) -> str:
     return done.stdout
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("part", range(3))
 def test_every_example_graph_under_another_hash_seed(part: int, tmp_path: Path) -> None:
     examples = EXAMPLES[part::3]

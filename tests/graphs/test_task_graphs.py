@@ -32,6 +32,7 @@ TASKS = {
 }
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", TASKS)
 def test_it_succeeds_in_the_robust_trial(name: str, tmp_path: Path) -> None:
     path = tmp_path / "robust.yaml"

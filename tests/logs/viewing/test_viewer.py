@@ -130,6 +130,7 @@ def check_views(client: Any, ticks: int) -> None:
     assert reports == []
 
 
+@pytest.mark.long
 @needs_browser
 def test_a_browser_shows_the_recording(recording: Path, tmp_path: Path) -> None:
     viewer = start_viewer("web", [recording])

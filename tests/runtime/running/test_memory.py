@@ -5,10 +5,9 @@ import pytest
 
 from aloft.blocks.general.constant import Constant
 from aloft.blocks.general.gain import Gain
-from aloft.blocks.general.unit_delay import UnitDelay
 from aloft.blocks.general.vector import Vector
 from aloft.runtime.language.block import Block, Input, Output, State
-from aloft.runtime.language.errors import DeclarationError, RunError
+from aloft.runtime.language.errors import BlockError, DeclarationError, RunError
 from aloft.runtime.language.parameters import Parameters
 from aloft.runtime.language.signals import Field, Signal
 from aloft.runtime.running.memory import BoundGraph
@@ -28,6 +27,11 @@ class Source(Block):
     def step(self) -> None:
         self.y.value.fill(7.0)
         self.y.extra[()] = 3
+
+
+class Cramped(Constant):
+    def setup(self) -> None:
+        raise BlockError("no room for the model")
 
 
 class Reader(Block):
@@ -107,10 +111,8 @@ def test_state_has_dimensions_of_its_own() -> None:
 
 def test_a_failing_setup_names_the_block() -> None:
     with pytest.raises(RunError) as caught:
-        BoundGraph(checked_graph({"d": Use(UnitDelay, {"n": 2, "initial": [1.0]}, {})}))
-    assert str(caught.value) == (
-        "block 'd' failed in setup: initial has 1 elements, expected n = 2"
-    )
+        BoundGraph(checked_graph({"d": Use(Cramped, {"value": [1.0]})}))
+    assert str(caught.value) == "block 'd' failed in setup: no room for the model"
     assert caught.value.block == "d"
 
 
