@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 import aloft
+from aloft.robots.description import find_robot
 from aloft.runtime.loading import check
 
 GRAPHS = Path(aloft.__file__).parent / "graphs"
@@ -46,8 +47,10 @@ def test_it_takes_a_push(robot: str) -> None:
     graph = GRAPHS / "robots" / f"{robot}_stand.yaml"
     result = aloft.load(graph, {"robot.seed": 32}).run()
     assert result.success, result.reason
-    speed = result.signal("robot.truth.com_velocity")
-    assert speed[:, 0].max() > 0.05  # the push did push
+    impulse = result.signal("push.push.force")[:, 0].sum() / 500.0
+    assert impulse == pytest.approx(0.1 * find_robot(robot).total_mass, rel=0.03)
+    # The feet stay where they are, so the centre of mass gets only a part of the 0.1 m/s.
+    assert result.signal("robot.truth.com_velocity")[:, 0].max() > 0.02
 
 
 @pytest.mark.long
