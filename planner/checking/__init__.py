@@ -1,1 +1,1 @@
-"""Whether a plan may be handed to a robot: exact dynamics, and named tests."""
+"""Decides whether a robot may follow a plan, by exact dynamics and named tests."""

@@ -1,4 +1,4 @@
-"""How far a planned robot keeps from the ground and its legs from each other.
+"""Distances in a plan: of the robot's bodies from the ground, and of its legs from each other.
 
 Links are the capsules of the robot's description, as in the simulator. The ground is level with a
 step where the task has one. Everything is vectorised over instants.

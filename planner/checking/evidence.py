@@ -1,4 +1,4 @@
-"""What the tests of a plan are made from: the plan, its replay, and what several tests need."""
+"""The data that the tests of a plan share: the plan, its replay, and quantities derived from both."""
 
 from __future__ import annotations
 

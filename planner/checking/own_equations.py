@@ -1,7 +1,7 @@
-"""The equations of ``paper`` and ``srbm``, evaluated anew with Pinocchio from a plan's arrays.
+"""Evaluates the equations of ``paper`` and ``srbm`` with Pinocchio from a plan's arrays.
 
-As ``midpoint`` does for ``full``: nothing of the planner's own model or solver is used. A plan may
-fulfil all of these and still not be what the robot would do, which the other tests find.
+Like ``midpoint`` for ``full``, this module uses nothing of the planner's own model or solver. A plan may
+fulfil all of these equations although the robot would move differently, which the other tests find.
 """
 
 from __future__ import annotations
@@ -112,7 +112,7 @@ def standing_inertia(plan: JumpPlan, dynamics: ExactDynamics) -> Array:
 
 
 def unmodelled_momentum(plan: JumpPlan, dynamics: ExactDynamics) -> Array:
-    """The angular momentum [N m s] that the robot has and the plan does not know of, (N, 3)."""
+    """The angular momentum [N m s] of the robot minus that in the plan, (N, 3)."""
     exact = [
         dynamics.centroidal(q, v)[2] for q, v in zip(plan.position, plan.velocity, strict=True)
     ]
@@ -120,7 +120,7 @@ def unmodelled_momentum(plan: JumpPlan, dynamics: ExactDynamics) -> Array:
 
 
 def own_residuals(plan: JumpPlan, robot: RobotDescription) -> dict[str, float]:
-    """Those of the plan's formulation; none for ``full``, which ``midpoint`` is for."""
+    """The residuals of the plan's formulation; none for ``full``, whose residuals ``midpoint`` computes."""
     evaluate = RESIDUALS.get(plan.task.formulation)
     return evaluate(plan, ExactDynamics(plan.task.equipped(robot))) if evaluate else {}
 

@@ -1,6 +1,6 @@
-"""The tests a plan must pass, each a few lines: what is measured, where, and what is allowed.
+"""The tests that a plan must pass. Each states what is measured, where, and the value allowed.
 
-Limits are about what the robot's feedback takes no notice of; they are not the solver's own
+The allowed values are errors that the robot's feedback corrects without effort. They are not the solver's
 tolerances, which are far smaller.
 """
 
@@ -41,7 +41,7 @@ def start_and_end(e: Evidence) -> Iterator[Found]:
 
 
 def states(e: Evidence) -> Iterator[Found]:
-    """Centre of mass, momentum and torque are what Pinocchio makes of the states and forces."""
+    """Centre of mass, momentum and torque agree with those that Pinocchio computes from states and forces."""
     plan, r = e.plan, e.replay
     for name, planned, exact, limit, unit in (
         ("com", plan.com, r.com, 1e-5, "m"),
@@ -75,10 +75,12 @@ def interval_defects(e: Evidence) -> Iterator[Found]:
 
 
 def discretisation(e: Evidence) -> Iterator[Found]:
-    """The planner's own equations, of the formulation that is built on them."""
+    """The planner's own equations on the ground, of the formulation that is built on them; in the
+    air it conserves momentum, as exact dynamics do."""
     if e.plan.task.formulation != "full":
         return
-    gap, wrench = e.replay.gap, e.replay.wrench
+    grounded = e.plan.phase[:-1] != Phase.FLIGHT
+    gap, wrench = e.replay.gap * grounded, e.replay.wrench * grounded
     for name, found, limit, unit, text in (
         ("violation", gap, 1e-6, "m or rad", "what the states miss of a constant acceleration"),
         (
@@ -105,7 +107,7 @@ def flight(e: Evidence) -> Iterator[Found]:
 
 
 def task_done(e: Evidence) -> Iterator[Found]:
-    """Every jump is the one that was asked for."""
+    """Every jump reaches the height, place, heading and rotation that the task asks for."""
     task, r = e.plan.task, e.replay
     hops, places = task.hops(), task.places()
     for name, missed, limit, unit, text in (
@@ -141,7 +143,7 @@ def task_done(e: Evidence) -> Iterator[Found]:
 
 
 def _which(e: Evidence, jump: int) -> str:
-    """Which of several jumps."""
+    """Says which of several jumps is meant."""
     return f" jump {jump + 1}" if len(e.replay.flights) > 1 else ""
 
 

@@ -1,8 +1,8 @@
-"""A plan replayed with exact dynamics: what really happens between and at its knots.
+"""Replays a plan with exact dynamics, at its knots and between them.
 
-Every interval is started from the plan's own state and integrated by itself, because in stance an
-open loop is unstable and an error that has grown says nothing about the plan. The flight is also
-integrated as a whole, from lift-off to touchdown, and so is each of several flights.
+Every interval is integrated by itself from the plan's state at its beginning. In stance the open loop is
+unstable, so an error that has grown over many intervals would say nothing about the plan. Every flight is
+also integrated as a whole, from lift-off to touchdown.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ class Samples:
 
 @dataclass(frozen=True)
 class Replay:
-    """What exact dynamics makes of a plan.
+    """The motion that follows from a plan by exact dynamics.
 
     Attributes:
         samples: knots, middles of stance intervals and every step of the flight.
@@ -120,7 +120,7 @@ def flight_knots(plan: JumpPlan) -> tuple[tuple[int, int], ...]:
 def _fly(
     plan: JumpPlan, dynamics: ExactDynamics, lift_off: int, touchdown: int
 ) -> tuple[list[tuple[float, int, Array, Array]], tuple[float, float]]:
-    """The flight from the plan's state at lift-off on, and where it misses the touchdown's."""
+    """Integrate the flight from the plan's state at lift-off, and compare its end with the planned touchdown."""
     q, v = plan.position[lift_off], plan.velocity[lift_off]
     nothing = np.zeros(plan.contact_force.shape[1:])
     out = []

@@ -1,7 +1,7 @@
-"""Whether a plan may be handed to a robot: named tests against exact dynamics and the task.
+"""Decides whether a robot may follow a plan: named tests against exact dynamics and the task.
 
-Independent of the solver: Pinocchio and NumPy only, nothing of the planner's own model. A plan is
-valid if every test passes; the report keeps every figure, passed or not.
+The check is independent of the solver. It uses Pinocchio and NumPy and nothing of the planner's own model. A
+plan is valid if every test passes. The report keeps the measured value of every test, passed or not.
 """
 
 from __future__ import annotations

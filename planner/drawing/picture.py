@@ -1,4 +1,4 @@
-"""A plan as a picture: the robot in its postures, and panels of how hard its motors and feet work."""
+"""Draws a plan: the robot in its postures, and panels with the loads on its motors and feet."""
 
 from __future__ import annotations
 

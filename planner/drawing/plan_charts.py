@@ -1,4 +1,4 @@
-"""A plan over time as panels: what it does, and how near it comes to every limit.
+"""Draws a plan over time in panels: its motion, and its distance from every limit.
 
 Limits are thin, grey and dashed; the phases are shaded.
 """

@@ -1,1 +1,1 @@
-"""Plans as data: the files they are kept in, and the table a controller follows."""
+"""Keeps plans in files, and turns a plan into the table that a controller follows."""

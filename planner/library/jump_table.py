@@ -53,23 +53,34 @@ class JumpTableReader:
         self._time = table.time
         self._columns = list(table.columns.items())
         self._scratch = {name: np.zeros(rows.shape[1:]) for name, rows in self._columns}
+        self._ahead = {name: np.zeros(rows.shape[1:]) for name, rows in self._columns}
+        self._sums = {
+            name: integral(self._time, rows) for name, rows in self._columns if name in _FED_FORWARD
+        }
         first = (table.thrust_time, table.lift_off_time, table.touchdown_time)
         self._jumps = [first, *table.later_jumps]
         self._touchdowns = np.array([jump[2] for jump in self._jumps])
 
-    def read(self, time: float, reference: JumpReference, lead: float = 0.0) -> None:
+    def read(
+        self, time: float, reference: JumpReference, lead: float = 0.0, hold: float = 0.0
+    ) -> None:
         """The reference at ``time``; before the table its first row, after it its last.
 
         Lift-off and touchdown times are those of the next flight, and from its middle on those of
         the one behind it: whoever lands, early or late, knows by them that it goes on.
 
         What a controller feeds forward, the acceleration, the rate of angular momentum and the
-        torques, is that of ``lead`` seconds later.
+        torques, is that of ``lead`` seconds later; with ``hold`` its mean over so many seconds
+        from then on, because a command holds until the next one. So a thrust that ends between two
+        commands ends with the right momentum.
         """
         table = self._table
         here, there = locate(self._time, time), locate(self._time, time + lead)
         for name, rows in self._columns:
             out, scratch = getattr(reference, name), self._scratch[name]
+            if hold > 0.0 and name in _FED_FORWARD:
+                self._mean(name, rows, time + lead, hold, out)
+                continue
             row, share = there if name in _FED_FORWARD else here
             np.subtract(rows[row + 1], rows[row], out=scratch)
             np.multiply(scratch, share, out=scratch)
@@ -91,6 +102,37 @@ class JumpTableReader:
         reference.contact[...] = phase != Phase.FLIGHT
         if table.contact is not None and phase != Phase.FLIGHT:
             reference.contact[...] = table.contact[here[0]]
+
+    def _mean(self, name: str, rows: Array, begin: float, hold: float, out: Array) -> None:
+        """The mean of a column from ``begin`` on over ``hold`` seconds."""
+        scratch, ahead = self._scratch[name], self._ahead[name]
+        self._sum_to(name, rows, begin + hold, ahead)
+        self._sum_to(name, rows, begin, out)
+        np.subtract(ahead, out, out=scratch)
+        np.divide(scratch, hold, out=out)
+
+    def _sum_to(self, name: str, rows: Array, time: float, out: Array) -> None:
+        """The integral of a column, linear between its rows, from its first row to ``time``."""
+        scratch, times = self._scratch[name], self._time
+        row, share = locate(times, time)
+        length = float(times[row + 1]) - float(times[row])
+        np.subtract(rows[row + 1], rows[row], out=scratch)
+        np.multiply(scratch, 0.5 * share, out=scratch)
+        np.add(scratch, rows[row], out=scratch)
+        np.multiply(scratch, share * length, out=scratch)
+        np.add(self._sums[name][row], scratch, out=out)
+        outside = time - min(max(time, float(times[0])), float(times[-1]))
+        if outside:
+            np.multiply(rows[0 if outside < 0.0 else -1], outside, out=scratch)
+            np.add(out, scratch, out=out)
+
+
+def integral(times: Array, rows: Array) -> Array:
+    """The integral of rows (n, ...) that are linear between ``times`` (n,) up to each of them."""
+    steps = np.diff(times).reshape(-1, *(1,) * (rows.ndim - 1))
+    sums = np.zeros_like(rows)
+    np.cumsum(0.5 * steps * (rows[1:] + rows[:-1]), axis=0, out=sums[1:])
+    return sums
 
 
 @kernel

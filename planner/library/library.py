@@ -1,4 +1,4 @@
-"""Plans kept by what was asked for: taken from there, or solved from the nearest one and kept."""
+"""Keeps plans by their tasks. A task's plan is taken from the library, or solved from the nearest plan and kept."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from ...robots.description import RobotDescription
 from ..checking.validity import InvalidPlanError, checked, require_valid
 from ..solving.refinement import ROUNDS, curable
 from ..task.errors import PlanError
-from ..task.plan import JumpPlan, PlanFileError, read_plan, write_plan
-from ..task.task import JumpTask, TaskError, make_task
+from ..task.plan import JumpPlan, PlanFileError, read_plan, task_of_header, write_plan
+from ..task.task import JumpTask, TaskError
 from .shipped import shipped_graphs
 
 SHIPPED = shipped_graphs() / "plans"
@@ -46,7 +46,7 @@ def user_folder() -> Path:
 def task_distance(first: JumpTask, second: JumpTask) -> float | None:
     """How far apart two tasks are, in units of ``SCALES``; ``None`` where one cannot start from
     the other, because something else than those parameters differs."""
-    alike = set(JumpTask.model_fields) - {"name", *SCALES}
+    alike = set(JumpTask.model_fields) - {"name", "recipe", *SCALES}
     if any(getattr(first, name) != getattr(second, name) for name in alike):
         return None
     total = 0.0
@@ -165,7 +165,7 @@ class PlanLibrary:
         """
         for path, header in self.headers():
             try:
-                yield path, make_task(header["task"])
+                yield path, task_of_header(header)
             except (KeyError, TypeError, TaskError):
                 continue
 

@@ -1,8 +1,8 @@
-"""The nearest task that can be planned, where the one asked for cannot: a short search.
+"""Searches for the nearest task that can be planned, where the given task cannot.
 
-One parameter at a time goes from what was asked for towards a modest value, by bisection over round
-steps. It costs several solves, so it is for people who wait for an answer: nothing that loads or
-runs a graph calls it.
+The search changes one parameter at a time between the given value and a modest one, by bisection over round
+values. It takes several solves, so only commands whose user waits for an answer call it; loading or running a
+graph never does.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from ...robots.description import RobotDescription
+from ..checking.binding import what_binds
 from ..checking.validity import InvalidPlanError
 from ..solving.bounded import cpu_time
 from ..task.errors import PlanError, TaskError
@@ -20,7 +21,7 @@ from ..task.task import JumpTask
 from .library import SCALES, Solver, solve_and_check
 
 MOST_SOLVES = 10
-MOST_SECONDS = 20.0
+MOST_SECONDS = 6.0
 """Processor time after which no further solve is begun [s]."""
 
 
@@ -78,6 +79,7 @@ class NearestFeasible:
         beyond: the value nearest to it that could not be planned.
         solves, cpu_s: what the search cost.
         plan: the valid plan of the changed task.
+        binds: what of the robot that plan uses to the full.
     """
 
     parameter: str
@@ -87,14 +89,17 @@ class NearestFeasible:
     solves: int
     cpu_s: float
     plan: JumpPlan
+    binds: tuple[str, ...] = ()
 
     @property
     def text(self) -> str:
         """One line for people, with a value to paste."""
         axis = AXES[self.parameter]
+        binds = f"; what binds: {', '.join(self.binds)}" if self.binds else ""
         return (
-            f"the nearest that can be planned is {self.parameter}: {axis.text(self.value)}; "
-            f"{axis.text(self.beyond)} cannot ({self.solves} solves, {self.cpu_s:.1f} s)"
+            f"{self.parameter}: {axis.text(self.asked)} is beyond the robot; the nearest that can be "
+            f"planned is {self.parameter}: {axis.text(self.value)}; {axis.text(self.beyond)} cannot"
+            f"{binds} ({self.solves} solves, {self.cpu_s:.1f} s)"
         )
 
 
@@ -150,6 +155,18 @@ def values_towards(task: JumpTask, parameter: str) -> list[float]:
     return [*(round(modest + sign * k * axis.step, 9) for k in range(count)), asked]
 
 
+def _only_from_near(solve: Solver | None, start: JumpPlan | None) -> Solver:
+    """The planner, which gives up soon where it has a plan to start from."""
+    from ..solving.solve import solve_jump
+
+    def make(task: JumpTask, robot: RobotDescription, warm_start: JumpPlan | None) -> JumpPlan:
+        if solve is not None:
+            return solve(task, robot, warm_start)
+        return solve_jump(task, robot, warm_start=warm_start, quick=start is not None)
+
+    return make
+
+
 class _Search:
     """The solves so far, and the bound on them."""
 
@@ -191,8 +208,9 @@ class _Search:
             else:
                 good, plan = middle, better
         return NearestFeasible(
-            parameter, values[-1], values[good], values[bad], self._solves, self.cpu, plan
-        )
+            parameter, values[-1], values[good], values[bad], self._solves, self.cpu, plan,
+            what_binds(plan, self._robot),
+        )  # fmt: skip
 
     def _try(self, parameter: str, value: float, start: JumpPlan | None) -> JumpPlan | None:
         """A valid plan with that value, or ``None``."""
@@ -200,6 +218,6 @@ class _Search:
         self._solves += 1
         task = self._task.model_copy(update={parameter: value})
         try:
-            return solve_and_check(task, self._robot, start, self._solve)
+            return solve_and_check(task, self._robot, start, _only_from_near(self._solve, start))
         except (PlanError, InvalidPlanError, TaskError):
             return None

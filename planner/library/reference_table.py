@@ -1,14 +1,13 @@
-"""A plan as the table of a reference: what the controller follows, every 2 ms or so.
+"""Turns a plan into a table of the reference that the controller follows, with a row about every 2 ms.
 
-Between knots the motion is the planner's own: constant acceleration of base position, Euler angles
-and joints, which is the cubic through both knots. In flight it is within a millimetre of what exact
-dynamics has, or the plan would not be valid. The rate of change of momentum
-comes from the contact forces, which are taken to hold in the middle of their interval and to
-change linearly from there to the next, never across lift-off or touchdown.
+Between two knots the base position, the Euler angles and the joints follow the cubic through both knots. In
+flight this is within a millimetre of exact dynamics, because a valid plan is. The rate of change of momentum
+follows from the contact forces. A contact force is taken to hold in the middle of its interval and to change
+linearly from there to the middle of the next, but never across lift-off or touchdown.
 
-The formulations ``paper`` and ``srbm`` have a centre of mass and a momentum of their own, which their
-motions do not quite have (the ``srbm``'s legs turn without any): whoever follows such a plan, which
-never is valid, is told what the plan believes, as its forces do.
+In the formulations ``paper`` and ``srbm`` the centre of mass and the momentum are variables of their own, with
+which the motion of the joints does not quite agree. Such plans are never valid. A controller that follows one
+nevertheless receives these variables, which agree with the planned forces.
 """
 
 from __future__ import annotations

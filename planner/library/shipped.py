@@ -1,4 +1,4 @@
-"""Where the tasks and plans are that ship with aloft."""
+"""Finds the tasks and plans that ship with aloft."""
 
 from __future__ import annotations
 

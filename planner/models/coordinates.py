@@ -64,6 +64,11 @@ class Coordinates:
         """Which of the base's six coordinates are reduced coordinates: these come first."""
         return tuple(int(i) for i in range(6) if np.any(self.matrix[i]))
 
+    @property
+    def turning(self) -> tuple[int, ...]:
+        """Which of the reduced coordinates are angles of the base."""
+        return tuple(i for i, axis in enumerate(self.free_base) if axis >= 3)
+
     def expand(self, reduced: Any) -> Any:
         """The robot's coordinates of an expression of reduced ones."""
         import casadi as ca

@@ -100,10 +100,10 @@ class SymbolicModel:
         for index in self._joints(limbs):
             joint = self.robot.joints[index]
             rotation, origin = frames[joint.parent]
-            turn = _joint_rotation(joint, q[6 + index])
+            turn = joint_rotation(joint, q[6 + index])
             frames[joint.child] = (
                 ca.mtimes(rotation, turn),
-                origin + ca.mtimes(rotation, _joint_origin(joint, q[6 + index])),
+                origin + ca.mtimes(rotation, joint_origin(joint, q[6 + index])),
             )
         return frames
 
@@ -178,7 +178,7 @@ class SymbolicModel:
             motion = link.mass * ca.mtimes(rotation, speed + ca.cross(spin, centre))
             linear = linear + motion
             lever = self.point(frames, link.name, link.com) - com
-            turn = ca.mtimes(rotation, ca.mtimes(ca.DM(_tensor(link)), spin))
+            turn = ca.mtimes(rotation, ca.mtimes(ca.DM(inertia_tensor(link)), spin))
             angular = angular + turn + ca.cross(lever, motion)
         return linear, angular
 
@@ -191,8 +191,8 @@ class SymbolicModel:
         spins = {base: base_angular_velocity(q[3:6], v[3:6])}
         speeds = {base: ca.mtimes(rotation.T, v[0:3])}
         for index, joint in enumerate(self.robot.joints):
-            back = _joint_rotation(joint, q[6 + index]).T
-            origin = _joint_origin(joint, q[6 + index])
+            back = joint_rotation(joint, q[6 + index]).T
+            origin = joint_origin(joint, q[6 + index])
             carried = speeds[joint.parent] + ca.cross(spins[joint.parent], origin)
             rate = ca.DM(list(joint.axis)) * v[6 + index]
             slides = joint.kind == "slide"
@@ -232,7 +232,7 @@ class SymbolicModel:
         for index in joints:
             joint = robot.joints[index]
             parent, child = joint.parent, joint.child
-            back = backs[child] = _joint_rotation(joint, q[6 + index]).T
+            back = backs[child] = joint_rotation(joint, q[6 + index]).T
             wrench = self._body_wrench(robot.link(child), spins[child], turns[child], pulls[child])
             for contact in robot.contacts:
                 push = pushes.get(contact.name)
@@ -252,7 +252,7 @@ class SymbolicModel:
             torques[index] = ca.dot(ca.DM(list(joint.axis)), own)
             turn = backs[joint.child].T
             force, moment = ca.mtimes(turn, wrench[0:3]), ca.mtimes(turn, wrench[3:6])
-            origin = _joint_origin(joint, q[6 + index])
+            origin = joint_origin(joint, q[6 + index])
             passed = ca.vertcat(force, moment + ca.cross(origin, force))
             if joint.parent == base:
                 limb_wrenches[self.limb_of_link[joint.child]] = passed
@@ -294,7 +294,7 @@ class SymbolicModel:
             arm = centre - ca.DM(list(load.origin))
             lifted = pulls[load.link] + ca.cross(turn, centre)
             force = load.mass * (lifted + ca.cross(spin, ca.cross(spin, centre)))
-            tensor = ca.DM(_tensor(load))
+            tensor = ca.DM(inertia_tensor(load))
             moment = ca.mtimes(tensor, turn) + ca.cross(spin, ca.mtimes(tensor, spin))
             found.append(ca.dot(ca.DM(list(load.axis)), moment + ca.cross(arm, force)))
         return found
@@ -314,11 +314,11 @@ class SymbolicModel:
         for index in self._joints(limbs):
             joint = self.robot.joints[index]
             parent, child = joint.parent, joint.child
-            back = _joint_rotation(joint, q[6 + index]).T
+            back = joint_rotation(joint, q[6 + index]).T
             axis = ca.DM(list(joint.axis))
             spin = ca.mtimes(back, spins[parent])
             rate = axis * v[6 + index]
-            origin = _joint_origin(joint, q[6 + index])
+            origin = joint_origin(joint, q[6 + index])
             pull = (
                 pulls[parent]
                 + ca.cross(turns[parent], origin)
@@ -341,7 +341,7 @@ class SymbolicModel:
 
         centre = ca.DM(list(link.com))
         force = link.mass * (pull + ca.cross(turn, centre) + ca.cross(spin, ca.cross(spin, centre)))
-        tensor = ca.DM(_tensor(link))
+        tensor = ca.DM(inertia_tensor(link))
         moment = (
             ca.mtimes(tensor, turn)
             + ca.cross(spin, ca.mtimes(tensor, spin))
@@ -363,7 +363,7 @@ class SymbolicModel:
         return sorted(index for limb in chosen for index in self.limbs[limb])
 
 
-def _joint_origin(joint: Joint, place: Expression) -> Expression:
+def joint_origin(joint: Joint, place: Expression) -> Expression:
     """The child's origin in the parent's frame; a slide carries it along its axis."""
     import casadi as ca
 
@@ -371,7 +371,7 @@ def _joint_origin(joint: Joint, place: Expression) -> Expression:
     return origin + ca.DM(list(joint.axis)) * place if joint.kind == "slide" else origin
 
 
-def _joint_rotation(joint: Joint, angle: Expression) -> Expression:
+def joint_rotation(joint: Joint, angle: Expression) -> Expression:
     """The rotation from child to parent: none for a slide, Rodrigues' formula for a hinge.
 
     A hinge about a coordinate axis gets a matrix with structural zeros, which is far cheaper.
@@ -395,6 +395,6 @@ def _joint_rotation(joint: Joint, angle: Expression) -> Expression:
     return rotation
 
 
-def _tensor(link: Link | HeldLoad) -> np.ndarray[Any, np.dtype[np.float64]]:
+def inertia_tensor(link: Link | HeldLoad) -> np.ndarray[Any, np.dtype[np.float64]]:
     xx, yy, zz, xy, xz, yz = link.inertia
     return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])

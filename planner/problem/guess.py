@@ -57,6 +57,8 @@ def ballistic_guess(problem: Problem) -> Array:
                 whole[2] = start[2] + up * time - 0.5 * GRAVITY * time * time
                 speed[2] = up - GRAVITY * time
                 guess[control : control + n] = falling
+                turning = list(coordinates.turning)
+                guess[control + n : control + n + len(turning)] = coordinates.reduce(speed)[turning]
             elif not stretch.impact:
                 first = control + n + every - 1
                 guess[first : control + n + coordinates.forces : every] = weight
@@ -126,6 +128,12 @@ def displaced_guess(problem: Problem, straight: Problem, values: Array) -> Array
         if hold is not None and held is not None:
             guess[control + hold] = values[others + held]
         if stretch.flies:
+            rates = np.zeros(len(q))
+            bent = values[others + own.size : others + own.size + len(own.turning)]
+            rates[[own.free_base[i] for i in own.turning]] = bent
+            rates[5] += twist / duration
+            turning = coordinates.reduce(rates)[list(coordinates.turning)]
+            guess[control + n : control + n + len(turning)] = turning
             continue
         pushed = values[others + own.size : others + own.size + own.forces]
         forces = (own.force_matrix @ pushed).reshape(-1, 3)

@@ -98,9 +98,11 @@ class ObstacleRows:
     def rows(self, hop: Hop, edge: float | None, stretch: Stretch, first: bool) -> Indices:
         """The rows of a jump's knot; ``first`` says that it is the flight's first."""
         turns = bool(hop.rotation)
+        landed = not stretch.flies and stretch.place > 0 and bool(hop.landing_height)
         if edge is None and not turns:
             return np.zeros(0, np.int64)
-        kinds = ["calf", *(["body"] if turns else [])]
+        # Off a step the legs may give way until the hips are near the ground.
+        kinds = ["calf", *(["body"] if turns or landed else [])]
         if turns and stretch.flies and not first:
             kinds = ["foot", *kinds]
         return np.concatenate([self._of_kind[kind] for kind in kinds])

@@ -24,9 +24,11 @@ from .assembly import Assembly
 from .layout import Stretch
 from .obstacles import step_parameters
 from .stage_functions import Piece, body_points, parameter_sizes
-from .structure import STEP_DOWN_SHARE, STEP_UP_SHARE, Structure
+from .structure import Structure
 
 Array = NDArray[np.float64]
+BODY_CLEARANCE = 0.002
+"""m; what a body between two knots may come nearer to a step than at them."""
 Rows = tuple[str, int, float, float]
 """Constraint rows that follow each other: their family, their number and their bounds."""
 
@@ -311,8 +313,8 @@ class ProblemBuilder:
 
     def _fill_flight(self, k: int) -> None:
         self._set("flight", k, share=self.steps[k], **self._interval(k))
-        base = ("dynamics", len(self.coordinates.rows), 0.0, 0.0)
-        self._rows("flight", k, [base, *self._motor_rows()])
+        balance = len(self.coordinates.rows) + len(self.coordinates.turning)
+        self._rows("flight", k, [("dynamics", balance, 0.0, 0.0), *self._motor_rows()])
 
     def _fill_contact(self, k: int) -> None:
         stretch = self.of_knot[k]
@@ -335,9 +337,10 @@ class ProblemBuilder:
         share = self.structure.flight_share(k) if stretch.flies else float(stretch.place > 0)
         self._set("obstacle", k, **step_parameters(hop, edge, place.z, share))
         floor = self.task.foot_clearance * np.sin(np.pi * share)
+        apart = BODY_CLEARANCE if self.margins.step is None else self.margins.step
         self._rows("obstacle", k, [
             ("ground clearance", obstacles.feet, floor, np.inf),
-            ("ground clearance", obstacles.count - obstacles.feet, 0.0, np.inf),
+            ("ground clearance", obstacles.count - obstacles.feet, apart, np.inf),
         ])  # fmt: skip
 
     def _fill_take_off(self, k: int) -> None:
@@ -354,8 +357,8 @@ class ProblemBuilder:
 
     def _fill_air(self, k: int) -> None:
         """Feet and calves are above the ground. At a step they are above the higher ground while
-        it is under them: until ``STEP_DOWN_SHARE`` of the flight's time, or from ``STEP_UP_SHARE``
-        on, and at that instant they are still, or already, on the lower side of the edge."""
+        it is under them, and at one knot, about ``STEP_DOWN_SHARE`` or ``STEP_UP_SHARE`` of the
+        flight's time, also on the lower side of the edge."""
         task, points = self.task, body_points(self.model, self.coordinates)
         n_feet, low = len(self.coordinates.contacts), self.structure.places[self.of_knot[k].place].z
         if not self.of_knot[k].flies:
@@ -364,18 +367,14 @@ class ProblemBuilder:
             return
         share = self.structure.flight_share(k)
         step, edge = self.structure.step_under(k)
-        switch = 0.5 if edge is None else STEP_UP_SHARE if step > 0.0 else STEP_DOWN_SHARE
-        ground = low + step if share > switch else low
+        higher, lower_side = self.structure.over_step(k)
+        ground = low + (max(step, 0.0) if higher else min(step, 0.0))
         floor = ground + task.foot_clearance * np.sin(np.pi * share)
-        if self.structure.flight_share(k - 1) < switch <= share:
-            floor = max(floor, low + step)
         ahead = (-np.inf, np.inf)
-        if edge is not None:
-            before = (share <= switch) if step > 0.0 else False
-            beyond = (share > switch) if step < 0.0 else False
+        if lower_side and edge is not None:
             forward = (self.hops[self.of_knot[k].place].distance_x or 0.0) > 0.0
-            if before or beyond:
-                ahead = (-np.inf, edge) if before is forward else (edge, np.inf)
+            apart = self.margins.step or 0.0
+            ahead = (-np.inf, edge - apart) if (step > 0.0) is forward else (edge + apart, np.inf)
         free = ("ground clearance", len(points) - n_feet, -np.inf, np.inf)
         self._rows("air", k, [
             ("ground clearance", n_feet, floor, np.inf),

@@ -10,8 +10,9 @@ reduced coordinates of ``Coordinates``:
 ``free_stance`` z = q, v, h, a, F. The same, ``share`` h seconds long. Rows: gap (2n + 1), then alike.
 ``impact``  z = q, v, dv, L.    Touchdown: velocities change by dv under impulses L, M dv = J' L, with
             none from the motors. Rows: gap (2n), impulse balance (n), motor speed (m), friction.
-``flight``  z = q, v, h, a.     Interval of ``share`` h seconds in the air. Rows: gap (2n + 1), base dynamics,
-            motor torque, torque-speed line at begin and end, motor speed, torques of held joints.
+``flight``  z = q, v, h, a, r.  Interval of ``share`` h seconds in the air. Rows: gap (2n + 1), momentum at
+            its end and in its middle (``exact_flight``), motor torque, torque-speed line at begin
+            and end, motor speed, torques of held joints.
 ``contact`` z = q, v.           Rows: velocity + 10/s x place error of every contact point along its
             foot, across it and upwards (2 in the sagittal plane), then the place errors;
             ``ContactRows`` says which of them are independent.
@@ -23,7 +24,7 @@ reduced coordinates of ``Coordinates``:
             with a step, rounded, less their radii.
 
 Over an interval of h seconds accelerations are constant: v+ = v + h a, q+ = q + h v + h^2 a / 2, and
-the dynamics hold in its middle (second order). Gap rows hold minus the next state. ``w`` is named
+on the ground the dynamics hold in its middle (second order). Gap rows hold minus the next state. ``w`` is named
 by ``Parameters``. Not modelled: friction in the joints and the rotors' gyroscopic moment.
 """
 
@@ -43,6 +44,8 @@ from ..models.coordinates import (
     sagittal_coordinates,
 )
 from ..models.symbolic_model import SymbolicModel, base_rotation
+from .exact_flight import flight_interval
+from .lifted import Lifted
 from .obstacles import heights_above_step, touching_sphere
 
 DRIFT_RATE = 10.0
@@ -102,10 +105,13 @@ def make_coordinates(model: SymbolicModel, name: str) -> Coordinates:
 
 
 def piece_expressions(
-    model: SymbolicModel, coordinates: Coordinates, name: str
+    model: SymbolicModel, coordinates: Coordinates, name: str, lifted: Lifted | None = None
 ) -> tuple[Any, Any, Any, Any]:
-    """The symbols ``z`` and ``w`` of a piece, its cost and its rows."""
+    """The symbols ``z`` and ``w`` of a piece, its cost and its rows; with ``lifted`` in terms of
+    what is lifted there, too."""
     import casadi as ca
+
+    lift = Lifted() if lifted is None else lifted
 
     n = coordinates.size
     sizes = parameter_sizes(coordinates)[name]
@@ -123,6 +129,15 @@ def piece_expressions(
         z = [q, v, a, F] if name == "stance" else [q, v, state, a, F]
         half_v = v + 0.5 * h * a
         half_q = q + 0.5 * h * v + 0.125 * h * h * a
+        end_q, end_v = q + h * v + 0.5 * h * h * a, v + h * a
+        balance: list[Any] = []
+        if name == "flight":
+            z[-1] = ca.SX.sym("r", len(coordinates.turning))
+            end_q, end_v, balance, half_q, half_v = flight_interval(
+                model, coordinates, q, v, h, a, z[-1], lift
+            )
+        else:
+            half_q, half_v = lift(half_q), lift(half_v)
         all_forces: Any = ca.mtimes(ca.DM(coordinates.force_matrix), F) if forces else None
         named = {
             model.robot.contacts[c].name: all_forces[3 * c : 3 * c + 3]
@@ -142,18 +157,20 @@ def piece_expressions(
             coordinates.expand(a),
             coordinates.limbs,
         )
-        wrench = base + coordinates.share * sum(limbs.values())
+        if name != "flight":
+            wrench = base + coordinates.share * sum(limbs.values())
+            balance = [wrench[list(coordinates.rows)]]
         to_motor = model.robot.torque_to_motor[np.ix_(coordinates.joints, coordinates.joints)]
         geared = _geared(model, coordinates)
         motor = ca.mtimes(ca.DM(to_motor), torque[list(coordinates.joints)])
         own = [6 + joint for joint in coordinates.joints]
         speed = ca.mtimes(ca.DM(geared), coordinates.expand(v)[own])
         end_speed = ca.mtimes(ca.DM(geared), coordinates.expand(v + h * a)[own])
-        gap = [-(q + h * v + 0.5 * h * h * a), -(v + h * a)]
+        gap = [-end_q, -end_v]
         rows = [
             *gap,
             *([] if name == "stance" else [-state]),
-            wrench[list(coordinates.rows)],
+            *balance,
             motor,
             motor + w["slope"] * speed,
             motor + w["slope"] * end_speed,
@@ -199,7 +216,10 @@ def piece_expressions(
     else:
         z = [q]
         rows = heights_above_step(model, coordinates, q, w)
-    return ca.vertcat(*z), ca.vertcat(*w.values()), cost, ca.vertcat(*rows)
+    rows_of_all = ca.vertcat(*rows)
+    if lifted is None and lift.symbols:
+        cost, rows_of_all = lift.put_back([cost, rows_of_all])
+    return ca.vertcat(*z), ca.vertcat(*w.values()), cost, rows_of_all
 
 
 def _geared(model: SymbolicModel, coordinates: Coordinates) -> Any:
@@ -253,21 +273,28 @@ def _impulse_balance(model: SymbolicModel, coordinates: Coordinates, q: Any, cha
 
 def make_piece(model: SymbolicModel, coordinates: Coordinates, name: str) -> Piece:
     """The functions of a piece with exact derivatives."""
-    return derived(f"{coordinates.name}_{name}", *piece_expressions(model, coordinates, name))
+    lifted = Lifted()
+    return derived(
+        f"{coordinates.name}_{name}", *piece_expressions(model, coordinates, name, lifted), lifted
+    )
 
 
-def derived(prefix: str, z: Any, w: Any, cost: Any, rows: Any) -> Piece:
-    """A piece from its symbols ``z`` and ``w``, its cost and its rows."""
+def derived(
+    prefix: str, z: Any, w: Any, cost: Any, rows: Any, lifted: Lifted | None = None
+) -> Piece:
+    """A piece from its symbols ``z`` and ``w``, its cost and its rows, which may be written in
+    terms of what is ``lifted``."""
     import casadi as ca
 
+    lift = Lifted() if lifted is None else lifted
     lam_f, lam_g = ca.SX.sym("lam_f"), ca.SX.sym("lam_g", rows.numel())
-    gradient = ca.densify(ca.gradient(cost, z))
-    hessian, slope = ca.hessian(lam_f * cost + ca.dot(lam_g, rows), z)
-    rows = ca.densify(rows)
+    hessian, slope = lift.hessian(lam_f * cost + ca.dot(lam_g, rows), z)
+    jacobian, gradient = lift.jacobian(rows, z), ca.densify(lift.jacobian(cost, z).T)
+    cost, rows = lift.put_back([cost, ca.densify(rows)])
     options = {"cse": True}
     return Piece(
         ca.Function(f"{prefix}_value", [z, w], [cost, rows], options),
-        ca.Function(f"{prefix}_jacobian", [z, w], [rows, gradient, ca.jacobian(rows, z)], options),
+        ca.Function(f"{prefix}_jacobian", [z, w], [rows, gradient, jacobian], options),
         ca.Function(
             f"{prefix}_hessian", [z, w, lam_f, lam_g], [ca.densify(slope), hessian], options
         ),

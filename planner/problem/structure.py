@@ -67,12 +67,12 @@ class Structure:
         for k, stretch in enumerate(self.of_knot):
             before = self.of_knot[k - 1] if k else None
             after = self.of_knot[k + 1] if k + 1 < end else None
-            forces = 0 if stretch.flies else self.forces
             states = 2 * n + stretch.timed
             holds = after is not None and after is not stretch and after.timed
-            knot = Knot(states, n + forces + holds, gap=stretch.piece)
-            knot.hold = n + forces if holds else None
-            take = np.arange(states + n + forces)
+            own = n + (len(self.coordinates.turning) if stretch.flies else self.forces)
+            knot = Knot(states, own + holds, gap=stretch.piece)
+            knot.hold = own if holds else None
+            take = np.arange(states + own)
             knot.pieces[stretch.piece] = (take, self._interval_rows(stretch))
             q_and_v = np.arange(2 * n)
             if stretch.flies and k > stretch.first:
@@ -170,11 +170,9 @@ class Structure:
         points = self.pieces["air"].rows // 3
         feet = len(self.coordinates.contacts)
         ahead = np.arange(points, points + feet)
-        step, edge = self.step_under(k)
         if self.hops[self.of_knot[k].place].rotation:
             return np.arange(2 * points, 3 * points)
-        if edge is None or (step > 0.0) is (
-            self.flight_share(k) > (STEP_UP_SHARE if step > 0.0 else STEP_DOWN_SHARE)):  # fmt: skip
+        if not self.over_step(k)[1]:
             ahead = ahead[:0]
         return np.concatenate([np.arange(points), ahead, np.arange(2 * points, 3 * points)])
 
@@ -218,6 +216,17 @@ class Structure:
         place = self.of_knot[k].place
         hop = self.hops[place]
         return hop.landing_height or 0.0, edge_of(hop, self.places[place])
+
+    def over_step(self, k: int) -> tuple[bool, bool]:
+        """Of a flight's knot whether feet are above the higher ground there, and whether they are
+        on the lower side of the edge. At the first knot of a step's later part both are true, or
+        they could cut the corner between that knot and the one before it."""
+        step, edge = self.step_under(k)
+        switch = 0.5 if edge is None else STEP_UP_SHARE if step > 0.0 else STEP_DOWN_SHARE
+        late, first = self.flight_share(k) >= switch, self.flight_share(k - 1) < switch
+        higher = late if step > 0.0 else not late or (first and edge is not None)
+        lower_side = (not late or first) if step > 0.0 else late
+        return higher, lower_side and edge is not None
 
     def flight_share(self, k: int) -> float:
         """How much of the flight's time is past at a knot of it."""

@@ -57,6 +57,7 @@ def unpack(problem: Problem, values: Array) -> dict[str, Any]:
     steps[-1] = steps[-2]
     middle = q + 0.5 * steps[:, None] * v + 0.125 * steps[:, None] ** 2 * bend
     moving = v + 0.5 * steps[:, None] * bend
+    _middles_in_flight(problem, values, steps, q, v, middle, moving)
     middle[-1], moving[-1] = middle[-2], moving[-2]
     com, speed, momentum, torque = _evaluate(model, q, v, middle, moving, bend, force)
     torque[impacts] = 0.0
@@ -79,6 +80,24 @@ def unpack(problem: Problem, values: Array) -> dict[str, Any]:
         "touchdown_time": flights[0][1],
         "later_flights": tuple(flights[1:]),
     }
+
+
+def _middles_in_flight(
+    problem: Problem, values: Array, steps: Array,
+    q: Array, v: Array, middle: Array, moving: Array,
+) -> None:  # fmt: skip
+    """Angles and rates of the base in the middle of intervals in flight; see ``exact_flight``."""
+    coordinates, assembly = problem.coordinates, problem.assembly
+    own = list(coordinates.turning)
+    for flight in problem.flights:
+        for k in flight:
+            start = assembly.control_start[k] + coordinates.size
+            rates = np.zeros(coordinates.size)
+            rates[own] = values[start : start + len(own)]
+            base = slice(3, 6)
+            moving[k, base] = (coordinates.matrix @ rates)[base]
+            middle[k, base] = 0.5 * (q[k, base] + q[k + 1, base])
+            middle[k, base] += 0.125 * steps[k] * (v[k, base] - v[k + 1, base])
 
 
 def can_start(problem: Problem, plan: JumpPlan) -> bool:
@@ -139,6 +158,11 @@ def pack(problem: Problem, plan: JumpPlan, guess: Array) -> Array:
         if not stretch.flies:
             pushed = coordinates.reduce_forces(force[k])
             values[control + n : control + n + coordinates.forces] = pushed
+        elif k + 1 < problem.knots:
+            turned = coordinates.reduce(q[k + 1] - q[k]) / steps[k]
+            rates = 1.5 * turned - 0.25 * coordinates.reduce(v[k] + v[k + 1])
+            own = list(coordinates.turning)
+            values[control + n : control + n + len(own)] = rates[own]
         hold = assembly.knots[k].hold
         if hold is not None:
             values[control + hold] = means[problem.stretch_at(k + 1)]

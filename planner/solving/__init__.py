@@ -1,1 +1,1 @@
-"""From a problem to its solution: compiled functions, solvers, easier problems first."""
+"""Solves problems: compiles their functions, calls the solvers, and solves easier problems first where needed."""

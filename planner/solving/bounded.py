@@ -1,4 +1,4 @@
-"""A call that ends: what may loop for ever inside a library runs in a process of its own."""
+"""Bounds the time of a call that may loop forever inside a library, by running it in a process of its own."""
 
 from __future__ import annotations
 

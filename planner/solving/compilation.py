@@ -32,9 +32,12 @@ are the same everywhere. Higher optimisation takes twice as long to compile and 
 
 SOURCES = (
     "models/symbolic_model.py",
+    "models/symbolic_momentum.py",
     "models/symmetry.py",
     "models/coordinates.py",
     "problem/stage_functions.py",
+    "problem/exact_flight.py",
+    "problem/lifted.py",
     "problem/obstacles.py",
 )
 KINDS = ("value", "jacobian", "hessian")

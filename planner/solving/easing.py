@@ -1,8 +1,8 @@
-"""Hard jumps by way of easier ones: stronger motors first, then weaker ones step by step.
+"""Solves hard jumps by way of easier ones, with stronger motors first and then weaker ones step by step.
 
-Where a body turns over, a solver that starts from a rough guess rarely finds a motion within tight
-motor limits. With limits half as high again it does; that motion is then a good start for limits a
-little lower, and so on down to the real ones. All constraints but the motors' hold at every step.
+For a somersault a solver that starts from a rough guess rarely finds a motion within tight motor limits. With
+limits that are higher by 40 % or more it does. That motion is then a good initial guess for limits a little lower, and so on
+down to the real ones. All other constraints hold at every step.
 """
 
 from __future__ import annotations

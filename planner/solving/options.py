@@ -1,4 +1,4 @@
-"""How a task is to be solved, besides what the task says."""
+"""The options of the solvers that are not part of a task."""
 
 from __future__ import annotations
 
@@ -21,6 +21,7 @@ class SolveOptions:
         compiled: whether functions are compiled where there is a compiler.
         solver: ``fatrop`` or ``ipopt`` to insist on one of them.
         knots: numbers of intervals to use instead of the task's.
+        quick: whether to give up soon: what is not found in a few iterations is not looked for.
     """
 
     warm_start: JumpPlan | None = None
@@ -28,3 +29,4 @@ class SolveOptions:
     compiled: bool = True
     solver: str = ""
     knots: Knots | None = None
+    quick: bool = False

@@ -1,4 +1,4 @@
-"""What the planner says of a solution: why there is no plan, what made one."""
+"""Describes the outcome of a solve: the reason why there is no plan, or the statistics of the solution."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""From a task to a plan with the ``paper`` formulation."""
+"""Plans a task in the ``paper`` formulation."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
-"""Finer intervals for a plan that failed the validity check because its own are too long.
+"""Chooses finer intervals for a plan that failed the validity check because its intervals are too long.
 
-The planner's equations are of second order: errors of the flight, of limits between knots and of
-torques at an interval's ends fall to a fourth where intervals are halved. What a finer grid cannot
-cure (a body in the way of a step, a task that is missed) is not tried again.
+The planner's equations on the ground are of second order: errors of limits between knots and of torques at an
+interval's ends fall to a fourth where intervals are halved. A plan that failed for a reason that a finer grid
+cannot remove (a body in the way of a step, a task that is missed) is not solved again.
 """
 
 from __future__ import annotations

@@ -1,10 +1,10 @@
-"""The whole body's motion for that of a single rigid body, by inverse kinematics.
+"""Computes a motion of the whole robot from the motion of a single rigid body, by inverse kinematics.
 
-The robot takes the body's centre of mass and torso attitude, and its feet stand where they were
+The robot takes over the rigid body's centre of mass and attitude, and its feet stand where they were
 planned. In flight each foot goes, seen from the centre of mass, from where it left the ground to
 where it lands; within ``BLEND`` of both it gains and loses speed, so that it is at rest on the
-ground. So the linear momentum is the planned one, and the angular momentum is not: it is what the
-legs make of it.
+ground. So the linear momentum is the planned one, but the angular momentum is not, because the legs add
+theirs.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""From a task to a plan with the ``srbm`` formulation."""
+"""Plans a task in the ``srbm`` formulation."""
 
 from __future__ import annotations
 

@@ -1,8 +1,9 @@
-"""From a task to a plan."""
+"""Plans a task."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +22,7 @@ from ..problem.stage_functions import PIECES, make_coordinates
 from ..problem.unpacking import can_start, knot_times, pack, unpack
 from ..task.errors import PlanError, TaskError
 from ..task.plan import JumpPlan
+from ..task.recipe import choices
 from ..task.sequence import PHASES
 from ..task.task import JumpTask, Knots
 from .bounded import cpu_time
@@ -31,12 +33,14 @@ from .outcome import failure, versions
 from .paper_plan import solve_paper
 from .refinement import asks_for_finer, finer_knots, with_knots
 from .rigid_body_plan import solve_rigid_body
-from .solver import Solution, solve
+from .solver import LIMIT, Solution, solve
 from .whole_robot import for_all_joints, for_moving_joints
 
 Array = NDArray[np.float64]
 
 
+QUICK = 60
+"""Iterations of a quick solve."""
 Formulation = Callable[[JumpTask, RobotDescription, SolveOptions], JumpPlan]
 """Makes a plan of a task with one set of decision variables, cost and constraints; the plan leaves
 out the robot's held joints."""
@@ -51,6 +55,7 @@ def solve_jump(
     compiled: bool = True,
     solver: str = "",
     knots: Knots | None = None,
+    quick: bool = False,
 ) -> JumpPlan:
     """The plan of a task, in the formulation that it names; ``SolveOptions`` explains the rest.
 
@@ -62,14 +67,17 @@ def solve_jump(
         TaskError: the task names joints that the robot has not.
     """
     try:
-        robot, task = task.equipped(robot), task.resolved(robot)
+        robot = task.equipped(robot)
+        chosen = [choice.as_json() for choice in choices(task, robot)]
+        task = task.resolved(robot)
     except TaskError as error:
         raise PlanError(str(error), family="motor torque") from error
     model_of(robot)  # raises what is wrong with the robot itself
     part = welded(robot)
     start = warm_start and for_moving_joints(warm_start, part)
-    options = SolveOptions(start, progress, compiled, solver, knots)
+    options = SolveOptions(start, progress, compiled, solver, knots, quick)
     plan = FORMULATIONS[task.formulation](task, robot, options)
+    plan = replace(plan, statistics={**plan.statistics, "chosen": chosen})
     return for_all_joints(plan, part, robot)
 
 
@@ -87,11 +95,18 @@ def solve_full(task: JumpTask, robot: RobotDescription, options: SolveOptions) -
     solution, warm = None, False
     if warm_start is not None and can_start(problem, warm_start):
         warm = True
-        solution = solve(problem, pack(problem, warm_start, guess), warm=True, solver="fatrop")
+        near, most = pack(problem, warm_start, guess), QUICK if options.quick else LIMIT
+        solution = solve(problem, near, warm=True, solver="fatrop", limit=most)
     if solution is None or not solution.solved:
         warm = False
         turns = any(hop.rotation for hop in task.hops()) and not solver
         solution = _turning(problem, robot, guess) if turns else None
+    if (solution is None or not solution.solved) and options.quick:
+        moved = _displaced(problem, robot)
+        start = guess if moved is None else moved
+        solution = solve(problem, start, warm=moved is not None, solver="fatrop", limit=QUICK)
+        if not solution.solved:
+            raise failure(task, solution)
     if solution is None or not solution.solved:
         solution = solve(
             problem, guess, solver=solver, other_guess=lambda: _displaced(problem, robot)

@@ -1,4 +1,4 @@
-"""Plans of a robot with held joints: planned without these joints, then written for all of them."""
+"""Plans for a robot with held joints: the planner leaves these joints out, and the plan is then written for all joints."""
 
 from __future__ import annotations
 

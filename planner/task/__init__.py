@@ -1,1 +1,1 @@
-"""What jump is asked for: the task, how it is read, and what of it contradicts itself."""
+"""Tasks: which jump is wanted, how a task is read, and which contradictions it may have."""

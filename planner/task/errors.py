@@ -1,4 +1,4 @@
-"""What the planner raises."""
+"""The exceptions of the planner."""
 
 from __future__ import annotations
 

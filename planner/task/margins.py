@@ -1,4 +1,4 @@
-"""What a plan leaves to the feedback: narrower bounds than what the robot could do at best."""
+"""The margins that a plan leaves to the feedback: bounds narrower than the robot's limits."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ LIMIT_MARGIN = 0.005
 
 
 class Margins(Parameters):
-    """Bounds that keep a plan away from where a disturbed robot has nothing left to do.
+    """Bounds that keep a plan away from states in which the feedback could not correct a disturbance.
 
     A plan that may do anything crouches until the torso lies on the thighs, pushes with the very
     ends of the feet, lands on straight legs and turns joints up to their stops. Each of these is
@@ -26,31 +26,36 @@ class Margins(Parameters):
 
     squat_lean: float | None = parameter(
         None, unit="rad", ge=0.1, le=1.5,
-        text="most the torso leans forwards or backwards until lift-off; None: any",
+        text="largest lean of the torso forwards or backwards until lift-off; None: any",
     )  # fmt: skip
     landing_lean: float | None = parameter(
         None, unit="rad", ge=0.01, le=1.5,
-        text="the same from touchdown on; None: any",
+        text="largest lean of the torso from touchdown on; None: any",
     )  # fmt: skip
     joints: float = parameter(
         LIMIT_MARGIN, unit="rad", ge=0.0, le=0.5, text="distance of the joints from their limits"
     )
     landing_limits: Mapping[str, tuple[float, float]] = parameter(
         {}, unit="rad",
-        text="narrower limits of joints from touchdown on, by a joint's name or by what is the "
-        "same in its name on both sides, such as knee: [-120 deg, -25 deg]",
+        text="narrower limits of joints from touchdown on, by a joint's name or by the part of it that "
+        "both sides share, such as knee: [-120 deg, -25 deg]",
+    )  # fmt: skip
+    step: float | None = parameter(
+        None, unit="m", ge=0.0, le=0.1,
+        text="least gap between calves and a step, and between feet and its edge where they pass "
+        "it; None: 2 mm for calves, no bound for feet",
     )  # fmt: skip
     pressure: float = parameter(
         0.0, ge=0.0, lt=0.5, text="least share of a foot's load on each of its contact points"
     )
     touchdown_speed: float | None = parameter(
         None, unit="m/s", gt=0.0, le=20.0,
-        text="most that a contact point moves downwards where it hits the ground with an impact; "
+        text="largest downward speed of a contact point where it hits the ground with an impact; "
         "None: any",
     )  # fmt: skip
     touchdown_slide: float | None = parameter(
         None, unit="m/s", gt=0.0, le=20.0,
-        text="most that it moves there along the foot, and across it; None: any",
+        text="its largest speed there along the foot, and across it; None: any",
     )  # fmt: skip
 
 

@@ -192,6 +192,15 @@ def write_plan(
     return write_whole(Path(path), plan_bytes(plan, names))
 
 
+def task_of_header(header: Mapping[str, Any], where: str = "task") -> JumpTask:
+    """The task of a plan's file, which says all of it: in files from before there were recipes too.
+
+    Raises:
+        KeyError, TypeError, TaskError: the header has no such task.
+    """
+    return make_task({"recipe": "paper", **header["task"]}, where=where)
+
+
 def read_plan(path: str | Path) -> JumpPlan:
     """The plan in a file.
 
@@ -215,7 +224,7 @@ def read_plan(path: str | Path) -> JumpPlan:
             "plan it anew with 'aloft plan'"
         )
     try:
-        task = make_task(header["task"], where=f"{path}: task")
+        task = task_of_header(header, where=f"{path}: task")
         values = {name: header[name] for name in _SCALARS if name != "later_flights"}
         times = [(float(start), float(end)) for start, end in header.get("later_flights", [])]
         return JumpPlan(task=task, **arrays, **values, later_flights=tuple(times))

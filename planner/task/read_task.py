@@ -1,4 +1,4 @@
-"""A task from its YAML file, with everything that is wrong with it."""
+"""Reads a task from its YAML file, and reports all of its mistakes at once."""
 
 from __future__ import annotations
 

@@ -1,13 +1,14 @@
-"""What a task leaves unsaid depends on the robot: a large robot takes its time and pushes harder.
+"""Scales the defaults of a task to the robot: a large robot moves more slowly and pushes harder.
 
 The defaults of ``JumpTask`` are those of a robot of 5.118 kg on four contact points, whose centre
 of mass stands at a height of 0.3287 m. For another robot the times grow with the square root of
 that height, as a pendulum's do, and the weights of forces and impulses fall so that the weight
-shared by all contact points costs the same. What a task says is never changed.
+shared by all contact points costs the same. A parameter that the task sets is never changed.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -41,12 +42,29 @@ def standing_height(robot: RobotDescription) -> float:
     return com - min(height(link_of[c.foot], c.position) for c in robot.contacts)
 
 
+@dataclass(frozen=True)
+class Size:
+    """How large a robot is: the height of its standing centre of mass [m], and by what times and
+    the weights of forces are multiplied."""
+
+    height: float
+    slow: float
+    light: float
+
+
+def size_of(robot: RobotDescription) -> Size:
+    """The size of a robot that stands on something."""
+    height = standing_height(robot)
+    light = (MASS / robot.total_mass) ** 2 * len(robot.contacts) / POINTS
+    return Size(height, float(np.sqrt(height / HEIGHT)), light)
+
+
 def scaled_defaults(task: Parameters, robot: RobotDescription) -> dict[str, Any]:
     """The parameters of a ``JumpTask`` that follow from the robot, where it does not say them."""
     if not robot.contacts:
         return {}
-    slow = np.sqrt(standing_height(robot) / HEIGHT)
-    light = (MASS / robot.total_mass) ** 2 * len(robot.contacts) / POINTS
+    size = size_of(robot)
+    slow, light = size.slow, size.light
     changed: dict[str, Any] = {
         name: rounded(type(task).model_fields[name].default * slow)
         for name in TIMES

@@ -1,4 +1,4 @@
-"""Several jumps in a row, and what the feet do in between: the parts of a task.
+"""The parts of a task with several jumps in a row, and with phases of contact of its own.
 
 name: up_and_down
 rise: 12 cm
@@ -53,7 +53,7 @@ class Hop(FreeTimes):
     take_off_speed: float | None = parameter(
         None, unit="m/s", gt=0.0, le=8.0, text="vertical speed of the centre of mass at lift-off"
     )
-    flight_time: float | None = parameter(None, unit="s", gt=0.0, le=3.0, text="in the air")
+    flight_time: float | None = parameter(None, unit="s", gt=0.0, le=3.0, text="time of the flight")
     distance_x: float | None = parameter(
         None, unit="m", ge=-2.0, le=2.0, text="how far it lands along the world's x axis"
     )
@@ -67,7 +67,11 @@ class Hop(FreeTimes):
         None, unit="m", ge=-2.0, le=2.0, text="ground at landing above the ground where it begins"
     )
     step_edge: float | None = parameter(
-        None, unit="m", ge=-2.0, le=2.0, text="where between them the ground changes, along x"
+        None,
+        unit="m",
+        ge=-2.0,
+        le=2.0,
+        text="where the ground changes its height, along x from the start of this jump",
     )
     rotation: float | None = parameter(
         None, unit="rad", ge=-12.6, le=12.6, text="the body's turn in pitch"
@@ -77,15 +81,16 @@ class Hop(FreeTimes):
 class Span(FreeTimes):
     """A phase of the sequence of contacts, in the order of time."""
 
-    phase: Literal["squat", "thrust", "flight", "landing"] = parameter(text="which phase it is")
+    phase: Literal["squat", "thrust", "flight", "landing"] = parameter(text="the kind of phase")
     time: float | None = parameter(
-        None, unit="s", gt=0.0, le=5.0, text="how long; None or free: found by the planner"
+        None, unit="s", gt=0.0, le=5.0, text="its time; None or free: found by the planner"
     )
     knots: int | None = parameter(
-        None, ge=2, le=400, text="intervals; None: as many as the task's knots say"
+        None, ge=2, le=400, text="number of intervals; None: that of the task's knots"
     )
     contacts: str = parameter(
-        "all", text="contact points on the ground: all, or what their names contain, e.g. toe"
+        "all",
+        text="contact points on the ground: all, or those whose names contain this, such as toe",
     )
 
     def on_ground(self, names: Sequence[str]) -> tuple[int, ...]:

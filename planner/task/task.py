@@ -1,4 +1,4 @@
-"""What jump is asked for: a task, written in YAML or made in Python.
+"""A task says which jump is wanted. It is written in YAML or made in Python.
 
 name: forward_10cm
 rise: 15 cm
@@ -20,6 +20,7 @@ from ...runtime.language.parameters import Parameters, parameter
 from .errors import TaskError
 from .margins import Margins
 from .placed_file import PlacedFile
+from .recipe import choices, chosen_fields
 from .scaling import scaled_defaults
 from .sequence import FreeTimes, Hop, Place, Span, check_spans, places_of
 
@@ -33,10 +34,10 @@ PLAN_FORMAT = 1
 class Knots(Parameters):
     """How many intervals each phase is divided into; about 60 in all are enough for a small biped."""
 
-    squat: int = parameter(8, ge=2, le=200, text="going down")
-    thrust: int = parameter(16, ge=4, le=200, text="pushing off")
-    flight: int = parameter(28, ge=4, le=400, text="in the air")
-    landing: int = parameter(14, ge=4, le=200, text="absorbing the touchdown and coming to rest")
+    squat: int = parameter(8, ge=2, le=200, text="the squat")
+    thrust: int = parameter(16, ge=4, le=200, text="the thrust")
+    flight: int = parameter(28, ge=4, le=400, text="the flight")
+    landing: int = parameter(14, ge=4, le=200, text="from touchdown to rest")
 
     @property
     def total(self) -> int:
@@ -52,7 +53,7 @@ class Weights(Parameters):
     joint_velocity: float = parameter(1e-1, ge=0.0, text="joint velocities")
     acceleration: float = parameter(5e-4, ge=0.0, text="generalised accelerations")
     force: float = parameter(1e-3, ge=0.0, text="contact forces")
-    impulse: float = parameter(0.05, ge=0.0, text="a touchdown's impulses, not over time")
+    impulse: float = parameter(0.05, ge=0.0, text="impulses at touchdown, not integrated over time")
 
 
 class JumpTask(FreeTimes):
@@ -71,11 +72,16 @@ class JumpTask(FreeTimes):
     """
 
     name: str = parameter(text="what the jump is called")
-    robot: str = parameter("bruce", text="the robot's description, as in a graph file")
+    robot: str = parameter("bruce", text="the robot, named as in a graph file")
     formulation: Literal["full", "paper", "srbm"] = parameter(
         "full",
         text="full: whole-body dynamics and motors; paper: centroidal momentum and kinematics as in the "
-        "paper; srbm: a single rigid body with legs that weigh nothing",
+        "paper; srbm: a single rigid body with massless legs",
+    )
+    recipe: Literal["robust", "paper"] = parameter(
+        "robust",
+        text="robust: parameters that are not set are chosen from task and robot so that the jump "
+        "lands; paper: they have the defaults of this table",
     )
     rise: float | None = parameter(
         None, unit="m", gt=0.0, le=2.0, text="apex of the centre of mass above standing"
@@ -84,7 +90,9 @@ class JumpTask(FreeTimes):
         None, unit="m/s", gt=0.0, le=8.0, text="vertical speed of the centre of mass at lift-off"
     )
     distance_x: float = parameter(0.0, unit="m", ge=-2.0, le=2.0, text="how far ahead it lands")
-    distance_y: float = parameter(0.0, unit="m", ge=-2.0, le=2.0, text="how far to the left")
+    distance_y: float = parameter(
+        0.0, unit="m", ge=-2.0, le=2.0, text="how far to the left it lands"
+    )
     twist: float = parameter(
         0.0, unit="rad", ge=-6.3, le=6.3, text="heading at landing, to the left; world frame"
     )
@@ -100,35 +108,41 @@ class JumpTask(FreeTimes):
         text="the body's turn in pitch from start to landing; 360 deg is a forward somersault",
     )  # fmt: skip
     squat_time: float | None = parameter(
-        0.4, unit="s", gt=0.0, le=5.0, text="going down; None: found by the planner"
+        0.4, unit="s", gt=0.0, le=5.0, text="time of the squat; None: found by the planner"
     )
     thrust_time: float | None = parameter(
-        0.25, unit="s", gt=0.0, le=2.0, text="pushing off; None: found by the planner"
+        0.25, unit="s", gt=0.0, le=2.0, text="time of the thrust; None: found by the planner"
     )
     flight_time: float | None = parameter(
-        None, unit="s", gt=0.0, le=3.0, text="in the air; None: found by the planner"
+        None, unit="s", gt=0.0, le=3.0, text="time of the flight; None: found by the planner"
     )
     landing_time: float | None = parameter(
-        0.5, unit="s", gt=0.0, le=5.0, text="touchdown to rest; None: found by the planner"
+        0.5,
+        unit="s",
+        gt=0.0,
+        le=5.0,
+        text="time from touchdown to rest; None: found by the planner",
     )
     contact_time: float | None = parameter(
         None, unit="s", gt=0.0, le=5.0,
-        text="on the ground between two jumps; None: found by the planner",
+        text="time on the ground between two jumps; None: found by the planner",
     )  # fmt: skip
     jumps: tuple[Hop, ...] | None = parameter(
-        None, min_length=1, max_length=50, text="jumps in a row; None: only the one above"
+        None, min_length=1, max_length=50, text="jumps in a row; None: one jump"
     )
-    repeat: int | None = parameter(None, ge=1, le=50, text="how often they are done in a row")
+    repeat: int | None = parameter(
+        None, ge=1, le=50, text="how often the jumps are repeated in a row"
+    )
     phases: tuple[Span, ...] | None = parameter(
         None, text="the sequence of contacts; None: squat, thrust, flight, landing, on all contacts"
     )
     touchdown_lean: float | None = parameter(
         None, unit="rad", ge=0.0, le=1.5,
-        text="most the torso may lean forwards or backwards at touchdown; None: any",
+        text="largest lean of the torso forwards or backwards at touchdown; None: any",
     )  # fmt: skip
     lift_off_momentum: float | None = parameter(
         None, unit="N*m*s", ge=0.0, le=20.0,
-        text="most angular momentum about the centre of mass at lift-off, about each axis; "
+        text="largest angular momentum about the centre of mass at lift-off, about each axis; "
         "None: any",
     )  # fmt: skip
     touchdown_momentum: float | None = parameter(
@@ -139,11 +153,13 @@ class JumpTask(FreeTimes):
         False, text="feet may hit the ground with speed and stop by an impulse; else they "
         "arrive at rest"
     )  # fmt: skip
-    knots: Knots = parameter(Knots(), text="intervals in each phase")
-    profile: str = parameter("", text="actuator profile; empty: the one the robot is used with")
+    knots: Knots = parameter(Knots(), text="numbers of intervals in each phase")
+    profile: str = parameter(
+        "", text="actuator profile; empty: that of the graph, or the robot's first"
+    )
     effort: float = parameter(
         1.0, gt=0.0, le=1.0,
-        text="share of the profile's torque and speed the plan may use; the rest is the feedback's",
+        text="share of the motors' torque and speed that the plan may use; the rest is for feedback",
     )  # fmt: skip
     friction: float = parameter(0.5, gt=0.0, le=2.0, text="coefficient between foot and ground")
     foot_clearance: float = parameter(
@@ -155,7 +171,7 @@ class JumpTask(FreeTimes):
     )
     weights: Weights = parameter(Weights(), text="weights of the cost")
     margins: Margins | None = parameter(
-        None, text="what the plan leaves to the feedback; None: nothing but 5 mrad at the joints"
+        None, text="room that the plan leaves to the feedback; None: only 5 mrad at the joints"
     )
     initial: Mapping[str, float] = parameter(
         {}, unit="rad", text="joint angles at the start, by name; others as the robot stands"
@@ -248,9 +264,10 @@ class JumpTask(FreeTimes):
             raise TaskError(f"profile: {error.args[0]}") from error
 
     def resolved(self, robot: RobotDescription) -> JumpTask:
-        """The task with all that it leaves to the robot: the actuator profile in use, and times
-        and weights that suit its size; see ``scaling``."""
-        changed = scaled_defaults(self, robot)
+        """The task with all that it leaves unsaid: what the ``recipe`` chooses for task and robot,
+        times and weights that suit the robot's size (``scaling``), the actuator profile in use."""
+        found = chosen_fields(self, choices(self, robot))
+        changed = found | scaled_defaults(self.model_copy(update=found), robot)
         if not self.profile:
             changed["profile"] = robot.motors.profile
         return self.model_copy(update=changed) if changed else self
@@ -258,9 +275,10 @@ class JumpTask(FreeTimes):
     def content(self) -> dict[str, Any]:
         """All that decides the plan, as plain data: everything but the name."""
         # What is not given is left out, so that a parameter added later changes no hash.
-        # So is the weight of impulses where there are none.
+        # So is the weight of impulses where there are none, and how the rest was chosen.
         unused: dict[str, Any] = {} if self.impact else {"weights": {"impulse"}}
-        return self.model_dump(mode="json", exclude={"name": True, **unused}, exclude_none=True)
+        left_out = {"name": True, "recipe": True, **unused}
+        return self.model_dump(mode="json", exclude=left_out, exclude_none=True)
 
     def hash(self, robot: RobotDescription) -> str:
         """What a plan of this task is kept under: the same for the same task, robot and format."""

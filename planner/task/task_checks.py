@@ -1,7 +1,6 @@
-"""What of a task contradicts itself or its robot: found at once, without solving anything.
+"""Finds contradictions within a task, and between a task and its robot, without solving anything.
 
-These are bounds that no jump can pass, not what a planner may find: a task that passes them may
-still have no plan.
+The checks are bounds that no jump can exceed. A task that passes them may still have no plan.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Files that are written as a whole or not at all, whatever is killed meanwhile."""
+"""Writes files as a whole or not at all, even if the process is killed meanwhile."""
 
 from __future__ import annotations
 

@@ -1,0 +1,220 @@
+"""Chooses the parameters that a task of a few lines does not set, so that the jump lands in closed loop.
+
+A plan that uses the motors and joints to the full cannot be followed, because noise, delay and errors of the
+model leave the feedback no room. The recipe is the same for every jump of every robot. Angles and shares are
+the same for all robots. Times, weights, the names of joints, and whether the heels rise before the toes leave
+the ground follow from the robot:
+
+- motors are used to 85 %, and up to 92 % where the jump asks for much;
+- feet may hit the ground with speed, but the impulse has a high weight in the cost;
+- the torso's orientation and the forces have high weights, so that the robot squats no deeper than it must;
+- the last sixth of the thrust is done on the toes, which lengthens the legs by the foot;
+- from touchdown on the torso leans little and the knees are bent; joints keep off their limits.
+
+A parameter that the task sets is kept: ``effort``, ``impact``, ``phases``, a time, or any single one of
+``weights`` and ``margins``; ``margins: null`` switches all margins off. With ``recipe: paper`` nothing is
+chosen: other parameters have their defaults, with full use of the motors and feet at rest at touchdown.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+
+from ...mathematics.constants import GRAVITY
+from ...robots.description import RobotDescription
+from ...runtime.language.parameters import Parameters
+from .margins import Margins
+from .robot_parts import knee_limits, least_distance_to_limits, word_of_toes
+from .scaling import rounded, size_of
+from .sequence import Hop, Span
+
+EFFORT, MOST_EFFORT = 0.85, 0.92
+EASY, HARD = 1.0, 1.5
+"""Demands (see ``demand``) up to which the least, and from which the most effort is chosen."""
+WEIGHTS = {"force": 0.01, "orientation": 20.0, "impulse": 5.0}
+SCALED_WEIGHTS = ("force", "impulse")
+THRUST, TOES, TOE_KNOTS = 0.25, 0.04, 8
+"""s; of the whole thrust and of its part on the toes, for a robot of BRUCE's size."""
+KNOTS = {"squat": 12, "thrust": 12, "flight": 16, "landing": 12}
+LANDING_LEAN, KNEE_BEND, JOINTS = 0.1, 0.4, 0.06
+"""rad"""
+STEP, STEP_FALL, FOOT_CLEARANCE = 0.012, 0.05, 0.12
+"""m from a step, how much more for each m that it goes down, and the feet's height in the middle of
+the flight as a share of that of the centre of mass."""
+SQUAT_LEAN, FAR = 0.9, 1.2
+"""rad, and from which distance ahead on, as a multiple of the centre of mass's height."""
+
+
+class Asked(Protocol):
+    """The attributes of a ``JumpTask`` that the recipe reads."""
+
+    recipe: Any
+    formulation: Any
+    thrust_time: float | None
+    margins: Margins | None
+    weights: Any
+    knots: Any
+
+    @property
+    def model_fields_set(self) -> set[str]:
+        """The names of what the task says."""
+        ...
+
+    def hops(self) -> tuple[Hop, ...]:
+        """The jumps in a row."""
+        ...
+
+
+@dataclass(frozen=True)
+class Choice:
+    """A parameter of a task that the recipe chose: its name, its value and the reason."""
+
+    parameter: str
+    value: Any
+    why: str
+
+    def as_json(self) -> dict[str, Any]:
+        """The choice as plain data."""
+        value = self.value
+        if isinstance(value, Parameters):
+            value = value.model_dump(mode="json")
+        if isinstance(value, tuple):
+            value = [each.model_dump(mode="json", exclude_none=True) for each in value]
+        return {"parameter": self.parameter, "value": value, "why": self.why}
+
+
+def applies(task: Asked) -> bool:
+    """Whether the recipe chooses anything for a task: for jumps of the ``full`` formulation in
+    which nothing turns over."""
+    turns = any(hop.rotation for hop in task.hops())
+    return task.recipe == "robust" and task.formulation == "full" and not turns
+
+
+def choices(task: Asked, robot: RobotDescription) -> tuple[Choice, ...]:
+    """Everything that the recipe chooses for a task of a robot; empty if the task sets all parameters."""
+    if not applies(task) or not robot.contacts:
+        return ()
+    return (*_plain(task, robot), *_weights(task, robot), *_margins(task, robot))
+
+
+def chosen_fields(task: Asked, found: tuple[Choice, ...]) -> dict[str, Any]:
+    """The task's fields with those choices."""
+    fields: dict[str, Any] = {}
+    for choice in found:
+        group, _, name = choice.parameter.partition(".")
+        if not name:
+            fields[group] = choice.value
+            continue
+        before = fields.get(group) or getattr(task, group) or Margins()
+        fields[group] = before.model_copy(update={name: choice.value})
+    return fields
+
+
+def _plain(task: Asked, robot: RobotDescription) -> Iterator[Choice]:
+    """Impact, effort and phases."""
+    said, slow = task.model_fields_set, size_of(robot).slow
+    if "impact" not in said:
+        yield Choice("impact", True, "feet that stop before they touch cost joint speed")
+    if "effort" not in said:
+        asked = demand(task, robot)
+        share = min(1.0, max(0.0, (asked - EASY) / (HARD - EASY)))
+        why = f"the jump asks for {asked:.2g} (easy below {EASY:g}, hard from {HARD:g}); "
+        yield Choice("effort", round(EFFORT + share * (MOST_EFFORT - EFFORT), 2),
+                     why + "the rest is the feedback's")  # fmt: skip
+    if "foot_clearance" not in said and any(
+        (hop.landing_height or 0.0) > 0.0 for hop in task.hops()
+    ):
+        high = rounded(FOOT_CLEARANCE * size_of(robot).height)
+        yield Choice("foot_clearance", high, "feet pass a step's edge")
+    if "knots" not in said:
+        why = "the flight is exact on any grid; where feet stand knots are closer"
+        yield Choice("knots", task.knots.model_copy(update=KNOTS), why)
+    toes = word_of_toes(robot)
+    if "phases" in said or len(task.hops()) > 1:
+        return
+    if toes and task.thrust_time is not None:
+        whole = task.thrust_time if "thrust_time" in said else rounded(THRUST * slow)
+        late = min(rounded(TOES * slow), 0.5 * whole)
+        spans = (
+            Span(phase="squat", time=_time(task, "squat_time", slow)),
+            Span(phase="thrust", time=round(whole - late, 6)),
+            Span(phase="thrust", time=late, contacts=toes, knots=TOE_KNOTS),
+            Span(phase="flight"),
+            Span(phase="landing", time=_time(task, "landing_time", slow)),
+        )
+        yield Choice("phases", spans, f"the heels rise {1000 * late:.0f} ms before the {toes}s leave "
+                     "the ground: the foot lengthens the leg")  # fmt: skip
+
+
+def _time(task: Asked, name: str, slow: float) -> float | None:
+    """A phase's time [s]: what the task says, or its usual one for a robot of that size."""
+    value: float | None = getattr(task, name)
+    return value if name in task.model_fields_set or value is None else rounded(value * slow)
+
+
+def _weights(task: Asked, robot: RobotDescription) -> Iterator[Choice]:
+    said = task.weights.model_fields_set if "weights" in task.model_fields_set else set()
+    light = size_of(robot).light
+    reasons = {
+        "force": "forces are dear: a shallow squat and a smooth thrust",
+        "orientation": "the torso stays near upright",
+        "impulse": "the legs give way as the feet touch down",
+    }
+    for name, value in WEIGHTS.items():
+        if name not in said:
+            scaled = rounded(value * light) if name in SCALED_WEIGHTS else value
+            yield Choice(f"weights.{name}", scaled, reasons[name])
+
+
+def _margins(task: Asked, robot: RobotDescription) -> Iterator[Choice]:
+    if "margins" in task.model_fields_set and task.margins is None:
+        return
+    said = set() if task.margins is None else task.margins.model_fields_set
+    far = max(abs(hop.distance_x or 0.0) for hop in task.hops()) / size_of(robot).height
+    if "squat_lean" not in said and far > FAR:
+        why = f"{far:.2g} times the centre of mass's height ahead; without it the torso lies down"
+        yield Choice("margins.squat_lean", SQUAT_LEAN, why)
+    if "landing_lean" not in said:
+        yield Choice("margins.landing_lean", LANDING_LEAN, "it lands upright")
+    knees = knee_limits(robot, KNEE_BEND)
+    if "landing_limits" not in said and knees:
+        yield Choice("margins.landing_limits", knees, "it lands on bent knees, which can give way")
+    fall = max(0.0, *(-(hop.landing_height or 0.0) for hop in task.hops()))
+    if "step" not in said and any(hop.landing_height for hop in task.hops()):
+        gap = rounded(STEP + STEP_FALL * fall)
+        yield Choice("margins.step", gap, "a disturbed robot must not touch the step")
+    if "joints" not in said:
+        room = math.floor(100.0 * min(JOINTS, 0.5 * least_distance_to_limits(robot))) / 100.0
+        yield Choice("margins.joints", max(Margins().joints, room), "joints keep off their limits")
+
+
+def demand(task: Asked, robot: RobotDescription) -> float:
+    """How much a jump asks for: its kinetic energy at lift-off by m g times the height of the
+    centre of mass, half of it. Speed aside counts three times, as legs push aside with their hips
+    only; a turn as the speed of what is a fifth of that height away. 1.2 is 20 cm straight up for
+    BRUCE."""
+    height = size_of(robot).height
+    found = 0.0
+    for hop in task.hops():
+        up = hop.landing_height or 0.0
+        rise = max(_rise(hop), up + 0.01)
+        time = math.sqrt(2.0 * rise / GRAVITY) + math.sqrt(2.0 * (rise - up) / GRAVITY)
+        speeds = np.array([hop.distance_x or 0.0, hop.distance_y or 0.0, hop.twist or 0.0]) / time
+        shares = np.array([1.0, 3.0, (0.2 * height) ** 2])
+        along = float(shares @ speeds**2)
+        found = max(found, (2.0 * GRAVITY * rise + along) / (GRAVITY * height))
+    return found
+
+
+def _rise(hop: Hop) -> float:
+    """How high a jump goes above where it begins [m]."""
+    if hop.rise is not None:
+        return hop.rise
+    if hop.take_off_speed is not None:
+        return hop.take_off_speed**2 / (2.0 * GRAVITY)
+    return GRAVITY * (hop.flight_time or 0.3) ** 2 / 8.0
