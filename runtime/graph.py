@@ -18,9 +18,12 @@ from typing import Any
 from .language.errors import AloftError
 from .language.stages import CheckedGraph, ClockSpec
 from .loading import load as load_checked
+from .loading import load_text
+from .loading.nodes import text_of
 from .running.executor import Executor
 from .running.run_result import RunResult
 from .running.sinks import Sink
+from .running.stepping import SteppedRun
 
 
 @dataclass(frozen=True, repr=False)
@@ -54,6 +57,7 @@ class Graph:
         clock: ClockSpec | None = None,
         sinks: Sequence[Sink] = (),
         log: bool = True,
+        plain: bool = False,
     ) -> RunResult:
         """Run the graph from start to close.
 
@@ -62,6 +66,7 @@ class Graph:
             clock: how to pace it; by default as the graph says.
             sinks: what else records the run.
             log: whether to keep every signal of every tick.
+            plain: whether to run all kernels as plain Python: slower, with the same bytes.
 
         Returns:
             The outcome; a run that failed is one too, see ``RunResult.raise_if_failed``.
@@ -74,17 +79,68 @@ class Graph:
             ticks = round(duration * self.checked.base_rate)
             if ticks < 1:
                 raise AloftError(f"a run of {duration} s is shorter than one tick")
-        return Executor(self.checked, clock=clock, sinks=sinks, log=log).run(ticks)
+        return Executor(self.checked, clock=clock, sinks=sinks, log=log, plain=plain).run(ticks)
+
+    def open(self, *, seed: int | None = None, plain: bool = False) -> SteppedRun:
+        """A run that is stepped from Python, for a ``with`` statement; see ``SteppedRun``.
+
+        Args:
+            seed: the value of every parameter called ``seed``; by default as the graph says.
+            plain: whether to run all kernels as plain Python.
+
+        Raises:
+            RunError: a block could not be set up or started.
+        """
+        return SteppedRun(
+            self.with_seed(seed).checked if seed is not None else self.checked, plain=plain
+        )
+
+    def with_seed(self, seed: int) -> Graph:
+        """The same graph with this value for every parameter called ``seed``."""
+        return self.changed(dict.fromkeys(self.seed_parameters, seed))
+
+    def changed(self, overrides: Mapping[str, Any] | Sequence[str]) -> Graph:
+        """The same graph with other parameters.
+
+        Raises:
+            LoadError: the changed graph may not run.
+        """
+        return Graph(load_text(self.checked.text, self.checked.file, overrides))
+
+    def _repr_html_(self) -> str:
+        """The block diagram, for notebooks."""
+        from .drawing.diagram import diagram
+        from .drawing.placing import draw
+        from .drawing.svg import svg
+
+        return svg(draw(diagram(self.checked)), self.checked.name)
+
+    def about(self) -> Mapping[str, Any]:
+        """What there is to say of a run beside its result: nothing."""
+        return {}
 
 
-def load(path: str | PathLike[str], overrides: Mapping[str, Any] | Sequence[str] = ()) -> Graph:
-    """The graph in a YAML file, checked, with ``overrides`` applied.
+def load(
+    graph: str | PathLike[str] | Mapping[str, Any],
+    overrides: Mapping[str, Any] | Sequence[str] = (),
+    *,
+    path: str | PathLike[str] = "graph.yaml",
+) -> Graph:
+    """A graph, checked, with ``overrides`` applied.
 
     Args:
-        path: the file.
+        graph: a YAML file, a shipped one such as ``aloft:jump``, the text of such a file (with more
+            than one line), or the same as a mapping.
         overrides: ``{"robot.seed": 3}``, or the same as texts, ``["robot.seed=3"]``.
+        path: for a text or a mapping the file that it stands for: reports name it, and what the
+            graph names is searched for beside it.
 
     Raises:
         LoadError: the graph may not run; the text is the report of everything wrong with it.
     """
-    return Graph(load_checked(Path(path), overrides))
+    if isinstance(graph, Mapping):
+        text = "".join(f"{key}: {text_of(value)}\n" for key, value in graph.items())
+        return Graph(load_text(text, Path(path), overrides))
+    if isinstance(graph, str) and "\n" in graph:
+        return Graph(load_text(graph, Path(path), overrides))
+    return Graph(load_checked(Path(graph), overrides))

@@ -27,15 +27,17 @@ A small one::
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
-from pathlib import Path
+from dataclasses import dataclass
 from typing import Any, ClassVar, Generic, Literal, Self, TypeVar, overload
 
 import numpy as np
 
 from ...robots.description import RobotDescription
+from .context import Clock as Clock  # noqa: PLC0414  also imported from here
+from .context import Context as Context  # noqa: PLC0414
 from .errors import BlockError, DeclarationError
 from .parameters import Parameters
+from .quantities import Carried, Given
 from .signals import Signal
 from .terrain import Terrain
 
@@ -134,46 +136,6 @@ class Misfit:
     fix: str = ""
 
 
-@dataclass
-class Clock:
-    """The time of a run: the present tick, the duration of a tick [s], and how the run is paced
-    (the ``kind`` of its ``ClockSpec``)."""
-
-    base_period: float
-    tick: int = 0
-    stop_reason: str | None = None
-    kind: str = "free"
-    stopped_by: str = ""
-    """The path of the block that asked for the end of the run."""
-
-
-@dataclass(frozen=True)
-class Context:
-    """What the runtime tells a block about the graph it is in.
-
-    ``period_ticks`` and ``offset_ticks`` say in which base ticks the block runs. ``dimensions``
-    holds the sizes of all dimensions that the block can use, and ``wired`` names its wired inputs.
-    ``folder`` is the folder of the graph file that has the block in it: files that a parameter
-    names are relative to it. ``graph_folder`` is the folder of the graph that was loaded, beside
-    which users keep their modules.
-    """
-
-    path: str
-    clock: Clock
-    period_ticks: int = 1
-    offset_ticks: int = 0
-    dimensions: Mapping[str, int] = field(default_factory=dict)
-    robot: RobotDescription | None = None
-    wired: tuple[str, ...] = ()
-    folder: Path = Path()
-    graph_folder: Path = Path()
-
-    @property
-    def period(self) -> float:
-        """The seconds between two runs of the block."""
-        return self.clock.base_period * self.period_ticks
-
-
 class Block:
     """The base of all blocks; the module's docstring shows how to write one.
 
@@ -268,6 +230,18 @@ class Block:
         return ()
 
     @classmethod
+    def tells(cls, params: Parameters, context: Context) -> Mapping[str, Any]:
+        """What follows from this block's parameters for other blocks, as plain data by name.
+
+        A graph writes ``parameter: {from: block.name}`` to use it, so that nothing is said twice;
+        ``name`` may also be a parameter of the block. Loading puts the value in its place.
+        A ``Misfit`` in place of a value says why there is none; it is reported where a graph uses
+        it. ``context`` is as for ``requires_of_graph``, but has no dimensions and no wired inputs.
+        What this raises should be a misfit of ``requires_of_graph`` as well.
+        """
+        return {}
+
+    @classmethod
     def absent_outputs(
         cls, params: Parameters, robot: RobotDescription | None
     ) -> Mapping[str, str]:
@@ -275,6 +249,17 @@ class Block:
 
         Such an output keeps its place in memory and holds zeros. A wire from it is reported at load
         with the reason, such as ``go2 has no IMU``. This is called when ``requires`` is.
+        """
+        return {}
+
+    @classmethod
+    def carried(cls, params: Parameters, given: Given) -> Carried:
+        """The units and frames of outputs whose fields are declared as ``carried``.
+
+        ``given`` has those of the inputs. A gain, for instance, answers ``{"y": u.times(unit)}``
+        with ``u = given["u"]``, and ``{"y": None}`` while ``u`` is not known. What inputs must have
+        in common is said by ``given.alike("a", "b")``. Without this method such an output has a
+        unit that is not checked, which ``aloft check`` says.
         """
         return {}
 
@@ -380,7 +365,8 @@ class Block:
     def cautions(self) -> Sequence[str]:
         """Warnings to those who read the run's results, such as of a check that was waived.
 
-        Called once, when every block has started.
+        Called when every block has started, and again when the run is over; what is said then for
+        the first time is added.
         """
         return ()
 

@@ -50,6 +50,8 @@ class RunError(AloftError):
         super().__init__(message)
         self.block = block
         self.tick = tick
+        self.record_tick = False
+        """Whether the tick is to be recorded all the same: its values are the reason."""
         self.where = ""
         """``file:line`` of the statement that raised what ended the run, where that is known."""
         self.traceback = ""

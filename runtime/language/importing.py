@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import importlib.util
+import linecache
 import sys
 import traceback
 from collections.abc import Iterable
@@ -37,8 +38,40 @@ def user_module(module_name: str, folders: Iterable[Path]) -> ModuleType:
     for folder in dict.fromkeys(folder.resolve() for folder in folders):
         file = _file_of(module_name, folder)
         if file is not None:
-            return _from_file(module_name, file, folder)
+            before = _stamp(file)
+            module = _fresh(_from_file(module_name, file, folder), file)
+            _STAMPS.setdefault(module.__name__, before)
+            return module
     return import_module(module_name)
+
+
+_STAMPS: dict[str, tuple[int, int]] = {}
+"""The time of change and the size of a user's file when its module was imported."""
+
+
+def _stamp(file: Path) -> tuple[int, int]:
+    status = file.stat()
+    return status.st_mtime_ns, status.st_size
+
+
+def _fresh(module: ModuleType, file: Path) -> ModuleType:
+    """The module, executed anew if its file has changed since; what it imports stays as it is.
+
+    Raises:
+        BlockImportError: it fails.
+    """
+    stamp = _stamp(file)
+    if _STAMPS.get(module.__name__, stamp) == stamp or module.__name__ == "__main__":
+        return module
+    linecache.checkcache(str(file))  # for the lines in tracebacks
+    try:
+        # Not importlib.reload: it takes the old code from the cache if the file was changed twice
+        # within a second and is as long as before.
+        exec(compile(file.read_bytes(), str(file), "exec"), module.__dict__)  # noqa: S102
+    except (Exception, SystemExit) as error:
+        raise _import_error(module.__name__, error) from error
+    _STAMPS[module.__name__] = stamp
+    return module
 
 
 def import_module(module_name: str) -> ModuleType:

@@ -2,8 +2,9 @@
 
 They are: written (what the user wrote, with the place of every key) -> flat (includes and
 sub-graphs expanded, overrides applied) -> checked (this module's ``CheckedGraph``: types, units,
-frames, rates and order are known to be right) -> bound (``memory.BoundGraph``: buffers and
-instances of blocks).
+frames, rates and order are known to be right) -> placed (``placement.PlacedGraph``: one part for
+each machine, and the links between them; only where a graph is spread over machines) -> bound
+(``memory.BoundGraph``: buffers and instances of blocks).
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from typing import Any, Literal
 from ...robots.description import RobotDescription
 from .block import Block
 from .parameters import Parameters
+from .quantities import Quantity
 
 
 @dataclass(frozen=True, order=True)
@@ -79,6 +81,50 @@ class BlockSpec:
     where: Position | None = None
     folder: Path = Path()
     """Where the file lies that the block is written in; files it names are relative to it."""
+    quantities: Mapping[str, Quantity] = field(default_factory=dict)
+    """Unit and frame of every field that carries what is wired, by ``port.field``."""
+    machine: str = ""
+    """The machine that the block runs on; empty in a graph that names no machines."""
+
+
+@dataclass(frozen=True)
+class MachineSpec:
+    """A machine that runs a part of a graph, and the endpoint at which the others reach it, such as
+    ``tcp/127.0.0.1:7450``."""
+
+    name: str
+    endpoint: str
+    where: Position | None = None
+
+
+@dataclass(frozen=True)
+class LinkPolicy:
+    """What the reader of a free-running link does where no message has come for ``max_age`` [s].
+
+    ``hold`` keeps the last values, ``safe`` reads zeros, and ``stop`` ends the run.
+    """
+
+    max_age: float | None = None
+    late: Literal["hold", "safe", "stop"] = "stop"
+
+
+@dataclass(frozen=True)
+class LinkSettings:
+    """How parts on several machines keep together.
+
+    In ``lockstep`` each waits for the messages of its tick; ``free`` parts keep their own time and
+    read the latest message. ``of`` has the policies of the links of single blocks.
+    """
+
+    mode: Literal["lockstep", "free"] = "lockstep"
+    policy: LinkPolicy = LinkPolicy()
+    of: Mapping[str, LinkPolicy] = field(default_factory=dict)
+    paths: Mapping[str, float] = field(default_factory=dict)
+    """The largest age [s] that is allowed on paths, ``block.output -> block.input``."""
+
+    def policy_of(self, source: str) -> LinkPolicy:
+        """The policy of the links that carry the outputs of the block ``source``."""
+        return self.of.get(source, self.policy)
 
 
 @dataclass(frozen=True)
@@ -111,6 +157,11 @@ class CheckedGraph:
     text: str = ""
     """The flattened graph as YAML, with includes expanded and overrides applied."""
     overrides: Mapping[str, Any] = field(default_factory=dict)
+    unchecked: tuple[str, ...] = ()
+    """Wires on which the reader has a unit and the source does not say its own, one text each."""
+    machines: tuple[MachineSpec, ...] = ()
+    """The machines that the graph may be spread over; the first runs what is placed nowhere."""
+    links: LinkSettings = LinkSettings()
 
     @property
     def base_period(self) -> float:

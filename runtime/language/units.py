@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -100,7 +101,7 @@ _TOKEN = re.compile(
     r"\s*(?:(?P<symbol>[A-Za-z%]+|1)(?:\s*(?:\^|\*\*)\s*(?P<power>[+-]?\d+))?|(?P<op>[*/·()]))"
 )
 _NUMBER = r"(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
-_QUANTITY = re.compile(
+QUANTITY = re.compile(
     rf"^\s*(?P<number>[+-]?{_NUMBER})(?:\s*/\s*(?P<divisor>{_NUMBER}))?\s*(?P<unit>.*)$"
 )
 
@@ -131,6 +132,37 @@ def parse_unit(text: str) -> Unit:
     if rest:
         raise UnitError(f"cannot read unit {text!r}: unexpected ')'")
     return Unit(unit.exponents, unit.scale, "" if stripped == "1" else stripped)
+
+
+@lru_cache(maxsize=512)
+def symbol_powers(text: str) -> Mapping[str, int]:
+    """The power of every symbol in a unit's text: ``{"N": 1, "m": 1, "rad": -1}`` for ``N m/rad``.
+
+    Raises:
+        UnitError: the text is not a product of known symbols.
+    """
+    parse_unit(text)  # the symbols are known and the brackets in order
+    powers: dict[str, int] = {}
+    signs = [1]  # of the brackets that are open
+    sign = 1
+    position = 0
+    stripped = text.strip()
+    while position < len(stripped):
+        match = _TOKEN.match(stripped, position)
+        assert match is not None
+        position = match.end()
+        if match["op"] == "(":
+            signs.append(signs[-1] * sign)
+        elif match["op"] == ")":
+            signs.pop()
+        elif match["op"]:
+            sign = -1 if match["op"] == "/" else 1
+            continue
+        elif match["symbol"] != "1":
+            power = signs[-1] * sign * int(match["power"] or 1)
+            powers[match["symbol"]] = powers.get(match["symbol"], 0) + power
+        sign = 1
+    return {symbol: power for symbol, power in powers.items() if power}
 
 
 def _product(
@@ -176,7 +208,7 @@ def parse_quantity(text: str, unit: str) -> float:
     Raises:
         UnitError: there is no number, or its unit has another dimension.
     """
-    match = _QUANTITY.match(text)
+    match = QUANTITY.match(text)
     if match is None:
         raise UnitError(f"cannot read {text!r} as a number with a unit")
     number = float(match["number"])

@@ -121,7 +121,7 @@ def read_mapping(
 def read_value(text: str, shown: str, problems: Problems) -> Node | None:
     """The one value in a YAML text; ``None`` for an empty text and after a problem."""
     try:
-        loader = _GraphLoader(text)
+        loader = _GraphLoader(_hide_brackets(text))
         try:
             return _Composer(loader, shown, problems).compose()
         finally:
@@ -169,6 +169,20 @@ def _report_syntax(error: yaml.MarkedYAMLError, text: str, shown: str, problems:
         other_where=other,
         fix=fix,
     )
+
+
+# YAML ends a plain text at a bracket or comma inside braces, so ``{u: e.y.value[0, 2]}`` would have
+# to be quoted. While YAML is read, these characters of a selection are private ones of the same width.
+_SOURCE = re.compile(r"(?<![\w./\]])[A-Za-z][\w/]*(?:\.[A-Za-z_]\w*){1,2}(?:\[[^\[\]{}#\"'\n]*\])+")
+_HIDDEN = str.maketrans("[],", "\ue000\ue001\ue002")
+_SHOWN = str.maketrans("\ue000\ue001\ue002", "[],")
+
+
+def _hide_brackets(text: str) -> str:
+    """The text with the brackets behind ``block.port`` hidden from YAML."""
+    if "[" not in text:
+        return text
+    return _SOURCE.sub(lambda match: match[0].translate(_HIDDEN), text)
 
 
 class _Rejected(Exception):
@@ -247,7 +261,7 @@ class _Composer:
         return made
 
     def _scalar(self, event: Any, where: Position) -> Plain:
-        text: str = event.value
+        text: str = event.value.translate(_SHOWN)
         full = event.tag
         if full is None or full == "!":
             full = self.loader.resolve(yaml.ScalarNode, text, event.implicit)
@@ -306,7 +320,7 @@ class _Composer:
                 continue
             # A key is always the text as it is written, also if that is `on`, `null` or `1`.
             written = isinstance(key_event, yaml.ScalarEvent)
-            key = str(key_event.value if written else key_node.value)
+            key = str(key_event.value if written else key_node.value).translate(_SHOWN)
             if key == "<<" and written and key_event.implicit[0]:
                 self._merge(value, key_where, merged)
             elif key in entries:

@@ -17,29 +17,37 @@ from ..language.registry import find_block, nearest_names
 from ..language.schedule import ScheduleBlock, find_loops, order_blocks
 from ..language.signals import Signal
 from ..language.stages import BlockSpec, CheckedGraph, Position, Wire
+from .carry import carried_fields, carry, unchecked_wires
+from .compose import put_together
 from .declaration_check import check_defaults, check_emit
 from .fit import check_fit, lacks_robot
 from .flat import FlatBlock, FlatGraph
 from .inserted import insert_constant, insert_delay, read_values
+from .link_settings import check_paths, read_link_settings
+from .machines import on_machines, read_machines
 from .parameter_check import check_parameters
 from .problems import Code, Problems, nearest
 from .rates import check_hyperperiod, read_offset, read_period
 from .settings import Settings, read_settings
 from .sizes import check_sizes
+from .told import resolve_told
 from .wire_check import Draft, WireCheck
 
 
 def examine(graph: FlatGraph, problems: Problems) -> CheckedGraph | None:
     """Check the whole graph. Returns ``None`` if there is any problem, also one noted before."""
     settings = read_settings(graph, problems)
+    graph = resolve_told(graph, settings, problems)
     if graph.empty:
         where = Position(graph.file, 1, 1)
         problems.add(Code.MISSING_KEY, "the graph has no blocks", where, fix="blocks: ...")
     drafts = {flat.path: _draft(flat, graph, settings, problems) for flat in graph.blocks}
     if settings.base_rate is not None and graph.rate is not None:
         check_hyperperiod(drafts.values(), graph.rate.key_where, problems)
+    drafts = put_together(graph, drafts, settings.robot, problems)
     wires = WireCheck(graph, drafts, problems)
     values: dict[str, Any] = {}
+    carry(drafts, problems)
     check_sizes(graph, drafts, problems)
     for draft in drafts.values():
         wires.check(draft)
@@ -48,9 +56,14 @@ def examine(graph: FlatGraph, problems: Problems) -> CheckedGraph | None:
         for name, wire in outputs.items():
             wires.check_output(f"{path}.{name}", wire)
     _report_loops(drafts, problems)
+    machines = read_machines(graph, problems)
+    links = read_link_settings(graph, settings.clock.kind, problems)
     if len(problems) or settings.base_rate is None:
         return None
-    return _assemble(graph, settings, settings.base_rate, drafts, values)
+    checked = _assemble(graph, settings, settings.base_rate, drafts, values)
+    checked = replace(on_machines(checked, graph, machines), links=links)
+    check_paths(checked, graph, problems)
+    return None if len(problems) else checked
 
 
 def _draft(flat: FlatBlock, graph: FlatGraph, settings: Settings, problems: Problems) -> Draft:
@@ -192,6 +205,8 @@ def _read_values(
             owner, node = drafts.get(wire.source_block), wire.initial
             output = owner.outputs.get(wire.source_port) if owner else None
             signal = output.signal if output else None
+            if owner is not None and owner.stands_for and port is not None:
+                owner, signal = draft, port.signal  # its fields have the reader's names and units
         if signal is not None and owner is not None and node is not None:
             values[at] = read_values(node, signal, owner, at, problems)
 
@@ -217,23 +232,26 @@ def _machines(drafts: Mapping[str, Draft]) -> list[ScheduleBlock]:
 def _report_loops(drafts: Mapping[str, Draft], problems: Problems) -> None:
     for loop in find_loops(_machines(drafts)):
         # The last wire leads back to the first block of the ring: usually that is the feedback.
-        source, target = loop.ports[-2:]
+        ports = [port for port in loop.ports if not drafts[port.rpartition(".")[0]].stands_for]
+        blocks = [path for path in loop.blocks if not drafts[path].stands_for]
+        if drafts[loop.ports[-1].rpartition(".")[0]].stands_for:
+            ports = [*ports[1:], ports[0]]  # so that the last one is an input
+        source, target = ports[-2:]
         block, _, name = target.rpartition(".")
-        reader = drafts[block].flat
-        ring = [*loop.blocks, loop.blocks[0]]
-        start = loop.blocks.index(block)
-        in_order = [*loop.blocks[start:], *loop.blocks[:start], block]
+        wire = drafts[block].flat.wires[name]
+        start = blocks.index(block)
+        in_order = [*blocks[start:], *blocks[:start], block]
         problems.add(
             Code.LOOP,
-            f"{' -> '.join(in_order if in_order else ring)} is a loop without a delay: "
+            f"{' -> '.join(in_order)} is a loop without a delay: "
             "each needs the next one's answer of the same tick",
-            reader.wires[name].where,
+            wire.where,
             at=target,
             other=source,
             other_where=drafts[source.rpartition(".")[0]].flat.where,
             expected="a delay, or a block that emits from its state, somewhere in the ring",
-            found=" -> ".join([*loop.ports, loop.ports[0]]),
-            fix=f"{name}: {{from: {source}, delay: 1}}",
+            found=" -> ".join([*ports, ports[0]]),
+            fix=f"{name}: {{from: {wire.shown or source}, delay: 1}}",
         )
 
 
@@ -277,6 +295,7 @@ def _assemble(
                 draft.offset_ticks,
                 flat.where,
                 flat.folder,
+                quantities=carried_fields(draft, drafts),
             )
         )
     order = order_blocks(
@@ -298,4 +317,5 @@ def _assemble(
         file=graph.file,
         text=graph.text,
         overrides=graph.overrides,
+        unchecked=tuple(unchecked_wires(drafts)),
     )

@@ -10,6 +10,7 @@ from typing import Any
 
 from ..language.stages import HasSource, Position
 from .nodes import Entry, MapNode, Node, plain, text_of
+from .selection import WHOLE, Selection
 
 _WIDTH = 100
 ROBOT_FILES = (".yaml", ".yml", ".urdf", ".xml", ".mjcf")
@@ -17,8 +18,41 @@ ROBOT_FILES = (".yaml", ".yml", ".urdf", ".xml", ".mjcf")
 
 
 @dataclass(frozen=True)
+class Item:
+    """One piece of a wire that is put together: what is selected of a source, or a ``literal``."""
+
+    where: Position
+    wire: FlatWire | None = None
+    selection: Selection = WHOLE
+    literal: Node | None = None
+
+    def plain(self) -> Any:
+        """The piece as a graph file says it."""
+        if self.literal is not None:
+            return plain(self.literal)
+        assert self.wire is not None
+        return f"{self.wire.source}{self.selection}"
+
+
+@dataclass(frozen=True)
+class Part:
+    """What one field of an input is made of; ``field`` is empty for its only one."""
+
+    field: str
+    where: Position
+    items: tuple[Item, ...]
+    is_list: bool = False
+
+    def plain(self) -> Any:
+        """The part as a graph file says it."""
+        items = [item.plain() for item in self.items]
+        return items if self.is_list else items[0]
+
+
+@dataclass(frozen=True)
 class FlatWire(HasSource):
-    """What one input reads: the output ``source`` (``block.port``), or a ``constant``."""
+    """What one input reads: the output ``source`` (``block.port``), a ``constant``, or ``parts``
+    that are put together."""
 
     source: str
     where: Position
@@ -26,14 +60,34 @@ class FlatWire(HasSource):
     initial: MapNode | None = None
     truth: bool = False
     constant: MapNode | None = None
+    parts: tuple[Part, ...] = ()
+    shown: str = ""
+    """What stands in the graph in place of ``source``, where loading has put a block between."""
+
+    @property
+    def selected(self) -> str:
+        """What is written behind the source: ``.position[2]``."""
+        return self.shown.removeprefix(self.source) if self.shown else ""
+
+    def inner(self) -> tuple[FlatWire, ...]:
+        """The wires that this one is made of: itself, or those of its parts; none of a constant."""
+        if self.constant is not None:
+            return ()
+        items = [item for part in self.parts for item in part.items]
+        return tuple(i.wire for i in items if i.wire is not None) if self.parts else (self,)
 
     def plain(self) -> Any:
         """The wire as a graph file says it."""
         if self.constant is not None:
             return {"value": plain(self.constant)}
+        source: Any = self.source
+        if self.parts:
+            one = len(self.parts) == 1 and not self.parts[0].field
+            source = {part.field: part.plain() for part in self.parts}
+            source = self.parts[0].plain() if one else source
         if not self.delay and not self.truth:
-            return self.source
-        data: dict[str, Any] = {"from": self.source}
+            return source
+        data: dict[str, Any] = {"from": source}
         if self.delay:
             data["delay"] = self.delay
         if self.initial is not None:
@@ -59,13 +113,25 @@ class FlatBlock:
     excused: tuple[str, ...] = ()
     input_places: Mapping[str, Position] = field(default_factory=dict)
     """Where each wired input's name is written."""
+    machine: Node | None = None
+    """The name of the machine that the block is placed on."""
+
+    def plain(self) -> dict[str, Any]:
+        """The block as an entry of ``blocks``, as plain data."""
+        given = (("rate", self.rate), ("offset", self.offset), ("on", self.machine))
+        return {
+            "use": self.use,
+            "with": plain(self.parameters),
+            "in": {name: wire.plain() for name, wire in self.wires.items()},
+            **{key: plain(node) for key, node in given if node is not None},
+        }
 
     def text(self) -> str:
         """The block as an entry of ``blocks``."""
         lines = [f"  {self.path}:", f"    use: {text_of(self.use)}"]
         lines += _section("with", _escape(plain(self.parameters)))
         lines += _section("in", {name: wire.plain() for name, wire in self.wires.items()})
-        for key, node in (("rate", self.rate), ("offset", self.offset)):
+        for key, node in (("rate", self.rate), ("offset", self.offset), ("on", self.machine)):
             if node is not None:
                 lines.append(f"    {key}: {text_of(plain(node))}")
         return "\n".join(lines)
@@ -90,6 +156,8 @@ class FlatGraph:
     actuators: Entry | None = None
     dimensions: MapNode | None = None
     clock: MapNode | None = None
+    machines: MapNode | None = None
+    links: MapNode | None = None
     overrides: Mapping[str, Any] = field(default_factory=dict)
     empty: bool = False
     """No file has any blocks."""
@@ -97,6 +165,10 @@ class FlatGraph:
     broken: tuple[str, ...] = ()
     subgraphs: Mapping[str, Mapping[str, FlatWire]] = field(default_factory=dict)
     """The sub-graph blocks that were expanded, and where their outputs come from."""
+
+    def plain(self) -> dict[str, dict[str, Any]]:
+        """The entries of all blocks as plain data, by their paths."""
+        return {block.path: block.plain() for block in self.blocks}
 
     @property
     def text(self) -> str:
@@ -112,7 +184,12 @@ class FlatGraph:
             lines.append(f"robot: {text_of(robot)}")
         if self.actuators is not None:
             lines.append(f"actuators: {text_of(plain(self.actuators.value))}")
-        for key, node in (("dimensions", self.dimensions), ("clock", self.clock)):
+        for key, node in (
+            ("dimensions", self.dimensions),
+            ("clock", self.clock),
+            ("machines", self.machines),
+            ("links", self.links),
+        ):
             if node is not None and node.entries:
                 lines.append(f"{key}: {text_of(plain(node))}")
         lines.append("blocks:" if self.blocks else "blocks: {}")

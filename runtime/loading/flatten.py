@@ -14,6 +14,7 @@ from .flat import FlatBlock, FlatGraph, FlatWire
 from .graph_keys import as_entry, is_graph_key, merge
 from .kinds_of_files import is_another_kind
 from .links import Link, read_link
+from .machines import placed
 from .nodes import Entry, MapNode, Node, ScalarNode, plain, text_of
 from .overrides import Override, Overrides, read_overrides, read_sets
 from .problems import Code, Problems, instead, listing, nearest
@@ -36,6 +37,7 @@ class _Scope:
     stack: Stack = ()
     rate: Node | None = None
     offset: Node | None = None
+    machine: Node | None = None
     shifted: bool = False
     """Whether the offset is said further out than the rate, so that it may exceed a period."""
     sets: tuple[Override, ...] = ()
@@ -92,8 +94,7 @@ class _Flattener:
         empty = False
         if tree is not None and is_another_kind(tree, shown, self.problems):
             tree = None
-        if tree is None:
-            self.files.incomplete = True
+        self.files.incomplete = tree is None
         if tree is not None:
             root = read_graph(tree, shown, path.parent, self.problems, subgraph=False)
             scope = _Scope(Bindings(None, self.problems), stack=((path.resolve(), shown),))
@@ -120,6 +121,8 @@ class _Flattener:
         def written(key: str) -> Entry | None:
             return graph[key][0] if key in graph else None
 
+        blocks = placed(blocks, self._mapping(written("place")), self.instances, self.problems)
+
         return FlatGraph(
             name=path.stem,
             file=shown,
@@ -132,6 +135,8 @@ class _Flattener:
             robot_folder=graph["robot"][1] if "robot" in graph else path.parent,
             dimensions=self._mapping(written("dimensions")),
             clock=self._mapping(written("clock")),
+            machines=self._mapping(written("machines")),
+            links=self._mapping(written("links")),
             overrides={command.key: plain(command.value) for command in commands},
             empty=empty and not self.files.incomplete,
             incomplete=self.files.incomplete,
@@ -231,8 +236,7 @@ class _Flattener:
     def _block(self, block: WrittenBlock, file: WrittenGraph, scope: _Scope) -> None:
         path = scope.prefix + block.name
         if len(self.drafts) >= _MAXIMAL_BLOCKS:
-            message = f"more than {_MAXIMAL_BLOCKS} blocks"
-            self.problems.add(Code.TOO_LARGE, message, block.where)
+            self.problems.add(Code.TOO_LARGE, f"more than {_MAXIMAL_BLOCKS} blocks", block.where)
             return
         if path in self.drafts or path in self.instances:
             present = self.drafts[path].block if path in self.drafts else self.instances[path]
@@ -251,6 +255,7 @@ class _Flattener:
         links, places = self._links(block, file, scope, path)
         rate = substitute(block.rate) if block.rate else scope.rate
         offset = substitute(block.offset) if block.offset else scope.offset
+        machine = substitute(block.machine) if block.machine else scope.machine
         shifted = block.offset is None and (block.rate is not None or scope.shifted)
         draft = _Draft(
             FlatBlock(
@@ -263,6 +268,7 @@ class _Flattener:
                 rate=rate,
                 offset=offset,
                 input_places=places,
+                machine=machine,
             ),
             links,
             shifted,
@@ -272,9 +278,8 @@ class _Flattener:
                 expected = "a block such as blocks.JointPD, module:Class, or a file.yaml"
                 wrong_kind(use, "'use'", expected, self.problems, at=path)
         elif use.value.endswith(_SUFFIXES):
-            self._instance(
-                draft, use, file, replace(scope, rate=rate, offset=offset, shifted=shifted)
-            )
+            inner = replace(scope, rate=rate, offset=offset, machine=machine, shifted=shifted)
+            self._instance(draft, use, file, inner)
             return
         else:
             draft.block = replace(draft.block, use=use.value, use_where=use.where)

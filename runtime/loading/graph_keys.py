@@ -9,12 +9,15 @@ from pathlib import Path
 from .nodes import Entry, MapNode
 from .overrides import Override
 
+_MAPPINGS = ("clock", "dimensions", "machines", "place", "links")
+"""The keys of a graph whose values are mappings."""
+
 
 def is_graph_key(override: Override, names: Iterable[str]) -> bool:
     """Whether an override sets a key of the graph itself, such as ``rate`` or ``clock.kind``."""
     if not override.block:
         return True
-    return override.block in ("clock", "dimensions") and override.block not in names
+    return override.block in _MAPPINGS and override.block not in names
 
 
 def as_entry(override: Override) -> Entry:

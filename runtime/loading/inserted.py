@@ -14,9 +14,10 @@ from ..language.errors import UnitError
 from ..language.parameters import Parameters, parameter
 from ..language.signals import Field, Signal
 from ..language.stages import BlockSpec, Wire
-from ..language.units import parse_quantity
+from ..language.unit_algebra import ONE
+from ..language.units import QUANTITY, Unit, parse_quantity, parse_unit
 from .flat import FlatWire
-from .nodes import MapNode, Node, ScalarNode, plain, text_of
+from .nodes import ListNode, MapNode, Node, ScalarNode, plain, text_of
 from .problems import Code, Problems, listing, nearest
 from .wire_check import Draft
 
@@ -120,6 +121,26 @@ def read_values(
     return found
 
 
+def own_unit(node: Node) -> Unit | None:
+    """The unit of a constant for an input that takes any: that of its first number with a unit.
+
+    Numbers without a unit are plain; zeros alone have a unit that is not checked, because zero
+    means the same in all of them.
+    """
+    if isinstance(node, ScalarNode):
+        if isinstance(node.value, str):
+            match = QUANTITY.match(node.value)
+            if match is not None:
+                try:
+                    return parse_unit(match["unit"])
+                except UnitError:
+                    return ONE  # reported with the value
+        return None if node.value in (0, False) else ONE
+    found = [own_unit(item) for item in (node.items if isinstance(node, ListNode) else ())]
+    units = [unit for unit in found if unit is not None]
+    return next((unit for unit in units if unit is not ONE), units[0] if units else None)
+
+
 def _array(node: Node, field: Field, owner: Draft) -> tuple[Any, str]:
     """The value and an empty text, or ``None`` and a text that says what was expected."""
     shape = owner.shape(field)
@@ -136,8 +157,11 @@ def _array(node: Node, field: Field, owner: Draft) -> tuple[Any, str]:
         expected = f"a finite number{unit}"
     if shape:
         expected = f"{expected}, or a list of shape [{', '.join(map(str, shape))}]"
+    own = field.unit
+    if field.carried:
+        own = own_unit(node) or ONE
     try:
-        value = _numbers(node, field, types)
+        value = _numbers(node, own, types)
         array = np.asarray(value, np.float64)
     except (TypeError, ValueError, OverflowError):
         return None, expected
@@ -148,13 +172,13 @@ def _array(node: Node, field: Field, owner: Draft) -> tuple[Any, str]:
     return value, ""
 
 
-def _numbers(node: Node, field: Field, types: tuple[type, ...]) -> Any:
+def _numbers(node: Node, unit: Unit | None, types: tuple[type, ...]) -> Any:
     """Plain numbers. Raises ``ValueError`` for anything else."""
     if isinstance(node, ScalarNode):
         value = node.value
-        if isinstance(value, str) and field.unit is not None:
+        if isinstance(value, str) and unit is not None:
             try:
-                return parse_quantity(value, field.unit.text)
+                return parse_quantity(value, unit.text)
             except UnitError as error:
                 raise ValueError(str(error)) from error
         if not isinstance(value, types) or (isinstance(value, bool) and bool not in types):
@@ -162,7 +186,7 @@ def _numbers(node: Node, field: Field, types: tuple[type, ...]) -> Any:
         return value
     if isinstance(node, MapNode):
         raise TypeError("a mapping is not a number")
-    return [_numbers(item, field, types) for item in node.items]
+    return [_numbers(item, unit, types) for item in node.items]
 
 
 def _short(node: Node) -> str:

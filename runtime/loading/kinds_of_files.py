@@ -29,6 +29,8 @@ def is_another_kind(tree: MapNode, shown: str, problems: Problems) -> bool:
     """
     keys = [entry.key for entry in tree if not entry.key.startswith("_")]
     of_graphs = [key for key in GRAPH_KEYS if key not in ("robot", "actuators")]
+    if "links" in keys and "joints" in keys:  # a robot's links, not those between machines
+        of_graphs.remove("links")
     if any(key in of_graphs for key in keys):
         return False
     for kind, (telling, command) in _KINDS.items():

@@ -2,24 +2,27 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from difflib import get_close_matches
 
 from ..language.stages import Position
+from ..language.units import QUANTITY
 from .nodes import Entry, ListNode, MapNode, Node, ScalarNode, kind, text_of
 from .problems import Code, Problems, nearest
+from .selection import WHOLE, Selection, read_selection
 from .written import WIRE_KEYS, unknown_key, wrong_kind
 
-_SOURCE = re.compile(r"[A-Za-z][A-Za-z0-9_]*(?:/[A-Za-z][A-Za-z0-9_]*)*\.[A-Za-z_][A-Za-z0-9_]*$")
-_EXAMPLE = "block.port, or {from: block.port, delay: 1}"
+_EXAMPLE = "block.port, block.port.field[2], or {from: block.port, delay: 1}"
+_ITEM_EXAMPLE = "block.port, block.port.field[2], or a number"
 
 
 @dataclass(frozen=True)
 class Link:
     """One end of a wire as it is written; ``instance`` is set for a sub-graph's own input.
 
-    ``source`` is the absolute ``block.port``, or the input's name where ``instance`` is set.
+    ``source`` is the absolute ``block.port``, or the input's name where ``instance`` is set. A wire
+    that is put together from several sources has ``parts`` instead, and a number is a ``literal``.
     """
 
     where: Position
@@ -29,6 +32,22 @@ class Link:
     initial: MapNode | None = None
     truth: bool = False
     constant: MapNode | None = None
+    selection: Selection = WHOLE
+    literal: Node | None = None
+    parts: tuple[LinkPart, ...] = ()
+
+
+@dataclass(frozen=True)
+class LinkPart:
+    """What one field of an input is made of: one source, or a list of several one behind another.
+
+    ``field`` is empty for the only field of the input.
+    """
+
+    field: str
+    where: Position
+    items: tuple[Link, ...]
+    is_list: bool = False
 
 
 def read_link(
@@ -38,12 +57,11 @@ def read_link(
 
     Block paths get ``prefix`` in front; ``inputs.name`` is an input of the sub-graph ``instance``.
     """
-    if isinstance(node, ScalarNode):
-        return _read_source(node, prefix, instance, at, problems)
     if not isinstance(node, MapNode):
-        wrong_kind(node, f"the source of {at}", _EXAMPLE, problems, at=at)
-        return None
+        return _read_expression(node, prefix, instance, at, problems)
     keys = {entry.key: entry for entry in node if not entry.key.startswith("_")}
+    if _is_by_field(keys):
+        return _read_fields(node, keys, prefix, instance, at, problems)
     meant = [
         unknown_key(entry, WIRE_KEYS, f"of the wire to {at}", problems)
         for entry in keys.values()
@@ -64,23 +82,107 @@ def read_link(
         )
         return None
     source = keys["from"].value
-    if not isinstance(source, ScalarNode):
-        wrong_kind(source, "'from'", "block.port", problems, at=at)
-        return None
-    link = _read_source(source, prefix, instance, at, problems)
+    if isinstance(source, MapNode):
+        inner = {entry.key: entry for entry in source if not entry.key.startswith("_")}
+        link = _read_fields(source, inner, prefix, instance, at, problems)
+    else:
+        link = _read_expression(source, prefix, instance, at, problems)
     delay = _read_delay(keys.get("delay"), at, problems)
     initial = _read_initial(keys, at, problems)
     truth = _read_allow(keys.get("allow"), at, problems)
     if link is None:
         return None
-    return Link(source.where, link.source, link.instance, delay, initial, truth)
+    return replace(link, where=source.where, delay=delay, initial=initial, truth=truth)
+
+
+def _is_by_field(keys: Mapping[str, Entry]) -> bool:
+    """Whether a mapping gives a source for every field: ``{value: e.y.value[2]}``."""
+    if not keys or any(key in ("from", "delay", "initial", "allow") for key in keys):
+        return False
+    if any(isinstance(entry.value, MapNode) for entry in keys.values()):
+        return False
+    keywords = ("from", "delay", "initial", "allow")
+    return not any(get_close_matches(key, keywords, cutoff=0.74) for key in keys)
+
+
+def _read_fields(
+    node: MapNode,
+    keys: Mapping[str, Entry],
+    prefix: str,
+    instance: str | None,
+    at: str,
+    problems: Problems,
+) -> Link | None:
+    parts = []
+    for key, entry in keys.items():
+        value = entry.value
+        if isinstance(value, MapNode):
+            wrong_kind(value, f"field {key!r} of {at}", _ITEM_EXAMPLE, problems, at=at)
+            return None
+        part = _read_part(key, value, prefix, instance, at, problems)
+        if part is None:
+            return None
+        parts.append(replace(part, where=entry.key_where))
+    return Link(node.where, parts=tuple(parts))
+
+
+def _read_expression(
+    node: ScalarNode | ListNode, prefix: str, instance: str | None, at: str, problems: Problems
+) -> Link | None:
+    """A source, a number, or a list of these."""
+    if isinstance(node, ScalarNode) and not is_number(node):
+        return _read_source(node, prefix, instance, at, problems)
+    part = _read_part("", node, prefix, instance, at, problems)
+    return Link(node.where, parts=(part,)) if part is not None else None
+
+
+def _read_part(
+    field: str,
+    node: ScalarNode | ListNode,
+    prefix: str,
+    instance: str | None,
+    at: str,
+    problems: Problems,
+) -> LinkPart | None:
+    if _all_numbers(node):
+        return LinkPart(field, node.where, (Link(node.where, literal=node),))
+    if isinstance(node, ScalarNode):
+        link = _read_source(node, prefix, instance, at, problems)
+        return LinkPart(field, node.where, (link,)) if link is not None else None
+    items = []
+    for item in node.items:
+        if not isinstance(item, ScalarNode):
+            wrong_kind(item, f"an item of the list for {at}", _ITEM_EXAMPLE, problems, at=at)
+            return None
+        if is_number(item):
+            items.append(Link(item.where, literal=item))
+            continue
+        link = _read_source(item, prefix, instance, at, problems)
+        if link is None:
+            return None
+        items.append(link)
+    return LinkPart(field, node.where, tuple(items), is_list=True)
+
+
+def is_number(node: ScalarNode) -> bool:
+    """Whether a value is a number, a truth value, or a number with a unit such as ``3 mm``."""
+    if not isinstance(node.value, str):
+        return node.value is not None
+    return QUANTITY.match(node.value) is not None
+
+
+def _all_numbers(node: Node) -> bool:
+    if isinstance(node, ScalarNode):
+        return is_number(node)
+    return isinstance(node, ListNode) and bool(node.items) and all(map(_all_numbers, node.items))
 
 
 def _read_source(
     node: ScalarNode, prefix: str, instance: str | None, at: str, problems: Problems
 ) -> Link | None:
     text = node.value
-    if not isinstance(text, str) or not _SOURCE.match(text):
+    found = read_selection(text) if isinstance(text, str) else None
+    if found is None:
         problems.add(
             Code.WRONG_KIND,
             f"the source of {at} cannot be {kind(node)}",
@@ -90,10 +192,11 @@ def _read_source(
             found=text_of(text),
         )
         return None
+    text, selection = found
     block, _, port = text.rpartition(".")
     if block == "inputs":
         if instance is not None:
-            return Link(node.where, port, instance)
+            return Link(node.where, port, instance, selection=selection)
         problems.add(
             Code.UNKNOWN_SOURCE,
             f"{text!r} stands for an input of a sub-graph, and this file is not one",
@@ -103,7 +206,7 @@ def _read_source(
             found=text,
         )
         return None
-    return Link(node.where, prefix + text)
+    return Link(node.where, prefix + text, selection=selection)
 
 
 def _read_constant(

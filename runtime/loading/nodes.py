@@ -61,12 +61,16 @@ class MapNode:
         return tuple(entry.key for entry in self.entries)
 
     def assign(self, path: Sequence[str], value: Node, key_where: Position) -> MapNode:
-        """A copy with the value at ``path`` set; mappings on the way are made where missing."""
+        """A copy with the value at ``path`` set; mappings on the way are made where missing.
+
+        Where a YAML file is named on the way, ``task: tasks/hop.yaml``, the value is a change of
+        what is in that file: ``task: {file: tasks/hop.yaml, rise: 12 cm}``.
+        """
         key, rest = path[0], path[1:]
         old = self.get(key)
         if rest:
-            inner = old.value if old and isinstance(old.value, MapNode) else MapNode((), key_where)
-            value = inner.assign(rest, value, key_where)
+            inner = _inside(old.value) if old else None
+            value = (inner or MapNode((), key_where)).assign(rest, value, key_where)
         new = Entry(key, key_where, value)
         if old is None:
             return replace(self, entries=(*self.entries, new))
@@ -74,6 +78,16 @@ class MapNode:
 
 
 Node = ScalarNode | ListNode | MapNode
+
+FILE_KEY = "file"
+"""The key of a mapping that names the file which the other keys change."""
+
+
+def _inside(node: Node) -> MapNode | None:
+    """The mapping that a value set inside ``node`` goes into; ``None`` if nothing of it stays."""
+    if isinstance(node, ScalarNode) and str(node.value).endswith((".yaml", ".yml")):
+        return MapNode((Entry(FILE_KEY, node.where, node),), node.where)
+    return node if isinstance(node, MapNode) else None
 
 
 def plain(node: Node) -> Any:

@@ -3,13 +3,23 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass
+from itertools import cycle
 from typing import Any
 
 from ..language.block import Block
 from ..language.delay import Delay
+from ..language.quantities import Quantity
 from ..language.registry import block_name
 from ..language.stages import BlockSpec, CheckedGraph, Wire
+from .gathering import Gather
 from .inserted import ConstantSignal
+
+_COLOURS = ("#cfe2f3", "#fce5cd", "#d9ead3", "#ead1dc", "#fff2cc", "#d9d2e9")
+"""The colours of the machines in a diagram."""
+
+
+INSERTED = (Delay, ConstantSignal, Gather)
+"""The blocks that loading inserts and diagrams leave out."""
 
 
 @dataclass(frozen=True)
@@ -26,6 +36,8 @@ class InputRow:
     transition: str = ""
     """``holds ...`` behind a slower source, ``samples ...`` behind a faster one."""
     truth: bool = False
+    sources: tuple[str, ...] = ()
+    """All outputs that are read, each as ``block.port``."""
 
     def text(self) -> str:
         """The input in one line."""
@@ -53,6 +65,8 @@ class BlockRow:
     inputs: tuple[InputRow, ...]
     outputs: tuple[str, ...]
     """The outputs with their signals: ``imu: ImuReading``."""
+    on: str = ""
+    """The machine that runs the block, in a graph that names machines."""
 
 
 def table(graph: CheckedGraph) -> tuple[BlockRow, ...]:
@@ -88,11 +102,12 @@ def _row(
         "Moore" if block_type.is_moore() else "Mealy",
         tuple(_input(graph, specs, spec, name) for name in block_type.inputs),
         tuple(f"{name}: {port.signal.__name__}" for name, port in block_type.outputs.items()),
+        spec.machine,
     )
 
 
 def _use(block_type: type[Block]) -> str:
-    for inserted, word in ((Delay, "delay"), (ConstantSignal, "constant")):
+    for inserted, word in ((Delay, "delay"), (ConstantSignal, "constant"), (Gather, "parts")):
         if issubclass(block_type, inserted):
             return word
     return block_name(block_type)
@@ -102,7 +117,7 @@ def _input(
     graph: CheckedGraph, specs: dict[str, BlockSpec], spec: BlockSpec, name: str
 ) -> InputRow:
     signal = spec.block_type.inputs[name].signal
-    fields = tuple(_field(spec, item, field) for item, field in signal.fields.items())
+    fields = tuple(_field(spec, name, item) for item in signal.fields)
     wire = spec.wires.get(name)
     if wire is None:
         return InputRow(name, "default", signal.__name__, fields)
@@ -110,22 +125,35 @@ def _input(
     source = specs[origin.rpartition(".")[0]]
     if issubclass(source.block_type, ConstantSignal):
         return InputRow(name, "constant", signal.__name__, fields)
+    origins: tuple[str, ...] = (origin,)
+    said = origin
+    if issubclass(source.block_type, Gather):
+        origins = tuple(dict.fromkeys(_origin(specs, wire) for wire in source.wires.values()))
+        said = source.block_type.said
+    ends = [specs[each.rpartition(".")[0]] for each in origins]
+    changes = dict.fromkeys(_transition(graph, end, spec) for end in ends)
+    ports = zip(ends, origins, strict=True)
     return InputRow(
         name,
-        origin,
+        said,
         signal.__name__,
         fields,
         wire.delay,
-        _transition(graph, source, spec),
-        source.block_type.outputs[origin.rpartition(".")[2]].truth,
+        ", ".join(filter(None, changes)),
+        any(end.block_type.outputs[each.rpartition(".")[2]].truth for end, each in ports),
+        origins,
     )
 
 
-def _field(spec: BlockSpec, name: str, field: Any) -> str:
+def _field(spec: BlockSpec, port: str, name: str) -> str:
+    field = spec.block_type.inputs[port].signal.fields[name]
     shape = field.resolve(spec.dimensions)
     numbers = f"[{', '.join(map(str, shape))}]" if shape else ""
-    unit = f" {field.unit}" if field.unit is not None else ""
-    frame = f" in {field.frame}" if field.frame else ""
+    quantity = spec.quantities.get(f"{port}.{name}", Quantity(field.unit, field.frame))
+    unit = f" {quantity.unit}" if quantity.unit is not None else ""
+    if field.carried and quantity.unit is None:
+        unit = " unit not checked"
+    frame = f" in {quantity.frame}" if quantity.frame else ""
     return f"{name}: {field.dtype_name}{numbers}{unit}{frame}"
 
 
@@ -153,10 +181,10 @@ def _hertz(graph: CheckedGraph, spec: BlockSpec) -> str:
 def mermaid(graph: CheckedGraph) -> str:
     """The graph as a Mermaid flowchart.
 
-    Rounded blocks are Moore machines. A dotted arrow is a delayed wire, a thick one joins blocks of
+    Blocks on one machine have one colour. Rounded blocks are Moore machines. A dotted arrow is a delayed wire, a thick one joins blocks of
     different rates; every arrow says which input it feeds, the signal, and what happens on the way.
     """
-    shown = [s for s in graph.blocks if not issubclass(s.block_type, (Delay, ConstantSignal))]
+    shown = [s for s in graph.blocks if not issubclass(s.block_type, INSERTED)]
     names = {spec.path: f"b{number}" for number, spec in enumerate(shown)}
     lines = ["flowchart LR"]
     lines += _nodes(graph, shown, names, "", 1)
@@ -164,16 +192,20 @@ def mermaid(graph: CheckedGraph) -> str:
         if row.path not in names:
             continue
         for item in row.inputs:
-            source = names.get(item.source.rpartition(".")[0])
-            if source is None:
-                continue
-            label = f"{item.source.rpartition('.')[2]} to {item.name}<br/>{item.signal}"
-            arrow = "-->"
-            if item.transition:
-                label, arrow = f"{label}<br/>{item.transition}", "==>"
-            if item.delay:
-                label, arrow = f"{label}<br/>delay {item.delay}", "-.->"
-            lines.append(f'  {source} {arrow}|"{label}"| {names[row.path]}')
+            for origin in item.sources:
+                block, _, port = origin.rpartition(".")
+                if block not in names:
+                    continue
+                label = f"{port} to {item.name}<br/>{item.signal}"
+                arrow = "-->"
+                if item.transition:
+                    label, arrow = f"{label}<br/>{item.transition}", "==>"
+                if item.delay:
+                    label, arrow = f"{label}<br/>delay {item.delay}", "-.->"
+                lines.append(f'  {names[block]} {arrow}|"{label}"| {names[row.path]}')
+    for machine, colour in zip(graph.machines, cycle(_COLOURS), strict=False):
+        lines.append(f"  classDef on_{machine.name} fill:{colour},color:#000")
+    lines += [f"  class {names[spec.path]} on_{spec.machine}" for spec in shown if spec.machine]
     return "\n".join(lines) + "\n"
 
 
@@ -190,6 +222,7 @@ def _nodes(
             boxes.setdefault(first, []).append(spec)
             continue
         label = f"{first}<br/>{_use(spec.block_type)}<br/>{_hertz(graph, spec)}"
+        label += f"<br/>on {spec.machine}" if spec.machine else ""
         left, right = ('(["', '"])') if spec.block_type.is_moore() else ('["', '"]')
         lines.append(f"{indent}{names[spec.path]}{left}{label}{right}")
     for first, inside in boxes.items():

@@ -44,6 +44,7 @@ class Code(StrEnum):
     WIRED_TWICE = "wired-twice"
     UNKNOWN_SOURCE = "unknown-source"
     FIELD_MISSING = "field-missing"
+    SELECTION = "selection"
     DTYPE = "dtype"
     SHAPE = "shape"
     UNIT = "unit"
@@ -56,6 +57,8 @@ class Code(StrEnum):
     OFFSET = "offset"
     DIMENSION = "dimension"
     ROBOT = "robot"
+    MACHINE = "machine"
+    AGE = "age"
     MISFIT = "misfit"
     OVERRIDE = "override"
 

@@ -10,7 +10,7 @@ from .nodes import ListNode, MapNode, Node, ScalarNode
 from .problems import Code, Problems, listing, nearest
 from .written import WrittenGraph
 
-_INPUT = re.compile(r"inputs\.([A-Za-z_][A-Za-z0-9_]*)$")
+_INPUT = re.compile(r"inputs\.([A-Za-z_][A-Za-z0-9_]*)(?:$|[.[])")
 
 
 @dataclass(frozen=True)

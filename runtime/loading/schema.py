@@ -17,6 +17,13 @@ from .written import CLOCK_KEYS
 Schema = dict[str, Any]
 
 _REFERENCE: Schema = {"type": "string", "pattern": "^\\$", "description": "a parameter's value"}
+_TOLD: Schema = {
+    "type": "object",
+    "additionalProperties": False,
+    "required": ["from"],
+    "properties": {"from": {"type": "string", "pattern": "^[A-Za-z][A-Za-z0-9_/]*\\.[A-Za-z_]"}},
+    "description": "what another block tells: {from: block.name}",
+}
 _RATE: Schema = {
     "anyOf": [
         {"type": "number", "exclusiveMinimum": 0},
@@ -24,18 +31,46 @@ _RATE: Schema = {
         _REFERENCE,
     ]
 }
-_SOURCE: Schema = {"type": "string", "pattern": "^[A-Za-z][A-Za-z0-9_/]*\\.[A-Za-z_][A-Za-z0-9_]*$"}
+_SOURCE: Schema = {
+    "type": "string",
+    "pattern": "^[A-Za-z][A-Za-z0-9_/]*(\\.[A-Za-z_][A-Za-z0-9_]*){1,2}(\\[[^\\[\\]]*\\])*$",
+}
+_NUMBER: Schema = {
+    "anyOf": [{"type": ["number", "boolean"]}, {"type": "string", "pattern": "^[-+]?[0-9.]"}],
+    "description": "a constant, such as 3 mm",
+}
+_ITEM: Schema = {"anyOf": [_SOURCE, _REFERENCE, _NUMBER]}
+_LIST: Schema = {
+    "type": "array",
+    "items": {"anyOf": [_ITEM, {"type": "array"}]},
+    "minItems": 1,
+    "description": "sources one behind another",
+}
+_FIELDS: Schema = {
+    "type": "object",
+    "propertyNames": {"not": {"enum": ["from", "delay", "initial", "allow"]}},
+    "additionalProperties": {"anyOf": [_ITEM, _LIST]},
+    "minProperties": 1,
+    "description": "a source for every field of the input",
+}
+_LINK_POLICY: Schema = {
+    "max_age": {"anyOf": [{"type": "number", "exclusiveMinimum": 0}, {"type": "string"}]},
+    "late": {"enum": ["hold", "safe", "stop"]},
+}
 _VALUES: Schema = {"type": "object", "description": "values by field; the others are zero"}
 _WIRE: Schema = {
     "anyOf": [
-        {**_SOURCE, "description": "block.port"},
+        {**_SOURCE, "description": "block.port, block.port.field or block.port.field[2]"},
         _REFERENCE,
+        _NUMBER,
+        _LIST,
+        _FIELDS,
         {
             "type": "object",
             "additionalProperties": False,
             "required": ["from"],
             "properties": {
-                "from": {"anyOf": [_SOURCE, _REFERENCE]},
+                "from": {"anyOf": [_ITEM, _LIST, _FIELDS]},
                 "delay": {
                     "anyOf": [{"type": "integer", "minimum": 1}, _REFERENCE],
                     "description": "periods of the source's block",
@@ -88,6 +123,39 @@ def graph_schema(blocks: Mapping[str, type[Block]] | None = None) -> Schema:
                 "description": "sizes by name",
             },
             "clock": _clock_schema(),
+            "machines": {
+                "type": "object",
+                "additionalProperties": {"type": "string", "pattern": "^(tcp|tls)/.+:[0-9]+$"},
+                "description": "machines that share the graph: name and endpoint",
+            },
+            "links": {
+                "type": "object",
+                "additionalProperties": False,
+                "properties": {
+                    "mode": {"enum": ["lockstep", "free"]},
+                    **_LINK_POLICY,
+                    "of": {
+                        "type": "object",
+                        "additionalProperties": {
+                            "type": "object",
+                            "additionalProperties": False,
+                            "properties": _LINK_POLICY,
+                        },
+                        "description": "the links of single blocks, by block",
+                    },
+                    "paths": {
+                        "type": "object",
+                        "additionalProperties": _LINK_POLICY["max_age"],
+                        "description": "block.output -> block.input: the largest age",
+                    },
+                },
+                "description": "how the machines keep together",
+            },
+            "place": {
+                "type": "object",
+                "additionalProperties": {"type": "string"},
+                "description": "block or sub-graph: machine; wins over 'on'",
+            },
             "include": {
                 "anyOf": [files, {"type": "array", "items": files}],
                 "description": "files whose blocks, wires and settings are taken over",
@@ -164,6 +232,7 @@ def _block_schema(known: Mapping[str, type[Block]]) -> Schema:
                 "anyOf": [{"type": "integer", "minimum": 0}, _REFERENCE],
                 "description": "tick of the first run, below the period",
             },
+            "on": {"type": "string", "description": "the machine that the block runs on"},
         },
         "allOf": [
             {
@@ -184,7 +253,7 @@ def _particular_schema(name: str, block_type: type[Block], definitions: Schema) 
     for key, schema in _relocate(model.get("properties", {}), name).items():
         schema.pop("live", None)
         description = " ".join(filter(None, [schema.pop("description", ""), _unit_text(schema)]))
-        options = [schema, _REFERENCE]
+        options = [schema, _REFERENCE, _TOLD]
         if schema.pop("unit", ""):  # a text with a unit may stand for each number, also in a list
             per_joint = "PerJoint" in json.dumps(schema)
             inside = {"type": "object"} if per_joint else {"type": "array"}

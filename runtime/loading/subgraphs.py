@@ -6,10 +6,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 from ..language.stages import Position
-from .flat import FlatWire
+from .flat import FlatWire, Item, Part
 from .links import Link
 from .nodes import MapNode, ScalarNode, kind
 from .problems import Code, Problems, listing, nearest
+from .selection import WHOLE, Selection
 from .written import WrittenGraph
 
 UNWIRED = "unwired"
@@ -94,10 +95,13 @@ class Resolver:
             return None
         start, seen = link, {}  # type: Link, dict[str, None]
         total = FlatWire("", start.where)
+        selection = WHOLE
         while True:
             if link.constant is not None:
                 if total.delay:
                     self._delayed_constant(start, at)
+                if selection:
+                    return self._of_constant(link.constant, selection, start, at)
                 return FlatWire("", start.where, constant=link.constant)
             if link.delay and total.delay:
                 self._delayed_twice(link, start, at)
@@ -105,6 +109,14 @@ class Resolver:
             if link.delay:
                 total = replace(total, delay=link.delay, initial=link.initial)
             total = replace(total, truth=total.truth or link.truth)
+            if link.parts:
+                return self._put_together(link, replace(total, where=start.where), selection, at)
+            if link.selection:
+                try:
+                    selection = selection.of(link.selection)
+                except ValueError as error:
+                    self._selection(str(error), start, at)
+                    return None
             block, _, port = link.source.rpartition(".")
             key = f"{link.instance}<{link.source}" if link.instance else link.source
             if key in seen:
@@ -116,11 +128,90 @@ class Resolver:
                 following = self._input(link, at)
             elif block in self.instances:
                 following = self._output(self.instances[block], port, link, at)
+            elif selection:
+                inner = FlatWire(link.source, start.where, truth=total.truth)
+                item = Item(start.where, inner, selection)
+                return replace(total, parts=(Part("", start.where, (item,)),))
             else:
                 return replace(total, source=link.source)
             if following is None or isinstance(following, str):
                 return following
             link = following
+
+    def _put_together(
+        self, link: Link, total: FlatWire, selection: Selection, at: str
+    ) -> FlatWire | None:
+        """The wire of a link with parts, of which ``selection`` takes something."""
+        parts = link.parts
+        if selection.field:
+            parts = tuple(part for part in parts if part.field == selection.field)
+            if not parts:
+                names = listing(part.field for part in link.parts if part.field)
+                self._selection(
+                    f"there is no field {selection.field!r}; there is {names}", link, at
+                )
+                return None
+        if selection.indices and (len(parts) > 1 or parts[0].is_list):
+            self._selection("elements cannot be selected of several sources", link, at)
+            return None
+        resolved = []
+        for part in parts:
+            items = []
+            for each in part.items:
+                if each.literal is not None:
+                    items.append(Item(each.where, literal=each.literal))
+                    continue
+                wire = self.resolve(each, at)
+                if wire is None:
+                    return None
+                if isinstance(wire, str):
+                    self._selection("a part comes from an input that is not wired", each, at)
+                    return None
+                items += self._pieces(wire, selection, total)
+            resolved.append(Part(part.field, part.where, tuple(items), part.is_list))
+        if selection.field:
+            resolved = [replace(resolved[0], field="")]
+        return replace(total, parts=tuple(resolved))
+
+    def _pieces(self, wire: FlatWire, selection: Selection, total: FlatWire) -> list[Item]:
+        """The pieces that a resolved wire adds to a part."""
+        rest = Selection("", selection.indices)
+        if not wire.parts:
+            inner = replace(wire, truth=wire.truth or total.truth)
+            return [Item(wire.where, inner, rest)]
+        return [
+            replace(
+                item,
+                selection=rest.of(item.selection),
+                wire=replace(
+                    item.wire,
+                    truth=item.wire.truth or wire.truth or total.truth,
+                    delay=wire.delay or item.wire.delay,
+                    initial=wire.initial or item.wire.initial,
+                )
+                if item.wire is not None
+                else None,
+            )
+            for part in wire.parts
+            for item in part.items
+        ]
+
+    def _of_constant(
+        self, constant: MapNode, selection: Selection, start: Link, at: str
+    ) -> FlatWire | None:
+        """A part of constant values, which is a number again."""
+        entry = constant.get(selection.field) if selection.field else None
+        if selection.indices or (entry is None and len(constant.entries) != 1):
+            self._selection(f"{str(selection)!r} cannot be selected of a constant", start, at)
+            return None
+        node = (entry or constant.entries[0]).value
+        item = Item(start.where, literal=node)
+        return FlatWire("", start.where, parts=(Part("", start.where, (item,)),))
+
+    def _selection(self, message: str, link: Link, at: str) -> None:
+        self.problems.add(
+            Code.SELECTION, f"the wire to {at} cannot be made: {message}", link.where, at=at
+        )
 
     def outputs(self) -> dict[str, dict[str, FlatWire]]:
         """For every sub-graph block that was expanded, where its outputs come from."""

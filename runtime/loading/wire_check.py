@@ -8,7 +8,10 @@ from typing import Any
 
 from ..language.block import Block, Input, Output
 from ..language.parameters import Parameters
+from ..language.quantities import UNCHECKED, Quantity, quantity_of
 from ..language.signals import Field, Signal
+from ..language.unit_algebra import over
+from ..language.units import Unit
 from .flat import FlatBlock, FlatGraph, FlatWire
 from .nodes import text_of
 from .problems import Code, Problems, listing, nearest
@@ -28,8 +31,13 @@ class Draft:
     dimensions: Mapping[str, int] = field(default_factory=dict)
     complete: bool = False
     absent: Mapping[str, str] = field(default_factory=dict)
+    quantities: dict[str, Quantity] = field(default_factory=dict)
+    """Unit and frame of every output, by ``port.field``; those of blocks that take any are there
+    once ``carry`` has been called."""
     period_ticks: int = 1
     offset_ticks: int = 0
+    stands_for: str = ""
+    """For a block that loading has inserted: the input whose wire it puts together."""
 
     @property
     def inputs(self) -> Mapping[str, Input[Any]]:
@@ -48,6 +56,13 @@ class Draft:
         except KeyError:
             return None
 
+    def quantity(self, port: str, field_name: str) -> Quantity:
+        """Unit and frame of an output's field; not checked where they are not known."""
+        known = self.quantities.get(f"{port}.{field_name}")
+        if known is None:
+            known = quantity_of(self.outputs[port].signal.fields[field_name])
+        return known or UNCHECKED
+
 
 @dataclass(frozen=True)
 class Mismatch:
@@ -61,11 +76,11 @@ class Mismatch:
 
 
 def compare(
-    writer: type[Signal], reader: type[Signal], source: Draft, target: Draft
+    output: Output[Any], reader: type[Signal], source: Draft, target: Draft
 ) -> Iterator[Mismatch]:
-    """All mismatches of the fields that both signals have."""
+    """All mismatches of the fields that the signals of an output and of its reader have."""
     for name, wanted in reader.fields.items():
-        given = writer.fields.get(name)
+        given = output.signal.fields.get(name)
         if given is None:
             continue
         if given.dtype_name != wanted.dtype_name:
@@ -83,36 +98,45 @@ def compare(
                 _shape_text(wanted, expected),
                 _shape_text(given, found),
             )
-        yield from _compare_units(name, given, wanted)
-        if given.frame and wanted.frame and given.frame != wanted.frame:
+        quantity = source.quantity(output.name, name)
+        yield from _compare_units(name, quantity.unit, wanted, _says_unit(source))
+        if quantity.frame and wanted.frame and quantity.frame != wanted.frame:
             yield Mismatch(
                 Code.FRAME,
                 f"field {name!r} is expressed in another frame",
                 wanted.frame,
-                given.frame,
-                f"rotate it from {given.frame} to {wanted.frame} in a block between",
+                quantity.frame,
+                f"rotate it from {quantity.frame} to {wanted.frame} in a block between",
             )
 
 
-def _compare_units(name: str, given: Field, wanted: Field) -> Iterator[Mismatch]:
-    if given.unit is None or wanted.unit is None or given.unit.matches(wanted.unit):
+def _says_unit(source: Draft) -> bool:
+    """Whether the source is a block whose parameter ``unit`` may still be set."""
+    fields = type(source.params).model_fields if source.params is not None else {}
+    return "unit" in fields and source.flat.parameters.get("unit") is None
+
+
+def _compare_units(
+    name: str, given: Unit | None, wanted: Field, may_say: bool
+) -> Iterator[Mismatch]:
+    if given is None or wanted.unit is None or given.matches(wanted.unit):
         return
-    if given.unit.same_dimension(wanted.unit):
-        factor = given.unit.factor_to(wanted.unit)
+    if given.same_dimension(wanted.unit):
+        factor = given.factor_to(wanted.unit)
         yield Mismatch(
             Code.UNIT,
             f"field {name!r} has another scale",
             str(wanted.unit),
-            str(given.unit),
-            f"multiply by {factor:.9g} in a block between: 1 {given.unit} is {factor:.9g} "
-            f"{wanted.unit}",
+            str(given),
+            f"multiply by {factor:.9g} in a block between: 1 {given} is {factor:.9g} {wanted.unit}; "
+            f"blocks.Gain with {{gain: {factor:.9g}, unit: {over(wanted.unit, given)}}}",
         )
     else:
+        fix = ""
+        if may_say:
+            fix = f"say what its numbers are: with: {{unit: {over(wanted.unit, given)}}}"
         yield Mismatch(
-            Code.UNIT,
-            f"field {name!r} is another quantity",
-            str(wanted.unit),
-            str(given.unit),
+            Code.UNIT, f"field {name!r} is another quantity", str(wanted.unit), str(given), fix
         )
 
 
@@ -132,7 +156,7 @@ def fits(output: Output[Any], port: Input[Any], source: Draft, target: Draft) ->
         return False
     if any(name not in output.signal.fields for name in port.signal.fields):
         return False
-    return next(compare(output.signal, port.signal, source, target), None) is None
+    return next(compare(output, port.signal, source, target), None) is None
 
 
 class WireCheck:
@@ -196,15 +220,17 @@ class WireCheck:
         return best
 
     def _check_wire(self, target: Draft, name: str, port: Input[Any], wire: FlatWire) -> None:
-        at = f"{target.flat.path}.{name}"
-        ends = self._source(at, wire, target, port)
+        at = target.stands_for or f"{target.flat.path}.{name}"
+        ends = self.source(at, wire, target, port)
         if ends is None:
             return
         source, output = ends
-        other = {"at": at, "other": wire.source, "other_where": source.flat.where}
+        name, written = at.rpartition(".")[2], wire.shown or wire.source
+        end = written if source.stands_for else wire.source
+        other = {"at": at, "other": end, "other_where": source.flat.where}
         if output.truth and not port.reads_truth and not wire.truth:
             nearby = self._local(self._candidates(target, port), at, wire)
-            allowed = f"{name}: {{from: {wire.source}, allow: truth}}"
+            allowed = f"{name}: {{from: {written}, allow: truth}}"
             self.problems.add(
                 Code.TRUTH,
                 f"{at} reads {wire.source}, which only a simulator knows",
@@ -243,10 +269,10 @@ class WireCheck:
                 nearest=candidates,
                 fix=f"{name}: {candidates[0]}" if candidates else "",
             )
-        for mismatch in compare(output.signal, port.signal, source, target):
+        for mismatch in compare(output, port.signal, source, target):
             self.problems.add(
                 mismatch.code,
-                f"{at} does not fit {wire.source}: {mismatch.message}",
+                f"{at} does not fit {written}: {mismatch.message}",
                 wire.where,
                 **other,
                 expected=mismatch.expected,
@@ -256,10 +282,10 @@ class WireCheck:
 
     def check_output(self, at: str, wire: FlatWire) -> None:
         """Report a sub-graph's output whose source does not exist."""
-        if wire.constant is None:
-            self._source(at, wire, None, None)
+        for inner in wire.inner():
+            self.source(at, inner, None, None)
 
-    def _source(
+    def source(
         self, at: str, wire: FlatWire, target: Draft | None, port: Input[Any] | None
     ) -> tuple[Draft, Output[Any]] | None:
         """The block and the output that a wire comes from; ``None`` after a problem."""
@@ -279,6 +305,7 @@ class WireCheck:
             able = [n for n, o in source.outputs.items() if fits(o, port, source, target)]
             similar = tuple(able)
         names = self._local([f"{wire.source_block}.{match}" for match in similar], at, wire)
+        names = tuple(f"{each}{wire.selected}" for each in names)
         self.problems.add(
             Code.UNKNOWN_SOURCE,
             f"{wire.source_block} ({source.flat.use}) has no output {wire.source_port!r}",
@@ -306,15 +333,18 @@ class WireCheck:
         prefixes = [f"{path}/" for path in self.graph.broken]
         if self.graph.incomplete or any(f"{block}/".startswith(prefix) for prefix in prefixes):
             return  # it may be in a file that could not be read, which is reported
-        similar = nearest(block, [*self.drafts, *self.graph.subgraphs])
+        known = [path for path, draft in self.drafts.items() if not draft.stands_for]
+        known += self.graph.subgraphs
+        similar = nearest(block, known)
         names = [f"{match}.{wire.source_port}" for match in similar]
         candidates = self._local(names or candidates, at, wire)
+        candidates = tuple(f"{each}{wire.selected}" for each in candidates)
         self.problems.add(
             Code.UNKNOWN_SOURCE,
             f"{at} reads {wire.source}, but there is no block {block!r}",
             wire.where,
             at=at,
-            expected=listing([*self.drafts, *self.graph.subgraphs]),
+            expected=listing(known),
             found=wire.source,
             nearest=candidates,
             fix=f"{at.rpartition('.')[2]}: {candidates[0]}" if candidates else "",
@@ -332,7 +362,7 @@ class WireCheck:
         exact: list[str] = []
         other: list[str] = []
         for source in self.drafts.values():
-            if source is target:
+            if source is target or source.stands_for:
                 continue
             for name, output in source.outputs.items():
                 path = f"{source.flat.path}.{name}"

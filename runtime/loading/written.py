@@ -12,12 +12,22 @@ from ..language.stages import Position
 from .nodes import Entry, ListNode, MapNode, Node, ScalarNode, kind, plain, text_of
 from .problems import Code, Problems, instead, listing, nearest
 
-GRAPH_KEYS = ("rate", "duration", "robot", "actuators", "dimensions", "clock")
+GRAPH_KEYS = (
+    "rate",
+    "duration",
+    "robot",
+    "actuators",
+    "dimensions",
+    "clock",
+    "machines",
+    "place",
+    "links",
+)
 """Keys that only a graph that is run, or a file it includes, may have."""
 SUBGRAPH_KEYS = ("inputs", "outputs", "parameters")
 """Keys that only a sub-graph's file may have."""
 COMMON_KEYS = ("include", "blocks", "wires", "set")
-BLOCK_KEYS = ("use", "with", "in", "rate", "offset")
+BLOCK_KEYS = ("use", "with", "in", "rate", "offset", "on")
 CLOCK_KEYS = ("kind", "overrun", "stop_after")
 WIRE_KEYS = ("from", "delay", "initial", "allow", "value")
 
@@ -35,6 +45,7 @@ class WrittenBlock:
     inputs: MapNode | None = None
     rate: Node | None = None
     offset: Node | None = None
+    machine: Node | None = None
 
 
 @dataclass(frozen=True)
@@ -113,7 +124,7 @@ def unknown_key(entry: Entry, legal: Iterable[str], of: str, problems: Problems)
         Code.UNKNOWN_KEY,
         f"{entry.key!r} is not a key {of}",
         entry.key_where,
-        expected=listing(names),
+        expected=listing(names, 16),
         found=entry.key,
         nearest=similar,
         fix=instead(entry.key, text_of(plain(entry.value)), entry.key_where, similar[0])
@@ -211,4 +222,5 @@ def _read_block(entry: Entry, problems: Problems) -> WrittenBlock | None:
         _mapping(found.get("in"), problems),
         value("rate"),
         value("offset"),
+        value("on"),
     )

@@ -11,6 +11,7 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from typing import Any
 
+from ...mathematics.compiling.compile_calls import compile_calls
 from ..language.block import Metric
 from ..language.errors import AloftError, ExitCode, RunError
 from ..language.stages import CheckedGraph, ClockSpec
@@ -40,6 +41,7 @@ class Executor:
         time_source: where the time comes from; by default the system's monotonic clock.
         on_ready: called once all blocks have started, before the first tick; a replay restores a
             keyframe here.
+        plain: whether to run all kernels as plain Python, which is slower and gives the same bytes.
 
     Raises:
         RunError: a block could not be set up.
@@ -58,6 +60,7 @@ class Executor:
         finite_check: bool = True,
         time_source: TimeSource | None = None,
         on_ready: Callable[[], None] | None = None,
+        plain: bool = False,
     ) -> None:
         self.bound = graph if isinstance(graph, BoundGraph) else BoundGraph(graph)
         self.life = LifeCycle(self.bound.blocks)
@@ -77,6 +80,7 @@ class Executor:
         self._sinks: list[Sink] = [*own, *sinks]
         self._opened: list[Sink] = []
         self._on_ready = on_ready
+        self._plain = plain
         self._cautions: list[str] = []
 
     def run(self, ticks: int | None = None) -> RunResult:
@@ -103,6 +107,7 @@ class Executor:
             try:
                 try:
                     interrupts.armed = True
+                    self._compile_kernels()
                     self._open_sinks(limit)
                     self.life.start()
                     self._note("life", "ready: every block has started")
@@ -135,6 +140,17 @@ class Executor:
             clock.tick - first_tick, (end_time - start_time) * 1e-9, error, problems, interrupts
         )
         return replace(result, warnings=tuple(self._finish_sinks(result)))
+
+    def _compile_kernels(self) -> None:
+        """Compile the kernels that the blocks call, before any block is started."""
+        if self._plain:
+            return
+        reason = compile_calls(self.bound.kernel_calls)
+        self.bound.parameters.compile = None if reason else compile_calls
+        if reason:
+            self._cautions.append(
+                f"the mathematics runs as plain Python, which is several times slower: {reason}"
+            )
 
     def _open_sinks(self, ticks: int | None) -> None:
         if self._log is not None:
@@ -175,10 +191,16 @@ class Executor:
         self.ticker.tell(note)
 
     def _ask_for_cautions(self) -> None:
-        for path, block in self.bound.blocks.items():
-            self._cautions += [f"{path}: {text}" for text in block.cautions()]
+        self._add_cautions()
         for caution in self._cautions:
             self._note("caution", caution, "WARN")
+
+    def _add_cautions(self) -> None:
+        """The blocks' cautions that are not known yet, in the order of the blocks."""
+        for path, block in self.bound.blocks.items():
+            known = set(self._cautions)
+            texts = [f"{path}: {text}" for text in block.cautions()]
+            self._cautions += [text for text in texts if text not in known]
 
     def _pause(self) -> None:
         """Wait for one period between two stop cycles, so that a bus has time to carry each."""
@@ -192,6 +214,8 @@ class Executor:
         problems: list[str],
         interrupts: Interrupts,
     ) -> RunResult:
+        if error is None:
+            self._add_cautions()
         by_block: dict[str, dict[str, Metric]] = {}
         for path, block in self.bound.blocks.items():
             try:

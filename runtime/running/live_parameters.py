@@ -10,8 +10,9 @@ from __future__ import annotations
 
 import time
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 
+from ...mathematics.compiling.kernel_call import KernelCall, collect_calls
 from ..language.block import Block
 from ..language.errors import AloftError
 from ..language.parameter_change import Adjustment, ParameterChange
@@ -27,6 +28,8 @@ class LiveParameters:
 
     Attributes:
         requests: the slot. It holds one adjustment, which the control thread takes out.
+        handed_in: where ``submit`` puts an adjustment. It is the slot, unless machines that share
+            the graph must agree first.
         changes: all changes so far, in order.
         listeners: called on the control thread with every change, before its first tick.
     """
@@ -34,8 +37,11 @@ class LiveParameters:
     def __init__(self, blocks: Mapping[str, Block]) -> None:
         self.blocks = blocks
         self.requests: deque[Adjustment] = deque(maxlen=1)
+        self.handed_in = self.requests
         self.changes: list[ParameterChange] = []
         self.listeners: list[Callable[[ParameterChange], None]] = []
+        self.compile: Callable[[Sequence[KernelCall]], object] | None = None
+        """Compiles the calls of kernels that a block makes anew; none in a plain run."""
 
     def answer(self, tick: int) -> None:
         """Apply the adjustment in the slot, from ``tick`` on; only the control thread does this."""
@@ -59,17 +65,23 @@ class LiveParameters:
         for path, params in adjustment.params.items():
             self.blocks[path].params = params
             try:
-                self.blocks[path].on_parameters()
+                self._take_over(self.blocks[path])
             except Exception as error:
                 for other, old in before.items():
                     self.blocks[other].params = old
-                    self.blocks[other].on_parameters()
+                    self._take_over(self.blocks[other])
                 raise AloftError(f"block '{path}' refuses the change: {describe(error)}") from error
         adjustment.tick = tick
         for change in adjustment.changes():
             self.changes.append(change)
             for listener in self.listeners:
                 listener(change)
+
+    def _take_over(self, block: Block) -> None:
+        with collect_calls() as calls:
+            block.on_parameters()
+        if self.compile is not None and calls:
+            self.compile(calls)
 
     def submit(self, adjustment: Adjustment, timeout: float = ANSWER_TIME) -> None:
         """Hand an adjustment to the control thread and wait until it is taken over.
@@ -80,14 +92,14 @@ class LiveParameters:
             AloftError: a block refused it, another adjustment is waiting, or no tick came in
                 time. In all these cases nothing has changed.
         """
-        if self.requests:
+        if self.handed_in:
             raise AloftError("another change is waiting for its tick; try again")
-        self.requests.append(adjustment)
+        self.handed_in.append(adjustment)
         end = time.monotonic() + timeout
         while not adjustment.answered:
             if time.monotonic() > end:
                 try:
-                    self.requests.remove(adjustment)
+                    self.handed_in.remove(adjustment)
                 except ValueError:
                     end = time.monotonic() + timeout  # it was taken just now: wait for the answer
                     continue

@@ -6,7 +6,7 @@ hashing a run and comparing two runs each take one memory copy. Views of inputs 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...mathematics.compiling.kernel_call import KernelCall, collect_calls
 from ...robots.description import RobotDescription
 from ..language.block import Block, Clock, Context
 from ..language.errors import DeclarationError, RunError
@@ -167,29 +168,37 @@ class BoundGraph:
         RunError: a block's constructor or ``setup`` failed; it names the block.
     """
 
+    clock_type: type[Clock] = Clock
+
     def __init__(self, graph: CheckedGraph) -> None:
         self.graph = graph
-        self.clock = Clock(graph.base_period)
+        self.clock = self.clock_type(graph.base_period)
         self.memory = Memory(graph.blocks, graph.robot)
         self.blocks: dict[str, Block] = {}
-        for spec in graph.blocks:
-            context = Context(
-                path=spec.path,
-                clock=self.clock,
-                period_ticks=spec.period_ticks,
-                offset_ticks=spec.offset_ticks,
-                dimensions=spec.dimensions,
-                robot=graph.robot,
-                wired=tuple(spec.wires),
-                folder=spec.folder,
-                graph_folder=Path(graph.file).parent,
-            )
-            with blame(spec, "setup"):
-                block = spec.block_type(spec.params, context)
-                self.memory.bind(block, spec)
-                block.setup()
-            self.blocks[spec.path] = block
+        with collect_calls() as calls:
+            for spec in graph.blocks:
+                self.blocks[spec.path] = self._set_up(spec)
+        self.kernel_calls: Sequence[KernelCall] = tuple(calls)
+        """The calls of kernels that the blocks made in ``setup``."""
         self.parameters = LiveParameters(self.blocks)
+
+    def _set_up(self, spec: BlockSpec) -> Block:
+        context = Context(
+            path=spec.path,
+            clock=self.clock,
+            period_ticks=spec.period_ticks,
+            offset_ticks=spec.offset_ticks,
+            dimensions=spec.dimensions,
+            robot=self.graph.robot,
+            wired=tuple(spec.wires),
+            folder=spec.folder,
+            graph_folder=Path(self.graph.file).parent,
+        )
+        with blame(spec, "setup"):
+            block = spec.block_type(spec.params, context)
+            self.memory.bind(block, spec)
+            block.setup()
+        return block
 
     def snapshot(self) -> Snapshot:
         """Everything the graph remembers now, after every block's ``freeze``."""

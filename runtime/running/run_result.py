@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from difflib import get_close_matches
+from html import escape
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
@@ -62,6 +63,20 @@ class RunResult:
             f"<RunResult: {outcome}: {self.reason}; {self.ticks} ticks, {self.duration_s:.6g} s"
             f"{logged}, {len(self.metrics)} metrics, hash {self.run_hash or 'none'}>"
         )
+
+    def __getstate__(self) -> dict[str, Any]:
+        """What is pickled: all but the graph, whose blocks are code that another process may lack."""
+        return {**self.__dict__, "graph": None}
+
+    def _repr_html_(self) -> str:
+        """Outcome and metrics as a table, for notebooks."""
+        rows = "".join(
+            f"<tr><td>{escape(name)}</td><td>{escape(_shown(value))}</td></tr>"
+            for name, value in self.metrics.items()
+        )
+        outcome = "success" if self.success else "no success"
+        head = f"{outcome}: {self.reason} ({self.ticks} ticks, {self.duration_s:.6g} s)"
+        return f"<p><b>{escape(head)}</b></p><table>{rows}</table>"
 
     @property
     def duration_s(self) -> float:
@@ -123,6 +138,10 @@ class RunResult:
             "warnings": list(self.warnings),
             "parameter_changes": [asdict(change) for change in self.parameter_changes],
         }
+
+
+def _shown(value: Metric) -> str:
+    return f"{value:.6g}" if isinstance(value, float) else str(value)
 
 
 def _plain(value: Any) -> Any:

@@ -139,7 +139,9 @@ class Ticker:
                     call(tick)
                 tick += 1
                 clock.tick = tick
-        except RunError:
+        except RunError as error:
+            if error.record_tick:
+                self._record_last(tick)
             raise
         except BaseException as error:
             if isinstance(error, NotFiniteError):

@@ -9,6 +9,8 @@ from typing import Any, Generic, Self, TypeVar
 
 import numpy as np
 
+from ...mathematics.compiling.compile_calls import compile_calls
+from ...mathematics.compiling.kernel_call import collect_calls
 from ...robots.description import RobotDescription, find_robot
 from ..language.block import Block, Clock, Context
 from ..language.errors import BlockError
@@ -34,6 +36,9 @@ class BlockBench(Generic[B]):
         dimensions: named sizes; they win over the robot's, and the block's own win over them.
         wired: the inputs that are wired; all by default. The others read their defaults and cannot
             be set.
+        plain: run the block's kernels as plain Python. By default they run as machine code, as in
+            a graph, which computes the same bits; where numba is not installed they always run as
+            plain Python.
 
     Raises:
         BlockError: the block cannot work with the robot or the rate; the message is the one that a
@@ -59,6 +64,7 @@ class BlockBench(Generic[B]):
         folder: Path | None = None,
         dimensions: Mapping[str, int] | None = None,
         wired: Iterable[str] | None = None,
+        plain: bool = False,
     ) -> None:
         description = find_robot(robot) if isinstance(robot, str) else robot
         if not isinstance(params, Parameters):
@@ -89,15 +95,18 @@ class BlockBench(Generic[B]):
             reasons = "; ".join(misfit.message for misfit in misfits)
             raise BlockError(f"{block_type.__name__}: {reasons}")
         self.memory = Memory([spec], description)
-        self.block: B = block_type(params, context)
-        self.memory.bind(self.block, spec)
+        with collect_calls() as calls:
+            self.block: B = block_type(params, context)
+            self.memory.bind(self.block, spec)
+            self.block.setup()
+        if not plain:
+            compile_calls(calls)
         self._is_moore = block_type.is_moore()
         self._settable: dict[str, Signal] = {
             name: self.memory.bus.signal(block_type.inputs[name].signal, f"block.{name}")
             for name in names
         }
         self._settable.update({name: getattr(self.block, name) for name in block_type.states})
-        self.block.setup()
         self.block.start()
 
     def set(self, port: str, /, **fields: Any) -> None:

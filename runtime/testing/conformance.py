@@ -24,6 +24,7 @@ from typing import Any
 
 import numpy as np
 
+from ...mathematics.compiling.compile_calls import compile_calls
 from ...robots.description import find_robot
 from ...robots.robot_description import RobotDescription
 from ..language.block import Block, Clock, Context
@@ -56,7 +57,7 @@ class Subject:
     dimensions: Mapping[str, int]
     seed: int
 
-    def bench(self) -> BlockBench[Block]:
+    def bench(self, *, plain: bool = False) -> BlockBench[Block]:
         """A new instance of the block, on a bench of its own."""
         return BlockBench(
             self.block_type,
@@ -64,6 +65,7 @@ class Subject:
             robot=self.robot,
             rate=self.rate,
             dimensions=self.dimensions,
+            plain=plain,
         )
 
     def feed(self, bench: BlockBench[Block], ticks: int, seed: int = 0) -> Iterator[int]:
@@ -215,7 +217,9 @@ def _live_parameters(subject: Subject) -> None:
         subject.trace(changed, WARM_UP)
         before = changed.snapshot()
         path = changed.block.context.path
-        LiveParameters({path: changed.block}).apply(Adjustment({path: params}, ()), WARM_UP)
+        parameters = LiveParameters({path: changed.block})
+        parameters.compile = compile_calls
+        parameters.apply(Adjustment({path: params}, ()), WARM_UP)
         after = changed.snapshot()
         subject.expect(before == after, f"on_parameters() writes state or outputs, for {name!r}")
         fresh = replace(subject, params=given).bench()
@@ -236,7 +240,7 @@ def _array_allocations(subject: Subject) -> None:
         kind.array_allocations == 0 or bool(kind.allocation_reason),
         "array_allocations without an allocation_reason",
     )
-    bench = subject.bench()
+    bench = subject.bench(plain=True)  # what a kernel allocates as plain Python counts too
     for tick in subject.feed(bench, TICKS):
         with count_array_allocations() as counted:
             bench.step()

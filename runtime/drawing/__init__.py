@@ -1,0 +1,1 @@
+"""Draws a graph as a block diagram: blocks with their ports, and wires between them."""

@@ -1,0 +1,113 @@
+"""The diagram as a page for a browser: a click on a block shows its details, one on a box opens it."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import json
+from collections.abc import Collection
+from html import escape
+
+from ..language.stages import CheckedGraph
+from .details import details
+from .diagram import diagram, subgraphs
+from .placing import draw
+from .svg import svg
+
+_STYLE = """
+:root{color-scheme:light dark} body{margin:0;font:14px/1.45 'DejaVu Sans',Verdana,Arial,sans-serif;
+background:Canvas;color:CanvasText;display:flex;height:100vh}
+main{flex:1;overflow:auto;padding:8px} aside{width:27em;overflow:auto;padding:12px 16px;
+border-left:1px solid GrayText;box-sizing:border-box} .node{cursor:pointer;outline:none}
+.node:hover>rect:first-of-type,.node:focus>rect:first-of-type{stroke-width:2.6}
+h1{font-size:17px;margin:0 0 2px} h2{font-size:13px;margin:14px 0 4px} p,pre{margin:4px 0}
+pre{white-space:pre-wrap;font:inherit} table{border-collapse:collapse;width:100%}
+td{vertical-align:top;padding:2px 8px 2px 0;overflow-wrap:anywhere} td:first-child{font-weight:bold;white-space:nowrap} p{overflow-wrap:anywhere}
+.soft{opacity:.72} button{font:inherit} header{display:flex;gap:.8em;align-items:baseline}
+@media print{aside,header{display:none} body{display:block;height:auto}}
+@media (max-width:60em){body{flex-direction:column} aside{width:auto;max-height:45%;border:0;
+border-top:1px solid GrayText}}
+"""
+_SCRIPT = """
+"use strict";
+const data = JSON.parse(document.getElementById("data").textContent);
+const panel = document.querySelector("aside"), drawing = document.querySelector("svg");
+const make = (tag, text, kind) => { const e = document.createElement(tag);
+  e.textContent = text; if (kind) e.className = kind; return e; };
+function rows(title, found) {
+  if (!found.length) return;
+  panel.append(make("h2", title));
+  const table = document.createElement("table");
+  for (const row of found) { const tr = document.createElement("tr");
+    row.forEach((cell, k) => tr.append(make("td", cell, k > 2 ? "soft" : ""))); table.append(tr); }
+  panel.append(table);
+}
+function toggle(path) {
+  const closed = new Set(data.closed);
+  if (!closed.delete(path)) closed.add(path);
+  location.search = [...closed].map(p => "closed=" + encodeURIComponent(p)).join("&");
+}
+function show(path) {
+  panel.replaceChildren();
+  const block = data.blocks[path];
+  panel.append(make("h1", path));
+  if (!block) {
+    const button = make("button", data.closed.includes(path) ? "open" : "close");
+    button.onclick = () => toggle(path);
+    panel.append(make("p", "sub-graph", "soft"), button);
+    return;
+  }
+  const on = block.machine ? ", on " + block.machine : "";
+  panel.append(make("p", block.use + ", " + block.rate + ", number " + block.order +
+    " in a tick" + on, "soft"));
+  if (block.place) panel.append(make("p", block.place));
+  rows("Parameters", block.parameters);
+  rows("Inputs", block.inputs);
+  rows("Outputs", block.outputs);
+  panel.append(make("h2", "Contract"), make("pre", block.text));
+}
+const nodeOf = event => event.target.closest(".node");
+drawing.addEventListener("click", e => { const n = nodeOf(e); if (n) show(n.dataset.path); });
+drawing.addEventListener("dblclick", e => { const n = nodeOf(e);
+  if (n && !data.blocks[n.dataset.path]) toggle(n.dataset.path); });
+drawing.addEventListener("keydown", e => { const n = nodeOf(e);
+  if (n && e.key === "Enter") show(n.dataset.path); });
+const width = drawing.viewBox.baseVal.width;
+let scale = 1;
+function zoom(to) { scale = Math.min(4, Math.max(0.2, to));
+  drawing.setAttribute("width", width * scale);
+  drawing.setAttribute("height", drawing.viewBox.baseVal.height * scale); }
+const fit = () => zoom((document.querySelector("main").clientWidth - 20) / width);
+document.getElementById("fit").onclick = fit;
+document.getElementById("in").onclick = () => zoom(scale * 1.25);
+document.getElementById("out").onclick = () => zoom(scale / 1.25);
+fit();
+"""
+
+
+def page(graph: CheckedGraph, closed: Collection[str] = ()) -> str:
+    """The page's text. It asks no other machine for anything."""
+    known = subgraphs(graph)
+    shut = [path for path in known if path in closed]
+    data = json.dumps({"blocks": details(graph), "closed": shut})
+    name = escape(graph.name)
+    body = data.replace("<", "\\u003c")
+    return (
+        f'<!doctype html><html lang="en"><head><meta charset="utf-8"><title>{name}</title>'
+        f"<style>{_STYLE}</style></head><body><main><header><h1>{name}</h1>"
+        '<button id="fit">fit</button><button id="in">+</button><button id="out">−</button>'
+        '<span class="soft">a click on a block shows what it does</span></header>'
+        f"{svg(draw(diagram(graph, shut)), graph.name)}</main>"
+        '<aside><p class="soft">Nothing is chosen.</p></aside>'
+        f'<script type="application/json" id="data">{body}</script>'
+        f"<script>{_SCRIPT}</script></body></html>\n"
+    )
+
+
+def policy() -> str:
+    """The Content-Security-Policy of the page: its own script and style, and nothing else."""
+    digest = base64.b64encode(hashlib.sha256(_SCRIPT.encode()).digest()).decode()
+    return (
+        f"default-src 'none'; script-src 'sha256-{digest}'; style-src 'unsafe-inline'; "
+        "base-uri 'none'; form-action 'self'; frame-ancestors 'none'"
+    )

@@ -1,0 +1,1 @@
+"""Links between the parts of a graph that run on several machines."""

@@ -1,0 +1,88 @@
+"""A transport within one process: parts in threads exchange messages through it, as tests do.
+
+``Hub.interfere`` may be set to a function that gets every message and returns what arrives in its
+place: the same, a changed one, none, or several. So faults of a network are made on purpose.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Iterable
+
+from .transport import Take
+
+
+class Hub:
+    """Where the transports of the parts meet."""
+
+    def __init__(self) -> None:
+        self.interfere: Callable[[str, bytes], Iterable[bytes]] | None = None
+        self._takers: dict[str, list[Take]] = {}
+        self._present: dict[str, Callable[[str], None]] = {}
+        self._lock = threading.Lock()
+
+    def transport(self) -> HubTransport:
+        """A transport for one part."""
+        return HubTransport(self)
+
+    def enter(self, machine: str, lost: Callable[[str], None]) -> None:
+        """A machine is there."""
+        with self._lock:
+            self._present[machine] = lost
+
+    def leave(self, machine: str) -> None:
+        """A machine has closed its transport, or is made to look as if its process had ended."""
+        with self._lock:
+            self._present.pop(machine, None)
+            others = list(self._present.values())
+        for lost in others:
+            lost(machine)
+
+    def add(self, key: str, take: Take) -> None:
+        """Another subscriber."""
+        with self._lock:
+            self._takers.setdefault(key, []).append(take)
+
+    def send(self, key: str, data: bytes) -> None:
+        """Give a message to all subscribers of its key."""
+        arriving = (data,) if self.interfere is None else self.interfere(key, data)
+        for message in arriving:
+            for take in self._takers.get(key, ()):
+                take(message)
+
+
+class HubTransport:
+    """One part's end of a hub."""
+
+    def __init__(self, hub: Hub) -> None:
+        self.hub = hub
+        self.machine = ""
+
+    def open(self, machine: str, lost: Callable[[str], None]) -> None:
+        """Enter the hub."""
+        self.machine = machine
+        self.hub.enter(machine, lost)
+
+    def publisher(self, key: str) -> Take:
+        """What sends under ``key``; a machine that has left sends nothing."""
+
+        def send(data: bytes) -> None:
+            if self.machine:
+                self.hub.send(key, data)
+
+        return send
+
+    def subscribe(self, key: str, take: Take) -> None:
+        """Have messages taken until this end is closed."""
+
+        def take_while_here(data: bytes) -> None:
+            if self.machine:
+                take(data)
+
+        self.hub.add(key, take_while_here)
+
+    def close(self) -> None:
+        """Leave the hub."""
+        machine, self.machine = self.machine, ""
+        if machine:
+            self.hub.leave(machine)

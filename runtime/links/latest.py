@@ -1,0 +1,158 @@
+"""The receiving end of a free-running link: the latest message, its age, and what is late or lost."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..language.block import Block, Output
+from ..language.signals import Field, Signal
+from ..language.stages import LinkPolicy
+from ..placement.placed import Link
+from .inbox import PROBE
+from .message import DamagedMessageError, Message, MessageReader
+from .others import Others
+
+KEPT = 4096
+"""The number of last ages from which the percentiles are computed."""
+
+
+class LinkHealth(Signal):
+    """How a free-running link does, at each tick of its reader."""
+
+    age = Field(unit="s", text="since the source ran, by the estimated clock of its machine")
+    late = Field(dtype="bool", text="whether the age exceeds what is allowed")
+    received = Field(dtype="int64", text="messages so far")
+    lost = Field(dtype="int64", text="messages that never came, by the gaps in their numbers")
+    surplus = Field(dtype="int64", text="messages that came twice or after a later one")
+    damaged = Field(dtype="int64", text="messages that were thrown away")
+
+
+class Health(Block):
+    """Holds the health of a link, so that it is recorded and shown; the link writes it."""
+
+    health = Output(LinkHealth)
+
+    def step(self) -> None:
+        """Never called: the link writes when the stand-in of its source runs."""
+
+
+class LatestInbox:
+    """Keeps the latest message of a link, and gives it to the stand-in of its source.
+
+    A message older than one that has come is thrown away. Nothing here waits.
+
+    Args:
+        link: the link.
+        reader: what checks messages and writes them into the bus.
+        others: the other parts.
+        policy: what to do where nothing has come for too long.
+        health: where to write how the link does.
+        stop: called with the reason where the policy is to stop.
+        clock: the monotonic time [ns].
+    """
+
+    def __init__(
+        self,
+        link: Link,
+        reader: MessageReader,
+        others: Others,
+        policy: LinkPolicy,
+        health: LinkHealth,
+        stop: Callable[[str], None],
+        clock: Callable[[], int] = time.monotonic_ns,
+    ) -> None:
+        self.link = link
+        self.policy = policy
+        self.received = self.lost = self.surplus = self.damaged = self.late_ticks = 0
+        self._reader = reader
+        self._others = others
+        self._health = health
+        self._stop = stop
+        self._clock = clock
+        self._limit = None if policy.max_age is None else int(policy.max_age * 1e9)
+        self._latest: Message | None = None
+        self._run = b""
+        self._sequence = -1
+        self._shown: Message | None = None
+        self._since = 0
+        self._zeros = memoryview(bytes(link.payload))
+        self._ages: NDArray[np.int64] = np.zeros(KEPT, np.int64)
+        self._count = 0
+
+    def hear(self, data: bytes) -> None:
+        """Take a message; a thread of the network calls this."""
+        run = self._others.run_of(self.link.sender)
+        if run is None:
+            return
+        self._reader.run = run
+        try:
+            message = self._reader.read(data)
+        except DamagedMessageError:
+            self.damaged += 1
+            return
+        self._others.note_checked(self.link.name)
+        if run != self._run:  # the first message of a part that was started, perhaps again
+            self._run, self._sequence = run, message.sequence - 1
+        if message.sequence <= self._sequence:
+            self.surplus += 1
+            return
+        gap = message.sequence - self._sequence - 1
+        self._sequence = message.sequence
+        if message.tick == PROBE:
+            return
+        self.lost += gap
+        self.received += 1
+        self._latest = message
+
+    def show(self, tick: int) -> None:
+        """Write the latest fields into the bus, or what the policy says where they are too old."""
+        now = self._clock()
+        message = self._latest
+        if self._since == 0:
+            self._since = now
+        if message is None:
+            age = now - self._since
+        else:
+            age = now + self._others.offset_of(self.link.sender) - message.time
+        late = self._limit is not None and age > self._limit
+        if late:
+            self.late_ticks += 1
+            if self.policy.late == "safe":
+                self._reader.show(self._zeros)
+                self._shown = None  # once it is in time again, it is written again
+            elif self.policy.late == "stop":
+                self._stop(
+                    f"link {self.link.name}: nothing has come for {age * 1e-6:.1f} ms, at most "
+                    f"{self._limit * 1e-6 if self._limit else 0:g} ms are allowed"
+                )
+        safe = late and self.policy.late == "safe"
+        if message is not None and message is not self._shown and not safe:
+            self._reader.show(message.payload)
+            self._shown = message
+        self._ages[self._count % KEPT] = age
+        self._count += 1
+        self._write(age, late)
+
+    def _write(self, age: int, late: bool) -> None:
+        health = self._health
+        health.age[()] = age * 1e-9
+        health.late[()] = late
+        health.received[()] = self.received
+        health.lost[()] = self.lost
+        health.surplus[()] = self.surplus
+        health.damaged[()] = self.damaged
+
+    def about(self) -> dict[str, Any]:
+        """The counts, and percentiles of the age [ms] at the reader's ticks."""
+        ages = self._ages[: min(self._count, KEPT)] * 1e-6
+        median, high, longest = np.percentile(ages, [50, 99, 100]) if len(ages) else (0.0,) * 3
+        return {
+            "name": self.link.name, "received": self.received, "lost": self.lost,
+            "surplus": self.surplus, "damaged": self.damaged, "late_ticks": self.late_ticks,
+            "age_p50_ms": float(median), "age_p99_ms": float(high), "age_max_ms": float(longest),
+        }  # fmt: skip

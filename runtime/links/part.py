@@ -1,0 +1,236 @@
+"""One machine's part of a placed graph: the blocks it runs, and what stands for all others.
+
+The memory of a part has the layout of the whole graph, so that a message is written to where the
+source would have written, and rows of several parts can be laid over one another.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+from ..language.block import Block
+from ..language.parameters import Parameters
+from ..language.stages import BlockSpec, CheckedGraph, ClockSpec
+from ..placement.placed import Link, PlacedGraph
+from ..running.executor import Executor
+from ..running.memory import BoundGraph
+from ..running.run_result import RunResult
+from ..running.sinks import Sink
+from .conductor import Conductor, FaultTeller, Gate
+from .free_conductor import FreeConductor
+from .inbox import Inbox, Received, received_block_type
+from .latest import Health, LatestInbox
+from .message import MessageReader, MessageWriter
+from .others import Others, Phase
+from .outbox import Send
+from .part_clock import PartClock
+from .spread_parameters import SpreadParameters
+from .transport import Transport, data_key
+
+PATIENCE = 30.0
+"""Seconds that a part in lockstep waits for a message before it gives up."""
+CONNECT_TIME = 180.0
+"""Seconds that a part waits at its start for the others, which may compile their kernels first."""
+CONDUCTOR, PREPARED, STARTED = "~conductor", "~prepared", "~started"
+
+
+def sender_path(link: Link) -> str:
+    """The path of the block that sends on a link."""
+    return f"{link.source}~to~{link.receiver}"
+
+
+def health_path(link: Link) -> str:
+    """The path of the block that shows how a free-running link does."""
+    return f"{link.source}~from~{link.sender}"
+
+
+def part_graph(placed: PlacedGraph, machine: str) -> CheckedGraph:
+    """The graph that one machine runs.
+
+    Blocks of other machines become stand-ins. One that is received from runs as late as it can:
+    right before the first block that reads it, or at the end of the tick where only ``update``
+    does. Each message is sent right after its source has run.
+
+    Raises:
+        PlacementError: there is no such machine.
+    """
+    placed.machine(machine)
+    graph = placed.graph
+    sends: dict[str, list[BlockSpec]] = {}
+    for link in placed.sent_by(machine):
+        source = graph.block(link.source)
+        sends.setdefault(link.source, []).append(
+            replace(_own(sender_path(link), Send, machine), period_ticks=source.period_ticks,
+                    offset_ticks=source.offset_ticks)
+        )  # fmt: skip
+    received = dict.fromkeys(link.source for link in placed.received_by(machine))
+    order: list[str] = []
+    for path in graph.order:
+        spec = graph.block(path)
+        if spec.machine != machine:
+            continue
+        if not spec.block_type.is_moore():
+            for wire in spec.wires.values():
+                if wire.source_block in received:
+                    del received[wire.source_block]
+                    order.append(wire.source_block)
+        order.append(path)
+        order += [send.path for send in sends.get(path, ())]
+    blocks = [
+        spec
+        if spec.machine == machine
+        else replace(spec, block_type=received_block_type(spec.block_type))
+        for spec in graph.blocks
+    ]
+    blocks += [send for of_block in sends.values() for send in of_block]
+    blocks += [_own(PREPARED, Gate, machine), _own(STARTED, Gate, machine)]
+    free = graph.links.mode == "free"
+    if free:
+        blocks += [_own(health_path(link), Health, machine) for link in placed.received_by(machine)]
+    blocks.append(_own(CONDUCTOR, FreeConductor if free else Conductor, machine))
+    return replace(graph, blocks=tuple(blocks), order=(*order, *received, CONDUCTOR))
+
+
+def _own(path: str, block_type: type[Block], machine: str) -> BlockSpec:
+    """A block of the runtime, which has no ports."""
+    return BlockSpec(path, block_type, Parameters(), {}, machine=machine)
+
+
+class BoundPart(BoundGraph):
+    """One machine's part, bound, with the ends of its links.
+
+    Args:
+        placed: the graph.
+        machine: the machine.
+        transport: what carries messages; the part opens it when it starts.
+        patience: the seconds to wait for a message.
+        connect_time: the seconds to wait for the others at the start.
+
+    Raises:
+        PlacementError: there is no such machine.
+        RunError: a block could not be set up.
+    """
+
+    clock_type = PartClock
+
+    def __init__(
+        self,
+        placed: PlacedGraph,
+        machine: str,
+        transport: Transport,
+        *,
+        patience: float = PATIENCE,
+        connect_time: float = CONNECT_TIME,
+    ) -> None:
+        super().__init__(part_graph(placed, machine))
+        assert isinstance(self.clock, PartClock)
+        clock = self.clock
+        self.placed = placed
+        self.machine = machine
+        self.parameters = SpreadParameters(self.blocks)
+        self.others = Others(
+            placed, machine, transport, lambda: clock.wish and clock.wish[0], free=self.is_free
+        )
+        self.inboxes: list[Inbox | LatestInbox] = []
+        self._transport = transport
+        conductor = self._block(CONDUCTOR, Conductor)
+        for path, phase in ((PREPARED, Phase.PREPARED), (STARTED, Phase.STARTED)):
+            self._block(path, Gate).connect(conductor, phase)
+        self._make_inboxes(patience)
+        conductor.connect(
+            self.others, transport, self.inboxes,
+            {link.name: self._block(sender_path(link), Send) for link in placed.sent_by(machine)},
+            self.parameters, clock=clock, on_open=self._open_links, patience=patience,
+            connect_time=connect_time, moves=bool(self._moving()),
+            elsewhere={s.path: s.machine for s in placed.graph.blocks if s.machine != machine},
+        )  # fmt: skip
+        self.conductor = conductor
+        self.blocks = self._in_order_of_start()
+
+    def _block(self, path: str, kind: type[Any]) -> Any:
+        block = self.blocks[path]
+        assert isinstance(block, kind)
+        return block
+
+    def _make_inboxes(self, patience: float) -> None:
+        bus, layout = self.memory.bus.buffer.data, self.memory.bus.layout
+        for link in self.placed.received_by(self.machine):
+            reader = MessageReader(link, layout, bus)
+            inbox: Inbox | LatestInbox
+            if self.is_free:
+                policy = self.placed.graph.links.policy_of(link.source)
+                health = self._block(health_path(link), Health).health
+                inbox = LatestInbox(link, reader, self.others, policy, health, self._ask_to_stop)
+            else:
+                inbox = Inbox(link, reader, self.others, patience)
+            self._block(link.source, Received).inbox = inbox
+            self.inboxes.append(inbox)
+
+    @property
+    def is_free(self) -> bool:
+        """Whether the part keeps its own time."""
+        return self.placed.graph.links.mode == "free"
+
+    def _ask_to_stop(self, reason: str) -> None:
+        self.clock.stop_reason = reason
+
+    def _moving(self) -> dict[str, Block]:
+        """The blocks that move actuators: those that have something to do to come to rest."""
+        still = Block.stop_cycle
+        return {p: block for p, block in self.blocks.items() if type(block).stop_cycle is not still}
+
+    def _open_links(self) -> None:
+        """Declare all links; the transport is open."""
+        bus, layout = self.memory.bus.buffer.data, self.memory.bus.layout
+        for inbox in self.inboxes:
+            link = inbox.link
+            key = data_key(link.sender, link.receiver, link.source)
+            self._transport.subscribe(key, inbox.hear)
+        for link in self.placed.sent_by(self.machine):
+            writer = MessageWriter(link, layout, bus, self.others.run)
+            put = self._transport.publisher(data_key(link.sender, link.receiver, link.source))
+            self._block(sender_path(link), Send).connect(writer, put)
+
+    def _in_order_of_start(self) -> dict[str, Block]:
+        """The blocks in the order in which they start: those that move actuators come last.
+
+        Between the two stands a gate, so that nothing moves before all parts have come that far.
+        """
+        moving = self._moving()
+        runtime = (CONDUCTOR, PREPARED, STARTED)
+        still = {p: b for p, b in self.blocks.items() if p not in moving and p not in runtime}
+        return {
+            CONDUCTOR: self.blocks[CONDUCTOR],
+            **still,
+            PREPARED: self.blocks[PREPARED],
+            **moving,
+            STARTED: self.blocks[STARTED],
+        }
+
+
+def part_clock(bound: BoundPart) -> ClockSpec:
+    """How to pace a part: one part is paced as the graph says, and the others follow it.
+
+    That part is the one with the block that drives the clock, or else the first machine. Where
+    the parts run free, each is paced.
+    """
+    clock = bound.graph.clock
+    if bound.is_free:
+        drives = any(hasattr(block, "wait") for block in bound.blocks.values())
+        return clock if clock.kind == "paced" or drives else replace(clock, kind="paced")
+    if clock.kind == "robot":
+        leads = any(hasattr(block, "wait") for block in bound.blocks.values())
+    else:
+        leads = bound.placed.machines[0].name == bound.machine
+    return clock if leads else replace(clock, kind="free")
+
+
+def run_part(
+    bound: BoundPart, ticks: int | None = None, *, sinks: Sequence[Sink] = (), **options: Any
+) -> RunResult:
+    """Run one part from start to close, together with the others; the options are the executor's."""
+    teller = FaultTeller(bound.conductor)
+    clock = options.pop("clock", None) or part_clock(bound)
+    return Executor(bound, clock=clock, sinks=[teller, *sinks], **options).run(ticks)

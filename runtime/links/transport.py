@@ -1,0 +1,45 @@
+"""What carries messages between machines; the runtime knows nothing else about a network."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Protocol
+
+Take = Callable[[bytes], None]
+"""Takes a message. It is called on a thread of the network, so it must copy and return."""
+
+
+class Transport(Protocol):
+    """Carries messages between the parts of one graph, by key."""
+
+    def open(self, machine: str, lost: Callable[[str], None]) -> None:
+        """Connect as ``machine``. ``lost`` is called with the name of a machine that was there and
+        is gone, on a thread of the network.
+
+        Raises:
+            AloftError: the machine's endpoint cannot be used.
+        """
+
+    def publisher(self, key: str) -> Take:
+        """What sends a message under ``key`` to whoever subscribes to it."""
+
+    def subscribe(self, key: str, take: Take) -> None:
+        """Have every message under ``key`` taken."""
+
+    def close(self) -> None:
+        """Disconnect; also after a failed ``open``."""
+
+
+def data_key(sender: str, receiver: str, source: str) -> str:
+    """The key of the link that carries the outputs of the block ``source``."""
+    return f"data/{sender}/{receiver}/{source}"
+
+
+def beacon_key(sender: str, receiver: str) -> str:
+    """The key under which a machine says how far it is."""
+    return f"beacon/{sender}/{receiver}"
+
+
+def tick_key(sender: str, receiver: str) -> str:
+    """The key under which a machine says how a tick ended."""
+    return f"tick/{sender}/{receiver}"

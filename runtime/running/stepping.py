@@ -1,0 +1,187 @@
+"""A run that Python steps: some ticks, a look at the signals, an input, some ticks more.
+
+::
+
+    with aloft.load("graph.yaml").open(seed=3) as run:
+        run.step(10)
+        run["pd.command"].torque
+        run["action"] = [0.1, 0.2]   # a block blocks.External
+        run.reset()
+"""
+
+from __future__ import annotations
+
+from difflib import get_close_matches
+from types import TracebackType
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...mathematics.compiling.compile_calls import compile_calls
+from ..language.errors import AloftError, RunError
+from ..language.signals import Signal
+from ..language.stages import CheckedGraph, ClockSpec
+from .life_cycle import LifeCycle, LifeState
+from .memory import BoundGraph, Snapshot
+from .pacing import WallTime
+from .ticker import Ticker
+
+
+class SteppedRun:
+    """One run of a graph, as fast as it is asked to step. Use it in a ``with`` statement.
+
+    Leaving the statement sends the stop cycles and closes all blocks, whatever has happened.
+
+    Raises:
+        RunError: a block could not be set up or started.
+    """
+
+    def __init__(self, graph: CheckedGraph, *, plain: bool = False) -> None:
+        self.graph = graph
+        self._bound = BoundGraph(graph)
+        self._bound.clock.kind = "free"
+        self._life = LifeCycle(self._bound.blocks)
+        self._ticker = Ticker(self._bound, ClockSpec(), WallTime(), timing=False)
+        if not plain:
+            compile_calls(self._bound.kernel_calls)
+        try:
+            self._life.start()
+        except BaseException:
+            self._life.stop()
+            raise
+        self._life.move(LifeState.RUNNING)
+        self._first = self._bound.snapshot()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Send the stop cycles and close all blocks; a second call does nothing.
+
+        Raises:
+            RunError: a block failed while it was closed.
+        """
+        if self._life.state is LifeState.STOPPED:
+            return
+        self._life.stop()
+        if self._life.problems:
+            raise RunError("; ".join(self._life.problems))
+
+    @property
+    def tick(self) -> int:
+        """How many ticks have been run since the start or the last reset."""
+        return self._bound.clock.tick
+
+    @property
+    def time(self) -> float:
+        """The same in seconds of the graph's time."""
+        return self.tick * self._bound.clock.base_period
+
+    @property
+    def reason(self) -> str:
+        """Why the run has ended; empty while it may go on."""
+        if self._bound.clock.stop_reason is not None:
+            return self._bound.clock.stop_reason
+        if self.graph.ticks is not None and self.tick >= self.graph.ticks:
+            return "the duration is over"
+        return ""
+
+    def step(self, ticks: int = 1) -> int:
+        """Run up to ``ticks`` ticks. Returns how many were run: fewer where the run has ended.
+
+        Raises:
+            RunError: a block failed, or a value is not finite.
+            AloftError: the run is closed, or ``ticks`` is below 1.
+        """
+        self._must_be_open()
+        if ticks < 1:
+            raise AloftError(f"a run is stepped by at least 1 tick, not {ticks}")
+        if self.graph.ticks is not None:
+            ticks = min(ticks, self.graph.ticks - self.tick)
+        return self._ticker.advance(ticks) if ticks > 0 and not self.reason else 0
+
+    def reset(self) -> None:
+        """Go back to the start: all signals and states are as they were before the first tick."""
+        self.restore(self._first)
+
+    def snapshot(self) -> Snapshot:
+        """Everything that the graph remembers now."""
+        self._must_be_open()
+        return self._bound.snapshot()
+
+    def restore(self, snapshot: Snapshot) -> None:
+        """Go back to a snapshot of this graph.
+
+        Raises:
+            ValueError: it is of another graph.
+        """
+        self._must_be_open()
+        self._bound.restore(snapshot)
+
+    def __getitem__(self, name: str) -> Any:
+        """A copy of a signal (``"pd.command"``) or of one of its fields (``"pd.command.torque"``).
+
+        Raises:
+            KeyError: there is none of that name; the text has the nearest.
+        """
+        bus = self._bound.memory.bus
+        if name in bus.layout.slots:
+            return bus.field(name, writable=False).copy()
+        block, _, port = name.rpartition(".")
+        found = self._bound.blocks.get(block)
+        if found is not None and port in type(found).outputs:
+            signal: Signal = getattr(found, port)
+            return type(signal).bind({n: view.copy() for n, view in signal.views().items()})
+        raise KeyError(f"no signal {name!r}{_nearest(name, self._names())}")
+
+    def __setitem__(self, name: str, value: Any) -> None:
+        """Set the vector of a block ``blocks.External``, as ``"action"`` or ``"action.y"``.
+
+        Raises:
+            KeyError: there is no such block.
+            ValueError: the value has another shape, or is not finite.
+        """
+        self._must_be_open()
+        path = name.removesuffix(".y")
+        block = self._bound.blocks.get(path)
+        if block is None or type(block).__name__ != "External":
+            external = [p for p, b in self._bound.blocks.items() if type(b).__name__ == "External"]
+            raise KeyError(
+                f"{name!r} is no block blocks.External, which alone can be set; "
+                f"there is {', '.join(external) or 'none'}"
+            )
+        target: NDArray[np.float64] = block.x.value  # type: ignore[attr-defined]
+        array = np.asarray(value, np.float64)
+        if array.shape not in ((), target.shape):
+            raise ValueError(f"{path} has shape {target.shape}, not {array.shape}")
+        if not np.isfinite(array).all():
+            raise ValueError(f"{path} cannot be set to what is not finite: {array.tolist()}")
+        target[...] = array
+
+    def __repr__(self) -> str:
+        state = self._life.state.value if self._life.state is not LifeState.RUNNING else self.reason
+        return f"<SteppedRun of {self.graph.name!r}: tick {self.tick}, {state or 'may go on'}>"
+
+    def _names(self) -> list[str]:
+        ports = [
+            f"{path}.{port}" for path, b in self._bound.blocks.items() for port in type(b).outputs
+        ]
+        return [*ports, *self._bound.memory.bus.layout.slots]
+
+    def _must_be_open(self) -> None:
+        if self._life.state is not LifeState.RUNNING:
+            raise AloftError(f"this run is {self._life.state.value}; open the graph again")
+
+
+def _nearest(name: str, names: list[str]) -> str:
+    found = get_close_matches(name, names, 1, 0.0)
+    return f"; the nearest is {found[0]}" if found else ""
