@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from typing import ClassVar, Literal
+from typing import Any, ClassVar, Literal
 
 from ..blocks.signals import ContactSwitches, ImuReading, JointCommand, JointState
 from ..robots.description import RobotDescription
-from ..runtime.language.block import Block, Input, Output
+from ..runtime.language.block import Block, Context, Input, Output
 from ..runtime.language.parameters import Parameters
 
 
@@ -20,14 +20,17 @@ class Robot(Block, ABC):
     instant ``t_n`` (``emit``). The controller runs. Then the robot takes the command and its time
     goes on to ``t_{n+1}`` (``update``).
 
-    A driver implements five methods. ``open`` is called once. The other four are called by the
+    A driver implements five methods, and ``wait`` if it has a clock. ``open`` is called once. The others are called by the
     control thread once in every tick, so they must not allocate arrays, must not wait without a
     time-out, and must not raise because a single packet is bad:
 
     * ``read`` writes the latest sensor sample into ``imu``, ``joints`` and ``contacts``.
     * ``write`` sends ``command`` to the drives.
-    * ``advance`` lets the time to the next tick pass. A simulator computes it. A robot that drives
-      the clock waits for the next cycle of its bus. One that the runtime paces returns at once.
+    * ``advance`` lets the time to the next tick pass. A simulator computes it. A real robot returns
+      at once: its time passes by itself.
+    * ``wait`` waits for the next cycle of the robot's own clock, and says how many were missed. The
+      runtime calls it before every tick of a graph whose ``clock`` is ``robot``, and never else. A
+      simulator, whose time passes in ``advance``, returns at once: it is what ``Robot`` has.
     * ``damp`` is one stop cycle: it puts all drives into damping, whatever was commanded, and lets
       one period pass. The runtime calls it at least five times at the end of
       every run, also after an exception, a signal or the loss of a machine. It must therefore not
@@ -67,6 +70,17 @@ class Robot(Block, ABC):
             absent["contacts"] = f"{robot.name} has no contact switches"
         return absent
 
+    @classmethod
+    def tells(cls, params: Parameters, context: Context) -> Mapping[str, Any]:
+        """``delay``: the delay from sensing to torque [s], for the graph to compensate."""
+        return {"delay": cls.usual_delay(params)}
+
+    @classmethod
+    def usual_delay(cls, params: Parameters) -> float:
+        """The delay [s] from an instant of the control clock, at which the sensors are read, to
+        the torques that are computed from them. A driver that knows its own says so here."""
+        return 0.002
+
     def emit(self) -> None:
         """Publish the sensors' readings."""
         self.read()
@@ -79,6 +93,10 @@ class Robot(Block, ABC):
     def start(self) -> None:
         """Open the robot."""
         self.open()
+
+    def wait(self) -> int:
+        """Wait for the next cycle of the robot's clock; gives how many were missed."""
+        return 0
 
     def stop_cycle(self) -> None:
         """Put all drives into damping for one cycle."""

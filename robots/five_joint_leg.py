@@ -8,8 +8,7 @@ ankle about -y; a robot whose axes point the other way has a sign of -1 there.
 
 Inside the leg plane a vector is (x, z) of the thigh's frame at zero pose, and a positive knee or
 ankle angle turns it from x to z. Everything is in the base's frame, in m and rad. The functions
-are pure, allocate nothing and return finite numbers for all finite arguments.
-"""
+are pure, allocate nothing and return finite numbers for all finite arguments."""
 
 from __future__ import annotations
 
@@ -21,6 +20,7 @@ from numpy.typing import NDArray
 
 from ..mathematics.kernel import kernel
 from ..mathematics.least_squares import solve_damped
+from ..mathematics.linear import multiply_matrices
 from ..mathematics.rotations import wrap
 from .limb import FootKind, chain_to, foot_shape
 from .robot_description import RobotDescription
@@ -30,7 +30,7 @@ Array = NDArray[np.float64]
 _AXES = ("yaw", 2), ("pitch", 1), ("roll", 0), ("knee", 1), ("ankle", 1)
 _CANONICAL = np.array([1.0, -1.0, 1.0, -1.0, -1.0])
 _FAR = 10.0
-"""Targets are limited to this distance [m], so that no square overflows."""
+"""Targets are limited to this distance [m]: no square overflows."""
 _SLANT = 1e-3
 """Below this sine of the angle between the foot's line and the line from hip to sole, the leg
 plane is undefined and blends into the upright one."""
@@ -301,8 +301,8 @@ def inverse_velocity(
         damping: in m; 1e-4 has no effect until a leg is within 1e-4 rad of full stretch.
         rows, turns, normal: scratch of shapes (5, 5), (3, 5) and (5, 5).
     """
-    np.dot(rotation.T, sole_jacobian[3:6, :], turns)
-    turn, nod = 0.0, 0.0
+    multiply_matrices(rotation.T, sole_jacobian[3:6, :], turns)
+    turn = nod = 0.0
     for i in range(3):
         turn += float(rotation[i, 1]) * float(line_rate[i])
         nod -= float(rotation[i, 2]) * float(line_rate[i])

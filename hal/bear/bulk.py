@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Sequence
 
 import numpy as np
@@ -36,6 +35,10 @@ class BulkExchange:
         values: what was read last, (N, R); an actuator that did not answer keeps its last values.
         error_bytes: of the last answers, (N,).
         ages: exchanges since an actuator last answered, (N,); zero for a fresh value.
+        plausible: the lowest and highest value of every register that is read, (R, 2). The checksum
+            has 8 bits, so pieces of damaged answers can pass for one; an answer with another value
+            than these, or one that is not finite, counts as damaged.
+        largest_step: how much a value may change from exchange to exchange, (R,).
 
     Raises:
         BusError: the frame would be too long, or a register is no status register.
@@ -76,6 +79,10 @@ class BulkExchange:
         self.values = np.zeros((n, r))
         self.error_bytes = np.full(n, HEALTHY, dtype=np.uint8)
         self.ages = np.zeros(n, dtype=np.int64)
+        self.plausible = np.array([[-1e30, 1e30]] * r)
+        self.largest_step = np.full(r, np.inf)
+        self.known = np.zeros(n, dtype=np.bool_)
+        """Which actuators have answered at all."""
 
     def exchange(self, reply_time: float | None = None) -> int:
         """Write the goals and read the registers; gives how many actuators answered.
@@ -88,10 +95,16 @@ class BulkExchange:
         """
         self._pack()
         bus = self.bus
-        bus.port.reset_input_buffer()
+        waiting = bus.port.in_waiting
+        if waiting:  # answers that came too late, or what somebody else sends
+            bus.port.timeout = 0.0
+            bus.overhear(bus.port.read(waiting))
         bus.port.write(self._frame)
         received = self._receive(bus.reply_time if reply_time is None else reply_time)
-        return self._unpack(received)
+        answered = self._unpack(received)
+        if answered < len(self.devices) and received:
+            bus.overhear(memoryview(self._answer)[:received], bytes(self._frame[5:-1]))
+        return answered
 
     def _pack(self) -> None:
         for row in range(len(self.devices)):
@@ -111,9 +124,9 @@ class BulkExchange:
     def _receive(self, reply_time: float) -> int:
         """Receive into ``_answer``; returns how many bytes came in time."""
         port, answer, count = self.bus.port, memoryview(self._answer), 0
-        end = time.monotonic() + reply_time
+        end = self.bus.now() + reply_time
         while count < len(answer):
-            left = end - time.monotonic()
+            left = end - self.bus.now()
             if left <= 0.0:
                 break
             port.timeout = left
@@ -135,8 +148,11 @@ class BulkExchange:
                 continue
             place = start + self._reply_size
             self._reply[:] = answer[start:place]
-            self._take(row)
-            answered += 1
+            if self._is_plausible(row):
+                self._take(row)
+                answered += 1
+            else:
+                self.bus.counts.damaged += 1
         answer.release()
         return answered
 
@@ -155,12 +171,32 @@ class BulkExchange:
                 self.bus.counts.damaged += 1
         return -1
 
+    def _is_plausible(self, row: int) -> bool:
+        """Whether the answer can be one of this actuator."""
+        if not self._reply[4] & HEALTHY:
+            return False
+        numbers, whole, last = self._numbers, self._whole_numbers, self.values[row]
+        waited = self.ages.item(row)  # this exchange is counted already
+        for column in range(len(self.read)):
+            if column in self._whole_values:
+                value = float(whole.item(column))
+            else:
+                value = numbers.item(column)
+            low, high = self.plausible.item(column, 0), self.plausible.item(column, 1)
+            if not low <= value <= high:  # also where it is not finite
+                return False
+            step = abs(value - last.item(column))
+            if self.known[row] and step > self.largest_step.item(column) * waited:
+                return False
+        return True
+
     def _take(self, row: int) -> None:
         self.values[row] = self._numbers
         for column in self._whole_values:
             self.values[row, column] = self._whole_numbers[column]
         self.error_bytes[row] = self._reply[4]
         self.ages[row] = 0
+        self.known[row] = True
 
 
 def _status(name: str, *, written: bool = False) -> Register:

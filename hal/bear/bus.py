@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
 from ...runtime.language.errors import AloftError
 from .conditions import describe, is_critical
-from .frames import Frame, FrameReader, Instruction, frame_bytes
+from .frames import BROADCAST, Frame, FrameReader, Instruction, frame_bytes
 from .registers import CONFIG, STATUS, Register
 
 BAUDRATE = 8_000_000
@@ -32,6 +32,10 @@ class SerialPort(Protocol):
     """The methods of a serial port that the bus needs; ``serial.Serial`` has them."""
 
     timeout: float | None
+
+    @property
+    def in_waiting(self) -> int:
+        """How many bytes were received and not read."""
 
     def write(self, data: bytes | bytearray, /) -> int | None:
         """Send all bytes."""
@@ -75,6 +79,8 @@ class BusCounts:
     """Frames with a wrong checksum."""
     stray: int = 0
     """Frames of somebody else, or with the wrong number of bytes."""
+    foreign: int = 0
+    """Instructions that another program or adapter sent to the actuators."""
 
 
 def open_port(path: str, baudrate: int = BAUDRATE) -> SerialPort:
@@ -115,11 +121,32 @@ class BearBus:
         self.reply_time = reply_time
         self.tries = tries
         self.counts = BusCounts()
+        self.now: Callable[[], float] = getattr(port, "now", time.monotonic)
+        """The time [s] by which answers are awaited; a port in virtual time has its own."""
         self._reader = FrameReader()
+        self._listener = FrameReader()
 
     def close(self) -> None:
         """Give the port back."""
         self.port.close()
+
+    def overhear(self, received: bytes | bytearray | memoryview, own: bytes = b"") -> None:
+        """Look for instructions among bytes that are no answers to a question of ours.
+
+        An answer's fifth byte has its highest bit set, an instruction's never. ``own`` is the data
+        of an instruction of ours, which some adapters send back.
+        """
+        for frame in self._listener.feed(received):
+            if _is_instruction(frame) and frame.data != own:
+                self.counts.foreign += 1
+
+    def listen(self, seconds: float) -> int:
+        """Stay silent and count the instructions that somebody else sends meanwhile."""
+        before, end = self.counts.foreign, self.now() + seconds
+        while (left := end - self.now()) > 0.0:
+            self.port.timeout = left
+            self.overhear(self.port.read(256))
+        return self.counts.foreign - before
 
     def ping(self, device: int) -> Reply:
         """Ask whether an actuator is there; its reply holds 4 bytes of versions.
@@ -217,10 +244,10 @@ class BearBus:
         self.port.reset_input_buffer()
         self._reader.clear()
         self.port.write(question)
-        end = time.monotonic() + self.reply_time
+        end = self.now() + self.reply_time
         missing = length + 6
         while True:
-            left = end - time.monotonic()
+            left = end - self.now()
             if left <= 0.0:
                 self.counts.silent += 1
                 return None
@@ -235,6 +262,22 @@ class BearBus:
         frames = self._reader.feed(self.port.read(size))
         self.counts.damaged += self._reader.damaged - before
         return frames
+
+
+def _is_instruction(frame: Frame) -> bool:
+    """Whether a frame is an instruction, and a sensible one: pieces of damaged answers may have a
+    right checksum by chance."""
+    size = len(frame.data)
+    match frame.code:
+        case Instruction.PING | Instruction.SAVE_CONFIG:
+            return size == 0
+        case Instruction.READ_STATUS | Instruction.READ_CONFIG:
+            return 0 < size <= len(CONFIG) and frame.device != BROADCAST
+        case Instruction.WRITE_STATUS | Instruction.WRITE_CONFIG:
+            return size > 0 and size % 5 == 0
+        case Instruction.BULK:
+            return frame.device == BROADCAST and size > 2
+    return False
 
 
 def register_of(name: str) -> Register:

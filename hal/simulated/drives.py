@@ -13,6 +13,49 @@ from .state import DriveState, TickRecord
 Array = NDArray[np.float64]
 
 
+class MotorLimits:
+    """Limits joint torques to what the motors can do at their speed, and records how near they
+    come to it."""
+
+    def __init__(self, robot: RobotDescription, record: TickRecord) -> None:
+        self._record = record
+        self._joint_to_motor = np.ascontiguousarray(robot.joint_to_motor)
+        self._motor_to_torque = np.ascontiguousarray(robot.joint_to_motor.T)
+        self._torque_to_motor = robot.torque_to_motor
+        motors = robot.motors
+        self._peak, self._no_load = motors.peak_torque, motors.no_load_speed
+        self._slope = motors.peak_torque / (motors.no_load_speed - motors.corner_speed)
+        n = len(robot.joints)
+        self._speed, self._wanted = np.zeros(n), np.zeros(n)
+        self.motor_torque = np.zeros(n)
+        """The motors' torques of the last call [N m], (n_joints,)."""
+        self._lower, self._upper, self._excess = (np.zeros(n) for _ in range(3))
+        self._clipped, self._one = np.zeros(n, dtype=np.bool_), np.ones(n, dtype=np.int64)
+
+    def apply(self, velocity: Array, torque: Array) -> None:
+        """Limit the joint ``torque`` [N m] at the joint ``velocity`` [rad/s] in place."""
+        record = self._record
+        np.dot(self._joint_to_motor, velocity, out=self._speed)
+        motor_torque_limits(
+            self._speed, self._peak, self._slope, self._no_load, self._lower, self._upper
+        )  # fmt: skip
+        clip_joint_torque(
+            torque, self._torque_to_motor, self._motor_to_torque, self._lower, self._upper,
+            self._wanted, self.motor_torque,
+        )  # fmt: skip
+        np.not_equal(self._wanted, self.motor_torque, out=self._clipped)
+        np.add(record.saturated, self._one, out=record.saturated, where=self._clipped)
+        np.maximum(record.torque_high, self.motor_torque, out=record.torque_high)
+        np.minimum(record.torque_low, self.motor_torque, out=record.torque_low)
+        np.maximum(record.speed_high, self._speed, out=record.speed_high)
+        np.minimum(record.speed_low, self._speed, out=record.speed_low)
+        np.subtract(self.motor_torque, self._upper, out=self._excess)
+        np.maximum(record.overload, self._excess, out=record.overload)
+        np.subtract(self._lower, self.motor_torque, out=self._excess)
+        np.maximum(record.overload, self._excess, out=record.overload)
+        np.add(record.joint_torque, torque, out=record.joint_torque)
+
+
 class Drives:
     """Turns commands into joint torques at the physics rate, because drives close their own loops.
 
@@ -35,17 +78,8 @@ class Drives:
     ) -> None:
         self._negative_damping = -damping
         self._state = state
-        self._record = record
-        self._joint_to_motor = np.ascontiguousarray(robot.joint_to_motor)
-        self._motor_to_torque = np.ascontiguousarray(robot.joint_to_motor.T)
-        self._torque_to_motor = robot.torque_to_motor
-        motors = robot.motors
-        self._peak, self._no_load = motors.peak_torque, motors.no_load_speed
-        self._slope = motors.peak_torque / (motors.no_load_speed - motors.corner_speed)
-        n = len(robot.joints)
-        self._scratch, self._speed, self._wanted, self._motor = (np.zeros(n) for _ in range(4))
-        self._lower, self._upper, self._excess = (np.zeros(n) for _ in range(3))
-        self._clipped, self._one = np.zeros(n, dtype=np.bool_), np.ones(n, dtype=np.int64)
+        self._limits = MotorLimits(robot, record)
+        self._scratch = np.zeros(len(robot.joints))
         self._slots = len(state.due)
         self._rows = [
             (state.torque[k], state.stiffness[k], state.damping[k], state.position[k],
@@ -120,27 +154,4 @@ class Drives:
             np.multiply(velocity, self._negative_damping, out=out)
         else:
             out.fill(0.0)
-        self._limit(velocity, out)
-
-    def _limit(self, velocity: Array, torque: Array) -> None:
-        """Limit the torque to what the motors can do at their speed, and record saturation."""
-        record = self._record
-        np.dot(self._joint_to_motor, velocity, out=self._speed)
-        motor_torque_limits(
-            self._speed, self._peak, self._slope, self._no_load, self._lower, self._upper
-        )  # fmt: skip
-        clip_joint_torque(
-            torque, self._torque_to_motor, self._motor_to_torque, self._lower, self._upper,
-            self._wanted, self._motor,
-        )  # fmt: skip
-        np.not_equal(self._wanted, self._motor, out=self._clipped)
-        np.add(record.saturated, self._one, out=record.saturated, where=self._clipped)
-        np.maximum(record.torque_high, self._motor, out=record.torque_high)
-        np.minimum(record.torque_low, self._motor, out=record.torque_low)
-        np.maximum(record.speed_high, self._speed, out=record.speed_high)
-        np.minimum(record.speed_low, self._speed, out=record.speed_low)
-        np.subtract(self._motor, self._upper, out=self._excess)
-        np.maximum(record.overload, self._excess, out=record.overload)
-        np.subtract(self._lower, self._motor, out=self._excess)
-        np.maximum(record.overload, self._excess, out=record.overload)
-        record.joint_torque[:] = torque
+        self._limits.apply(velocity, out)

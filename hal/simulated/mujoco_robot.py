@@ -14,24 +14,14 @@ from ...runtime.language.block import Context, Input, Metric, Misfit, Output, St
 from ...runtime.language.parameters import Parameters
 from ...runtime.language.terrain import Ground, Terrain
 from ..robot import Robot
-from .base import BASES
 from .drives import Drives
-from .holding import RELEASED, holding_gains, passive_joints
-from .mujoco_model import Variation, body_name
+from .holding import RELEASED
 from .parameters import SimulatorParameters
-from .random_streams import WORDS, Purpose, RandomStreams, stream
+from .plant import Plant
+from .random_streams import Purpose
 from .rotors import unfit_motor
-from .sensors import Sensors
-from .stance import centre_on_origin, holding_torque, place_standing, uneven_contacts
-from .start_check import StartCheck
+from .stance import uneven_contacts
 from .state import DriveState, PhysicsState, TickRecord
-from .truth import TruthReport
-from .world import build_world, draw_variation
-
-SETTLING_TIME = 0.3
-"""The time that a robot settles for, before it is checked whether it stands [s]."""
-OBSERVED_TIME = 0.02
-"""The last part of the settling time, in which the load on the feet is averaged [s]."""
 
 
 class MujocoRobot(Robot):
@@ -40,11 +30,11 @@ class MujocoRobot(Robot):
     Time: the control tick ``n`` is at ``t_n``. Physics runs in steps of ``timestep`` between ticks;
     with ``random_start_phase`` it starts at a phase of the control clock drawn from the seed.
     Sensors are sampled at ``t_n``: the gyroscope and the joints at that instant, the accelerometer
-    as its mean over the tick before (its filter passes no more), the switches by the force in the
-    physics step before. The command computed from them takes effect at the first physics step at
-    or after ``t_n + latency + jitter``, and stays in effect until the next one does. Meanwhile the
-    drives close the joint loop at the physics rate with the command's gains, by their own encoders,
-    and limit the torques in motor space by the torque-speed curves.
+    and the torques as their means over the tick before (their filters pass no more), the switches
+    by the force in the physics step before. The command computed from them takes effect at the
+    first physics step at or after ``t_n + latency + jitter``, and stays in effect until the next
+    one does. Meanwhile the drives close the joint loop at the physics rate with the command's
+    gains, by their own encoders, and limit the torques in motor space by the torque-speed curves.
 
     Command modes: ``OFF`` gives no torque, ``ACTIVE`` feedforward plus joint feedback, ``DAMPING``
     the damping ``drive_damping`` on every joint, whatever the command's gains are.
@@ -122,6 +112,12 @@ class MujocoRobot(Robot):
             )
 
     @classmethod
+    def usual_delay(cls, params: Parameters) -> float:
+        """The latency that is simulated."""
+        assert isinstance(params, SimulatorParameters)
+        return params.latency
+
+    @classmethod
     def terrain(cls, params: Parameters) -> Terrain | None:
         """The scene's floor and boxes."""
         assert isinstance(params, SimulatorParameters)
@@ -153,123 +149,45 @@ class MujocoRobot(Robot):
         cls, params: Parameters, robot: RobotDescription | None
     ) -> Mapping[str, int]:
         """Sizes of the simulator's state, of the random streams' and of the command ring."""
-        import mujoco
-
         assert isinstance(params, SimulatorParameters) and robot is not None
-        model = build_world(params, robot, Variation())
-        everything = mujoco.mjtState.mjSTATE_INTEGRATION
         flight = params.latency + params.jitter + params.timestep
         return {
-            "n_integration": mujoco.mj_stateSize(model, everything),
-            "n_random": WORDS,
+            **Plant.state_dimensions(params, robot),
             "n_queue": math.ceil(flight / params.timestep) + 2,
         }
 
     def setup(self) -> None:
         """Draw the world from the seed and build it."""
-        import mujoco
-
         robot, params = self.robot, self.params
-        self._variation = draw_variation(params)
-        self._model = build_world(params, robot, self._variation)
-        self._robot = robot
-        self._step1, self._step2 = mujoco.mj_step1, mujoco.mj_step2
+        plant = self.plant = Plant(robot, params, self.period, self.physics, self.record)
         self._steps = round(self.period / params.timestep)
-        self._streams = RandomStreams(params.seed)
-        self._jitter = self._streams[Purpose.JITTER]
-        self._sensors = Sensors(robot, params, self._streams)
-        self._stiffness, self._damping = holding_gains(self._model, robot)
-        damping = RELEASED * self._damping
+        self._jitter = plant.streams[Purpose.JITTER]
+        damping = RELEASED * plant.damping
         if params.drive_damping is not None:
             damping = np.full(len(robot.joints), params.drive_damping)
         self._drives = Drives(robot, damping, self.drives, self.record)
-        self._passive = passive_joints(robot)
-        self._limits = (robot.joint_limits[:, 0].copy(), robot.joint_limits[:, 1].copy())
-        n = len(robot.joints)
-        self._encoder, self._excess = np.zeros(n), np.zeros(n)
-        self._mean_force = np.zeros(3)
-        self._attach(mujoco.MjData(self._model))
-
-    def _attach(self, data: Any) -> None:
-        """Make the views into the simulator's memory, once."""
-        model = self._model
-        self._data = data
-        base = self._base = BASES[self._robot.base_joint](data)
-        self._position, self._velocity = data.qpos[base.positions :], data.qvel[base.velocities :]
-        self._ctrl, self._external = data.ctrl, data.xfrc_applied
-        self._accelerometer = data.sensor("accelerometer").data
-        self._contacts = data.sensor("contacts").data
-        # The sensors of the contact points are the model's last.
-        first = model.nsensordata - 4 * len(self._robot.contacts)
-        self._load = data.sensordata[first:].reshape(-1, 4)
-        self._vertical = self._load[:, 3]
-        self._truth = TruthReport(data, base, self._robot, self.params.build_scene())
-        self._points = []
-        for point, (link, _) in self._robot.points.items():
-            body = model.body(body_name(link)).id
-            place, centre = data.site(f"point/{point}").xpos, data.xipos[body]
-            self._points.append((place, centre, self._external[body]))
+        self._torque = np.zeros(len(robot.joints))
 
     def open(self) -> None:
         """Stand on the ground, settle, and wait for the first command."""
-        import mujoco
-
-        params = self.params
-        attitude = stream(params.seed, Purpose.ATTITUDE).standard_normal(3)
-        mujoco.mj_resetData(self._model, self._data)
-        model, data, base, robot = self._model, self._data, self._base, self._robot
-        place_standing(model, data, base, robot, attitude * params.initial_attitude_error)
-        rotation = data.body(body_name(robot.base)).xmat.reshape(3, 3).copy()
-        pose = self._position.copy()
-        torque = holding_torque(model, data, base, robot)
-        held = self._position + self._sensors.encoder_offset
-        self._drives.hold(held, torque, self._stiffness, self._damping)
-        phase = 0.0
-        if params.random_start_phase:
-            phase = float(stream(params.seed, Purpose.START_PHASE).random()) * self.period
-        early = math.floor(phase / params.timestep)
-        self._late = phase - early * params.timestep
-        self._step1(self._model, self._data)
-        observed = math.ceil(OBSERVED_TIME / params.timestep)
-        self._settle(math.ceil(SETTLING_TIME / params.timestep) + early - observed)
-        self._clear_record()
-        self._settle(observed)
-        load = self.record.load[:, 3] / -observed
-        StartCheck(model, data, base, robot).check(load, pose, torque, rotation)
-        centre_on_origin(data, base, robot)
-        self._data.time = 0.0
-        self.physics.step[()] = -self._steps
-        self.record.bounce_end.fill(-self._steps)
-        self._step1(self._model, self._data)
-        self._clear_record()
-        self._settle(self._steps)
-
-    def _settle(self, steps: int) -> None:
-        """Simulate physics steps in which joints that no motor can move stay in the standing pose,
-        as if held by hand."""
-        if not len(self._passive):
-            self._simulate(steps)
-            return
-        for _ in range(steps):
-            self._simulate(1)
-            self._position[self._passive] = self._robot.standing_position[self._passive]
-            self._velocity[self._passive] = 0.0
-            self._step1(self._model, self._data)
+        plant, drives = self.plant, self._drives
+        plant.stand(
+            drives, lambda pose, torque: drives.hold(pose, torque, plant.stiffness, plant.damping)
+        )
 
     def read(self) -> None:
         """Publish the sensors and the truth at the present instant."""
-        record, steps = self.record, int(self.record.steps)
-        np.divide(record.accelerometer, steps, out=self._mean_force)
-        self._base.refresh()
-        self._sensors.read_imu(self._base.angular_velocity, self._mean_force, self.imu)
-        self._sensors.read_joints(self._position, self._velocity, record.joint_torque, self.joints)
-        self._sensors.read_switches(int(self.physics.step), record, self.contacts)
-        self._truth.publish(record, self.truth)
+        plant, record, sensors = self.plant, self.record, self.plant.sensors
+        plant.read_imu(self.imu)
+        np.divide(record.joint_torque, int(record.steps), out=self._torque)
+        sensors.read_joints(plant.position, plant.velocity, self._torque, self.joints)
+        sensors.read_switches(int(self.physics.step), record, self.contacts)
+        plant.truth.publish(record, self.truth)
 
     def write(self) -> None:
         """Send the command on its way to the drives."""
         params = self.params
-        delay = params.latency + self._late
+        delay = params.latency + self.plant.late
         if params.jitter:
             delay += params.jitter * self._jitter.random()
         arrival = int(self.physics.step) + math.ceil(delay / params.timestep - 1e-9)
@@ -277,101 +195,26 @@ class MujocoRobot(Robot):
 
     def advance(self) -> None:
         """Simulate to the next tick."""
-        self._external.fill(0.0)
-        self._clear_record()
-        self._simulate(self._steps, pushed=True)
+        self.plant.clear_record()
+        self.plant.simulate(self._drives, self._steps, self.push)
 
     def damp(self) -> None:
         """Simulate one tick with the drives in damping and no external force."""
         self._drives.damp()
-        self._external.fill(0.0)
-        self._clear_record()
-        self._simulate(self._steps)
+        self.plant.clear_record()
+        self.plant.simulate(self._drives, self._steps)
 
     def freeze(self) -> None:
         """Copy the state of the simulator and the random streams to the declared state."""
-        import mujoco
-
-        mujoco.mj_getState(
-            self._model, self._data, self.physics.integration, mujoco.mjtState.mjSTATE_INTEGRATION
-        )
-        self._streams.save(self.physics.random)
+        self.plant.save()
 
     def thaw(self) -> None:
         """Restore both from the declared state, and recompute what depends on them."""
-        import mujoco
-
-        mujoco.mj_setState(
-            self._model, self._data, self.physics.integration, mujoco.mjtState.mjSTATE_INTEGRATION
-        )
-        self._streams.load(self.physics.random)
-        self._step1(self._model, self._data)
+        self.plant.load()
 
     def metrics(self) -> Mapping[str, Metric]:
         """The values that were drawn from the seed."""
-        return {
-            "robot_friction": float(self._variation.friction),
-            "robot_mass_kg": float(self._robot.total_mass * self._variation.mass),
-            "robot_contact_stiffness": float(self._variation.contact_stiffness),
-        }
-
-    def _simulate(self, steps: int, *, pushed: bool = False) -> None:
-        """Simulate physics steps; afterwards all derived quantities are up to date."""
-        model, data, record = self._model, self._data, self.record
-        step = int(self.physics.step)
-        for _ in range(steps):
-            np.add(self._position, self._sensors.encoder_offset, out=self._encoder)
-            self._drives.joint_torque(step, self._encoder, self._velocity, self._ctrl)
-            if pushed:
-                self._apply_push()
-            self._step2(model, data)
-            self._sensors.watch_switches(step, self._vertical, record)
-            np.add(record.load, self._load, out=record.load)
-            np.add(record.accelerometer, self._accelerometer, out=record.accelerometer)
-            allowed = 0.0
-            for point in self._load:
-                allowed += point.item(0)
-            if self._contacts.item(0) > allowed:
-                record.forbidden += 1
-            self._step1(model, data)
-            lower, upper = self._limits
-            np.subtract(lower, self._position, out=self._excess)
-            np.maximum(record.violation, self._excess, out=record.violation)
-            np.subtract(self._position, upper, out=self._excess)
-            np.maximum(record.violation, self._excess, out=record.violation)
-            step += 1
-        record.steps += steps
-        self.physics.step[()] = step
-
-    def _apply_push(self) -> None:
-        """Apply the external force at its point of its body, which moves with the body."""
-        force = self.push.force
-        fx, fy, fz = force.item(0), force.item(1), force.item(2)
-        if fx == fy == fz == 0.0:
-            return
-        index = int(self.push.point)
-        if not 0 <= index < len(self._points):
-            raise IndexError(
-                f"push at point {index}; {self._robot.name} has {len(self._points)}: "
-                + ", ".join(self._robot.points)
-            )
-        place, centre, wrench = self._points[index]
-        x, y, z = (place.item(k) - centre.item(k) for k in range(3))
-        wrench[0], wrench[1], wrench[2] = fx, fy, fz
-        wrench[3], wrench[4], wrench[5] = y * fz - z * fy, z * fx - x * fz, x * fy - y * fx
-
-    def _clear_record(self) -> None:
-        """Clear the record for a new tick, except for the memory of the switches."""
-        record = self.record
-        record.steps[()] = 0
-        record.forbidden[()] = 0
-        for total in (record.load, record.accelerometer, record.violation, record.overload):
-            total.fill(0.0)
-        record.saturated.fill(0)
-        for high in (record.torque_high, record.speed_high):
-            high.fill(-np.inf)
-        for low in (record.torque_low, record.speed_low):
-            low.fill(np.inf)
+        return self.plant.metrics()
 
 
 def _nearest_step(period: float, timestep: float) -> float:

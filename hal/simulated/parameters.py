@@ -23,8 +23,10 @@ class SimulatorParameters(Parameters):
         0.0005, unit="s", gt=0, le=0.002, text="physics step; it must divide the control period"
     )
 
-    scene: Literal["flat", "step", "platform", "none"] = parameter(
-        "flat", text="the kind of ground; none: there is no ground"
+    scene: Literal["flat", "step", "platform", "none"] | scenes.SceneParameters = parameter(
+        "flat",
+        text="the kind of ground; none: there is no ground; or a floor and boxes; or "
+        "{from: plan.scene}, the ground that a jump's task asks for",
     )
     step_height: float = parameter(0.05, unit="m", gt=0, text="scene step: its height")
     step_distance: float = parameter(
@@ -120,6 +122,8 @@ class SimulatorParameters(Parameters):
 
     def build_scene(self) -> scenes.Scene:
         """The ground these parameters describe."""
+        if isinstance(self.scene, scenes.SceneParameters):
+            return self.scene.build()
         if self.scene == "step":
             return scenes.step(self.step_height, self.step_distance, self.step_depth)
         if self.scene == "platform":

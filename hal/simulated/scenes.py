@@ -7,6 +7,13 @@ surface there is at z = 0 in every scene.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Self
+
+from pydantic import model_validator
+
+from ...runtime.language.parameters import Parameters, parameter
+
+Span = tuple[float, float]
 
 
 @dataclass(frozen=True)
@@ -57,3 +64,30 @@ def platform(height: float, edge: float) -> Scene:
     ahead of the origin, or behind it if that is negative."""
     x = (edge - 0.6, edge) if edge >= 0.0 else (edge, edge + 0.6)
     return Scene(-height, (Box(x, (-0.4, 0.4), 0.0, -height),))
+
+
+class BoxParameters(Parameters):
+    """A box, as a graph describes it."""
+
+    x: Span = parameter(text="from, to; ahead of where the robot starts", unit="m")
+    y: Span = parameter((-0.75, 0.75), unit="m", text="from, to; to the left of it")
+    top: float = parameter(text="height of its upper face", unit="m")
+    bottom: float = parameter(0.0, unit="m", text="height of its lower face")
+
+    @model_validator(mode="after")
+    def _check_extent(self) -> Self:
+        for name, (low, high) in (("x", self.x), ("y", self.y), ("z", (self.bottom, self.top))):
+            if not low < high:
+                raise ValueError(f"a box must have an extent along {name}: {low:g} to {high:g} m")
+        return self
+
+
+class SceneParameters(Parameters):
+    """Ground that a graph describes by itself: a level floor and boxes on it."""
+
+    floor: float = parameter(0.0, unit="m", text="height of the floor")
+    boxes: tuple[BoxParameters, ...] = parameter((), text="solid blocks")
+
+    def build(self) -> Scene:
+        """The ground these parameters describe."""
+        return Scene(self.floor, tuple(Box(b.x, b.y, b.top, b.bottom) for b in self.boxes))

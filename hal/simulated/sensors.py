@@ -102,11 +102,15 @@ class Sensors:
     def read_switches(self, step: int, record: TickRecord, out: ContactSwitches) -> None:
         """Write a sample of the switches; a switch that has just changed reads either way at
         random. Without switches none is closed."""
+        self.read_closed(step, record, out.closed)
+
+    def read_closed(self, step: int, record: TickRecord, closed: NDArray[np.bool_]) -> None:
+        """The same as an array, (n_contacts,)."""
         if not self._has_switches:
-            out.closed.fill(False)
+            closed.fill(False)
             return
-        out.closed[:] = record.closed
+        closed[:] = record.closed
         if self._bounce_steps:
             for k, end in enumerate(record.bounce_end.tolist()):
                 if step < end:
-                    out.closed[k] = self._bounce.random() < 0.5
+                    closed[k] = self._bounce.random() < 0.5

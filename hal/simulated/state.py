@@ -41,7 +41,7 @@ class TickRecord(Signal):
         dtype="int64", text="steps with a contact other than a contact point's on the ground"
     )
     violation = Field("n_joints", unit="rad", text="largest excess over a joint limit")
-    joint_torque = Field("n_joints", unit="N m", text="joint torque of the last step")
+    joint_torque = Field("n_joints", unit="N m", text="sum of the joint torques")
     torque_high = Field("n_joints", unit="N m", text="highest motor torque")
     torque_low = Field("n_joints", unit="N m", text="lowest motor torque")
     speed_high = Field("n_joints", unit="rad/s", text="highest motor speed")

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import struct
 from dataclasses import dataclass, field
+from functools import lru_cache
 
 from ..bear.conditions import HEALTHY
 from ..bear.frames import Frame, Instruction
@@ -15,6 +17,15 @@ VERSION = b"\x01\x00\x02\x00"
 
 _STATUS = {register.address: register for register in STATUS.values()}
 _CONFIG = {register.address: register for register in CONFIG.values()}
+
+
+@lru_cache(maxsize=64)
+def _layout(addresses: bytes) -> tuple[struct.Struct, tuple[Register, ...]]:
+    """How the values of these status registers lie in an answer or an instruction."""
+    unknown = Register("unknown", 0xFF, "status", writable=False)
+    registers = tuple(_STATUS.get(address, unknown) for address in addresses)
+    kinds = "".join("f" if register.kind == "f32" else "I" for register in registers)
+    return struct.Struct(f"<{kinds}"), registers
 
 
 @dataclass
@@ -32,6 +43,9 @@ class EmulatedActuator:
         status, config: the registers' values, by name.
         stopped: whether the emergency stop's line is pressed.
         saves: how often the configuration was saved to flash.
+        errors: the bits of errors that are set.
+        corrupt: whether a packet arrived damaged since the last answer.
+        silent_time: since something was written last [s].
     """
 
     device: int
@@ -43,14 +57,15 @@ class EmulatedActuator:
     )
     stopped: bool = False
     saves: int = 0
-    _errors: int = 0
-    _corrupt: bool = False
-    _silent_time: float = 0.0
+    errors: int = 0
+    corrupt: bool = False
+    silent_time: float = 0.0
 
     def __post_init__(self) -> None:
         self.config["id"] = self.device
         self.status.setdefault("input_voltage", 14.8)
         self.status["input_voltage"] = self.status["input_voltage"] or 14.8
+        self.status["unknown"] = 0.0  # what a register that does not exist reads
         for sensor in ("winding", "powerstage", "ic"):
             self.status[f"{sensor}_temperature"] = 25.0
 
@@ -58,12 +73,12 @@ class EmulatedActuator:
     def error_byte(self) -> int:
         """What the next answer reports."""
         hot = self.status["winding_temperature"] > self.config["temp_limit_low"]
-        return HEALTHY | self._errors | hot << HOT | self._corrupt << CORRUPT
+        return HEALTHY | self.errors | hot << HOT | self.corrupt << CORRUPT
 
     @property
     def driving(self) -> bool:
         """Whether the drive follows its goals."""
-        return self.status["torque_enable"] == Torque.ON and not self._errors
+        return self.status["torque_enable"] == Torque.ON and not self.errors
 
     @property
     def damping(self) -> bool:
@@ -72,20 +87,20 @@ class EmulatedActuator:
 
     def fail(self, bit: int) -> None:
         """Set an error's bit: the torque goes off until the error is cleared."""
-        self._errors |= 1 << bit
+        self.errors |= 1 << bit
         if self.status["torque_enable"] == Torque.ON:
             self.status["torque_enable"] = Torque.ERROR
 
     def garble(self) -> None:
         """A packet arrived damaged; the next answer says so."""
-        self._corrupt = True
+        self.corrupt = True
 
     def advance(self, seconds: float) -> None:
         """Let time pass: the watchdog, voltage and temperature are looked at."""
-        self._silent_time += seconds
+        self.silent_time += seconds
         timeout = 1e-6 * self.config["watchdog_timeout"]
         in_mode = self.config["mode"] in (Mode.TORQUE, Mode.DIRECT_FORCE)
-        if timeout and in_mode and self.driving and self._silent_time > timeout:
+        if timeout and in_mode and self.driving and self.silent_time > timeout:
             self.fail(WATCHDOG)
         if self.stopped:
             self.fail(WATCHDOG)
@@ -121,18 +136,25 @@ class EmulatedActuator:
 
     def bulk_read(self, addresses: bytes) -> bytes:
         """The status registers of a bulk exchange's answer."""
-        return self._read(addresses, _STATUS, self.status)
+        layout, registers = _layout(addresses)
+        status = self.status
+        return layout.pack(
+            *(
+                status[register.name] if register.kind == "f32" else int(status[register.name])
+                for register in registers
+            )
+        )
 
     def bulk_write(self, addresses: bytes, values: bytes) -> None:
         """Take over the goals of a bulk exchange."""
-        pairs = b"".join(
-            bytes((address,)) + values[4 * k : 4 * k + 4] for k, address in enumerate(addresses)
-        )
-        self._write(pairs, _STATUS, self.status)
+        self.silent_time = 0.0
+        layout, registers = _layout(addresses)
+        for register, value in zip(registers, layout.unpack(values), strict=True):
+            self._set(register, value, self.status)
 
     def answered(self) -> None:
         """An answer with the error byte has gone out."""
-        self._corrupt = False
+        self.corrupt = False
 
     def _read(
         self, addresses: bytes, known: dict[int, Register], values: dict[str, float]
@@ -144,18 +166,22 @@ class EmulatedActuator:
         return found
 
     def _write(self, data: bytes, known: dict[int, Register], values: dict[str, float]) -> None:
-        self._silent_time = 0.0
+        self.silent_time = 0.0
         for start in range(0, len(data) - 4, 5):
             register = known.get(data[start])
             if register is None or not register.writable:
                 continue
-            value = register.unpack(data[start + 1 : start + 5])
-            if not register.least <= value <= register.most or self._beyond(register.name, value):
-                continue
-            if register.name == "torque_enable":
-                self._enable(int(value))
-            else:
-                values[register.name] = value
+            self._set(register, register.unpack(data[start + 1 : start + 5]), values)
+
+    def _set(self, register: Register, value: float, values: dict[str, float]) -> None:
+        """Take over a value, unless it is beyond what the actuator takes."""
+        name = register.name
+        if not register.writable or not register.least <= value <= register.most:
+            return
+        if name == "torque_enable":
+            self._enable(int(value))
+        elif not self._beyond(name, value):
+            values[name] = value
 
     def _beyond(self, name: str, value: float) -> bool:
         """Whether a goal is beyond its limit; the actuator then keeps the last one."""
@@ -170,10 +196,10 @@ class EmulatedActuator:
 
     def _enable(self, wanted: int) -> None:
         if wanted == Torque.OFF and not self.stopped:
-            self._errors = 0  # errors are cleared by switching off
-        if wanted == Torque.ON and self._errors:
+            self.errors = 0  # errors are cleared by switching off
+        if wanted == Torque.ON and self.errors:
             return
         if wanted == Torque.DAMPING:
-            self._errors |= 1 << WATCHDOG
+            self.errors |= 1 << WATCHDOG
         if wanted != Torque.ERROR:
             self.status["torque_enable"] = wanted

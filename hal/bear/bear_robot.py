@@ -1,0 +1,212 @@
+"""A real robot on BEAR actuators and BRUCE's sensor board."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Literal
+
+from ...blocks.signals import DrivePhase
+from ...runtime.language.block import Context, Misfit
+from ...runtime.language.parameters import Parameters, parameter
+from .bus import BusError, open_port
+from .command_queue import CommandQueue
+from .configuration import Hardware, HardwareError
+from .dead_man import AlwaysHeld, DeadMansSwitch, open_switch, wait_until_held
+from .driven_robot import DrivenRobot, DriveParameters, joint_gains, read_hardware
+from .driver import Driver
+from .motor_thread import MotorThread
+from .watchdog import Watchdog
+
+_HOLDING_TIME = 30.0
+"""How long somebody has to take the dead man's switch [s]."""
+_LOST_TIME = 1.0
+"""After so long without a cycle the motor thread counts as dead [s]."""
+
+
+class BearParameters(DriveParameters):
+    """The parameters of ``BearRobot``."""
+
+    hardware: str = parameter(..., text="file of the hardware, relative to the graph")
+    time: Literal["real", "virtual"] = parameter(
+        "real", text="virtual: the robot is a twin whose time goes on with the exchanges"
+    )
+    command_age: float = parameter(
+        0.02, unit="s", gt=0, le=1.0, text="without a command for so long the drives are damped"
+    )
+    graph_timeout: float = parameter(
+        0.04, unit="s", gt=0, le=2.0, text="after so long the watchdog's process damps the drives"
+    )
+    latency: float = parameter(
+        0.0, unit="s", ge=0, le=0.1, text="with virtual time: delay from sensing to the exchange"
+    )
+
+
+class BearRobot(DrivenRobot):
+    """The robot of the graph on BEAR drives and BRUCE's sensor board (``docs/bring_up.md``).
+
+    **Nothing moves unless** ``armed`` is true. Without it the drives are watched, and never written
+    to. With it ``open`` finds every drive, refuses if somebody else sends on the bus, waits for the
+    dead man's switch, clears errors, writes the configuration and reads it back, checks voltages,
+    temperatures and angles, starts the watchdog, enables the drives where they are, leads them to
+    the standing pose with little current, and holds it until the first command.
+
+    **Time.** A thread exchanges with all drives once every period of the bus, 1 kHz, with goals made
+    from the newest command and the newest measurement; the graph runs beside it. Its clock should
+    be ``paced``, or ``robot``: then ticks begin with the thread's cycles.
+
+    **Ends.** Every fault ends in the drives' damping mode, and the run with the reason:
+
+    * in the motor thread: a drive or the board is silent, reports an error, is too hot, has too low
+      a voltage; a stuck encoder, a frozen IMU, a saturated gyroscope; a second writer on the bus; a
+      command older than ``command_age``; the dead man's switch let go;
+    * in a process of its own: the graph hangs for ``graph_timeout`` or has died;
+    * in the drives: nothing written for the hardware's ``drives.watchdog``.
+
+    It was never run on a real robot; against the twin every shipped jump was (``aloft twin``).
+
+    Raises:
+        BusError: ``open`` could not do one of its steps; the text says which drive, and why.
+    """
+
+    Params = BearParameters
+    params: BearParameters
+
+    @classmethod
+    def requires_of_graph(cls, params: Parameters, context: Context) -> Iterable[Misfit]:
+        """Report a wrong file of the hardware."""
+        assert isinstance(params, BearParameters) and context.robot is not None
+        try:
+            hardware = read_hardware(params.hardware, context, context.robot)
+        except HardwareError as error:
+            yield Misfit(str(error), parameter="hardware", found=params.hardware)
+            return
+        ratio = context.period / hardware.bus.period
+        if abs(ratio - round(ratio)) > 1e-6 or round(ratio) < 1:
+            yield Misfit(
+                f"the bus's period {hardware.bus.period} s does not divide the control period "
+                f"{context.period} s"
+            )
+
+    @classmethod
+    def example_parameters(cls) -> dict[str, str]:
+        """A file of the hardware of BRUCE."""
+        return {"hardware": str(Path(__file__).parents[2] / "graphs/hardware/bruce.yaml")}
+
+    def setup(self) -> None:
+        """Read the file of the hardware; nothing is opened."""
+        super().setup()
+        self._hardware: Hardware = read_hardware(self.params.hardware, self.context, self.robot)
+        self._thread: MotorThread | None = None
+        self._watchdog: Watchdog | None = None
+        self._switch: DeadMansSwitch = AlwaysHeld()
+        self._queue: CommandQueue | None = None
+        self._opened_at = self._cycle = 0.0
+        self._next_tick = 0
+
+    def open(self) -> None:
+        """Connect; if armed, come to the standing pose; then begin to exchange."""
+        hardware, params = self._hardware, self.params
+        bus_port = open_port(hardware.bus.port, hardware.bus.baudrate)
+        try:
+            board_port = open_port(hardware.board.port, 115_200)
+        except BusError:
+            bus_port.close()
+            raise
+        stiffness, damping = joint_gains(params, self.robot)
+        driver = Driver(self.robot, hardware, bus_port, board_port, stiffness, damping)
+        self.driver = driver
+        self._opened_at = time.monotonic()
+        driver.connect()
+        if params.armed:
+            self._switch = open_switch(hardware.dead_man)
+            wait_until_held(self._switch, _HOLDING_TIME)
+            if params.time == "real":
+                devices = [motor.id for motor in hardware.motors.values()]
+                descriptor = bus_port.fileno()  # type: ignore[attr-defined]
+                self._watchdog = Watchdog(descriptor, devices, params.graph_timeout)
+            self._cycle = time.monotonic()
+            driver.arm(self._next_cycle)
+        if params.time == "real":
+            self._thread = MotorThread(driver.loop, params.command_age, self._objection)
+            self._thread.start()
+        else:
+            self._queue = CommandQueue(driver.loop, self.robot, params.latency, self.period)
+
+    def now(self) -> float:
+        """The time since ``open`` [s]: of the clock, or of the exchanges."""
+        if self.params.time == "virtual":
+            return self._driver.loop.cycles * self._hardware.bus.period
+        return time.monotonic() - self._opened_at
+
+    def write(self) -> None:
+        """Give the command to the motor thread, or to the next exchanges."""
+        if self._watchdog is not None:
+            self._watchdog.beat()
+        if self._thread is not None:
+            self._thread.follow(self.command)
+        elif self._queue is not None:
+            self._queue.give(self.command)
+        self.stop_after_fault()
+
+    def advance(self) -> None:
+        """In virtual time, exchange until the next tick; else time passes by itself."""
+        if self._queue is not None:
+            self._queue.advance()
+
+    def wait(self) -> int:
+        """Wait for the cycle with which the next tick begins; gives the ticks that were missed."""
+        thread = self._thread
+        if thread is None:
+            return 0
+        each = max(1, round(self.period / self._hardware.bus.period))
+        self._next_tick = max(self._next_tick + each, each)
+        missed = max(0, (thread.done - self._next_tick) // each)
+        self._next_tick += missed * each
+        if not thread.wait_for(self._next_tick, _LOST_TIME):
+            self._driver.loop.fail(f"the motor thread made no cycle for {_LOST_TIME:g} s")
+            self.stop_after_fault()
+        return missed
+
+    def damp(self) -> None:
+        """Put the drives into damping for a tick; if they were never on, only watch them."""
+        driver, thread = self.driver, self._thread
+        if driver is None or driver.loop.link_lost:
+            return
+        if thread is None:
+            driver.damp(self._queue.cycles if self._queue is not None else 1)
+            return
+        if driver.loop.phase is not DrivePhase.OFF:
+            driver.loop.phase = DrivePhase.DAMPED
+        thread.wait_for(thread.done + 2, _LOST_TIME)
+
+    def close(self) -> None:
+        """End the thread and the watchdog, and give the ports back."""
+        if self._thread is not None:
+            self._thread.stop()
+        if self._watchdog is not None:
+            self._watchdog.close()
+        self._switch.close()
+        if self.driver is not None:
+            self.driver.close()
+
+    def _objection(self) -> str:
+        """Why the motor thread must not go on; empty if it may."""
+        if self._watchdog is not None and self._watchdog.tripped:
+            limit = 1e3 * self.params.graph_timeout
+            return f"the watchdog has damped the drives: the graph hung for {limit:g} ms"
+        return "" if self._switch.held() else "the dead man's switch was let go"
+
+    def _next_cycle(self) -> bool:
+        """While the drives are led to the standing pose: the next period has begun, and the dead
+        man's switch is held."""
+        if self.params.time == "virtual":
+            return True
+        self._cycle += self._hardware.bus.period
+        rest = self._cycle - time.monotonic()
+        if rest > 0.0:
+            time.sleep(rest)
+        else:
+            self._cycle -= rest
+        return self._switch.held()

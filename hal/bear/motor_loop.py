@@ -1,0 +1,258 @@
+"""One cycle of a real robot: goals to all drives, measurements back, and the verdict on them."""
+
+from __future__ import annotations
+
+from threading import Lock
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...blocks.signals import CommandMode, DrivePhase, JointCommand, RobotHealth
+from ...robots.robot_description import RobotDescription
+from .bulk import BulkExchange
+from .bus import BearBus, BusError
+from .configuration import Hardware
+from .drive_goals import DriveGoals
+from .measurement import FASTEST, LARGEST_STEP, PLAUSIBLE, READ, Measurement
+from .registers import Torque
+from .sense_board import SenseBoard
+from .supervision import Supervision
+
+Array = NDArray[np.float64]
+
+WRITE = ("goal_iq", "goal_position", "goal_velocity")
+
+
+class MotorLoop:
+    """Exchanges with the drives and polls the board, once a ``cycle``, and damps after a fault.
+
+    What a cycle sends follows from ``phase``: nothing but questions while OFF; in STARTING and
+    HOLDING the goals ``target`` at rest; in DRIVING the goals of ``command``, recomputed from the
+    newest measurement; in DAMPED the drives' damping mode, again in every cycle, since an
+    instruction may be lost. The first fault leads to DAMPED for good.
+
+    A command for damping leads there too, without a fault. One for no torque gives zero torque.
+
+    Args:
+        robot: the description.
+        hardware: the drives' addresses, directions and limits.
+        bus: the drives' bus.
+        board: the sensor board.
+        goals: how commands become goals.
+
+    Attributes:
+        measured: what was measured last.
+        phase: what the drives do.
+        command: what DRIVING follows.
+        target: the motor angles of STARTING and HOLDING [rad], (n_joints,).
+        current_limit: the current [A] that STARTING may use.
+        fault: the first fault; empty where there was none.
+        cycles: how many there were.
+        late_cycles: how many of them began too late.
+        lost_answers: how many answers were lost or damaged.
+        link_lost: whether the port has failed, so that nothing can be sent any more.
+    """
+
+    def __init__(
+        self,
+        robot: RobotDescription,
+        hardware: Hardware,
+        bus: BearBus,
+        board: SenseBoard,
+        goals: DriveGoals,
+        motor_stiffness: Array,
+    ) -> None:
+        names = robot.transmission.motors
+        devices = [hardware.motors[name].id for name in names]
+        self.bus, self.board, self.hardware = bus, board, hardware
+        self.measured = Measurement(robot, hardware)
+        self.supervision = Supervision(hardware, names)
+        self.goals = goals
+        self.command = JointCommand.allocate(robot.dimensions)
+        self.phase = DrivePhase.OFF
+        self.fault = ""
+        self.cycles = self.late_cycles = 0
+        self.link_lost = False
+        self.lock = Lock()
+        """Held while measurements or the command are written: who reads them from another thread
+        takes it."""
+        self.lost_answers = 0
+        n = len(names)
+        self.target = np.zeros(n)
+        drives = hardware.drives
+        self.current_limit = drives.current_limit
+        self._highest_current = drives.current_limit - drives.current_margin
+        self._stiffness = np.maximum(motor_stiffness, 1e-9)
+        self._watch = BulkExchange(bus, devices, READ, ())
+        self._drive = BulkExchange(bus, devices, READ, WRITE)
+        self._damp = BulkExchange(bus, devices, READ, ("torque_enable",))
+        self._damp.goals.fill(Torque.DAMPING)
+        for exchange in (self._watch, self._drive, self._damp):
+            exchange.plausible[:] = PLAUSIBLE
+            exchange.largest_step[0] = LARGEST_STEP + FASTEST * hardware.bus.period
+        self._released = JointCommand.allocate(robot.dimensions)
+        self._reach, self._scratch = np.zeros(n), np.zeros(n)
+        self._low = np.array([hardware.motors[name].low for name in names])
+        self._high = np.array([hardware.motors[name].high for name in names])
+        self._last = self._watch
+
+    def cycle(self) -> int:
+        """Exchange once with everything; gives how many drives answered.
+
+        It raises nothing: whatever goes wrong is a ``fault``.
+        """
+        self.cycles += 1
+        if self.link_lost:
+            return 0
+        try:
+            with self.lock:
+                bulk = self._prepare()
+                self._switch_to(bulk)
+            answered = bulk.exchange()
+            fresh = self.board.poll()
+        except BusError as error:
+            self.fail(str(error))
+            return 0
+        except Exception as error:  # noqa: BLE001  # whatever a serial port raises
+            self.link_lost = True
+            self.fail(
+                f"a port failed ({type(error).__name__}: {error}): the drives stop by their own "
+                "watchdog"
+            )
+            return 0
+        with self.lock:
+            self.lost_answers += len(bulk.ages) - answered
+            self.measured.take_drives(bulk)
+            if fresh:
+                self.measured.take_board(self.board)
+        driving = self.phase in (DrivePhase.STARTING, DrivePhase.HOLDING, DrivePhase.DRIVING)
+        fault = self.supervision.judge_drives(self.measured, bulk, driving)
+        fault = self.supervision.judge_board(self.board, fresh) or fault
+        if fault and driving:
+            self.fail(fault)
+        return answered
+
+    def follow(self, command: JointCommand) -> None:
+        """From the next cycle on follow this command, if the drives are on."""
+        with self.lock:
+            for name, values in command:
+                getattr(self.command, name)[...] = values
+            if self.phase is DrivePhase.HOLDING:
+                self.phase = DrivePhase.DRIVING
+
+    def fail(self, reason: str) -> None:
+        """Damp from the next cycle on, for this reason, unless there was another before."""
+        if not self.fault:
+            self.fault = reason
+        if self.phase is not DrivePhase.OFF:
+            self.phase = DrivePhase.DAMPED
+
+    def load_goals(self) -> None:
+        """Write the present positions as goals, with the drives off: what they hold at first."""
+        self.target[:] = self.measured.position
+        self._fill(self.target)
+        self._switch_to(self._drive)
+        self._drive.exchange()
+        self.measured.take_drives(self._drive)
+
+    def report(self, health: RobotHealth, now: float) -> None:
+        """Write how everything is."""
+        measured, bulk, period = self.measured, self._last, self.hardware.bus.period
+        health.state[()] = self.phase
+        health.voltage[:] = measured.voltage
+        health.temperature[:] = measured.temperature
+        health.current[:] = measured.current
+        health.condition[:] = bulk.error_bytes
+        for k, age in enumerate(bulk.ages.tolist()):
+            health.age[k] = age * period
+        silent = self.supervision.imu_silent
+        health.imu_age[()] = silent * period
+        health.stamp[()] = now
+        health.joints_valid[()] = not self.link_lost and not any(bulk.ages.tolist())
+        health.imu_valid[()] = not self.link_lost and self.supervision.imu_valid
+        health.contacts_valid[()] = not self.link_lost and silent == 0
+        health.late_cycles[()] = self.late_cycles
+        health.lost_answers[()] = self.lost_answers
+
+    def parts(self) -> list[tuple[object, tuple[str, ...]]]:
+        """What changes in a run: objects, and the names of their attributes."""
+        found: list[tuple[object, tuple[str, ...]]] = [
+            (self, ("phase", "cycles", "late_cycles", "lost_answers", "target", "current_limit",
+                    "link_lost", "exchange_in_use")),
+            (self.supervision, ("low", "hot", "still", "last", "moved", "numbers", "frozen",
+                                "saturated", "imu_silent", "imu_valid")),
+            (self.measured, ("sum", "count", "specific_force", "angular_velocity", "closed")),
+            (self.board, ("specific_force", "angular_velocity", "closed", "packets")),
+            (self.command, tuple(self.command.views())),
+        ]  # fmt: skip
+        exchanges = (self._watch, self._drive, self._damp)
+        return found + [
+            (each, ("goals", "values", "ages", "error_bytes", "known")) for each in exchanges
+        ]
+
+    def restored(self) -> None:
+        """Take over what was set from outside."""
+        self.measured.take_drives(self._last)
+        if self.phase is not DrivePhase.DAMPED:
+            self.fault = ""
+
+    @property
+    def exchange_in_use(self) -> int:
+        """Which of the three exchanges was the last: 0 to watch, 1 to drive, 2 to damp."""
+        return (self._watch, self._drive, self._damp).index(self._last)
+
+    @exchange_in_use.setter
+    def exchange_in_use(self, which: int) -> None:
+        self._last = (self._watch, self._drive, self._damp)[which]
+
+    def _switch_to(self, bulk: BulkExchange) -> None:
+        """Take over the last answers into another exchange: a drive may not answer at first."""
+        if bulk is not self._last:
+            bulk.ages[:] = self._last.ages
+            bulk.values[:] = self._last.values
+            bulk.error_bytes[:] = self._last.error_bytes
+            bulk.known[:] = self._last.known
+            self._last = bulk
+
+    def _prepare(self) -> BulkExchange:
+        """The exchange that belongs to the phase, with its goals."""
+        measured = self.measured
+        if self.phase is DrivePhase.DRIVING and self.command.mode[()] == CommandMode.DAMPING:
+            self.phase = DrivePhase.DAMPED
+        if self.phase is DrivePhase.OFF:
+            return self._watch
+        if self.phase is DrivePhase.DAMPED:
+            return self._damp
+        if self.phase is DrivePhase.DRIVING:
+            active = self.command.mode[()] == CommandMode.ACTIVE
+            self.goals.follow(
+                self.command if active else self._released, measured.position, measured.velocity,
+                measured.joint_position, measured.joint_velocity,
+            )  # fmt: skip
+        else:
+            self._approach()
+        self._fill(self.goals.position)
+        return self._drive
+
+    def _approach(self) -> None:
+        """Goals at rest, no further from where the motors are than the current's limit allows."""
+        measured = self.measured
+        np.divide(self.current_limit * measured.torque_constant, self._stiffness, out=self._reach)
+        self.goals.hold(self.target)
+        np.subtract(measured.position, self._reach, out=self._scratch)
+        np.maximum(self.goals.position, self._scratch, out=self.goals.position)
+        np.add(measured.position, self._reach, out=self._scratch)
+        np.minimum(self.goals.position, self._scratch, out=self.goals.position)
+
+    def _fill(self, position: Array) -> None:
+        """The goals in the drives' units and directions, clamped to what they do not ignore."""
+        measured, goals, out = self.measured, self.goals, self._drive.goals
+        np.divide(goals.torque, measured.torque_constant, out=self._scratch)
+        np.minimum(self._scratch, self._highest_current, out=self._scratch)
+        np.maximum(self._scratch, -self._highest_current, out=self._scratch)
+        np.multiply(self._scratch, measured.sign, out=out[:, 0])
+        np.maximum(position, self._low, out=self._scratch)
+        np.minimum(self._scratch, self._high, out=self._scratch)
+        np.add(self._scratch, measured.offset, out=self._scratch)
+        np.multiply(self._scratch, measured.sign, out=out[:, 1])
+        np.multiply(goals.velocity, measured.sign, out=out[:, 2])

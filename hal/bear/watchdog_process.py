@@ -1,0 +1,55 @@
+"""The program of the watchdog's process: it damps the drives when the graph hangs or dies.
+
+It knows nothing of aloft: it gets the open port, some shared memory, a time limit and the bytes
+that damp. So it starts fast, and nothing that the graph imports can fail in it.
+
+    python watchdog_process.py PORT_FD MEMORY_FD SECONDS FRAME_IN_HEX
+"""
+
+from __future__ import annotations
+
+import mmap
+import os
+import struct
+import sys
+import time
+from contextlib import suppress
+
+BEATS, TRIPPED, CLOSING, READY = 0, 8, 16, 24
+"""Where each unsigned number of 8 bytes lies in the shared memory."""
+SIZE = 32
+LASTING = 2.0
+"""For how long damping is commanded again and again [s]."""
+
+
+def main() -> int:
+    """Watch until the graph says that it closes, or until it hangs or has died."""
+    port, memory, limit = int(sys.argv[1]), int(sys.argv[2]), float(sys.argv[3])
+    frame = bytes.fromhex(sys.argv[4])
+    parent = os.getppid()
+    with mmap.mmap(memory, SIZE) as shared:
+
+        def read(place: int) -> int:
+            return int(struct.unpack_from("Q", shared, place)[0])
+
+        struct.pack_into("Q", shared, READY, 1)
+        beats, since = read(BEATS), time.monotonic()
+        while not read(CLOSING):
+            now = read(BEATS)
+            if now != beats:
+                beats, since = now, time.monotonic()
+            died = os.getppid() != parent
+            if died or (beats and time.monotonic() - since > limit):
+                struct.pack_into("Q", shared, TRIPPED, 1)
+                end = time.monotonic() + LASTING
+                while time.monotonic() < end and (died or not read(CLOSING)):
+                    with suppress(OSError):  # a full or a lost port; the next try may get through
+                        os.write(port, frame)
+                    time.sleep(0.002)
+                return 3
+            time.sleep(0.001)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

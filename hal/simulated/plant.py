@@ -1,0 +1,291 @@
+"""The simulated robot without its ports: rigid bodies, contact, sensors, and a standing start.
+
+``MujocoRobot`` puts a graph's ports around it, and the twin the buses of the real robot. Whoever
+owns a plant says which torques its drives give, and lets it simulate so many physics steps.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...blocks.signals import ExternalForce, ImuReading
+from ...robots.description import RobotDescription
+from ...runtime.language.block import Metric
+from .base import BASES
+from .holding import holding_gains, passive_joints
+from .mujoco_model import Variation, body_name
+from .parameters import SimulatorParameters
+from .random_streams import WORDS, Purpose, RandomStreams, stream
+from .sensors import Sensors
+from .stance import centre_on_origin, holding_torque, place_standing
+from .start_check import StartCheck
+from .state import PhysicsState, TickRecord
+from .truth import TruthReport
+from .world import build_world, draw_variation
+
+if TYPE_CHECKING:
+    from mujoco import MjData
+
+Array = NDArray[np.float64]
+
+SETTLING_TIME = 0.3
+"""The time that a robot settles for, before it is checked whether it stands [s]."""
+OBSERVED_TIME = 0.02
+"""The last part of the settling time, in which the load on the feet is averaged [s]."""
+
+
+class JointTorques(Protocol):
+    """The drives of a plant, as its physics sees them."""
+
+    def joint_torque(self, step: int, position: Array, velocity: Array, out: Array) -> None:
+        """Write the joint torques [N m] during physics step ``step`` to ``out``, from the reading
+        of the drives' encoders [rad] and the true joint velocities [rad/s]."""
+
+
+class Plant:
+    """The physics of a robot in its scene, in steps of ``params.timestep``.
+
+    All that changes in a run is in the given signals or, between ``save`` and ``load``, in the
+    simulator's memory, so that a snapshot is exact.
+
+    Args:
+        robot: the description, with the actuator profile in use.
+        params: the scene, what is drawn from the seed, and the sensors' errors.
+        period: the control period [s]; the start phase is drawn within it.
+        physics: the simulator's state, as ``save`` writes it, and the count of physics steps.
+        record: sums and extremes since the last ``clear_record``.
+
+    Attributes:
+        model, data: the simulator's.
+        variation: the values that were drawn from the seed.
+        streams: the random streams of the run.
+        sensors: what makes readings of the true motion.
+        stiffness, damping: the gains [N m/rad, N m s/rad] (n_joints,) that hold the standing pose.
+        position, velocity: the true joint motion [rad, rad/s], views of the simulator's memory.
+        late: by how much [s] the physics steps begin after the control clock's ticks.
+    """
+
+    def __init__(
+        self,
+        robot: RobotDescription,
+        params: SimulatorParameters,
+        period: float,
+        physics: PhysicsState,
+        record: TickRecord,
+    ) -> None:
+        import mujoco
+
+        self.physics, self.record = physics, record
+        self.variation = draw_variation(params)
+        self.model = build_world(params, robot, self.variation)
+        self._robot, self._params, self._period = robot, params, period
+        self._step1, self._step2 = mujoco.mj_step1, mujoco.mj_step2
+        self.streams = RandomStreams(params.seed)
+        self.sensors = Sensors(robot, params, self.streams)
+        self.stiffness, self.damping = holding_gains(self.model, robot)
+        self._passive = passive_joints(robot)
+        self._limits = (robot.joint_limits[:, 0].copy(), robot.joint_limits[:, 1].copy())
+        n = len(robot.joints)
+        self._encoder, self._excess = np.zeros(n), np.zeros(n)
+        self._mean_force = np.zeros(3)
+        self.late = 0.0
+        self._attach(mujoco.MjData(self.model))
+
+    @staticmethod
+    def state_dimensions(params: SimulatorParameters, robot: RobotDescription) -> Mapping[str, int]:
+        """The sizes of the simulator's state and of the random streams'."""
+        import mujoco
+
+        model = build_world(params, robot, Variation())
+        everything = mujoco.mjtState.mjSTATE_INTEGRATION
+        return {"n_integration": mujoco.mj_stateSize(model, everything), "n_random": WORDS}
+
+    def _attach(self, data: MjData) -> None:
+        """Make the views into the simulator's memory, once."""
+        model = self.model
+        self.data = data
+        base = self._base = BASES[self._robot.base_joint](data)
+        self.position, self.velocity = data.qpos[base.positions :], data.qvel[base.velocities :]
+        self._ctrl, self._external = data.ctrl, data.xfrc_applied
+        self._accelerometer = data.sensor("accelerometer").data
+        self._contacts = data.sensor("contacts").data
+        # The sensors of the contact points are the model's last.
+        first = model.nsensordata - 4 * len(self._robot.contacts)
+        self._load = data.sensordata[first:].reshape(-1, 4)
+        self._vertical = self._load[:, 3]
+        self.truth = TruthReport(data, base, self._robot, self._params.build_scene())
+        self._points = []
+        for point, (link, _) in self._robot.points.items():
+            body = model.body(body_name(link)).id
+            place, centre = data.site(f"point/{point}").xpos, data.xipos[body]
+            self._points.append((place, centre, self._external[body]))
+
+    def stand(self, drives: JointTorques, hold: Callable[[Array, Array], None]) -> None:
+        """Stand on the ground and settle, up to the first instant of the control clock.
+
+        Args:
+            drives: what gives the torques meanwhile.
+            hold: called with the joint angles [rad] and the static torques [N m] that ``drives``
+                are to hold.
+
+        Raises:
+            StartError: the robot does not stand as its description says.
+        """
+        import mujoco
+
+        params = self._params
+        attitude = stream(params.seed, Purpose.ATTITUDE).standard_normal(3)
+        mujoco.mj_resetData(self.model, self.data)
+        model, data, base, robot = self.model, self.data, self._base, self._robot
+        place_standing(model, data, base, robot, attitude * params.initial_attitude_error)
+        rotation = data.body(body_name(robot.base)).xmat.reshape(3, 3).copy()
+        pose = self.position.copy()
+        torque = holding_torque(model, data, base, robot)
+        hold(self.position + self.sensors.encoder_offset, torque)
+        phase = 0.0
+        if params.random_start_phase:
+            phase = float(stream(params.seed, Purpose.START_PHASE).random()) * self._period
+        early = math.floor(phase / params.timestep)
+        self.late = phase - early * params.timestep
+        self._step1(self.model, self.data)
+        observed = math.ceil(OBSERVED_TIME / params.timestep)
+        self._settle(drives, math.ceil(SETTLING_TIME / params.timestep) + early - observed)
+        self.clear_record()
+        self._settle(drives, observed)
+        load = self.record.load[:, 3] / -observed
+        StartCheck(model, data, base, robot).check(load, pose, torque, rotation)
+        centre_on_origin(data, base, robot)
+        self.data.time = 0.0
+        steps = round(self._period / params.timestep)
+        self.physics.step[()] = -steps
+        self.record.bounce_end.fill(-steps)
+        self._step1(self.model, self.data)
+        self.clear_record()
+        self._settle(drives, steps)
+
+    def _settle(self, drives: JointTorques, steps: int) -> None:
+        """Simulate physics steps in which joints that no motor can move stay in the standing pose,
+        as if held by hand."""
+        if not len(self._passive):
+            self.simulate(drives, steps)
+            return
+        for _ in range(steps):
+            self.simulate(drives, 1)
+            self.position[self._passive] = self._robot.standing_position[self._passive]
+            self.velocity[self._passive] = 0.0
+            self._step1(self.model, self.data)
+
+    def simulate(self, drives: JointTorques, steps: int, push: ExternalForce | None = None) -> None:
+        """Simulate physics steps; afterwards all derived quantities are up to date.
+
+        ``push`` is a force from outside, held for all these steps.
+
+        Raises:
+            IndexError: the push acts at a point that the robot does not have.
+        """
+        model, data, record = self.model, self.data, self.record
+        step = int(self.physics.step)
+        self._external.fill(0.0)
+        for _ in range(steps):
+            np.add(self.position, self.sensors.encoder_offset, out=self._encoder)
+            drives.joint_torque(step, self._encoder, self.velocity, self._ctrl)
+            if push is not None:
+                self._apply_push(push)
+            self._step2(model, data)
+            self.sensors.watch_switches(step, self._vertical, record)
+            np.add(record.load, self._load, out=record.load)
+            np.add(record.accelerometer, self._accelerometer, out=record.accelerometer)
+            allowed = 0.0
+            for point in self._load:
+                allowed += point.item(0)
+            if self._contacts.item(0) > allowed:
+                record.forbidden += 1
+            self._step1(model, data)
+            lower, upper = self._limits
+            np.subtract(lower, self.position, out=self._excess)
+            np.maximum(record.violation, self._excess, out=record.violation)
+            np.subtract(self.position, upper, out=self._excess)
+            np.maximum(record.violation, self._excess, out=record.violation)
+            step += 1
+        record.steps += steps
+        self.physics.step[()] = step
+
+    def _apply_push(self, push: ExternalForce) -> None:
+        """Apply the external force at its point of its body, which moves with the body."""
+        force = push.force
+        fx, fy, fz = force.item(0), force.item(1), force.item(2)
+        if fx == fy == fz == 0.0:
+            return
+        index = int(push.point)
+        if not 0 <= index < len(self._points):
+            raise IndexError(
+                f"push at point {index}; {self._robot.name} has {len(self._points)}: "
+                + ", ".join(self._robot.points)
+            )
+        place, centre, wrench = self._points[index]
+        x, y, z = (place.item(k) - centre.item(k) for k in range(3))
+        wrench[0], wrench[1], wrench[2] = fx, fy, fz
+        wrench[3], wrench[4], wrench[5] = y * fz - z * fy, z * fx - x * fz, x * fy - y * fx
+
+    def read_imu(self, out: ImuReading) -> None:
+        """Write a sample of the IMU: the gyroscope of this instant, and the mean of the
+        accelerometer since ``clear_record``."""
+        np.divide(self.record.accelerometer, int(self.record.steps), out=self._mean_force)
+        self.sensors.read_imu(self.angular_velocity(), self._mean_force, out)
+
+    def angular_velocity(self) -> Array:
+        """The base's true angular velocity now [rad/s, body]."""
+        self._base.refresh()
+        return self._base.angular_velocity
+
+    def clear_record(self) -> None:
+        """Begin a new record, except for the memory of the switches."""
+        record = self.record
+        record.steps[()] = 0
+        record.forbidden[()] = 0
+        for total in (
+            record.load, record.accelerometer, record.joint_torque, record.violation,
+            record.overload,
+        ):  # fmt: skip
+            total.fill(0.0)
+        record.saturated.fill(0)
+        for high in (record.torque_high, record.speed_high):
+            high.fill(-np.inf)
+        for low in (record.torque_low, record.speed_low):
+            low.fill(np.inf)
+
+    def save(self) -> None:
+        """Copy the state of the simulator and of the random streams to ``physics``."""
+        import mujoco
+
+        mujoco.mj_getState(
+            self.model, self.data, self.physics.integration, mujoco.mjtState.mjSTATE_INTEGRATION
+        )
+        self.streams.save(self.physics.random)
+
+    def load(self) -> None:
+        """Restore both from ``physics``, and recompute what depends on them."""
+        import mujoco
+
+        mujoco.mj_setState(
+            self.model, self.data, self.physics.integration, mujoco.mjtState.mjSTATE_INTEGRATION
+        )
+        self.streams.load(self.physics.random)
+        self._step1(self.model, self.data)
+
+    def metrics(self) -> Mapping[str, Metric]:
+        """The values that were drawn from the seed."""
+        x, y, z = (1e3 * float(value) for value in self.variation.base_com_offset)
+        return {
+            "robot_base_com_x_mm": x,
+            "robot_base_com_y_mm": y,
+            "robot_base_com_z_mm": z,
+            "robot_friction": float(self.variation.friction),
+            "robot_mass_kg": float(self._robot.total_mass * self.variation.mass),
+            "robot_contact_stiffness": float(self.variation.contact_stiffness),
+        }

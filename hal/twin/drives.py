@@ -1,0 +1,168 @@
+"""The torques of emulated actuators: each closes its loop on its own motor, at the physics rate."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...robots.robot_description import RobotDescription
+from ...robots.transmission import Transmission
+from ..bear.configuration import Hardware
+from ..bear.registers import Mode
+from ..simulated.drives import MotorLimits
+from ..simulated.state import TickRecord
+from .actuator import EmulatedActuator
+from .frozen import Part
+
+Array = NDArray[np.float64]
+
+
+_SLOTS = 8
+"""How many sets of goals may be on their way."""
+
+
+class EmulatedDrives:
+    """What all actuators of a robot give its joints.
+
+    In the modes torque and direct force the current is ``goal_iq``, in direct force plus
+    ``P (goal_position - position) + D (goal_velocity - velocity)``, within ``limit_i_max``. The
+    torque at the output is ``torque_constant`` times that, within the motor's torque-speed curve.
+    An actuator in damping brakes with ``braking`` [N m s/rad], as shorted windings do; one that is
+    off gives no torque.
+
+    Goals that the bus has brought act from the physics step that ``take_goals`` is given, so that
+    the time on the wire and in the actuator can be simulated.
+
+    Args:
+        robot: the description.
+        hardware: directions and offsets, as the driver has them.
+        actuators: in the order of the robot's motors.
+        record: where torques, speeds and saturation are noted.
+        braking: of every actuator in damping [N m s/rad].
+    """
+
+    def __init__(
+        self, robot: RobotDescription, hardware: Hardware, actuators: Sequence[EmulatedActuator],
+        record: TickRecord, braking: float,
+    ) -> None:  # fmt: skip
+        n = len(actuators)
+        self.actuators = tuple(actuators)
+        self._transmission = Transmission(robot)
+        self._limits = MotorLimits(robot, record)
+        settings = [hardware.motors[name] for name in robot.transmission.motors]
+        self.sign = np.array([float(motor.sign) for motor in settings])
+        """1 where a drive turns as the description's motor does, -1 where it does not."""
+        self._offset = np.array([motor.offset for motor in settings])
+        self._constant = hardware.drives.torque_constant
+        self._braking = braking
+        self.current = np.zeros(n)
+        """The torque current of every actuator [A]."""
+        self.position = np.zeros(n)
+        """What every actuator's encoder reads [rad]; a stuck one stays."""
+        self.velocity = np.zeros(n)
+        """The same of its velocity [rad/s]."""
+        self.stuck = np.zeros(n, dtype=np.bool_)
+        """Which encoders are stuck."""
+        self.goals = np.zeros((n, 6))
+        """What acts now: goal current, position, velocity, P, D, and the current's limit."""
+        self.queue = np.zeros((_SLOTS, n, 6))
+        self.dues = np.zeros(_SLOTS, dtype=np.int64)
+        self.first = self.waiting = 0
+        self.last_due = -(1 << 50)
+        self.torque_sum, self.torque_steps = np.zeros(n), 0
+        self.enabled, self.damped = np.zeros(n), np.zeros(n)
+        self._wanted, self._torque = np.zeros(n), np.zeros(n)
+        self._fresh_position, self._fresh_velocity = np.zeros(n), np.zeros(n)
+        self._not_stuck = np.zeros(n, dtype=np.bool_)
+
+    def parts(self) -> list[Part]:
+        """What changes in a run."""
+        names = (
+            "current", "position", "velocity", "stuck", "goals", "enabled", "damped", "queue", "dues", "first",
+            "waiting", "last_due", "torque_sum", "torque_steps",
+        )  # fmt: skip
+        return [(self, names)]
+
+    def take_goals(self, due: int) -> None:
+        """From physics step ``due`` on, follow what the actuators' registers say now; but not
+        before the goals that were taken earlier."""
+        due = max(due, self.last_due)
+        slot = (self.first + self.waiting) % _SLOTS
+        if self.waiting < _SLOTS:
+            self.waiting += 1
+        else:
+            slot = (slot - 1) % _SLOTS
+        self.dues[slot] = self.last_due = due
+        for k, actuator in enumerate(self.actuators):
+            status, config = actuator.status, actuator.config
+            row = self.queue[slot, k]
+            row[0] = status["goal_iq"]
+            direct = config["mode"] == Mode.DIRECT_FORCE
+            row[1], row[2] = status["goal_position"], status["goal_velocity"]
+            row[3] = config["p_gain_direct_force"] if direct else 0.0
+            row[4] = config["d_gain_direct_force"] if direct else 0.0
+            row[5] = config["limit_i_max"]
+
+    def _arrive(self, step: int) -> None:
+        """Let the goals act that are due."""
+        while self.waiting and self.dues[self.first] <= step:
+            self.goals[:] = self.queue[self.first]
+            self.first = (self.first + 1) % _SLOTS
+            self.waiting -= 1
+
+    def take_states(self) -> None:
+        """From now on follow which actuators are on, damping or off."""
+        for k, actuator in enumerate(self.actuators):
+            follows = actuator.config["mode"] in (Mode.TORQUE, Mode.DIRECT_FORCE)
+            self.enabled[k] = float(actuator.driving and follows)
+            self.damped[k] = float(actuator.damping)
+
+    def sense(self, position: Array, velocity: Array) -> None:
+        """Read the encoders, from the joints' motion [rad, rad/s]."""
+        self._transmission.motor_motion(position, self._fresh_position)
+        np.add(self._fresh_position, self._offset, out=self._fresh_position)
+        np.multiply(self._fresh_position, self.sign, out=self._fresh_position)
+        self._transmission.motor_motion(velocity, self._fresh_velocity)
+        np.multiply(self._fresh_velocity, self.sign, out=self._fresh_velocity)
+        moving = self._moving()
+        np.copyto(self.position, self._fresh_position, where=moving)
+        np.copyto(self.velocity, self._fresh_velocity, where=moving)
+
+    def _moving(self) -> NDArray[np.bool_]:
+        np.logical_not(self.stuck, out=self._not_stuck)
+        return self._not_stuck
+
+    def joint_torque(self, step: int, position: Array, velocity: Array, out: Array) -> None:
+        """Write the joint torques [N m] of a physics step, from the joints' motion."""
+        self.sense(position, velocity)
+        self._arrive(step)
+        goals, current, wanted = self.goals, self.current, self._wanted
+        np.subtract(goals[:, 1], self.position, out=current)
+        np.multiply(current, goals[:, 3], out=current)
+        np.add(current, goals[:, 0], out=current)
+        np.subtract(goals[:, 2], self.velocity, out=wanted)
+        np.multiply(wanted, goals[:, 4], out=wanted)
+        np.add(current, wanted, out=current)
+        np.minimum(current, goals[:, 5], out=current)
+        np.negative(goals[:, 5], out=wanted)
+        np.maximum(current, wanted, out=current)
+        np.multiply(current, self.enabled, out=current)
+        np.multiply(self._fresh_velocity, self.damped, out=wanted)
+        np.multiply(wanted, self._braking / self._constant, out=wanted)
+        np.subtract(current, wanted, out=current)
+        np.multiply(current, self._constant, out=self._torque)
+        np.multiply(self._torque, self.sign, out=self._torque)
+        self._transmission.joint_torque(self._torque, out)
+        self._limits.apply(velocity, out)
+        np.add(self.torque_sum, self._limits.motor_torque, out=self.torque_sum)
+        self.torque_steps += 1
+
+    def mean_current(self, out: Array) -> None:
+        """Write the mean torque current of every actuator [A] since this was last called: with
+        the sign of its own direction."""
+        np.divide(self.torque_sum, max(1, self.torque_steps) * self._constant, out=out)
+        np.multiply(out, self.sign, out=out)
+        self.torque_sum.fill(0.0)
+        self.torque_steps = 0

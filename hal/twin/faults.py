@@ -1,0 +1,90 @@
+"""Faults that a twin can have: what goes wrong, from when, for how long, and where."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Literal
+
+import numpy as np
+
+from ...runtime.language.parameters import Parameters, parameter
+
+Kind = Literal[
+    "lost", "truncated", "corrupted", "late", "corrupted_request", "dead", "stuck_encoder", "low_voltage",
+    "hot", "second_writer", "pulled_cable", "silent_board", "frozen_imu", "saturated_gyro", "stuck_switch",
+    "bouncing_switch",
+]  # fmt: skip
+
+ANSWERS: tuple[Kind, ...] = ("lost", "truncated", "corrupted", "late")
+"""The kinds that spoil answers of drives."""
+
+
+class Fault(Parameters):
+    """One fault, as a graph says it: ``{kind: dead, start: 0.5 s, target: left_knee_motor}``."""
+
+    kind: Kind = parameter(..., text="what goes wrong")
+    start: float = parameter(0.0, unit="s", ge=0, text="when, after the robot was let go")
+    duration: float = parameter(1e6, unit="s", gt=0, text="for how long; by default to the end")
+    target: str = parameter(
+        "", text="the motor, or the contact point of a switch; by default all of them"
+    )
+    share: float = parameter(
+        1.0, gt=0, le=1, text="share of answers, requests or readings it befalls"
+    )
+    value: float = parameter(0.0, text="a low voltage [V], a high temperature [deg C]")
+
+
+class Faults:
+    """Which faults are there at an instant. What befalls a share only is drawn from the seed, the
+    exchange and the place, so that it does not depend on what was drawn before."""
+
+    def __init__(self, faults: Sequence[Fault], seed: int) -> None:
+        self._faults = tuple(faults)
+        self._seed = seed
+        self.now = -1.0
+        self.exchange = 0
+
+    def __bool__(self) -> bool:
+        return bool(self._faults)
+
+    def active(self, *kinds: Kind) -> list[Fault]:
+        """The faults of these kinds that are there now."""
+        if not self._faults:
+            return []
+        return [
+            fault
+            for fault in self._faults
+            if fault.kind in kinds and fault.start <= self.now < fault.start + fault.duration
+        ]
+
+    def of(self, target: str, *kinds: Kind) -> list[Fault]:
+        """Those of them that concern ``target``, after the draw of their share."""
+        return [
+            fault
+            for fault in self.active(*kinds)
+            if fault.target in ("", target) and self._befalls(fault, target)
+        ]
+
+    def draw(self, target: str, purpose: int) -> np.random.Generator:
+        """Random numbers for one exchange and place."""
+        place = int.from_bytes(target.encode()[:6].ljust(6, b"_"), "big")
+        return np.random.default_rng([self._seed, self.exchange, place, len(target), purpose])
+
+    def _befalls(self, fault: Fault, target: str) -> bool:
+        return fault.share >= 1.0 or bool(self.draw(target, 0).random() < fault.share)
+
+
+def spoil(fault: Fault, answer: bytes, draws: np.random.Generator) -> bytes:
+    """The bytes of a drive's answer that really travel; empty where none do in time."""
+    if fault.kind == "truncated":
+        return answer[: int(draws.integers(0, len(answer)))]
+    if fault.kind == "corrupted":
+        return flip(answer, draws)
+    return b""
+
+
+def flip(data: bytes, draws: np.random.Generator) -> bytes:
+    """The same bytes with one of them changed."""
+    hurt = bytearray(data)
+    hurt[int(draws.integers(0, len(hurt)))] ^= int(draws.integers(1, 256))
+    return bytes(hurt)

@@ -1,0 +1,143 @@
+"""A twin behind two pseudo-terminals, for a driver in another process."""
+
+from __future__ import annotations
+
+import threading
+import time
+from types import TracebackType
+from typing import Self
+
+from ..bear.frames import BROADCAST, HEADER, LAST_DEVICE
+from .pseudo_terminal import PseudoTerminal
+from .twin import PulledCableError, Twin
+
+_LEAST = 6
+"""Bytes of the shortest instruction."""
+_PATIENCE = 0.5
+"""After so long without a byte the beginning of an instruction is forgotten [s]."""
+
+
+class TwinServer:
+    """Serves a twin's drives and sensor board until it is closed.
+
+    In virtual time the twin's time goes on with the exchanges, and a packet of the board is there
+    before the answers of the same exchange: a driver gets the same bytes in every run. In real time
+    a thread lets it go on by the clock, at most as fast; where the machine is too slow for that,
+    ``behind`` says by how much.
+
+    Args:
+        twin: standing.
+        virtual: whether its time is virtual.
+        period: of the bus [s].
+
+    Attributes:
+        bus_path, board_path: the ports to open.
+        behind: by how much the twin's time is behind the clock [s].
+    """
+
+    def __init__(self, twin: Twin, *, virtual: bool, period: float) -> None:
+        self.twin = twin
+        twin.lockstep = virtual
+        self._period = period
+        self._lock = threading.Lock()
+        self._pending = bytearray()
+        self._received = 0.0
+        self._stop = threading.Event()
+        self._board = PseudoTerminal(self._to_board)
+        self._bus = PseudoTerminal(self._to_bus)
+        self.bus_path, self.board_path = self._bus.path, self._board.path
+        self.behind = 0.0
+        self._clock: threading.Thread | None = None
+        if not virtual:
+            self._clock = threading.Thread(target=self._run, name="twin's clock", daemon=True)
+            self._clock.start()
+
+    def close(self) -> None:
+        """Close both ports."""
+        self._stop.set()
+        if self._clock is not None:
+            self._clock.join()
+        self._bus.close()
+        self._board.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:  # fmt: skip
+        self.close()
+
+    def _to_board(self, data: bytes) -> bytes:
+        with self._lock:
+            self.twin.write_board(data)
+        return b""
+
+    def _to_bus(self, data: bytes) -> bytes:
+        """Take what arrived; instructions are handled one by one, as they become whole."""
+        now = time.monotonic()
+        if now - self._received > _PATIENCE:  # the rest of an instruction will not come any more
+            self._pending.clear()
+        self._received = now
+        self._pending += data
+        answers = b""
+        with self._lock:
+            for instruction in self._instructions():
+                answers += self.twin.read_late()
+                try:
+                    answer = self.twin.write_bus(instruction)
+                except PulledCableError:
+                    self._pull()
+                    return b""
+                self._send_packets()
+                answers += answer
+        return answers
+
+    def _instructions(self) -> list[bytes]:
+        """The whole instructions among what arrived. Bytes that belong to none are skipped."""
+        found: list[bytes] = []
+        pending = self._pending
+        while True:
+            start = pending.find(HEADER)
+            if start < 0:
+                del pending[: max(0, len(pending) - 1)]
+                return found
+            del pending[:start]
+            if len(pending) < 4:
+                return found
+            end = 4 + pending[3]
+            possible = pending[2] <= LAST_DEVICE or pending[2] == BROADCAST
+            if end < _LEAST or not possible:
+                del pending[:1]
+                continue
+            if len(pending) < end:
+                return found
+            found.append(bytes(pending[:end]))
+            del pending[:end]
+
+    def _send_packets(self) -> None:
+        packets = self.twin.read_board()
+        if packets:
+            self._board.send(packets)
+
+    def _pull(self) -> None:
+        """The cable of the drives is pulled: their port is gone, from a thread of its own."""
+        threading.Thread(target=self._bus.close, daemon=True).start()
+
+    def _run(self) -> None:
+        following = time.monotonic()
+        while not self._stop.is_set():
+            with self._lock:
+                self.twin.advance()
+                self._send_packets()
+                pulled = bool(self.twin.faults.active("pulled_cable"))
+            if pulled:
+                self._bus.close()
+            following += self._period
+            rest = following - time.monotonic()
+            if rest > 0.0:
+                time.sleep(rest)
+            else:
+                self.behind -= rest
+                following -= rest

@@ -1,0 +1,282 @@
+"""A robot's twin: the plant behind the bus of its drives and the port of its sensor board."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...blocks.signals import ExternalForce, ImuReading, JointState
+from ...robots.robot_description import RobotDescription
+from ..bear.configuration import Hardware
+from ..bear.frames import BROADCAST, Instruction, frame_bytes
+from ..simulated.drives import Drives
+from ..simulated.parameters import SimulatorParameters
+from ..simulated.plant import Plant
+from ..simulated.random_streams import Purpose
+from ..simulated.state import DriveState, PhysicsState, TickRecord
+from .actuator import EmulatedActuator
+from .bus import EmulatedBus
+from .drives import EmulatedDrives
+from .faults import ANSWERS, Fault, Faults, flip, spoil
+from .frozen import Part
+from .sense_board import EmulatedBoard
+
+Array = NDArray[np.float64]
+
+BRAKING = 0.5
+"""Of an actuator with shorted windings [N m s/rad]: an estimate."""
+SUPPLY = 14.8
+"""The battery's voltage [V]."""
+
+
+class PulledCableError(OSError):
+    """The twin's cable was pulled."""
+
+
+class Twin:
+    """Drives, sensor board and mechanics of a robot, as their ports see them.
+
+    Its time goes on when the master exchanges with all drives (``BULK``): first one period of
+    physics with the goals so far, then the board's packet of this instant, then the new goals and
+    the answers of this instant. So a driver that exchanges, then reads the board, gets the same
+    bytes in every run, however long it takes. ``advance`` lets time go on without an exchange.
+
+    A gantry holds the robot in its standing pose, and adds to the torques of the drives, until the
+    first current is commanded of drives that are all on. That is instant zero.
+
+    Goals act at the first physics step after the exchange plus the plant's drawn start phase and
+    ``jitter``; the ``latency`` is the driver's.
+
+    Args:
+        robot: the description.
+        params: world, disturbances and sensors' errors, as of ``MujocoRobot``. Noise of the
+            accelerometer is that of the mean over ``tick``; a packet has accordingly more.
+        hardware: addresses, directions, offsets and the bus's period.
+        tick: the control period [s].
+        physics, record, gantry: memory of the plant and of the gantry.
+        faults: what goes wrong.
+    """
+
+    def __init__(
+        self, robot: RobotDescription, params: SimulatorParameters, hardware: Hardware, tick: float,
+        physics: PhysicsState, record: TickRecord, gantry: DriveState, faults: tuple[Fault, ...] = (),
+    ) -> None:  # fmt: skip
+        period = hardware.bus.period
+        finer = {"accelerometer_noise": params.accelerometer_noise * math.sqrt(tick / period)}
+        self.plant = Plant(robot, params.model_copy(update=finer), tick, physics, record)
+        self._names = robot.transmission.motors
+        self.actuators = [EmulatedActuator(hardware.motors[name].id) for name in self._names]
+        self._by_device = {actuator.device: k for k, actuator in enumerate(self.actuators)}
+        self.bus = EmulatedBus(self.actuators, self._spoil)
+        self.board = EmulatedBoard()
+        self.drives = EmulatedDrives(robot, hardware, self.actuators, record, BRAKING)
+        self.faults = Faults(faults, params.seed)
+        self.push: ExternalForce | None = None
+        self.lockstep = True
+        """Whether time goes on with the exchanges; else only by ``advance``."""
+        self.released = False
+        self.exchanges = 0
+        self.zero = 0
+        """The exchange in which the gantry let go."""
+        self._gantry = Drives(robot, self.plant.damping, gantry, record)
+        self._record, self._params, self._hardware = record, params, hardware
+        self._steps = round(period / params.timestep)
+        self._period = period
+        self._jitter = self.plant.streams[Purpose.JITTER]
+        self._points = [contact.name for contact in robot.contacts]
+        self._order = [self._points.index(name) for name in hardware.board.switches]
+        n = len(self._names)
+        self._sample = JointState.allocate(robot.dimensions)
+        self._imu = ImuReading.allocate()
+        self.closed = np.zeros(len(self._points), dtype=np.bool_)
+        self._packet_closed = np.zeros(len(self._order), dtype=np.bool_)
+        self.before, self._force = np.zeros(3), np.zeros(3)
+        self.counted = 0
+        self._current, self._held, self._nothing = np.zeros(n), np.zeros(n), np.zeros(n)
+        self._packet = b""
+        self._to_board = b""
+        self._late = b""
+        self.last_packet = np.zeros((2, 3))
+
+    def stand(self) -> None:
+        """Stand on the ground, held by the gantry.
+
+        Raises:
+            StartError: the robot does not stand as its description says.
+        """
+        plant = self.plant
+        plant.stand(
+            self._gantry,
+            lambda pose, torque: self._gantry.hold(pose, torque, plant.stiffness, plant.damping),
+        )
+        for actuator in self.actuators:
+            actuator.status["input_voltage"] = SUPPLY
+        self._sense()
+        self._begin_packet()
+
+    def parts(self) -> list[Part]:
+        """What changes in a run, beside the memory that was given."""
+        names = ("released", "exchanges", "zero", "before", "counted", "last_packet", "closed")
+        found: list[Part] = [(self, names), *self.drives.parts()]
+        found += [
+            (actuator, ("status", "config", "errors", "corrupt", "silent_time"))
+            for actuator in self.actuators
+        ]
+        return [*found, (self.board, ("mode", "cooling"))]
+
+    # -- the ports ---------------------------------------------------------------------------
+
+    def write_bus(self, data: bytes) -> bytes:
+        """Take what the master sends on the drives' bus; gives what it receives.
+
+        Raises:
+            PulledCableError: the cable is pulled.
+        """
+        bulk = len(data) > 4 and data[2] == BROADCAST and data[4] == Instruction.BULK
+        if bulk and self.lockstep:
+            self.advance()
+        if self.faults.active("pulled_cable"):
+            raise PulledCableError("the cable of the drives' bus is pulled")
+        for fault in self.faults.of("", "corrupted_request"):
+            data = flip(data, self.faults.draw(fault.kind, 1))
+        answers = self.bus.receive(data)
+        step = int(self.plant.physics.step)
+        if bulk:
+            delay = self.plant.late
+            if self._params.jitter:
+                delay += self._params.jitter * self._jitter.random()
+            step += math.ceil(delay / self._params.timestep - 1e-9)
+        self.drives.take_goals(step)
+        foreign = b""
+        if self.faults.active("second_writer"):
+            foreign = frame_bytes(1, Instruction.READ_STATUS, b"\x09")
+        return answers + foreign
+
+    def read_late(self) -> bytes:
+        """Answers that come after the master has given up waiting for them."""
+        data, self._late = self._late, b""
+        return data
+
+    def read_board(self) -> bytes:
+        """What the sensor board has sent since it was read last."""
+        data, self._to_board = self._to_board, b""
+        return data
+
+    def write_board(self, data: bytes) -> None:
+        """Take what the host sends to the sensor board."""
+        self.board.receive(data)
+
+    # -- time --------------------------------------------------------------------------------
+
+    def advance(self) -> None:
+        """Let one period of the bus pass, and let the board send its packet."""
+        self.exchanges += 1
+        self.faults.exchange = self.exchanges
+        self.faults.now = (self.exchanges - self.zero) * self._period if self.released else -1.0
+        self._befall()
+        for _ in range(self._steps):
+            self.plant.simulate(self, 1, self.push if self.released else None)
+        for actuator in self.actuators:
+            actuator.advance(self._period)
+        self.drives.take_states()
+        self._sense()
+        self._send_packet()
+
+    def joint_torque(self, step: int, position: Array, velocity: Array, out: Array) -> None:
+        """The torques of the drives, and of the gantry until it lets go."""
+        self.drives.joint_torque(step, position, velocity, out)
+        self._let_go()
+        if not self.released:
+            self._gantry.joint_torque(step, position, velocity, self._held)
+            np.add(out, self._held, out=out)
+
+    def clear_record(self) -> None:
+        """Begin a new record of torques, loads and limits; packets go on."""
+        np.subtract(self.before, self._record.accelerometer, out=self.before)
+        self.counted -= int(self._record.steps)
+        self.plant.clear_record()
+
+    def _let_go(self) -> None:
+        """The gantry lets go when all drives are on and one is told to give a current."""
+        if not self.released and self.drives.enabled.all() and self.drives.goals[:, 0].any():
+            self.released = True
+            self.zero = self.exchanges - 1
+
+    # -- what is measured --------------------------------------------------------------------
+
+    def _sense(self) -> None:
+        """Put what the drives measure now into their registers."""
+        plant, sample, drives = self.plant, self._sample, self.drives
+        plant.sensors.read_joints(plant.position, plant.velocity, self._nothing, sample)
+        drives.sense(sample.position, sample.velocity)
+        drives.mean_current(self._current)
+        for k, actuator in enumerate(self.actuators):
+            status = actuator.status
+            status["present_position"] = drives.position.item(k)
+            status["present_velocity"] = drives.velocity.item(k)
+            status["present_iq"] = self._current.item(k)
+
+    def _begin_packet(self) -> None:
+        self.before[:] = self._record.accelerometer
+        self.counted = int(self._record.steps)
+
+    def _send_packet(self) -> None:
+        """A packet of the IMU and the switches: the accelerometer's mean since the last one."""
+        plant, record = self.plant, self._record
+        np.subtract(record.accelerometer, self.before, out=self._force)
+        np.divide(self._force, int(record.steps) - self.counted, out=self._force)
+        self._begin_packet()
+        imu = self._imu
+        plant.sensors.read_imu(plant.angular_velocity(), self._force, imu)
+        self._read_switches()
+        if self.faults.active("frozen_imu"):
+            imu.specific_force[:], imu.angular_velocity[:] = self.last_packet
+        self.last_packet[0], self.last_packet[1] = imu.specific_force, imu.angular_velocity
+        if self.faults.active("saturated_gyro"):
+            imu.angular_velocity[0] = self._hardware.board.gyro_range
+        if not self.faults.active("silent_board"):
+            self._to_board += self.board.packet(imu, self._packet_closed)
+
+    def _read_switches(self) -> None:
+        closed = self.closed
+        plant = self.plant
+        plant.sensors.read_closed(int(plant.physics.step), self._record, closed)
+        if self.faults:
+            for k, name in enumerate(self._points):
+                if self.faults.of(name, "stuck_switch"):
+                    closed[k] = True
+                if self.faults.of(name, "bouncing_switch"):
+                    closed[k] = bool(self.faults.draw(name, 2).random() < 0.5)
+        for bit, point in enumerate(self._order):
+            self._packet_closed[bit] = closed[point]
+
+    # -- what goes wrong ---------------------------------------------------------------------
+
+    def _befall(self) -> None:
+        """Let faults of drives begin and end."""
+        if not self.faults:
+            return
+        for k, (name, actuator) in enumerate(zip(self._names, self.actuators, strict=True)):
+            self.drives.stuck[k] = bool(self.faults.of(name, "stuck_encoder"))
+            low, hot = self.faults.of(name, "low_voltage"), self.faults.of(name, "hot")
+            actuator.status["input_voltage"] = low[0].value if low else SUPPLY
+            actuator.status["winding_temperature"] = hot[0].value if hot else 25.0
+            if self.faults.of(name, "dead"):
+                actuator.status["torque_enable"] = 0.0
+
+    def _spoil(self, device: int, answer: bytes) -> bytes:
+        """What travels of an answer."""
+        if not self.faults:
+            return answer
+        name = self._names[self._by_device[device]]
+        if self.faults.of(name, "dead"):
+            return b""
+        for fault in self.faults.of(name, *ANSWERS):
+            if fault.kind == "late":
+                self._late += answer
+            answer = spoil(fault, answer, self.faults.draw(name, 3))
+            if not answer:
+                break
+        return answer

@@ -1,0 +1,248 @@
+"""The robot's twin in a graph: the real driver, the real bytes, and physics behind them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any
+
+from ...blocks.signals import ExternalForce, RobotTruth
+from ...robots.description import RobotDescription
+from ...runtime.language.block import Context, Input, Metric, Misfit, Output, State
+from ...runtime.language.parameters import Parameters, parameter
+from ...runtime.language.signals import Field, Signal
+from ...runtime.language.terrain import Ground, Terrain
+from ..bear.command_queue import CommandQueue
+from ..bear.configuration import Hardware
+from ..bear.driven_robot import DrivenRobot, DriveParameters, joint_gains, read_hardware
+from ..bear.driver import Driver
+from ..simulated.parameters import SimulatorParameters
+from ..simulated.plant import Plant
+from ..simulated.rotors import unfit_motor
+from ..simulated.stance import uneven_contacts
+from ..simulated.state import DriveState, PhysicsState, TickRecord
+from .faults import Fault
+from .frozen import Frozen, Part
+from .twin import Twin
+from .virtual_port import VirtualBoardPort, VirtualBusPort
+
+
+class TwinParameters(SimulatorParameters, DriveParameters):
+    """The parameters of ``TwinRobot``: those of ``MujocoRobot``, and the drives'."""
+
+    armed: bool = parameter(True, text="whether the drives are switched on; else only watched")
+    hardware: str = parameter(
+        "", text="file of the hardware, relative to the graph; none: addresses in order, no offsets"
+    )
+    faults: list[Fault] = parameter([], text="what goes wrong, and when")
+
+
+class Registers(Signal):
+    """What the actuators, the buses and the driver keep."""
+
+    values = Field("n_kept", text="all numbers in a fixed order")
+
+
+class TwinRobot(DrivenRobot):
+    """The robot of the graph as its twin: the driver of ``BearRobot`` on emulated hardware.
+
+    Every command and every measurement goes through the drivers of the real robot and the bytes of
+    its protocols: checksums, float32, addresses, directions and offsets, error bytes, goals that
+    are ignored beyond their limits. Behind them is the physics of ``MujocoRobot``, with the same
+    parameters and the same world for a seed. The drives close their loops per motor.
+
+    Time is virtual: an exchange on the bus is one period of physics, so a run is the same on every
+    machine. A command acts in the first exchange at or after ``t_n + latency``, at the earliest one
+    period after the tick; ``jitter`` and the drawn start phase are added behind the bus.
+
+    A gantry holds the robot in its standing pose until the drives are on and get a first current.
+
+    ``drive_damping`` is not used: drives in damping brake as shorted windings do.
+    """
+
+    outside = "simulated"
+
+    Params = TwinParameters
+    params: TwinParameters
+
+    push = Input(ExternalForce, default={}, text="a force from outside, held for the tick")
+    truth = Output(RobotTruth, truth=True, text="what only a simulator knows")
+    physics = State(PhysicsState, text="the simulator's state, written for a snapshot")
+    gantry = State(DriveState, text="the gantry's hold on the robot")
+    record = State(TickRecord, text="what happened in the physics steps of the last tick")
+    rest = State(Registers, text="registers, counters and commands on their way, for a snapshot")
+
+    @classmethod
+    def requires(cls, params: Parameters, robot: RobotDescription | None) -> Iterable[Misfit]:
+        """Report what the simulator cannot express, and gains that the drives cannot give."""
+        assert robot is not None
+        yield from super().requires(params, robot)
+        complaint = unfit_motor(robot) or uneven_contacts(robot)
+        if complaint:
+            yield Misfit(complaint, fix="correct the robot's description")
+        if len(robot.contacts) > 7:
+            yield Misfit(
+                f"{robot.name} has {len(robot.contacts)} contact points, and a packet of the "
+                "sensor board has room for 7 switches"
+            )
+        if len(robot.joints) > 18:
+            yield Misfit(
+                f"{robot.name} has {len(robot.joints)} motors, and one exchange has room for 18"
+            )
+
+    @classmethod
+    def requires_of_graph(cls, params: Parameters, context: Context) -> Iterable[Misfit]:
+        """Report periods that do not divide each other, and a wrong file of the hardware."""
+        assert isinstance(params, TwinParameters) and context.robot is not None
+        period = 0.001
+        if params.hardware:
+            try:
+                period = read_hardware(params.hardware, context, context.robot).bus.period
+            except Exception as error:  # noqa: BLE001  # said in the load report
+                yield Misfit(str(error), parameter="hardware", found=params.hardware)
+        for what, longer, shorter in (
+            ("the bus's period", context.period, period),
+            ("timestep", period, params.timestep),
+        ):
+            ratio = longer / shorter
+            if abs(ratio - round(ratio)) > 1e-6 or round(ratio) < 1:
+                yield Misfit(
+                    f"{what} {shorter} s does not divide {longer} s",
+                    parameter="timestep" if what == "timestep" else "",
+                )
+
+    @classmethod
+    def terrain(cls, params: Parameters) -> Terrain | None:
+        """The scene's floor and boxes."""
+        assert isinstance(params, SimulatorParameters)
+        scene = params.build_scene()
+        boxes = (
+            Ground((box.x[0], box.y[0], box.bottom), (box.x[1], box.y[1], box.top))
+            for box in scene.boxes
+        )
+        return Terrain(scene.floor, tuple(boxes))
+
+    @classmethod
+    def local_dimensions(
+        cls, params: Parameters, robot: RobotDescription | None
+    ) -> Mapping[str, int]:
+        """The seed is not a dimension."""
+        return {"n_points": len(robot.points) if robot is not None else 0}
+
+    @classmethod
+    def state_dimensions(
+        cls, params: Parameters, robot: RobotDescription | None
+    ) -> Mapping[str, int]:
+        """Sizes of the simulator's state, and of all that the twin and its driver keep."""
+        assert isinstance(params, TwinParameters) and robot is not None
+        sizes = {**robot.dimensions, **Plant.state_dimensions(params, robot), "n_queue": 2}
+        hardware = Hardware.for_twin(robot)
+        twin = Twin(
+            robot, params, hardware, hardware.bus.period, PhysicsState.allocate(sizes),
+            TickRecord.allocate(sizes), DriveState.allocate(sizes),
+        )  # fmt: skip
+        driver = _driver(robot, params, hardware, twin)
+        queue = CommandQueue(driver.loop, robot, params.latency, hardware.bus.period)
+        kept = Frozen(_parts(twin, driver, queue))
+        return {**sizes, "n_kept": kept.size}
+
+    def setup(self) -> None:
+        """Draw the world from the seed and build the twin."""
+        super().setup()
+        params, robot = self.params, self.robot
+        if params.hardware:
+            hardware = read_hardware(params.hardware, self.context, robot)
+        else:
+            hardware = Hardware.for_twin(robot)
+        self.twin = Twin(
+            robot, params, hardware, self.period, self.physics, self.record, self.gantry,
+            tuple(params.faults),
+        )  # fmt: skip
+        self.twin.push = self.push
+        self._hardware = hardware
+        self.driver = _driver(robot, params, hardware, self.twin)
+        self._queue = CommandQueue(self.driver.loop, robot, params.latency, self.period)
+        self._kept = Frozen(_parts(self.twin, self.driver, self._queue))
+
+    def open(self) -> None:
+        """Stand in the gantry, find the drives and, if armed, lead them to the standing pose."""
+        twin = self.twin
+        twin.stand()
+        self._driver.connect()
+        if self.params.armed:
+            self._driver.arm(lambda: True)
+        twin.clear_record()
+        self._driver.loop.cycle()
+
+    def now(self) -> float:
+        """The virtual time [s]."""
+        return self.twin.exchanges * self._hardware.bus.period
+
+    def read(self) -> None:
+        """Publish the newest measurements, and the truth."""
+        super().read()
+        self.twin.plant.truth.publish(self.record, self.truth)
+
+    def write(self) -> None:
+        """Send the command on its way to the drives."""
+        self._queue.give(self.command)
+        self.stop_after_fault()
+
+    def advance(self) -> None:
+        """Exchange with the drives until the next tick."""
+        self._pass_time(self._queue.advance)
+
+    def damp(self) -> None:
+        """One tick with the drives in damping and no external force."""
+        self.twin.push = None
+        self._pass_time(lambda: self._driver.damp(self._queue.cycles))
+
+    def _pass_time(self, exchange: Callable[[], None]) -> None:
+        """Exchange for a tick; with a lost link, time passes without exchanges."""
+        twin = self.twin
+        twin.clear_record()
+        end = twin.exchanges + self._queue.cycles
+        exchange()
+        while twin.exchanges < end:
+            twin.advance()
+
+    def close(self) -> None:
+        """Give the ports back."""
+        if self.driver is not None:
+            self.driver.close()
+
+    def freeze(self) -> None:
+        """Copy all that is kept elsewhere to the declared state."""
+        self.twin.plant.save()
+        self._kept.save(self.rest.values)
+
+    def thaw(self) -> None:
+        """Restore it from there."""
+        self.twin.plant.load()
+        self._kept.load(self.rest.values)
+        self._driver.loop.restored()
+
+    def metrics(self) -> Mapping[str, Metric]:
+        """What was drawn from the seed, and what became of the drives."""
+        return {**self.twin.plant.metrics(), **super().metrics()}
+
+    @classmethod
+    def example_parameters(cls) -> Mapping[str, Any]:
+        """All disturbances at once, so that the conformance suite covers them."""
+        return {
+            "gyro_noise": 0.02, "gyro_bias": 0.01, "accelerometer_noise": 0.1,
+            "accelerometer_bias": 0.1, "encoder_offset": 0.003, "joint_velocity_noise": 0.05,
+            "switch_threshold": [0.5, 3.0], "switch_bounce": 0.002, "latency": 0.002,
+            "jitter": 0.0005, "initial_attitude_error": 0.01, "random_start_phase": True,
+        }  # fmt: skip
+
+
+def _driver(
+    robot: RobotDescription, params: TwinParameters, hardware: Hardware, twin: Twin
+) -> Driver:
+    stiffness, damping = joint_gains(params, robot)
+    return Driver(robot, hardware, VirtualBusPort(twin), VirtualBoardPort(twin), stiffness, damping)
+
+
+def _parts(twin: Twin, driver: Driver, queue: CommandQueue) -> list[Part]:
+    """All that changes in a run and lies in no declared state."""
+    return [*twin.parts(), *driver.loop.parts(), *queue.parts()]

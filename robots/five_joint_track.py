@@ -1,0 +1,182 @@
+"""One tick of a five-joint leg that follows a foot's target: joint angles and velocities.
+
+The kernels here put those of ``five_joint_leg`` and ``five_joint_reach`` in order for a tick, so
+that a leg is one call.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..mathematics.kernel import kernel
+from .five_joint_leg import Leg, forward, inverse, inverse_velocity, jacobian
+from .five_joint_reach import keep_along, line_rate, pitched_line, slide, slow_stretch
+
+Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+Indices = NDArray[np.int64]
+
+_FASTEST = 100.0
+"""Foot velocities are limited to this [m/s], so that no square overflows."""
+
+
+class LegGeometry(NamedTuple):
+    """A ``Leg`` as arrays; ``joints`` (5,) are its joints' indices."""
+
+    joints: Indices
+    hip: Array
+    plane: Array
+    signs: Array
+    limits: Array
+
+
+class FootMotion(NamedTuple):
+    """A foot's target in the base's frame: place (3,) [m], velocity (3,) [m/s], rotation (3, 3)."""
+
+    position: Array
+    velocity: Array
+    rotation: Array
+
+
+class LegTargets(NamedTuple):
+    """What a robot's joints shall do: (n_joints,) twice; and whether each foot is reached."""
+
+    position: Array
+    velocity: Array
+    reachable: Flags
+
+
+class LegScratch(NamedTuple):
+    """Memory for intermediate results; ``line`` and ``rate`` lead from one kernel to the other."""
+
+    line: Array
+    rate: Array
+    angles: Array
+    speeds: Array
+    sole: Array
+    turn: Array
+    velocity: Array
+    place: Array
+    jacobian: Array
+    rows: Array
+    turns: Array
+    normal: Array
+
+
+class LegSettings(NamedTuple):
+    """Settings that may change during a run, each an array of one element.
+
+    ``softness`` [m], ``turn_length`` [m] and ``damping`` [m] are those of ``inverse`` and
+    ``inverse_velocity``; ``speed_limit`` [rad/s] limits the joints' velocities; ``slides`` says
+    whether a foot out of reach slides in the plane of its sole first.
+    """
+
+    softness: Array
+    turn_length: Array
+    damping: Array
+    speed_limit: Array
+    slides: Flags
+
+
+def leg_geometry(leg: Leg, margin: float) -> LegGeometry:
+    """A leg whose joints stay ``margin`` [rad] inside their limits."""
+    limits = leg.limits + np.array([margin, -margin])
+    return LegGeometry(np.array(leg.joints), leg.hip, leg.plane, leg.signs, limits)
+
+
+def leg_scratch() -> LegScratch:
+    """Zero memory for one leg."""
+    shapes = (3, 3, 5, 5, 3, (3, 3), 3, 3, (6, 5), (5, 5), (3, 5), (5, 5))
+    return LegScratch(*(np.zeros(shape) for shape in shapes))
+
+
+def leg_settings() -> LegSettings:
+    """Settings that are all zero."""
+    return LegSettings(
+        np.zeros(1), np.zeros(1), np.zeros(1), np.zeros(1), np.zeros(1, dtype=np.bool_)
+    )
+
+
+@kernel
+def watch_line(
+    rotation: Array,
+    pitched: bool,
+    pitch: Array,
+    period: float,
+    known: Flags,
+    direction: Array,
+    scratch: LegScratch,
+) -> None:
+    """The direction of the foot's line that is wanted, and how fast it turns.
+
+    Args:
+        rotation: of the foot's target, (3, 3).
+        pitched: whether the line is turned by ``pitch`` [rad], of shape (), about the foot's y axis.
+        period: between two ticks [s].
+        known: whether ``direction`` (3,) is that of the last tick, of shape (); it is updated.
+    """
+    for i in range(3):
+        scratch.line[i] = rotation[i, 0]
+    if pitched:
+        pitched_line(rotation, float(pitch[()]), scratch.line)
+    line_rate(scratch.line, direction, period, bool(known[()]), scratch.rate)
+
+
+@kernel
+def follow_foot(
+    leg: LegGeometry,
+    number: int,
+    foot: FootMotion,
+    measured: Array,
+    settings: LegSettings,
+    scratch: LegScratch,
+    target: LegTargets,
+) -> None:
+    """The angles and velocities of a leg's joints for its foot's target (paper, V).
+
+    Args:
+        number: the foot's.
+        measured: angles of all joints [rad], (n_joints,), for where any angle is a solution.
+        scratch: with the line and its rate from ``watch_line``.
+        target: out; only the leg's joints are written.
+    """
+    angles, speeds, turn, velocity = scratch.angles, scratch.speeds, scratch.turn, scratch.velocity
+    softness, yaw = float(settings.softness[0]), float(measured[leg.joints[0]])
+    inside, share = inverse(
+        leg.hip,
+        leg.plane,
+        leg.signs,
+        leg.limits,
+        foot.position,
+        scratch.line,
+        softness,
+        yaw,
+        angles,
+    )
+    target.reachable[number] = inside
+    for i in range(3):
+        velocity[i] = min(max(float(foot.velocity[i]), -_FASTEST), _FASTEST)
+    if settings.slides[0] and not inside:
+        slid, kept = slide(
+            leg.hip, leg.plane, leg.signs, leg.limits, foot.position, foot.rotation, softness, yaw,
+            scratch.place, angles,
+        )  # fmt: skip
+        if slid:
+            share = kept
+            keep_along(foot.rotation[:, 2], velocity)
+    forward(leg.hip, leg.plane, leg.signs, angles, scratch.sole, turn)
+    jacobian(leg.plane, leg.signs, angles, scratch.jacobian)
+    slow_stretch(leg.hip, leg.plane, scratch.sole, turn, share, velocity)
+    inverse_velocity(
+        scratch.jacobian, turn, velocity, scratch.rate, float(settings.turn_length[0]),
+        float(settings.damping[0]), scratch.rows, scratch.turns, scratch.normal, speeds,
+    )  # fmt: skip
+    limit = float(settings.speed_limit[0])
+    for i in range(5):
+        joint, angle, speed = int(leg.joints[i]), float(angles[i]), float(speeds[i])
+        held = angle <= float(leg.limits[i, 0]) or angle >= float(leg.limits[i, 1])
+        target.position[joint] = angle
+        target.velocity[joint] = 0.0 if held else min(max(speed, -limit), limit)
