@@ -41,7 +41,8 @@ class BalanceTarget(Block):
 
     Before the last touchdown the target's positions and heading are the plan's, shifted and rotated
     with the measured feet. The plan is relative to the feet, so a drift of the estimated position
-    or heading does not matter.
+    or heading does not matter. Its angular momentum and the rate of that are scaled with the mass
+    of the model at ``terms``.
 
     So the error of each landing would add to the next one, unless ``place_gain`` feeds the position
     back. In the last T_p = ``place_time`` before a lift-off it changes the length of the jump. Let
@@ -127,7 +128,7 @@ class BalanceTarget(Block):
         self._middle = np.zeros(3)
         self._planned_middle = np.zeros(3)
         robot = self.robot
-        self._feet = len(robot.feet)
+        self._feet, self._mass = len(robot.feet), robot.total_mass
         kinds = [foot_shape(robot, foot)[0] for foot in range(self._feet)]
         self._heads = np.array([kind != FootKind.POINT for kind in kinds])
         self._counted = np.ones(self._feet, bool) if not self._heads.any() else self._heads
@@ -201,6 +202,10 @@ class BalanceTarget(Block):
                 np.add(out, self._middle, out=out)
             else:
                 turn_about_vertical(source, turn, out)
+        # The plan's momenta are those of the description's mass.
+        heavier = (float(self.terms.mass_matrix[0, 0]) or self._mass) / self._mass
+        target.angular_momentum *= heavier
+        target.angular_momentum_rate *= heavier
         self._set_heading(turn)
         multiply(self._turn, reference.orientation, target.orientation)
         target.angular_velocity[...] = reference.angular_velocity

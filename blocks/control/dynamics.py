@@ -12,9 +12,12 @@ from ...mathematics.rotations import normalise, rotate_back, to_matrix
 from ...robots.ball_feet import ball_feet
 from ...robots.pinocchio_model import build_pinocchio_model
 from ...runtime.language.block import Block, Input, Output
-from ..signals import BaseState, DynamicsTerms, JointState
+from ..signals import BaseState, DynamicsTerms, JointState, MassEstimate
 
 Array = NDArray[np.float64]
+
+LEAST_SCALE, LEAST_OFFSET = 1e-4, 2e-5
+"""The steps in which the model's mass (as a share) and its torso's CoM [m] change."""
 
 
 class Dynamics(Block):
@@ -37,6 +40,10 @@ class Dynamics(Block):
     point is at rest; its velocity is that of the centre plus that due to the ball's rotation.
     Contact points of other feet are fixed to the foot.
 
+    With ``mass`` wired, the model has the mass and the torso's centre of mass that are given there:
+    all masses and inertias scale alike, and the inertia of the torso about its own centre of mass
+    stays. Without it, or where the mass is zero, they are the description's.
+
     The block does not filter or estimate anything, and knows no ground: contact points are points
     of the feet, loaded or not.
     """
@@ -45,6 +52,7 @@ class Dynamics(Block):
 
     base = Input(BaseState, text="pose and velocity of the base")
     joints = Input(JointState, text="joint angles and velocities")
+    mass = Input(MassEstimate, default={}, text="the robot's mass and its torso's centre of mass")
     terms = Output(DynamicsTerms, text="the model's terms")
 
     def setup(self) -> None:
@@ -57,6 +65,16 @@ class Dynamics(Block):
         self._data: Any = built.model.createData()
         self._rotor_coupling = built.rotor_coupling
         n_velocities: int = built.model.nv
+        # What the model has now: the factor on all masses, and the offset of the torso's CoM.
+        self._nominal_mass = robot.total_mass
+        self._scale, self._offset, self._rest = 1.0, np.zeros(3), np.zeros(3)
+        base = self._model.inertias[self._model.getJointId("base")]
+        self._lever, self._described_lever = base.lever, np.array(base.lever)
+        torso = next(link for link in robot.links if link.name == robot.base)
+        self._torso_share = torso.mass / base.mass
+        self._armature = np.diag(built.model.armature)
+        self._rotors = np.array(self._rotor_coupling)
+        self._weighs = "mass" in self.context.wired
 
         self._position = np.array(pinocchio.neutral(self._model))
         self._velocity = np.zeros(n_velocities)
@@ -106,20 +124,23 @@ class Dynamics(Block):
         v[3:6] = base.angular_velocity
         v[6:] = joints.velocity
 
+        if self._weighs:
+            self._weigh()
         pinocchio, model, data = self._pinocchio, self._model, self._data
         pinocchio.computeAllTerms(model, data, q, v)
         # Also leaves every joint's spatial acceleration at v' = 0 in the model's data.
         pinocchio.computeCentroidalMomentumTimeVariation(model, data, q, v, self._still)
 
         terms.velocity[...] = v
-        np.add(self._mass_matrix, self._rotor_coupling, out=terms.mass_matrix)
-        terms.nonlinear_effects[...] = data.nle
+        np.multiply(self._mass_matrix, self._scale, out=terms.mass_matrix)
+        np.add(terms.mass_matrix, self._rotors, out=terms.mass_matrix)
+        np.multiply(data.nle, self._scale, out=terms.nonlinear_effects)
         terms.com[...] = data.com[0]
         terms.com_velocity[...] = data.vcom[0]
-        terms.centroidal_matrix[...] = data.Ag
-        terms.linear_momentum[...] = self._momentum[0:3]
-        terms.angular_momentum[...] = self._momentum[3:6]
-        terms.centroidal_drift[...] = self._momentum_rate
+        np.multiply(data.Ag, self._scale, out=terms.centroidal_matrix)
+        np.multiply(self._momentum[0:3], self._scale, out=terms.linear_momentum)
+        np.multiply(self._momentum[3:6], self._scale, out=terms.angular_momentum)
+        np.multiply(self._momentum_rate, self._scale, out=terms.centroidal_drift)
         terms.base_position[...] = base.position
         to_matrix(q[3:7], terms.base_rotation)
 
@@ -147,6 +168,25 @@ class Dynamics(Block):
             motion, turn = self._foot_motion[ball.foot], self._foot_turn[ball.foot]
             rolling_drift(*motion, ball.centre, self._points[ball.point], self._local)
             np.dot(turn, self._local[1], terms.contact_drift[ball.point])
+
+    def _weigh(self) -> None:
+        """Give the model the mass and the torso's centre of mass at the input, if they changed."""
+        mass, offset = float(self.mass.mass), self.mass.com_offset
+        scale = mass / self._nominal_mass if mass > 0.0 else 1.0
+        # In small steps, so that the model is a function of the input and rarely changes.
+        scale = round(scale / LEAST_SCALE) * LEAST_SCALE
+        np.divide(offset, LEAST_OFFSET, out=self._rest)
+        np.rint(self._rest, out=self._rest)
+        self._rest *= LEAST_OFFSET
+        if scale == self._scale and np.array_equal(self._rest, self._offset):
+            return
+        self._scale, self._offset[...] = scale, self._rest
+        # All masses scale alike, so the terms do; rotors do not. The body that carries the torso may
+        # carry links that are welded to it as well.
+        np.multiply(self._armature, 1.0 - scale, out=self._rotors)
+        np.add(self._rotors, self._rotor_coupling, out=self._rotors)
+        np.multiply(self._offset, self._torso_share, out=self._rest)
+        np.add(self._described_lever, self._rest, out=self._lever)
 
 
 @kernel

@@ -9,17 +9,20 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from ...mathematics.compiling.kernel_call import KernelCall
 from ...robots.ball_feet import ball_feet
 from ...robots.description import RobotDescription
-from ...robots.five_joint_leg import (
-    Leg,
-    find_leg,
-    forward,
-    inverse,
-    inverse_velocity,
-    jacobian,
+from ...robots.five_joint_leg import Leg, find_leg
+from ...robots.five_joint_reach import pitched_line
+from ...robots.five_joint_track import (
+    FootMotion,
+    LegTargets,
+    follow_foot,
+    leg_geometry,
+    leg_scratch,
+    leg_settings,
+    watch_line,
 )
-from ...robots.five_joint_reach import keep_along, line_rate, pitched_line, slide, slow_stretch
 from ...robots.limb import FootKind, Limb, chain_to, read_limb
 from ...robots.limb_error import aim, turning
 from ...robots.limb_inverse import (
@@ -152,6 +155,8 @@ class LegInverseKinematics(Block):
 
     def setup(self) -> None:
         robot, p = self.robot, self.params
+        self.leg_settings = leg_settings()
+        self.on_parameters()
         self._legs: list[_ClosedForm | _LeastSquares] = []
         for foot in range(len(robot.feet)):
             leg = find_leg(robot, foot) if p.method == "auto" else None
@@ -164,6 +169,12 @@ class LegInverseKinematics(Block):
             for k, joint in enumerate(robot.joints)
             if joint.name in robot.held
         ]
+
+    def on_parameters(self) -> None:
+        p, settings = self.params, self.leg_settings
+        settings.softness[0], settings.turn_length[0] = p.softness, p.turn_length
+        settings.damping[0], settings.speed_limit[0] = p.damping, p.speed_limit
+        settings.slides[0] = p.beyond == "slide"
 
     def step(self) -> None:
         target = self.target
@@ -189,58 +200,26 @@ class _ClosedForm:
     """One five-joint leg of the block, solved in closed form."""
 
     def __init__(self, block: LegInverseKinematics, foot: int, leg: Leg) -> None:
-        self.block, self.foot, self.leg = block, foot, leg
-        leg.limits[:, 0] += block.params.margin
-        leg.limits[:, 1] -= block.params.margin
-        self._angles, self._speeds = np.zeros(5), np.zeros(5)
-        self._line, self._rate = np.zeros(3), np.zeros(3)
-        self._sole, self._turn = np.zeros(3), np.zeros((3, 3))
-        self._velocity, self._place = np.zeros(3), np.zeros(3)
-        self._jacobian, self._rows = np.zeros((6, 5)), np.zeros((5, 5))
-        self._turns, self._normal = np.zeros((3, 5)), np.zeros((5, 5))
+        feet, target, scratch = block.feet, block.target, leg_scratch()
+        self._watch = KernelCall(
+            watch_line, feet.rotation[foot], block.params.follow == "pitch",
+            block.reference.foot_pitch[foot : foot + 1].reshape(()), block.period,
+            block.memory.known, block.memory.direction[foot], scratch,
+        )  # fmt: skip
+        self._follow = KernelCall(
+            follow_foot, leg_geometry(leg, block.params.margin), foot,
+            FootMotion(feet.position[foot], feet.velocity[foot], feet.rotation[foot]),
+            block.joints.position, block.leg_settings, scratch,
+            LegTargets(target.position, target.velocity, target.reachable),
+        )  # fmt: skip
 
     def note(self) -> None:
         """Take the line that is wanted, and how fast it turns."""
-        block, foot = self.block, self.foot
-        rotation = block.feet.rotation[foot]
-        self._line[:] = rotation[:, 0]
-        if block.params.follow == "pitch":
-            pitched_line(rotation, float(block.reference.foot_pitch[foot]), self._line)
-        known = bool(block.memory.known[()])
-        line_rate(self._line, block.memory.direction[foot], block.period, known, self._rate)
+        self._watch.run()
 
     def solve(self) -> None:
         """The joints' positions and velocities."""
-        block, foot, leg, p = self.block, self.foot, self.leg, self.block.params
-        feet, target, angles, turn = block.feet, block.target, self._angles, self._turn
-        yaw = float(block.joints.position[leg.joints[0]])
-        inside, share = inverse(
-            leg.hip, leg.plane, leg.signs, leg.limits, feet.position[foot], self._line,
-            p.softness, yaw, angles,
-        )  # fmt: skip
-        target.reachable[foot] = inside
-        np.clip(feet.velocity[foot], -_FASTEST, _FASTEST, out=self._velocity)
-        if not inside and p.beyond == "slide":
-            slid, kept = slide(
-                leg.hip, leg.plane, leg.signs, leg.limits, feet.position[foot],
-                feet.rotation[foot], p.softness, yaw, self._place, angles,
-            )  # fmt: skip
-            if slid:
-                share = kept
-                keep_along(feet.rotation[foot, :, 2], self._velocity)
-        forward(leg.hip, leg.plane, leg.signs, angles, self._sole, turn)
-        jacobian(leg.plane, leg.signs, angles, self._jacobian)
-        slow_stretch(leg.hip, leg.plane, self._sole, turn, share, self._velocity)
-        inverse_velocity(
-            self._jacobian, turn, self._velocity, self._rate, p.turn_length, p.damping,
-            self._rows, self._turns, self._normal, self._speeds,
-        )  # fmt: skip
-        limit = p.speed_limit
-        for i, joint in enumerate(leg.joints):
-            angle, speed = float(angles[i]), float(self._speeds[i])
-            held = angle <= leg.limits[i, 0] or angle >= leg.limits[i, 1]
-            target.position[joint] = angle
-            target.velocity[joint] = 0.0 if held else min(max(speed, -limit), limit)
+        self._follow.run()
 
 
 class _LeastSquares:

@@ -6,24 +6,29 @@ from collections.abc import Iterable
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.constants import GRAVITY
 from ...mathematics.quadratic_program import QuadraticProgramSolver
 from ...mathematics.whole_body_qp import (
     Bounds,
-    CostScratch,
-    FrictionCone,
     RigidBodyTerms,
     TaskRows,
     TorqueSpeedCurves,
-    assemble_cost,
-    base_dynamics,
-    friction_pyramids,
     joint_torque,
-    motor_limits,
     share_weight,
-    torque_limits,
+)
+from ...mathematics.whole_body_solution import (
+    JOINT_LIMITS,
+    MOTOR_LIMITS,
+    NO_LIMITS,
+    SOLVED,
+    Motors,
+    Solution,
+    Weights,
+    limit_motors,
+    solution_memory,
+    solve_whole_body,
 )
 from ...robots.description import RobotDescription
 from ...runtime.language.block import Block, Context, Input, Misfit, Output, State
@@ -40,9 +45,10 @@ from ..signals import (
 from .task_gains import TaskGains
 from .tasks.choose import OWN_TASKS, PHASE_KINDS, ChosenTask, TaskChoiceError, choose_tasks
 from .tasks.task import Situation, Task, TaskChoice
-from .whole_body_program import WholeBodyProgram
+from .whole_body_program import FullProgram
 
-Array = NDArray[np.float64]
+OWN_SOLVER = "active_set"
+"""The name of the method that needs no library."""
 
 
 class SolverMemory(Signal):
@@ -82,28 +88,37 @@ class WholeBodyController(Block):
     the same index. ``motor`` bounds the torque of every motor, through the transmission, by its
     torque-speed curve at its present speed, which is exact also for differential joints.
 
+    **Solution.** By default (``active_set``) accelerations and torques are eliminated, which leaves
+    a program in the contact forces, and a dual active-set method solves it from a cold start, so
+    the solution is exact up to rounding and depends on the inputs alone
+    (``mathematics/whole_body_reduction``). Where it finds none, the whole program is given to DAQP.
+    With another ``solver`` every tick's whole program is given to that one.
+
     Without a point in stance there is nothing to solve: torque, force and acceleration are zero,
     and the command counts as solved.
 
-    If the solver fails, the torque is the last solved one times ``fallback_decay`` to the power of
+    If no solution is found, the torque is the last solved one times ``fallback_decay`` to the power of
     the number of ticks since, for ``fallback_ticks`` ticks. After these it is the torque that
     carries the weight, shared equally by the points in stance, with no acceleration. Failures are
     counted.
 
     The block works for any robot with a floating base and feet. It does no feedback on joints
-    (``JointPD`` does) and keeps no solver state: with a cold start the solution depends on the
-    inputs alone. The load report names a solver that is not installed, an unknown task or gain, and
+    (``JointPD`` does) and keeps no solver state. The load report names a solver that is not installed, an unknown task or gain, and
     feet that can carry no load.
     """
 
-    array_allocations = 12
-    allocation_reason = "qpsolvers and the solver behind it return new arrays for every problem"
+    array_allocations = 14
+    allocation_reason = (
+        "where the own method fails, qpsolvers and the solver behind it return new arrays"
+    )
 
     class Params(Parameters):
         tasks: list[str | TaskChoice] = parameter(
             list(OWN_TASKS), min_length=1, text="the tasks, each an objective for the acceleration"
         )
-        solver: str = parameter("daqp", text="any dense solver that qpsolvers finds installed")
+        solver: str = parameter(
+            OWN_SOLVER, text="active_set, or any dense solver that qpsolvers finds installed"
+        )
         limits: Literal["none", "joint", "motor"] = parameter("motor", text="torque limits")
         torque_margin: float = live_parameter(
             0.97, gt=0.0, le=1.0, text="share of the limits that is used"
@@ -165,9 +180,12 @@ class WholeBodyController(Block):
         if not robot.contacts:
             yield Misfit(f"{robot.name} has no contact points, so its feet can carry no load")
         try:
-            QuadraticProgramSolver.check_name(params.solver)
+            if params.solver != OWN_SOLVER:
+                QuadraticProgramSolver.check_name(params.solver)
         except LookupError as error:
-            yield Misfit(str(error), parameter="solver", found=params.solver, fix="solver: daqp")
+            yield Misfit(
+                str(error), parameter="solver", found=params.solver, fix=f"solver: {OWN_SOLVER}"
+            )
         for foot in robot.feet:
             if foot.link == robot.base:
                 yield Misfit(f"foot {foot.name} of {robot.name} is part of the base, not of a leg")
@@ -189,35 +207,39 @@ class WholeBodyController(Block):
             yield Misfit(str(error), parameter="tasks")
 
     def setup(self) -> None:
-        robot, p = self.robot, self.params
-        self._solver = QuadraticProgramSolver(p.solver)
+        robot, p, terms, command = self.robot, self.params, self.terms, self.command
         self._weight = robot.total_mass * GRAVITY
         n_joints, n_contacts, n = len(robot.joints), len(robot.contacts), 6 + len(robot.joints)
-        self._motors, self._to_motor = robot.motors, robot.joint_to_motor
-        motor = p.limits == "motor"
-        self._transmission = robot.torque_to_motor if motor else np.eye(n_joints)
-        limit_rows = 0 if p.limits == "none" else 2 * n_joints
-        self._bounds = Bounds(np.zeros(n_joints), np.zeros(n_joints))
-        self._curves = TorqueSpeedCurves(
-            np.zeros(n_joints), self._motors.corner_speed, self._motors.no_load_speed
-        )
-        self._speed, self._product, self._still = (
+        self._weights = Weights(*(np.zeros(1) for _ in Weights._fields))
+        limited, by_motor = p.limits != "none", p.limits == "motor"
+        limits = MOTOR_LIMITS if by_motor else JOINT_LIMITS if limited else NO_LIMITS
+        motors = robot.motors
+        curves = TorqueSpeedCurves(np.zeros(n_joints), motors.corner_speed, motors.no_load_speed)
+        self._motors = Motors(
+            robot.joint_to_motor,
+            robot.torque_to_motor if by_motor else np.eye(n_joints),
+            curves,
             np.zeros(n_joints),
-            np.zeros(n_joints),
-            np.zeros(n),
+            Bounds(np.zeros(n_joints), np.zeros(n_joints)),
         )
-        terms = self.terms
+        self._product, self._still = np.zeros(n_joints), np.zeros(n)
         self._model = RigidBodyTerms(
             terms.mass_matrix, terms.nonlinear_effects, terms.contact_jacobian
         )
         self._build_tasks(robot, n)
         self.on_parameters()
-        self._active = np.zeros(n_contacts, dtype=np.int64)
-        # There is a program for every number of points in stance, each of its own size, because
-        # fixing forces to zero by bounds would leave the feasible set without an interior.
-        self._programs = [
-            WholeBodyProgram.of_size(n, count, limit_rows) for count in range(n_contacts + 1)
-        ]
+        self._code = np.zeros(1, dtype=np.int64)
+        self._solve = KernelCall(
+            solve_whole_body, self._rows, self._model, self.phase.stance, self.joints.velocity,
+            self._weights, limits, self._motors, solution_memory(n, n_contacts),
+            Solution(command.torque, command.acceleration, command.force, self._code),
+        )  # fmt: skip
+        self._limit = KernelCall(limit_motors, self.joints.velocity, limits, self._motors)
+        self._own = p.solver == OWN_SOLVER
+        self._other = FullProgram(
+            "daqp" if self._own else p.solver, self._rows, self._model, self._motors,
+            self._weights, limited=limited, n_contacts=n_contacts,
+        )  # fmt: skip
 
     def _build_tasks(self, robot: RobotDescription, n: int) -> None:
         """The chosen tasks, each with its part of the rows."""
@@ -231,7 +253,6 @@ class WholeBodyController(Block):
         ]
         total = sum(counts)
         self._rows = TaskRows(np.zeros((total, n)), np.zeros(total), np.zeros(total))
-        self._scratch = CostScratch(np.zeros((total, n)), np.zeros((n, n)), np.zeros(n))
         self._tasks: list[Task[Any]] = []
         first = 0
         for chosen, count in zip(self._chosen, counts, strict=True):
@@ -240,10 +261,12 @@ class WholeBodyController(Block):
             first += count
 
     def on_parameters(self) -> None:
-        p = self.params
-        most = 8.0 * self._weight if p.force_max is None else p.force_max
-        self._cone = FrictionCone(p.friction, p.force_min, most)
-        np.multiply(p.torque_margin, self._motors.peak_torque, out=self._curves.peak)
+        p, weights = self.params, self._weights
+        weights.acceleration[0], weights.force[0] = p.acceleration_weight, p.force_weight
+        weights.friction[0], weights.force_min[0] = p.friction, p.force_min
+        weights.force_max[0] = 8.0 * self._weight if p.force_max is None else p.force_max
+        peak = self.robot.motors.peak_torque
+        np.multiply(p.torque_margin, peak, out=self._motors.curves.peak)
         self._gains = {
             kind: [
                 task.prepare(chosen.gains(kind, getattr(p, kind)))
@@ -254,73 +277,48 @@ class WholeBodyController(Block):
 
     def step(self) -> None:
         memory, command = self.memory, self.command
-        count = self._find_stance()
-        command.force[...] = 0.0
-        command.acceleration[...] = 0.0
-        if count == 0:
-            command.torque[...] = 0.0
-            memory.torque[...] = 0.0
+        if not any(self.phase.stance.tolist()):
+            for array in (command.force, command.acceleration, command.torque, memory.torque):
+                array.fill(0.0)
             memory.failed[()] = 0
             command.solved[()] = True
             command.failures[()] = memory.failures
             return
-        program = self._programs[count]
         phase = int(self.phase.phase)
         kind = "thrust" if phase == Phase.THRUST else "landing" if phase > Phase.THRUST else "stand"
-        gains = self._gains[kind]
-        for i in range(len(gains)):
-            self._tasks[i].update(gains[i])
-        self._assemble(program, count)
-        answer = self._solver.solve(
-            program.cost.hessian, program.cost.gradient,
-            program.inequality.matrix, program.inequality.bound,
-            program.equality.matrix, program.equality.bound,
-        )  # fmt: skip
-        if answer is None:
-            self._fall_back()
-        else:
-            self._take(answer, count)
+        for task, gains in zip(self._tasks, self._gains[kind], strict=True):
+            task.update(gains)
+        solved = False
+        if self._own:
+            self._solve.run()
+            solved = int(self._code[0]) == SOLVED
+        if not solved:
+            solved = self._solve_otherwise()
+        if solved:
             memory.torque[...] = command.torque
             memory.failed[()] = 0
-        command.solved[()] = answer is not None
+        else:
+            self._fall_back()
+        command.solved[()] = solved
         command.failures[()] = memory.failures
 
-    def _find_stance(self) -> int:
-        count = 0
-        for point in range(self._active.shape[0]):
-            if self.phase.stance[point]:
-                self._active[count] = point
-                count += 1
-        return count
-
-    def _assemble(self, program: WholeBodyProgram, count: int) -> None:
-        p = self.params
-        active, n = self._active[:count], self._still.shape[0]
-        assemble_cost(
-            self._rows, p.acceleration_weight, p.force_weight, self._scratch, program.cost
-        )
-        base_dynamics(self._model, active, program.equality)
-        friction_pyramids(count, n, self._cone, program.cones)
-        if p.limits == "none":
-            return
-        if p.limits == "motor":
-            np.dot(self._to_motor, self.joints.velocity, self._speed)
-            motor_limits(self._speed, self._curves, self._bounds)
-        else:
-            self._bounds.upper[:] = self._curves.peak
-            np.negative(self._curves.peak, self._bounds.lower)
-        torque_limits(
-            self._model, active, self._transmission, self._bounds, program.scratch, program.limits
-        )
-
-    def _take(self, answer: Array, count: int) -> None:
+    def _solve_otherwise(self) -> bool:
+        """Solve the program in accelerations and forces by the chosen solver, or where the own
+        method has failed by DAQP. Returns whether it was solved."""
         command, n = self.command, self._still.shape[0]
+        command.force.fill(0.0)
+        command.acceleration.fill(0.0)
+        active = np.flatnonzero(self.phase.stance)
+        self._limit.run()
+        answer = self._other.solve(active)
+        if answer is None:
+            return False
         command.acceleration[...] = answer[:n]
-        for j in range(count):
-            command.force[self._active[j]] = answer[n + 3 * j : n + 3 * j + 3]
+        command.force[active] = answer[n:].reshape(-1, 3)
         joint_torque(
             self._model, command.acceleration, command.force, self._product, command.torque
         )
+        return True
 
     def _fall_back(self) -> None:
         p, memory, command = self.params, self.memory, self.command

@@ -5,8 +5,27 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
-from ...mathematics.whole_body_qp import PYRAMID_ROWS, Constraints, Cost, TorqueScratch
+from ...mathematics.quadratic_program import QuadraticProgramSolver
+from ...mathematics.whole_body_qp import (
+    PYRAMID_ROWS,
+    Constraints,
+    Cost,
+    CostScratch,
+    FrictionCone,
+    RigidBodyTerms,
+    TaskRows,
+    TorqueScratch,
+    assemble_cost,
+    base_dynamics,
+    friction_pyramids,
+    torque_limits,
+)
+from ...mathematics.whole_body_solution import Motors, Weights
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -41,3 +60,65 @@ class WholeBodyProgram:
                 np.zeros((n_joints, size)), np.zeros((n_joints, size)), np.zeros(n_joints)
             ),
         )
+
+
+class FullProgram:
+    """The program in accelerations and forces, as any solver of qpsolvers takes it.
+
+    There is a program for every number of points in stance, each of its own size, because fixing
+    forces to zero by bounds would leave the feasible set without an interior.
+
+    Args:
+        solver: the solver's name.
+        rows: the tasks' rows, which the tasks write.
+        model: the rigid-body terms.
+        limited: whether torques are limited.
+        n_contacts: the number of contact points.
+    """
+
+    def __init__(
+        self,
+        solver: str,
+        rows: TaskRows,
+        model: RigidBodyTerms,
+        motors: Motors,
+        weights: Weights,
+        *,
+        limited: bool,
+        n_contacts: int,
+    ) -> None:
+        n = rows.jacobian.shape[1]
+        total = rows.jacobian.shape[0]
+        self._solver = QuadraticProgramSolver(solver)
+        self._rows, self._model, self._motors, self._weights = rows, model, motors, weights
+        self._limited, self._n = limited, n
+        self._scratch = CostScratch(np.zeros((total, n)), np.zeros((n, n)), np.zeros(n))
+        limit_rows = 2 * (n - 6) if limited else 0
+        self.programs = [
+            WholeBodyProgram.of_size(n, count, limit_rows) for count in range(n_contacts + 1)
+        ]
+
+    def assemble(self, active: Indices) -> WholeBodyProgram:
+        """The program for the points ``active`` in stance; the torques' bounds are up to date."""
+        program, w, count = self.programs[len(active)], self._weights, len(active)
+        assemble_cost(
+            self._rows, float(w.acceleration[0]), float(w.force[0]), self._scratch, program.cost
+        )
+        base_dynamics(self._model, active, program.equality)
+        cone = FrictionCone(float(w.friction[0]), float(w.force_min[0]), float(w.force_max[0]))
+        friction_pyramids(count, self._n, cone, program.cones)
+        if self._limited:
+            torque_limits(
+                self._model, active, self._motors.to_torque, self._motors.bounds,
+                program.scratch, program.limits,
+            )  # fmt: skip
+        return program
+
+    def solve(self, active: Indices) -> Array | None:
+        """The accelerations and then the forces of the points ``active``; none if it fails."""
+        program = self.assemble(active)
+        return self._solver.solve(
+            program.cost.hessian, program.cost.gradient,
+            program.inequality.matrix, program.inequality.bound,
+            program.equality.matrix, program.equality.bound,
+        )  # fmt: skip

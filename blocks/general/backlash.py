@@ -7,10 +7,11 @@ import numpy as np
 from ...runtime.language.block import Block, Input, Output, State
 from ...runtime.language.parameters import live_parameter
 from .elements import Elements, PerElement, spread
+from .quantity_parameters import Keeps
 from .vector import Vector
 
 
-class Backlash(Block):
+class Backlash(Keeps, Block):
     """Play: y[n] = min(max(y[n-1], u[n] - width / 2), u[n] + width / 2), from y = 0."""
 
     class Params(Elements):

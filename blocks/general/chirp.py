@@ -8,10 +8,11 @@ from typing import Literal
 from ...runtime.language.block import Block, Output
 from ...runtime.language.parameters import live_parameter, parameter
 from .elements import Elements
+from .quantity_parameters import Says, SourceParameters
 from .vector import Vector
 
 
-class Chirp(Block):
+class Chirp(Says, Block):
     """A sine that sweeps from one frequency to another: y = offset + amplitude sin(phi(t)).
 
     With frequencies f0 to f1 and duration D the phase is, for t <= D,
@@ -22,7 +23,12 @@ class Chirp(Block):
     After D the sine goes on at f1 with no jump of its phase.
     """
 
-    class Params(Elements):
+    class Params(Elements, SourceParameters):
+        in_unit = (
+            "amplitude",
+            "offset",
+        )
+
         start_frequency: float = parameter(0.1, unit="Hz", gt=0.0, text="frequency at time zero")
         end_frequency: float = parameter(10.0, unit="Hz", gt=0.0, text="frequency at the end")
         duration: float = parameter(10.0, unit="s", gt=0.0, text="of the sweep")

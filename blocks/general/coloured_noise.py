@@ -11,6 +11,7 @@ from ...runtime.language.parameters import live_parameter, parameter
 from ...runtime.language.random_stream import RandomStream, StreamState
 from ...runtime.language.signals import Field
 from .elements import Elements, PerElement, spread
+from .quantity_parameters import Says, SourceParameters
 from .vector import Vector
 
 
@@ -21,7 +22,7 @@ class NoiseState(StreamState):
     started = Field((), dtype="bool", text="whether there was a run")
 
 
-class ColouredNoise(Block):
+class ColouredNoise(Says, Block):
     """First-order Gauss-Markov noise, sampled exactly: y = std x with
 
     x[n] = f x[n-1] + sqrt(1 - f^2) N(0, 1), f = exp(-T / correlation_time), x[0] = N(0, 1).
@@ -30,7 +31,9 @@ class ColouredNoise(Block):
     correlation time. T is the block's period. The stream depends on ``seed`` and the block's path.
     """
 
-    class Params(Elements):
+    class Params(Elements, SourceParameters):
+        in_unit = ("std",)
+
         std: PerElement = live_parameter(1.0, text="standard deviation")
         correlation_time: float = parameter(
             0.1, unit="s", gt=0.0, text="in which the autocorrelation falls to 1 / e"

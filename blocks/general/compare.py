@@ -8,7 +8,8 @@ from typing import Any, Literal
 import numpy as np
 
 from ...runtime.language.block import Block, Input, Output
-from ...runtime.language.parameters import parameter
+from ...runtime.language.parameters import Parameters, parameter
+from ...runtime.language.quantities import Carried, Given
 from .elements import Elements
 from .flags import Flags
 from .vector import Vector
@@ -34,6 +35,12 @@ class Compare(Block):
     a = Input(Vector, text="the left side")
     b = Input(Vector, text="the right side")
     y = Output(Flags, text="where it holds")
+
+    @classmethod
+    def carried(cls, params: Parameters, given: Given) -> Carried:
+        """Both sides must be the same quantity."""
+        given.alike("a", "b")
+        return {}
 
     def setup(self) -> None:
         """Choose the comparison."""

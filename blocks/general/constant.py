@@ -10,13 +10,16 @@ import numpy as np
 from ...robots.description import RobotDescription
 from ...runtime.language.block import Block, Output
 from ...runtime.language.parameters import Parameters, live_parameter
+from .quantity_parameters import Says, SourceParameters
 from .vector import Vector
 
 
-class Constant(Block):
+class Constant(Says, Block):
     """A constant vector: y[n] = value. It has as many elements as ``value``."""
 
-    class Params(Parameters):
+    class Params(SourceParameters):
+        in_unit = ("value",)
+
         value: list[float] = live_parameter(text="the vector", min_length=1)
 
     params: Params

@@ -11,10 +11,11 @@ from ...runtime.language.block import Block, Input, Misfit, Output
 from ...runtime.language.parameters import Parameters, live_parameter
 from .bounds import crossed_bounds
 from .elements import Elements, PerElement, spread
+from .quantity_parameters import Keeps
 from .vector import Vector
 
 
-class DeadZone(Block):
+class DeadZone(Keeps, Block):
     """Nothing within a zone, and what goes beyond it outside: y = u - min(max(u, lower), upper)."""
 
     class Params(Elements):

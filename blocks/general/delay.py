@@ -8,6 +8,7 @@ from ...runtime.language.block import Block, Input, Output, State
 from ...runtime.language.parameters import parameter
 from ...runtime.language.signals import Field, Signal
 from .initial_value import InitialParameters
+from .quantity_parameters import Keeps
 from .vector import Vector
 
 
@@ -18,7 +19,7 @@ class Line(Signal):
     next = Field((), dtype="int64", text="the place of the oldest, which is the next to be written")
 
 
-class Delay(Block):
+class Delay(Keeps, Block):
     """The input of k runs before: y[n] = u[n-k] with k = ``samples``, and initial for n < k.
 
     A Moore block, so it breaks a loop. A wire delays as well: ``{from: a.y, delay: 3}``.

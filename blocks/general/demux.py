@@ -9,6 +9,7 @@ import numpy as np
 from ...robots.description import RobotDescription
 from ...runtime.language.block import Block, Input, Output
 from ...runtime.language.parameters import Parameters
+from ...runtime.language.quantities import Carried, Given
 from .pairs import First, Joined, PairSizes, Second
 
 
@@ -28,6 +29,11 @@ class Demux(Block):
         """``n`` is the sum of ``n_a`` and ``n_b``."""
         assert isinstance(params, cls.Params)
         return params.sizes()
+
+    @classmethod
+    def carried(cls, params: Parameters, given: Given) -> Carried:
+        """Both are what u is."""
+        return {"a": given["u"], "b": given["u"]}
 
     def step(self) -> None:
         """Split."""

@@ -5,8 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from ...runtime.language.block import Block, Input, Output, State
-from ...runtime.language.parameters import live_parameter
+from ...runtime.language.parameters import Parameters, live_parameter
+from ...runtime.language.quantities import Carried, Given
 from ...runtime.language.signals import Field, Signal
+from ...runtime.language.unit_algebra import SECOND
 from .elements import Elements
 from .vector import Vector
 
@@ -34,6 +36,12 @@ class FilteredDerivative(Block):
     u = Input(Vector, text="what is differentiated")
     y = Output(Vector, text="its rate per second")
     x = State(DerivativeMemory, text="the input and the derivative before")
+
+    @classmethod
+    def carried(cls, params: Parameters, given: Given) -> Carried:
+        """The unit of the input by a second."""
+        u = given["u"]
+        return {"y": u and u.times(SECOND, -1)}
 
     def setup(self) -> None:
         """Compute the weights."""

@@ -8,7 +8,11 @@ from typing import Any, Literal
 import numpy as np
 
 from ...runtime.language.block import Block, Input, Output
-from ...runtime.language.parameters import parameter
+from ...runtime.language.errors import UnitError
+from ...runtime.language.parameters import Parameters, parameter
+from ...runtime.language.quantities import Carried, Given, Quantity
+from ...runtime.language.unit_algebra import ONE, root
+from ...runtime.language.units import parse_unit
 from .elements import Elements
 from .vector import Vector
 
@@ -25,6 +29,33 @@ UFUNCS: Mapping[str, Any] = {
 }  # fmt: skip
 
 
+_SAME = ("abs", "negative", "floor", "ceil", "round")
+_OF_ANGLES = ("sin", "cos", "tan")
+_TO_ANGLES = ("asin", "acos", "atan")
+
+
+def _quantity(name: str, given: Given) -> Quantity | None:
+    """What a function makes of the quantity of ``u``."""
+    u = given["u"]
+    if u is None or name in _SAME:
+        return u
+    if name == "reciprocal":
+        return Quantity(frame=u.frame).times(u.unit, -1)
+    if name == "square":
+        return u.times(u.unit)
+    if name == "sqrt":
+        try:
+            return Quantity(None if u.unit is None else root(u.unit), u.frame)
+        except UnitError as error:
+            given.refuse("u", str(error))
+            return Quantity(None)
+    if name in _OF_ANGLES:
+        given.demand("u", ("rad", ""), f"{name} takes angles in rad")
+    elif name != "sign":
+        given.demand("u", ("",), f"{name} takes plain numbers")
+    return Quantity(parse_unit("rad") if name in _TO_ANGLES else ONE)
+
+
 class Function(Block):
     """A function of every element by itself: y = f(u).
 
@@ -39,6 +70,12 @@ class Function(Block):
     params: Params
     u = Input(Vector, text="the arguments")
     y = Output(Vector, text="the function's values")
+
+    @classmethod
+    def carried(cls, params: Parameters, given: Given) -> Carried:
+        """Angles go into sin, cos and tan; roots need even powers."""
+        assert isinstance(params, cls.Params)
+        return {"y": _quantity(params.function, given)}
 
     def setup(self) -> None:
         """Choose the function."""

@@ -7,16 +7,19 @@ import numpy as np
 from ...runtime.language.block import Block, Input, Output
 from ...runtime.language.parameters import live_parameter
 from .elements import Elements, PerElement
+from .quantity_parameters import InUnit, Scales
 from .vector import Vector
 
 
-class Gain(Block):
+class Gain(Scales, Block):
     """The input times a constant: y = gain u.
 
     There may be one gain for each element. ``MatrixGain`` multiplies by a matrix.
     """
 
-    class Params(Elements):
+    class Params(Elements, InUnit):
+        in_unit = ("gain",)
+
         gain: PerElement = live_parameter(1.0, text="the factor")
 
     params: Params

@@ -9,6 +9,8 @@ import numpy as np
 from ...robots.description import RobotDescription
 from ...runtime.language.block import Block, Input, Misfit, Output, State
 from ...runtime.language.parameters import Parameters, parameter
+from ...runtime.language.quantities import Carried, Given
+from ...runtime.language.unit_algebra import SECOND
 from .bounds import crossed_bounds
 from .elements import PerElement, spread_bound
 from .flags import NEVER, Flag
@@ -39,6 +41,12 @@ class Integrator(Block):
         """The bounds must not cross."""
         assert isinstance(params, cls.Params)
         return crossed_bounds(params.lower, params.upper, params.n)
+
+    @classmethod
+    def carried(cls, params: Parameters, given: Given) -> Carried:
+        """The unit of the rate times a second."""
+        u = given["u"]
+        return {"y": u and u.times(SECOND)}
 
     def setup(self) -> None:
         """Start from the initial value, and keep the bounds at hand."""

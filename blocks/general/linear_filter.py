@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from ...mathematics.second_order_filter import advance, settle
 from ...runtime.language.block import Block, Input, Misfit, Output, State
 from ...runtime.language.signals import Field, Signal
+from .quantity_parameters import Keeps
 from .vector import Vector
 
 
@@ -20,7 +21,7 @@ class FilterMemory(Signal):
     started = Field((), dtype="bool", text="whether there was an input")
 
 
-class LinearFilter(Block):
+class LinearFilter(Keeps, Block):
     """The base of the filters: ``coefficients`` says which filter it is."""
 
     u = Input(Vector, text="what is filtered")

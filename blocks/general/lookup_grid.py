@@ -13,6 +13,7 @@ from ...robots.description import RobotDescription
 from ...runtime.language.block import Block, Input, Misfit, Output
 from ...runtime.language.parameters import Parameters, parameter
 from ...runtime.language.signals import Field, Signal
+from .quantity_parameters import Says, SourceParameters
 from .tables import unsorted_points
 from .vector import Vector
 
@@ -20,10 +21,10 @@ from .vector import Vector
 class TableValue(Signal):
     """What a table of several variables gives: a vector of one number."""
 
-    value = Field(1, text="the number")
+    value = Field(1, carried=True, text="the number")
 
 
-class LookupGrid(Block):
+class LookupGrid(Says, Block):
     """One number from a table on a grid, multilinear between its points: y = table(u[0], u[1], ...).
 
     ``axes`` holds the rising points of every variable; ``values`` the table in row-major order: the
@@ -31,7 +32,9 @@ class LookupGrid(Block):
     the outer cells go on (``extrapolate``). It takes time in proportion to 2^n for n variables.
     """
 
-    class Params(Parameters):
+    class Params(SourceParameters):
+        in_unit = ("values",)
+
         axes: list[list[float]] = parameter(
             text="for every variable its points, rising", min_length=1, max_length=8
         )

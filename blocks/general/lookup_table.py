@@ -12,18 +12,21 @@ from ...robots.description import RobotDescription
 from ...runtime.language.block import Block, Input, Misfit, Output
 from ...runtime.language.parameters import Parameters, parameter
 from .elements import Elements
+from .quantity_parameters import Says, SourceParameters
 from .tables import unsorted_points
 from .vector import Vector
 
 
-class LookupTable(Block):
+class LookupTable(Says, Block):
     """The line through the points (points[k], values[k]), evaluated at every element of the input.
 
     Beyond the first and last point the outer values hold (``clamp``) or the outer lines go on
     (``extrapolate``).
     """
 
-    class Params(Elements):
+    class Params(Elements, SourceParameters):
+        in_unit = ("values",)
+
         points: list[float] = parameter(text="inputs, rising", min_length=2)
         values: list[float] = parameter(text="the output at each of them", min_length=2)
         beyond: Literal["clamp", "extrapolate"] = parameter(

@@ -8,6 +8,7 @@ from ...runtime.language.block import Block, Input, Output, State
 from ...runtime.language.parameters import parameter
 from ...runtime.language.signals import Field, Signal
 from .elements import Elements
+from .quantity_parameters import Keeps
 from .vector import Vector
 
 
@@ -18,7 +19,7 @@ class Window(Signal):
     count = Field((), dtype="int64", text="how many inputs there were")
 
 
-class MovingAverage(Block):
+class MovingAverage(Keeps, Block):
     """The mean of the last inputs: y[n] = (u[n] + ... + u[n-k+1]) / k with k = ``samples``.
 
     At the start it is the mean of the inputs so far. The sum is made anew in every run, so no

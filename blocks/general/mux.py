@@ -9,6 +9,7 @@ import numpy as np
 from ...robots.description import RobotDescription
 from ...runtime.language.block import Block, Input, Output
 from ...runtime.language.parameters import Parameters
+from ...runtime.language.quantities import UNCHECKED, Carried, Given
 from .pairs import First, Joined, PairSizes, Second
 
 
@@ -28,6 +29,14 @@ class Mux(Block):
         """``n`` is the sum of ``n_a`` and ``n_b``."""
         assert isinstance(params, cls.Params)
         return params.sizes()
+
+    @classmethod
+    def carried(cls, params: Parameters, given: Given) -> Carried:
+        """What both have in common; the unit is not checked where they differ."""
+        a, b = given["a"], given["b"]
+        if a is None or b is None:
+            return {}
+        return {"y": a if a == b else UNCHECKED}
 
     def step(self) -> None:
         """Join."""

@@ -11,19 +11,19 @@ from ...runtime.language.signals import Field, Signal
 class First(Signal):
     """A vector of ``n_a`` numbers."""
 
-    value = Field("n_a", text="the first elements")
+    value = Field("n_a", carried=True, text="the first elements")
 
 
 class Second(Signal):
     """A vector of ``n_b`` numbers."""
 
-    value = Field("n_b", text="the elements behind them")
+    value = Field("n_b", carried=True, text="the elements behind them")
 
 
 class Joined(Signal):
     """A vector of ``n_a + n_b`` numbers."""
 
-    value = Field("n", text="first those of a, then those of b")
+    value = Field("n", carried=True, text="first those of a, then those of b")
 
 
 class PairSizes(Parameters):

@@ -10,10 +10,13 @@ from ...mathematics.pid import PidGains, PidMemory, start_pid, step_pid
 from ...robots.description import RobotDescription
 from ...runtime.language.block import Block, Input, Misfit, Output, State
 from ...runtime.language.parameters import Parameters, live_parameter
+from ...runtime.language.quantities import Carried, Given
 from ...runtime.language.signals import Field, Signal
+from ...runtime.language.unit_algebra import read_unit
 from .bounds import crossed_bounds
 from .elements import Elements, PerElement, spread, spread_bound
 from .flags import NEVER, Flag
+from .quantity_parameters import InUnit
 from .vector import Vector
 
 
@@ -39,9 +42,12 @@ class PID(Block):
 
     I[0] = 0 and D = 0 in the first run and where ``reset`` holds. (Astrom and Hagglund, Advanced PID
     Control, chapter 3.)
+
+    ``unit`` is the unit of kp: N m/rad, if r and y are angles and u is a torque. ki is in it per
+    second, and kd in it times seconds.
     """
 
-    class Params(Elements):
+    class Params(Elements, InUnit):
         kp: PerElement = live_parameter(1.0, text="proportional gain")
         ki: PerElement = live_parameter(0.0, text="integral gain, per second")
         kd: PerElement = live_parameter(0.0, text="derivative gain, in seconds")
@@ -69,6 +75,15 @@ class PID(Block):
         """The bounds must not cross."""
         assert isinstance(params, cls.Params)
         return crossed_bounds(params.lower, params.upper, params.n)
+
+    @classmethod
+    def carried(cls, params: Parameters, given: Given) -> Carried:
+        """u has the unit of the error times ``unit``, which the feedforward must have too."""
+        assert isinstance(params, cls.Params)
+        error = given.alike("setpoint", "measured")
+        u = error and error.times(read_unit(params.unit))
+        given.agree("feedforward", u, "it is added to the control")
+        return {"u": u}
 
     def setup(self) -> None:
         """Keep gains and memory at hand."""

@@ -9,17 +9,23 @@ import numpy as np
 from ...runtime.language.block import Block, Output
 from ...runtime.language.parameters import live_parameter, parameter
 from .elements import Elements, PerElement, spread
+from .quantity_parameters import Says, SourceParameters
 from .vector import Vector
 
 
-class Pulse(Block):
+class Pulse(Says, Block):
     """Rectangular pulses: y = offset + amplitude in the first ``width`` share of every period.
 
     In between, and before ``start``, y = offset. Edges fall on the first tick that is not before
     them.
     """
 
-    class Params(Elements):
+    class Params(Elements, SourceParameters):
+        in_unit = (
+            "amplitude",
+            "offset",
+        )
+
         duration: float = parameter(1.0, unit="s", gt=0.0, text="from one pulse to the next")
         width: float = parameter(0.5, ge=0.0, le=1.0, text="share of it that the pulse lasts")
         start: float = parameter(0.0, unit="s", ge=0.0, text="when the first pulse begins")

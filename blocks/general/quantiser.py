@@ -7,10 +7,11 @@ import numpy as np
 from ...runtime.language.block import Block, Input, Output
 from ...runtime.language.parameters import live_parameter
 from .elements import Elements
+from .quantity_parameters import Keeps
 from .vector import Vector
 
 
-class Quantiser(Block):
+class Quantiser(Keeps, Block):
     """The nearest whole multiple of a step: y = interval round(u / interval), halves to even."""
 
     class Params(Elements):

@@ -7,16 +7,19 @@ import numpy as np
 from ...runtime.language.block import Block, Output
 from ...runtime.language.parameters import live_parameter, parameter
 from .elements import Elements, PerElement, spread
+from .quantity_parameters import Says, SourceParameters
 from .vector import Vector
 
 
-class Ramp(Block):
+class Ramp(Says, Block):
     """Even growth: y = offset + slope min(max(t - start, 0), duration).
 
     Without ``duration`` it grows for ever.
     """
 
-    class Params(Elements):
+    class Params(Elements, SourceParameters):
+        in_unit = ("offset",)
+
         start: float = parameter(0.0, unit="s", ge=0.0, text="when it begins to grow")
         duration: float | None = parameter(None, unit="s", ge=0.0, text="how long it grows")
         slope: PerElement = live_parameter(1.0, text="growth per second")

@@ -8,6 +8,7 @@ from ...runtime.language.block import Block, Input, Output, State
 from ...runtime.language.parameters import live_parameter
 from ...runtime.language.signals import Field, Signal
 from .elements import Elements, PerElement, spread
+from .quantity_parameters import Keeps
 from .vector import Vector
 
 
@@ -18,7 +19,7 @@ class LastOutput(Signal):
     started = Field((), dtype="bool", text="whether there was one")
 
 
-class RateLimiter(Block):
+class RateLimiter(Keeps, Block):
     """The input, followed only so fast: y[n] = min(max(u[n], y[n-1] - T f), y[n-1] + T r).
 
     r and f are the rates ``rising`` and ``falling`` and T is the block's period. The first output

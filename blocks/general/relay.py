@@ -11,16 +11,22 @@ from ...runtime.language.block import Block, Input, Misfit, Output, State
 from ...runtime.language.parameters import Parameters, live_parameter
 from .elements import Elements
 from .flags import Flags
+from .quantity_parameters import Says, SourceParameters
 from .vector import Vector
 
 
-class Relay(Block):
+class Relay(Says, Block):
     """Two values with hysteresis: on from u >= switch_on, off from u <= switch_off.
 
     In between every element stays as it was; all begin off. y = on_value or off_value.
     """
 
-    class Params(Elements):
+    class Params(Elements, SourceParameters):
+        in_unit = (
+            "on_value",
+            "off_value",
+        )
+
         switch_on: float = live_parameter(0.5, text="the input from which it is on")
         switch_off: float = live_parameter(-0.5, text="the input down to which it stays on")
         on_value: float = live_parameter(1.0, text="the output when on")

@@ -10,6 +10,7 @@ import numpy as np
 from ...mathematics.rotations import rotate, rotate_back
 from ...runtime.language.block import Block, Input, Output
 from ...runtime.language.parameters import Parameters, parameter
+from ...runtime.language.quantities import Carried, Given, Quantity
 from .rotation_signals import Quaternion, Vector3, random_unit
 
 
@@ -32,6 +33,17 @@ class RotateVector(Block):
     ) -> Mapping[str, Mapping[str, Any]]:
         """A unit quaternion."""
         return {"rotation": random_unit(rng)}
+
+    @classmethod
+    def carried(cls, params: Parameters, given: Given) -> Carried:
+        """The vector must be in the first frame; the result is in the second."""
+        assert isinstance(params, cls.Params)
+        before, _, after = params.direction.split()
+        u = given["u"]
+        if u is None:
+            return {}
+        given.agree("u", Quantity(u.unit, before), f"the block turns vectors from {before}")
+        return {"y": Quantity(u.unit, after)}
 
     def setup(self) -> None:
         """Choose the direction."""

@@ -31,7 +31,7 @@ class EulerAngles(Signal):
 class Vector3(Signal):
     """A vector in space."""
 
-    value = Field(3, text="x, y, z")
+    value = Field(3, carried=True, text="x, y, z")
 
 
 def random_unit(rng: np.random.Generator) -> Mapping[str, Any]:

@@ -7,10 +7,11 @@ import numpy as np
 from ...runtime.language.block import Block, Input, Output, State
 from .flags import Flag
 from .initial_value import InitialParameters
+from .quantity_parameters import Keeps
 from .vector import Vector
 
 
-class SampleHold(Block):
+class SampleHold(Keeps, Block):
     """The input where ``trigger`` holds, and its last such value where it does not.
 
     Before the first sample y = initial.

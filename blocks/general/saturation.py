@@ -11,10 +11,11 @@ from ...runtime.language.block import Block, Input, Misfit, Output
 from ...runtime.language.parameters import Parameters, live_parameter
 from .bounds import crossed_bounds
 from .elements import Elements, PerElement, spread_bound
+from .quantity_parameters import Keeps
 from .vector import Vector
 
 
-class Saturation(Block):
+class Saturation(Keeps, Block):
     """Every element kept within its bounds: y = min(max(u, lower), upper).
 
     A bound that is left out does not bind.

@@ -11,16 +11,17 @@ from ...robots.description import RobotDescription
 from ...runtime.language.block import Block, Input, Misfit, Output
 from ...runtime.language.parameters import Parameters, parameter
 from ...runtime.language.signals import Field, Signal
+from .quantity_parameters import Keeps
 from .vector import Vector
 
 
 class Selected(Signal):
     """The ``m`` elements that were selected."""
 
-    value = Field("m", text="the elements, in the order asked for")
+    value = Field("m", carried=True, text="the elements, in the order asked for")
 
 
-class Selector(Block):
+class Selector(Keeps, Block):
     """Some elements of the input, in any order, also repeated: y[i] = u[elements[i]], from 0."""
 
     class Params(Parameters):

@@ -5,14 +5,20 @@ from __future__ import annotations
 import math
 
 from ...runtime.language.block import Block, Output
-from ...runtime.language.parameters import Parameters, live_parameter, parameter
+from ...runtime.language.parameters import live_parameter, parameter
+from .quantity_parameters import Says, SourceParameters
 from .vector import Vector
 
 
-class SineWave(Block):
+class SineWave(Says, Block):
     """A sine of time in every element: y = offset + amplitude sin(2 pi frequency t + phase)."""
 
-    class Params(Parameters):
+    class Params(SourceParameters):
+        in_unit = (
+            "amplitude",
+            "offset",
+        )
+
         n: int = parameter(1, ge=1, text="elements")
         amplitude: float = live_parameter(1.0, text="half of peak to peak")
         frequency: float = live_parameter(1.0, unit="Hz", ge=0.0, text="oscillations per second")

@@ -9,19 +9,13 @@ import numpy as np
 
 from ...mathematics.linear import add_product, multiply_vector
 from ...robots.description import RobotDescription
-from ...runtime.language.block import Block, Input, Misfit, Output, State
+from ...runtime.language.block import Misfit
 from ...runtime.language.parameters import Parameters, parameter
-from .linear_system import (
-    SystemInput,
-    SystemOutput,
-    SystemParameters,
-    SystemState,
-    example_system,
-)
+from .linear_system import LinearSystem, SystemParameters
 from .matrices import Matrix, matrix_rows
 
 
-class StateSpaceWithFeedthrough(Block):
+class StateSpaceWithFeedthrough(LinearSystem):
     """A linear system: y[n] = C x[n] + D u[n], x[n+1] = A x[n] + B u[n], x[0] = initial.
 
     With ``time: continuous`` A and B are those of dx/dt = A x + B u, discretised exactly for an
@@ -34,17 +28,6 @@ class StateSpaceWithFeedthrough(Block):
         _d_rows = matrix_rows("d")
 
     params: Params
-    u = Input(SystemInput, text="the inputs")
-    y = Output(SystemOutput, text="the outputs")
-    x = State(SystemState, text="the system's state")
-
-    @classmethod
-    def local_dimensions(
-        cls, params: Parameters, robot: RobotDescription | None
-    ) -> Mapping[str, int]:
-        """``n`` inputs, ``m`` outputs and the ``order``."""
-        assert isinstance(params, cls.Params)
-        return params.sizes()
 
     @classmethod
     def requires(cls, params: Parameters, robot: RobotDescription | None) -> Iterable[Misfit]:
@@ -59,20 +42,15 @@ class StateSpaceWithFeedthrough(Block):
     @classmethod
     def example_parameters(cls) -> Mapping[str, Any]:
         """An oscillator with feedthrough."""
-        return {**example_system(), "d": [[0.5, -1.0]]}
+        return {**super().example_parameters(), "d": [[0.5, -1.0]]}
 
     def setup(self) -> None:
         """Discretise, and start from the initial state."""
-        self._a, self._b = self.params.matrices(self.period)
-        self._c, self._d = np.array(self.params.c), np.array(self.params.d)
-        self._next = np.zeros(len(self._a))
-        if self.params.initial is not None:
-            self.x.value[...] = self.params.initial
+        super().setup()
+        self._d = np.array(self.params.d)
 
     def step(self) -> None:
         """Write the outputs and go on to the next state."""
         multiply_vector(self._c, self.x.value, self.y.value)
         add_product(self._d, self.u.value, self.y.value)
-        multiply_vector(self._a, self.x.value, self._next)
-        add_product(self._b, self.u.value, self._next)
-        np.copyto(self.x.value, self._next)
+        self.advance()

@@ -8,16 +8,22 @@ from ...runtime.language.block import Block, Output
 from ...runtime.language.parameters import live_parameter, parameter
 from .elements import Elements, PerElement, spread
 from .periods import first_tick
+from .quantity_parameters import Says, SourceParameters
 from .vector import Vector
 
 
-class Step(Block):
+class Step(Says, Block):
     """A vector that jumps once: y = before while t < at, y = after from then on.
 
     The jump comes in the first tick that is not before ``at``.
     """
 
-    class Params(Elements):
+    class Params(Elements, SourceParameters):
+        in_unit = (
+            "before",
+            "after",
+        )
+
         at: float = parameter(1.0, unit="s", ge=0.0, text="when the step comes")
         before: PerElement = live_parameter(0.0, text="the value before the step")
         after: PerElement = live_parameter(1.0, text="the value from the step on")

@@ -6,6 +6,7 @@ import numpy as np
 
 from ...runtime.language.block import Block, Input, Output
 from ...runtime.language.parameters import Parameters, live_parameter, parameter
+from ...runtime.language.quantities import Carried, Given
 from .vector import Vector
 
 
@@ -22,6 +23,11 @@ class Sum(Block):
     a = Input(Vector, text="the first")
     b = Input(Vector, text="the second")
     y = Output(Vector, text="the sum")
+
+    @classmethod
+    def carried(cls, params: Parameters, given: Given) -> Carried:
+        """Both inputs must be the same quantity, and so is the sum."""
+        return {"y": given.alike("a", "b")}
 
     def setup(self) -> None:
         """Keep the factors at hand."""

@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from ...runtime.language.block import Block, Input, Output
+from ...runtime.language.parameters import Parameters
+from ...runtime.language.quantities import Carried, Given
 from .elements import Elements
 from .flags import Flag
 from .vector import Vector
@@ -19,6 +21,11 @@ class Switch(Block):
     a = Input(Vector, text="taken where the condition holds")
     b = Input(Vector, text="taken where it does not")
     y = Output(Vector, text="the one that is taken")
+
+    @classmethod
+    def carried(cls, params: Parameters, given: Given) -> Carried:
+        """Both vectors must be the same quantity, and so is the output."""
+        return {"y": given.alike("a", "b")}
 
     def step(self) -> None:
         """Choose."""

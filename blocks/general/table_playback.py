@@ -13,10 +13,11 @@ from ...mathematics.lookup import interpolate
 from ...robots.description import RobotDescription
 from ...runtime.language.block import Block, Context, Misfit, Output
 from ...runtime.language.parameters import Parameters, parameter
+from .quantity_parameters import Says, SourceParameters
 from .vector import Vector
 
 
-class TablePlayback(Block):
+class TablePlayback(Says, Block):
     """Columns of a table over time, from a CSV or NPZ file beside the graph or from ``rows``.
 
     A CSV file has the columns' names in its first line, an NPZ file one array for each. Times [s]
@@ -25,7 +26,7 @@ class TablePlayback(Block):
     begins again.
     """
 
-    class Params(Parameters):
+    class Params(SourceParameters):
         file: str | None = parameter(None, text="the file, relative to the graph's folder")
         rows: list[list[float]] | None = parameter(
             None, text="instead of a file: rows of the time and every column"

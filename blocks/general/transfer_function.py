@@ -14,6 +14,7 @@ from ...runtime.language.block import Block, Input, Misfit, Output, State
 from ...runtime.language.parameters import Parameters, parameter
 from ...runtime.language.signals import Field, Signal
 from .elements import Elements
+from .quantity_parameters import InUnit, Scales
 from .vector import Vector
 
 
@@ -23,7 +24,7 @@ class TransferMemory(Signal):
     value = Field(("n", "order"), text="states in the controllable canonical form")
 
 
-class TransferFunction(Block):
+class TransferFunction(Scales, Block):
     """A proper rational transfer function, the same for every element, from rest.
 
     Coefficients are of falling powers, of s for a continuous function and of z for a discrete one:
@@ -33,7 +34,7 @@ class TransferFunction(Block):
     strictly proper system use ``StateSpace``.
     """
 
-    class Params(Elements):
+    class Params(Elements, InUnit):
         numerator: list[float] = parameter(text="coefficients of falling powers", min_length=1)
         denominator: list[float] = parameter(text="coefficients of falling powers", min_length=2)
         time: Literal["continuous", "discrete"] = parameter(

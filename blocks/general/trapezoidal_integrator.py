@@ -5,7 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from ...runtime.language.block import Block, Input, Output, State
+from ...runtime.language.parameters import Parameters
+from ...runtime.language.quantities import Carried, Given
 from ...runtime.language.signals import Field, Signal
+from ...runtime.language.unit_algebra import SECOND
 from .flags import NEVER, Flag
 from .initial_value import InitialParameters
 from .vector import Vector
@@ -32,6 +35,12 @@ class TrapezoidalIntegrator(Block):
     reset = Input(Flag, text="whether to start anew from the initial value", default=NEVER)
     y = Output(Vector, text="its integral")
     x = State(Trapezoids, text="the integral and the rate before")
+
+    @classmethod
+    def carried(cls, params: Parameters, given: Given) -> Carried:
+        """The unit of the rate times a second."""
+        u = given["u"]
+        return {"y": u and u.times(SECOND)}
 
     def setup(self) -> None:
         """Keep the initial value and half of the period at hand."""

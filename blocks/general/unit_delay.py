@@ -6,10 +6,11 @@ import numpy as np
 
 from ...runtime.language.block import Block, Input, Output, State
 from .initial_value import InitialParameters
+from .quantity_parameters import Keeps
 from .vector import Vector
 
 
-class UnitDelay(Block):
+class UnitDelay(Keeps, Block):
     """The input of the run before: y[n] = x[n], x[n+1] = u[n], x[0] = initial.
 
     A Moore block, so it breaks a loop.

@@ -6,6 +6,6 @@ from ...runtime.language.signals import Field, Signal
 
 
 class Vector(Signal):
-    """A vector of ``n`` numbers. It has no unit and no frame, so it fits any of them."""
+    """A vector of ``n`` numbers. Its unit and frame are those of what is wired."""
 
-    value = Field("n", text="the vector's elements")
+    value = Field("n", carried=True, text="the vector's elements")

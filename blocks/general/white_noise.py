@@ -8,17 +8,23 @@ from ...runtime.language.block import Block, Output, State
 from ...runtime.language.parameters import live_parameter, parameter
 from ...runtime.language.random_stream import RandomStream, StreamState
 from .elements import Elements, PerElement, spread
+from .quantity_parameters import Says, SourceParameters
 from .vector import Vector
 
 
-class WhiteNoise(Block):
+class WhiteNoise(Says, Block):
     """Gaussian noise: every element of every run is drawn anew, y = mean + std N(0, 1).
 
     ``std`` is that of one sample. For a noise density d per square root of Hz it is d sqrt(f / 2)
     at a rate f. The stream depends on ``seed`` and on the block's path.
     """
 
-    class Params(Elements):
+    class Params(Elements, SourceParameters):
+        in_unit = (
+            "std",
+            "mean",
+        )
+
         std: PerElement = live_parameter(1.0, text="standard deviation of one sample")
         mean: PerElement = live_parameter(0.0, text="the mean")
         seed: int = parameter(0, ge=0, text="of the random stream")

@@ -8,6 +8,7 @@ from ...runtime.language.block import Block, Input, Output, State
 from ...runtime.language.parameters import parameter
 from ...runtime.language.signals import Field, Signal
 from .elements import Elements
+from .quantity_parameters import Keeps
 from .vector import Vector
 
 
@@ -18,7 +19,7 @@ class Held(Signal):
     age = Field((), dtype="int64", text="runs since it was taken")
 
 
-class ZeroOrderHold(Block):
+class ZeroOrderHold(Keeps, Block):
     """A sample of the input in every k-th run, held in between: y[n] = u[k floor(n / k)].
 
     Between blocks of different rates none is needed: there a slower reader samples and a faster

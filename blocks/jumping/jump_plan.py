@@ -8,23 +8,38 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from ...planner.library.jump_table import JumpTableReader
-from ...runtime.language.block import Block, Context, Metric, Misfit, Output
+from ...runtime.language.block import Block, Context, Input, Metric, Misfit, Output, State
 from ...runtime.language.errors import BlockError
 from ...runtime.language.parameters import Parameters, parameter
-from ..signals import JumpReference
+from ...runtime.language.signals import Field, Signal
+from ..signals import DelayEstimate, DynamicsTerms, JumpReference, Phase
+from .plan_progress import delay_change, speed_error
 
 if TYPE_CHECKING:
     from ...planner.checking.validity import ValidityReport
+    from ...planner.library.library import PlanLibrary
     from ...planner.task.plan import JumpPlan as Plan
     from ...planner.task.task import JumpTask
     from ...robots.description import RobotDescription
+
+
+FASTEST = 0.5
+"""By how much a plan is slowed down or hastened at most, as a share of time."""
+
+
+class PlanProgress(Signal):
+    """The state of ``JumpPlan``."""
+
+    late = Field(unit="s", text="how much later than by the clock the plan is read")
+    before = Field(unit="s", text="the same before the thrust's last part")
 
 
 class JumpPlan(Block):
     """The reference motion of a jump, found by the kino-dynamic planner (paper, III).
 
     The task is a file (``tasks/in_situ.yaml``; looked for beside the graph, then among the shipped
-    graphs) or the task itself (``{rise: 12 cm, distance_x: 5 cm}``). Its plan comes from the plan
+    graphs), the task itself (``{rise: 12 cm, distance_x: 5 cm}``), or a file with changes
+    (``{file: tasks/in_situ.yaml, rise: 12 cm}``). Its plan comes from the plan
     library, where the task's hash is its key: the shipped plans need no solver. If there is none it
     is solved while the graph loads, starting from the nearest plan of the library, and kept.
 
@@ -41,24 +56,55 @@ class JumpPlan(Block):
     (``planner/library/reference_table``); accelerations and torques are read ``lead`` ahead of
     time, because they are fed forward.
 
-    The block follows time alone and does not depend on what the robot really does. It raises
-    ``BlockError`` at load where the task cannot be read or is for another robot, where it cannot be
+    **Progress.** With ``by: clock``, as in the paper, the thrust ends at the planned time. With
+    ``by: progress``, and ``terms`` wired, it ends when the state of take-off is reached. In the last
+    ``progress_time`` before lift-off let e be how much too fast the centre of mass is for the
+    planned apex, of its measured velocity v and height z above the feet (``plan_progress``)::
+
+        e = v - v_plan + g (z - z_plan) / v_plan,     delay' = -progress_gain e / z''_plan
+
+    The plan is read later by this delay, which is within ``progress_limit``; so a robot that is too
+    slow is pushed longer, as far as its legs reach. Everything behind, flight and landing too, is
+    shifted with it, and ``reference.time`` with them. For this the feedforward is the mean over the
+    tick in which the command holds: a thrust may end between two ticks.
+
+    What follows from the task it tells other blocks of the graph: the ``scene`` with its steps, for
+    the simulator, and for the score the number of ``jumps`` and, of the last one, where it ends:
+    ``landing_height``, ``distance`` [m, forward and left], ``yaw`` [rad], and ``rise`` [m] where the
+    task gives it for a single jump. It also tells the ``velocity_correction`` [m/s] and the
+    ``momentum_correction`` [N m s] that a rehearsal of the plan with this controller has learnt
+    (``aloft plan --rehearse``), which are zero where there was none, or with ``rehearsed: false``.
+
+    But for this and the progress the block follows time alone. It raises ``BlockError`` at load where the task cannot be read or is for another robot, where it cannot be
     planned, or where its plan must be valid and is not; the message says which constraint or test.
     """
 
     class Params(Parameters):
         task: str | Mapping[str, Any] = parameter(
-            "tasks/in_situ.yaml", text="a task's file, or the task's parameters"
+            "tasks/in_situ.yaml",
+            text="a task's file, the task's parameters, or a file and parameters that change it",
         )
         stand_time: float = parameter(
             0.4, unit="s", gt=0.0, text="standing before the plan, for the estimator to settle"
         )
-        lead: float = parameter(
-            0.002,
+        lead: float | None = parameter(
+            None,
             unit="s",
             ge=0.0,
             le=0.02,
-            text="delay from sensing to torque that is compensated",
+            text="delay from sensing to torque that is compensated; none: the one at `delay`",
+        )
+        by: Literal["progress", "clock"] = parameter(
+            "progress", text="what ends the thrust: the speed reached, if `terms` is wired, or time"
+        )
+        progress_time: float = parameter(
+            0.06, unit="s", gt=0.0, text="how long before lift-off the motion counts"
+        )
+        progress_gain: float = parameter(
+            40.0, unit="1/s", ge=0.0, text="rate at which an error of the speed is corrected"
+        )
+        progress_limit: float = parameter(
+            0.008, unit="s", ge=0.0, le=0.05, text="how much later or earlier a thrust may end"
         )
         library: str = parameter(
             "", text="folder where new plans are kept; the user's cache if empty"
@@ -70,10 +116,17 @@ class JumpPlan(Block):
         formulation: Literal["full", "paper", "srbm"] | None = parameter(
             None, text="the planner's formulation, in place of the task's"
         )
+        rehearsed: bool = parameter(
+            True, text="whether what a rehearsal of this plan has learnt is told to the graph"
+        )
 
     needs = ("floating base", "feet")
+    files_folder = "library"
     params: Params
+    terms = Input(DynamicsTerms, default={}, text="the measured motion, for by: progress")
+    delay = Input(DelayEstimate, default={"delay": 0.002}, text="the delay that is compensated")
     reference = Output(JumpReference, text="the plan at the present instant")
+    progress = State(PlanProgress, text="how late the plan is")
 
     @classmethod
     def requires_of_graph(cls, params: Parameters, context: Context) -> Iterable[Misfit]:
@@ -128,16 +181,91 @@ class JumpPlan(Block):
                 fix=f"actuators: {task.profile}, as a key of the graph",
             )
 
+    @classmethod
+    def tells(cls, params: Parameters, context: Context) -> Mapping[str, Any]:
+        """The ground and the score's expectation that follow from the task."""
+        from ...planner.task.ground import scene_of
+        from ...planner.task.task import TaskError
+
+        assert isinstance(params, cls.Params) and context.robot is not None
+        task = read_or_make_task(params.task, context)
+        try:
+            scene = scene_of(task, context.robot)
+        except TaskError as error:
+            scene = Misfit(str(error), fix="robot.scene: flat, or a floor and boxes")
+        end, hops = task.places()[-1], task.hops()
+        velocity, momentum = cls._corrections(params, context)
+        return {
+            "scene": scene,
+            "jumps": len(hops),
+            "landing_height": round(end.z, 9),
+            "distance": [round(end.x, 9), round(end.y, 9)],
+            "yaw": end.heading,
+            "rise": hops[0].rise if len(hops) == 1 else None,
+            "velocity_correction": velocity,
+            "momentum_correction": momentum,
+        }
+
+    @classmethod
+    def _corrections(cls, params: Params, context: Context) -> tuple[Any, Any]:
+        """What a rehearsal has learnt; for both the same ``Misfit`` where its file is damaged."""
+        from ...planner.library.rehearsed import (
+            ZERO,
+            RehearsalFileError,
+            controller_hash,
+            find_rehearsed,
+        )
+
+        assert context.robot is not None
+        if not params.rehearsed:
+            return list(ZERO), list(ZERO)
+        rate = 1.0 / context.clock.base_period
+        controller = controller_hash(context.graph, rate, context.path)
+        try:
+            task = planned_task(params, context)
+            found = find_rehearsed(plan_library(params, context.robot), task, controller)
+        except RehearsalFileError as error:
+            damaged = Misfit(str(error), fix=f"{context.path}.rehearsed: false")
+            return damaged, damaged
+        if found is None:
+            return list(ZERO), list(ZERO)
+        return list(found.velocity_correction), list(found.momentum_correction)
+
     def setup(self) -> None:
         from ...planner.library.reference_table import reference_table
 
-        robot, task = self.robot, self._task()
+        robot, task = self.robot, planned_task(self.params, self.context)
         plan = self._plan(task, robot)
         self._report = self._report_validity(plan)
+        self._by_progress = self.params.by == "progress" and "terms" in self.context.wired
         self._reader = JumpTableReader(reference_table(plan, robot, self.params.stand_time))
 
     def step(self) -> None:
-        self._reader.read(self.time, self.reference, self.params.lead)
+        lead = self.params.lead
+        lead = float(self.delay.delay) if lead is None else lead
+        time = self.time - float(self.progress.late)
+        self._reader.read(time, self.reference, lead, self.period)
+        if self._by_progress:
+            self._follow_motion(time)
+
+    def _follow_motion(self, time: float) -> None:
+        """Delay or hasten the end of a thrust by the speed and height of the centre of mass."""
+        p, reference, terms, progress = self.params, self.reference, self.terms, self.progress
+        left = float(reference.lift_off_time) - time
+        if int(reference.phase) != Phase.THRUST or not 0.0 < left <= p.progress_time:
+            progress.before[()] = progress.late
+            return
+        error = speed_error(
+            float(terms.com[2]) - float(terms.foot_position[:, 2].mean()),
+            float(terms.com_velocity[2]),
+            float(reference.com[2]) - float(reference.foot_position[:, 2].mean()),
+            float(reference.com_velocity[2]),
+        )
+        push = float(reference.com_acceleration[2])
+        late = float(progress.late) - float(progress.before)
+        late += delay_change(error, push, p.progress_gain, FASTEST, self.period)
+        late = min(max(late, -p.progress_limit), p.progress_limit)
+        progress.late[()] = float(progress.before) + late
 
     def metrics(self) -> Mapping[str, Metric]:
         report = self._report
@@ -166,21 +294,11 @@ class JumpPlan(Block):
             raise BlockError(f"the plan {plan.task.name!r} is broken: {broken[0].where}")
         return report
 
-    def _task(self) -> JumpTask:
-        task = read_or_make_task(self.params.task, self.context)
-        chosen = self.params.formulation
-        if chosen is None:
-            return task
-        impact = task.impact and chosen == "full"
-        return task.model_copy(update={"formulation": chosen, "impact": impact})
-
     def _plan(self, task: JumpTask, robot: RobotDescription) -> Plan:
-        from ...planner.library.library import PlanLibrary
         from ...planner.task.errors import TaskError
         from ...planner.task.plan import PlanFileError
 
-        folder = Path(self.params.library) if self.params.library else None
-        library = PlanLibrary(robot, folder)
+        library = plan_library(self.params, robot)
         if not self.params.solve and library.path_of(task) is None:
             raise BlockError(
                 f"there is no plan for the task {task.name!r}; make one with 'aloft plan', or set "
@@ -198,22 +316,45 @@ class JumpPlan(Block):
         return plan
 
 
+def plan_library(params: JumpPlan.Params, robot: RobotDescription) -> PlanLibrary:
+    """The library in which a block looks for its plan."""
+    from ...planner.library.library import PlanLibrary
+
+    return PlanLibrary(robot, Path(params.library) if params.library else None)
+
+
+def planned_task(params: JumpPlan.Params, context: Context) -> JumpTask:
+    """The task of a block, in the formulation that is planned.
+
+    Raises:
+        LookupError, TaskError: as ``read_or_make_task``.
+    """
+    task, chosen = read_or_make_task(params.task, context), params.formulation
+    if chosen is None:
+        return task
+    impact = task.impact and chosen == "full"
+    return task.model_copy(update={"formulation": chosen, "impact": impact})
+
+
 def read_or_make_task(wanted: str | Mapping[str, Any], context: Context) -> JumpTask:
-    """The task of a graph, which gives the name of its file or its parameters.
+    """The task of a graph, which gives the name of its file, its parameters, or both.
 
     Raises:
         LookupError: there is no file of that name beside the graph or among the shipped tasks.
         TaskError: it cannot be read as a task.
     """
     from ...planner.library.shipped import shipped_graphs
+    from ...planner.task.changed_task import changed_task, spoken_name
     from ...planner.task.read_task import read_task
     from ...planner.task.task import make_task
 
-    if not isinstance(wanted, str):
+    changes = {} if isinstance(wanted, str) else dict(wanted)
+    file = wanted if isinstance(wanted, str) else changes.pop("file", None)
+    if file is None:
         robot = {"robot": context.robot.name} if context.robot is not None else {}
-        return make_task({"name": context.path, **robot, **wanted})
-    places = [folder / wanted for folder in (context.folder, Path(), shipped_graphs())]
+        return spoken_name(make_task({"name": "", **robot, **changes}))
+    places = [folder / str(file) for folder in (context.folder, Path(), shipped_graphs())]
     found = next((place for place in places if place.is_file()), None)
     if found is None:
-        raise LookupError(f"there is no task {wanted!r} beside the graph or among the shipped ones")
-    return read_task(found)
+        raise LookupError(f"there is no task {file!r} beside the graph or among the shipped ones")
+    return changed_task(found, changes) if changes else read_task(found)

@@ -10,7 +10,16 @@ import numpy as np
 import pydantic
 from numpy.typing import NDArray
 
-from ...mathematics.kernel import kernel
+from ...mathematics.constants import GRAVITY
+from ...mathematics.landing_law import (
+    heading_matrix,
+    keep_within,
+    landing_place,
+    lowest_height,
+    retraction,
+    swing,
+    turn_places,
+)
 from ...mathematics.polynomials import minimum_jerk
 from ...mathematics.rotations import (
     conjugate,
@@ -28,6 +37,7 @@ from ...runtime.language.block import Block, Input, Misfit, Output, State
 from ...runtime.language.parameters import Parameters, live_parameter, parameter
 from ...runtime.language.signals import Field, Signal
 from ..signals import DynamicsTerms, FootTarget, JumpReference, Phase, PhaseState
+from .landing_prediction import LandingPrediction, PredictionGains
 
 Array = NDArray[np.float64]
 
@@ -37,6 +47,8 @@ def _three(value: object) -> object:
     return (value,) * 3 if isinstance(value, int | float) else value
 
 
+_SLOWEST = 0.3
+"""The least speed of descent [m/s] by which a change of the legs' length changes the time."""
 Share = Annotated[float, pydantic.Field(ge=0.0, le=1.0)]
 Shares = Annotated[tuple[Share, Share, Share], pydantic.BeforeValidator(_three)]
 
@@ -53,6 +65,7 @@ class LandingMemory(Signal):
     linear = Field(3, unit="kg m/s", frame="world", text="planned linear momentum")
     angular = Field(3, unit="N m s", frame="world", text="planned angular momentum")
     orientation = Field(4, unit="", text="planned base quaternion x, y, z, w")
+    shift = Field(4, unit="m", frame="world", text="chosen: ahead, to the left, apart, upwards")
 
 
 class LandingHeuristic(Block):
@@ -76,6 +89,25 @@ class LandingHeuristic(Block):
     measured momenta minus the planned ones: the planned footholds already fit the planned momentum,
     so feeding back the whole momentum of a forward jump would count it twice.
 
+    With ``law: predicted`` the landing place is chosen anew in every tick, from the momenta that
+    were not planned, by what it does to the torso. Feet that keep their place in the world turn a
+    torso that tilts even further; drawn up they turn BRUCE's forward, by 5 to 8 deg per cm
+    (``mathematics/flight_prediction``). All feet are shifted ahead, to the left, apart and upwards
+    by the s that costs least::
+
+        (s_x - g_x)^2 + (s_y - g_y)^2 + (apart_cost (s_a - g_a))^2 + (height_cost s_z)^2
+            + sum over roll and pitch of (tilt_cost h (tilt - free))^2
+
+    where tilt is the deviation from the planned orientation at touchdown, linear in s, of which up
+    to ``free_tilt`` costs nothing. s_z is within ``height_range`` h, but drawn up legs must keep
+    the stroke in which ``stop_acceleration`` g stops the fall. The goal g is the capture point of
+    the linear inverted pendulum of the standing height h, w^2 = g / h, times the gains::
+
+        g_x = capture l^x / (m w) + capture_turn k^y w / (m g),
+        g_y = capture l^y / (m w) - capture_turn k^x w / (m g),    g_a = clearance |l^y| / (m w)
+
+    These gains have no unit, so they are the same for robots of any size. p_max applies as above.
+
     The foot moves there from its position at lift-off, along x and y with minimum jerk over
     ``reach_share`` of the predicted flight. Its height follows the plan (paper, V), and near
     touchdown the foot moves upwards at the speed ``retraction``, to land softly.
@@ -91,10 +123,10 @@ class LandingHeuristic(Block):
     touchdown. Whether a leg can reach the target is left to its inverse kinematics.
     """
 
-    class Params(Parameters):
-        law: Literal["paper", "deviation"] = parameter(
+    class Params(PredictionGains):
+        law: Literal["paper", "deviation", "predicted"] = parameter(
             "deviation",
-            text="the momentum fed back: the measured one, or its deviation from the plan",
+            text="feed back the measured momentum, or its deviation from the plan; or predict",
         )
         w_l: tuple[float, float] = live_parameter(
             (0.03, 0.04), unit="s/kg", text="W_l: metres per linear momentum along x and y"
@@ -157,6 +189,8 @@ class LandingHeuristic(Block):
         self._mass = robot.total_mass
         stance = standing_feet(robot)
         self._sides = foot_sides(stance)
+        self._prediction = LandingPrediction(robot, -float(stance[:, 2].mean()), self._sides)
+        self._predicts = self.params.law == "predicted"
         self._turned = self.params.limits_about == "stance"
         self._stance = stance if self._turned else np.zeros_like(stance)
         self._centres = np.zeros_like(stance)
@@ -174,6 +208,8 @@ class LandingHeuristic(Block):
         self._w_l, self._w_k, self._p_max = np.array(p.w_l), np.array(p.w_k), np.array(p.p_max)
         self._alpha = np.array(p.alpha)
         self._beta = 1.0 - self._alpha
+        if self._predicts:
+            self._prediction.prepare(p)
 
     def step(self) -> None:
         p, reference, terms, memory = self.params, self.reference, self.terms, self.memory
@@ -184,10 +220,13 @@ class LandingHeuristic(Block):
             self._remember_plan()
         self._feed_back()
         if flying and not memory.flying:
+            memory.shift[...] = 0.0
             np.subtract(terms.foot_position, terms.com, out=memory.offset)
             np.subtract(memory.offset, memory.planned, out=memory.offset)
         memory.flying[()] = flying
         elapsed, left = float(self.phase.time_in_phase), float(self.phase.time_to_touchdown)
+        if self._predicts and flying:
+            left = self._predict(left)
         reach = p.reach_share * max(elapsed + left, self.period)
         share, rate, _ = minimum_jerk(elapsed / reach)
         lift, lift_rate = retraction(left, p.retraction, p.retraction_time)
@@ -197,10 +236,7 @@ class LandingHeuristic(Block):
             turn_places(self._stance, yaw(memory.orientation), self._centres)
         for foot in range(len(self._sides)):
             planned, place = memory.planned[foot], self.feet.landing[foot]
-            landing_place(
-                planned, self._sides[foot], self._linear, self._angular,
-                self._w_l, self._w_k, p.w_c, self._p_max, self._centres[foot], place,
-            )  # fmt: skip
+            self._choose_place(foot, planned, place)
             np.subtract(reference.foot_velocity[foot], reference.com_velocity, out=self._speed)
             if overdue:
                 self._speed[:] = 0.0
@@ -224,15 +260,42 @@ class LandingHeuristic(Block):
         """Keep the plan of this instant, unless it is past its touchdown."""
         reference, memory = self.reference, self.memory
         np.subtract(reference.foot_position, reference.com, out=memory.planned)
-        np.multiply(reference.com_velocity, self._mass, out=memory.linear)
-        memory.angular[...] = reference.angular_momentum
+        mass = float(self.terms.mass_matrix[0, 0]) or self._mass
+        np.multiply(reference.com_velocity, mass, out=memory.linear)
+        np.multiply(reference.angular_momentum, mass / self._mass, out=memory.angular)
         memory.orientation[...] = reference.orientation
+
+    def _predict(self, left: float) -> float:
+        """Choose the shift; returns the time [s] to a touchdown with the legs that much shorter."""
+        memory, terms = self.memory, self.terms
+        self._prediction.choose(
+            terms, self.reference, memory.planned, memory.orientation, self._linear, self._angular,
+            left, memory.shift,
+        )  # fmt: skip
+        speed = max(GRAVITY * left - float(terms.com_velocity[2]), _SLOWEST)
+        return max(left + float(memory.shift[3]) / speed, 0.0)
+
+    def _choose_place(self, foot: int, planned: Array, place: Array) -> None:
+        """The landing place of a foot from the centre of mass, by the law."""
+        p, side, centre = self.params, self._sides[foot], self._centres[foot]
+        if self._predicts:
+            shift = self.memory.shift
+            place[...] = planned
+            place[0] += shift[0]
+            place[1] += shift[1] + side * shift[2]
+            place[2] += shift[3]
+            keep_within(self._p_max, centre, place)
+            return
+        landing_place(
+            planned, side, self._linear, self._angular, self._w_l, self._w_k, p.w_c, self._p_max,
+            centre, place,
+        )  # fmt: skip
 
     def _feed_back(self) -> None:
         """Compute the momenta that the law feeds back."""
         self._linear[:] = self.terms.linear_momentum
         self._angular[:] = self.terms.angular_momentum
-        if self.params.law == "deviation":
+        if self.params.law != "paper":
             np.subtract(self._linear, self.memory.linear, out=self._linear)
             np.subtract(self._angular, self.memory.angular, out=self._angular)
 
@@ -290,91 +353,3 @@ def standing_feet(robot: RobotDescription) -> Array:
 def foot_sides(feet: Array) -> tuple[float, ...]:
     """For every foot 1 on the left of the base, -1 on the right, 0 in the middle (1 mm)."""
     return tuple(math.copysign(1.0, y) if abs(y) > 1e-3 else 0.0 for y in feet[:, 1].tolist())
-
-
-@kernel
-def landing_place(
-    nominal: Array,
-    side: float,
-    linear: Array,
-    angular: Array,
-    w_l: Array,
-    w_k: Array,
-    w_c: float,
-    p_max: Array,
-    centre: Array,
-    out: Array,
-) -> None:
-    """The paper's law (IV): the landing place (3,) from the nominal one (3,); z is unchanged.
-
-    Args:
-        side: 1 for a foot on the left, -1 on the right, 0 in the middle.
-        linear, angular: the momenta l and k fed back.
-        p_max: the largest distance of the place from ``centre`` (3,), ahead and aside [m].
-    """
-    x = float(nominal[0]) + float(w_l[0]) * float(linear[0]) + float(w_k[0]) * float(angular[1])
-    y = float(nominal[1]) + float(w_l[1]) * float(linear[1]) + float(w_k[1]) * float(angular[0])
-    y += side * w_c * abs(float(linear[1]))
-    far_x, far_y = float(p_max[0]), float(p_max[1])
-    dx, dy = x - float(centre[0]), y - float(centre[1])
-    out[0] = x if abs(dx) <= far_x else float(centre[0]) + math.copysign(far_x, dx)
-    out[1] = y if abs(dy) <= far_y else float(centre[1]) + math.copysign(far_y, dy)
-    out[2] = nominal[2]
-
-
-@kernel
-def turn_places(places: Array, angle: float, out: Array) -> None:
-    """Rotate places (n, 3) about the vertical by ``angle`` [rad]."""
-    cosine, sine = math.cos(angle), math.sin(angle)
-    for i in range(places.shape[0]):
-        x, y = float(places[i, 0]), float(places[i, 1])
-        out[i, 0], out[i, 1], out[i, 2] = cosine * x - sine * y, sine * x + cosine * y, places[i, 2]
-
-
-@kernel
-def lowest_height(points: Array) -> float:
-    """The least z of points (n, 3)."""
-    lowest = float(points[0, 2])
-    for i in range(1, points.shape[0]):
-        lowest = min(lowest, float(points[i, 2]))
-    return lowest
-
-
-@kernel
-def swing(
-    planned: Array, place: Array, offset: Array, share: float, rate: float, out: Array, speed: Array
-) -> None:
-    """The motion of a foot from its offset at lift-off to its corrected landing place.
-
-    Args:
-        planned, place: the positions relative to the centre of mass [m, world] without and with the
-            correction, (3,).
-        offset: the measured minus the planned position at lift-off [m, world], (3,).
-        share, rate: the share of the way, from 0 to 1, and its time derivative [1/s].
-        out: becomes the foot's position.
-        speed: the planned velocity [m/s], which becomes the foot's.
-    """
-    for k in range(3):
-        goal = float(place[k]) - float(planned[k])
-        start = float(offset[k])
-        out[k] = float(planned[k]) + start + share * (goal - start)
-        speed[k] += rate * (goal - start)
-
-
-@kernel
-def retraction(left: float, speed: float, duration: float) -> tuple[float, float]:
-    """Height added to the foot and its rate, ``left`` seconds before touchdown.
-
-    It first reaches down, then comes up, so that at touchdown it is zero and its rate ``speed``.
-    """
-    x = min(max(left / duration, 0.0), 1.0)
-    return -speed * duration * x * (1.0 - x) ** 2, speed * (1.0 - x) * (1.0 - 3.0 * x)
-
-
-@kernel
-def heading_matrix(angle: float, out: Array) -> None:
-    """The rotation about the vertical by ``angle`` [rad], (3, 3)."""
-    cosine, sine = math.cos(angle), math.sin(angle)
-    out[:, :] = 0.0
-    out[0, 0] = out[1, 1] = cosine
-    out[0, 1], out[1, 0], out[2, 2] = -sine, sine, 1.0

@@ -17,11 +17,13 @@ from __future__ import annotations
 from .control import (
     BaseState,
     ContactState,
+    DelayEstimate,
     DynamicsTerms,
     EstimatorHealth,
     FootTarget,
     JointTarget,
     JointTorque,
+    MassEstimate,
     WholeBodyCommand,
     WholeBodyTarget,
 )
@@ -29,10 +31,12 @@ from .jumping import JumpReference, Phase, PhaseState
 from .robot import (
     CommandMode,
     ContactSwitches,
+    DrivePhase,
     ExternalForce,
     ImuReading,
     JointCommand,
     JointState,
+    RobotHealth,
     RobotTruth,
 )
 
@@ -41,6 +45,8 @@ __all__ = [
     "CommandMode",
     "ContactState",
     "ContactSwitches",
+    "DelayEstimate",
+    "DrivePhase",
     "DynamicsTerms",
     "EstimatorHealth",
     "ExternalForce",
@@ -51,8 +57,10 @@ __all__ = [
     "JointTarget",
     "JointTorque",
     "JumpReference",
+    "MassEstimate",
     "Phase",
     "PhaseState",
+    "RobotHealth",
     "RobotTruth",
     "WholeBodyCommand",
     "WholeBodyTarget",

@@ -39,6 +39,23 @@ class EstimatorHealth(Signal):
     saturated_ticks = Field(dtype="int64", text="ticks so far in which any of the two was")
 
 
+class MassEstimate(Signal):
+    """What the robot weighs and where, as its model should have it."""
+
+    mass = Field(unit="kg", text="mass of the robot; zero where it is not known")
+    mass_std = Field(unit="kg", text="standard deviation of its error")
+    com_offset = Field(3, unit="m", frame="body", text="of the torso's CoM from the description's")
+    com_offset_std = Field(3, unit="m", frame="body", text="standard deviation of its error")
+
+
+class DelayEstimate(Signal):
+    """The delay from sensing to torque."""
+
+    delay = Field(unit="s", text="the delay to compensate")
+    measured = Field(unit="s", text="as measured; zero while it is not known")
+    known = Field(dtype="bool", text="whether it has been measured")
+
+
 class DynamicsTerms(Signal):
     """The whole-body model at the present state: everything the controllers need, once a tick."""
 

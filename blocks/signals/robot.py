@@ -42,6 +42,43 @@ class ContactSwitches(Signal):
     closed = Field("n_contacts", dtype="bool", text="whether each switch is pressed")
 
 
+class DrivePhase(IntEnum):
+    """What a real robot does with its drives."""
+
+    OFF = 0
+    """Only watched: they were never enabled, or are off again."""
+    STARTING = 1
+    """On their way to the standing pose, with a current that is limited."""
+    HOLDING = 2
+    """Enabled, in the standing pose, before the first command."""
+    DRIVING = 3
+    """They follow the commands."""
+    DAMPED = 4
+    """In damping, and until the end of the run."""
+
+
+class RobotHealth(Signal):
+    """How the drives and the sensor board of a real robot are. Drives are in the motors' order."""
+
+    state = Field(dtype="int64", values=DrivePhase, text="what the drives do; see DrivePhase")
+    voltage = Field("n_joints", unit="V", text="supply voltage at every drive")
+    temperature = Field("n_joints", text="temperature of every winding [deg C]")
+    current = Field("n_joints", unit="A", text="measured torque current of every drive")
+    condition = Field(
+        "n_joints", dtype="int64", text="error byte of every drive's last answer; healthy: 128"
+    )
+    age = Field("n_joints", unit="s", text="time since every drive answered last")
+    imu_age = Field(unit="s", text="time since the last packet of the sensor board")
+    stamp = Field(unit="s", text="time of the newest measurement, since the driver was opened")
+    joints_valid = Field(dtype="bool", text="every drive has answered in the last exchange")
+    imu_valid = Field(
+        dtype="bool", text="the board streams, and its IMU is not frozen or saturated"
+    )
+    contacts_valid = Field(dtype="bool", text="the board streams")
+    late_cycles = Field(dtype="int64", text="exchanges that began too late, so far")
+    lost_answers = Field(dtype="int64", text="answers that were lost or damaged, so far")
+
+
 class JointCommand(Signal):
     """What the drives execute: mode, feedforward torque, joint targets and gains."""
 

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ....mathematics.compiling.kernel_call import KernelCall
 from ....mathematics.kernel import kernel
 from ....mathematics.whole_body_qp import TaskRows
 from ....robots.description import RobotDescription
@@ -46,7 +47,7 @@ class Momentum(NamedTuple):
     rate: Array
 
 
-class AngularMomentum(Task[Feedback]):
+class AngularMomentum(Task[KernelCall]):
     """The rate of the angular momentum k is -K_d k, the paper's damping (V, task 4), or, with
     ``track_angular_momentum``, k_ref' + K_d (k_ref - k).
 
@@ -67,16 +68,16 @@ class AngularMomentum(Task[Feedback]):
     def row_count(cls, robot: RobotDescription, gains: AngularGains) -> int:
         return 3
 
-    def prepare(self, gains: AngularGains) -> Feedback:
-        return Feedback(
+    def prepare(self, gains: AngularGains) -> KernelCall:
+        feedback = Feedback(
             np.array(gains.angular_weight), np.array(gains.angular_damping),
             gains.track_angular_momentum,
         )  # fmt: skip
+        matrix = self.situation.terms.centroidal_matrix
+        return KernelCall(angular_rows, matrix, self._measured, self._target, feedback, self.rows)
 
-    def update(self, gains: Feedback) -> None:
-        angular_rows(
-            self.situation.terms.centroidal_matrix, self._measured, self._target, gains, self.rows
-        )
+    def update(self, gains: KernelCall) -> None:
+        gains.run()
 
 
 @kernel
@@ -90,8 +91,9 @@ def angular_rows(
         measured: the measured momentum; its ``rate`` is the drift, the rate at zero acceleration.
         target: the planned momentum and its rate.
     """
-    rows.jacobian[:, :] = matrix[3:6]
     for i in range(3):
+        for k in range(matrix.shape[1]):
+            rows.jacobian[i, k] = matrix[3 + i, k]
         wanted = -float(gains.damping[i]) * float(measured.value[i])
         if gains.track:
             wanted += float(target.rate[i]) + float(gains.damping[i]) * float(target.value[i])

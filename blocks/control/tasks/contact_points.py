@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ....mathematics.compiling.kernel_call import KernelCall
 from ....mathematics.kernel import kernel
 from ....mathematics.whole_body_qp import TaskRows
 from ....robots.description import RobotDescription
@@ -18,6 +19,8 @@ from .task import Situation, Task
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 Indices = NDArray[np.int64]
+
+_THRUST = int(Phase.THRUST)
 
 
 class ContactGains(Parameters):
@@ -52,6 +55,19 @@ class ContactGains(Parameters):
     )
 
 
+class PointGains(NamedTuple):
+    """``ContactGains`` as a kernel takes them."""
+
+    stance_weight: float
+    stance_damping: float
+    swing_weight: float
+    swing_stiffness: float
+    swing_damping: float
+    rolling_weight: float
+    rolling_stiffness: float
+    rolling_damping: float
+
+
 class Points(NamedTuple):
     """The contact points: (n, 3, n_velocities), then (n, 3) each [m, m/s, m/s^2, world]."""
 
@@ -77,7 +93,7 @@ class JointMotion(NamedTuple):
     acceleration: Array
 
 
-class ContactPoints(Task[ContactGains]):
+class ContactPoints(Task[KernelCall]):
     """Points in stance do not accelerate (paper, V, task 1): J a + drift = -damping velocity.
 
     Points that are not in stance while others are go to the ground, at the mean height of the
@@ -110,21 +126,52 @@ class ContactPoints(Task[ContactGains]):
     def row_count(cls, robot: RobotDescription, gains: ContactGains) -> int:
         return 3 * len(robot.contacts)
 
-    def update(self, gains: ContactGains) -> None:
-        now, g = self.situation, gains
-        contact_rows(
-            self._points, now.phase.stance, g.stance_weight, g.stance_damping,
-            g.swing_weight, g.swing_stiffness, g.swing_damping, self.rows,
+    def prepare(self, gains: ContactGains) -> KernelCall:
+        now = self.situation
+        numbers = {name: float(getattr(gains, name)) for name in PointGains._fields}
+        return KernelCall(
+            contact_task, self._points, now.phase.stance, now.phase.phase, self._foot,
+            now.terms.foot_rotation, self._planned, now.joints.position, now.terms.velocity,
+            self._ankles, PointGains(**numbers), self.rows,
         )  # fmt: skip
-        if int(now.phase.phase) == Phase.THRUST:
-            follow_plan(
-                self._planned, now.joints.position, now.terms.velocity,
-                g.rolling_stiffness, g.rolling_damping, self._ankles,
-            )  # fmt: skip
-            lifting_rows(
-                self._points, now.phase.stance, self._foot, now.terms.foot_rotation, self._ankles,
-                g.swing_weight, g.swing_damping, g.rolling_weight, self.rows,
-            )  # fmt: skip
+
+    def update(self, gains: KernelCall) -> None:
+        gains.run()
+
+
+@kernel
+def contact_task(
+    points: Points,
+    stance: Flags,
+    phase: Indices,
+    foot: Indices,
+    foot_rotation: Array,
+    planned: JointMotion,
+    position: Array,
+    velocity: Array,
+    ankles: Ankles,
+    gains: PointGains,
+    rows: TaskRows,
+) -> None:
+    """All rows of the task.
+
+    Args:
+        phase: the phase of the jump, of shape ().
+        foot, foot_rotation: as for ``lifting_rows``.
+        position, velocity: as for ``follow_plan``.
+    """
+    contact_rows(
+        points, stance, gains.stance_weight, gains.stance_damping, gains.swing_weight,
+        gains.swing_stiffness, gains.swing_damping, rows,
+    )  # fmt: skip
+    if int(phase[()]) == _THRUST:
+        follow_plan(
+            planned, position, velocity, gains.rolling_stiffness, gains.rolling_damping, ankles
+        )
+        lifting_rows(
+            points, stance, foot, foot_rotation, ankles, gains.swing_weight,
+            gains.swing_damping, gains.rolling_weight, rows,
+        )  # fmt: skip
 
 
 @kernel
@@ -153,7 +200,8 @@ def contact_rows(
     for i in range(count):
         for k in range(3):
             row = 3 * i + k
-            rows.jacobian[row, :] = points.jacobian[i, k, :]
+            for j in range(rows.jacobian.shape[1]):
+                rows.jacobian[row, j] = points.jacobian[i, k, j]
             speed, drift = float(points.velocity[i, k]), float(points.drift[i, k])
             if stance[i]:
                 rows.weights[row] = stance_weight

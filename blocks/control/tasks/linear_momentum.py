@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ....mathematics.compiling.kernel_call import KernelCall
 from ....mathematics.kernel import kernel
 from ....mathematics.whole_body_qp import TaskRows
 from ....robots.description import RobotDescription
@@ -47,11 +48,12 @@ class Centre(NamedTuple):
     acceleration: Array
 
 
-class LinearMomentum(Task[Feedback]):
+class LinearMomentum(Task[KernelCall]):
     """The centre of mass accelerates by a_ref + K_p (p_ref - p) + K_d (v_ref - v) (paper, V, task 2).
 
     With the linear rows A_l of the centroidal momentum matrix, their drift and the desired
-    acceleration c'' above, the rows are A_l / m a = c'' - drift / m, in m/s^2.
+    acceleration c'' above, the rows are A_l / m a = c'' - drift / m, in m/s^2. The mass m is that of
+    the mass matrix.
     """
 
     Gains = LinearGains
@@ -59,7 +61,7 @@ class LinearMomentum(Task[Feedback]):
     def __init__(self, situation: Situation, rows: TaskRows) -> None:
         super().__init__(situation, rows)
         terms, target = situation.terms, situation.target
-        self._mass = situation.robot.total_mass
+        self._described = situation.robot.total_mass
         self._target = Centre(target.com, target.com_velocity, target.com_acceleration)
         self._measured = Centre(terms.com, terms.com_velocity, terms.centroidal_drift)
 
@@ -67,17 +69,34 @@ class LinearMomentum(Task[Feedback]):
     def row_count(cls, robot: RobotDescription, gains: LinearGains) -> int:
         return 3
 
-    def prepare(self, gains: LinearGains) -> Feedback:
-        return Feedback(
+    def prepare(self, gains: LinearGains) -> KernelCall:
+        feedback = Feedback(
             np.array(gains.linear_weight), np.array(gains.linear_stiffness),
             np.array(gains.linear_damping),
         )  # fmt: skip
-
-    def update(self, gains: Feedback) -> None:
-        linear_rows(
-            self.situation.terms.centroidal_matrix, self._mass, self._measured, self._target, gains,
-            self.rows,
+        terms = self.situation.terms
+        return KernelCall(
+            linear_task, terms.mass_matrix, self._described, terms.centroidal_matrix,
+            self._measured, self._target, feedback, self.rows,
         )  # fmt: skip
+
+    def update(self, gains: KernelCall) -> None:
+        gains.run()
+
+
+@kernel
+def linear_task(
+    mass_matrix: Array,
+    described: float,
+    matrix: Array,
+    measured: Centre,
+    target: Centre,
+    gains: Feedback,
+    rows: TaskRows,
+) -> None:
+    """``linear_rows`` with the mass of the mass matrix, or where that is zero the ``described`` one."""
+    mass = float(mass_matrix[0, 0])
+    linear_rows(matrix, mass if mass != 0.0 else described, measured, target, gains, rows)
 
 
 @kernel
@@ -92,8 +111,9 @@ def linear_rows(
         measured: the measured motion; its ``acceleration`` holds the drift of the momentum [N], of
             which the first three elements are used.
     """
-    np.divide(matrix[0:3], mass, rows.jacobian)
     for i in range(3):
+        for k in range(matrix.shape[1]):
+            rows.jacobian[i, k] = float(matrix[i, k]) / mass
         rows.desired[i] = (
             float(target.acceleration[i])
             + float(gains.stiffness[i]) * (float(target.position[i]) - float(measured.position[i]))

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ....mathematics.compiling.kernel_call import KernelCall
 from ....mathematics.kernel import kernel
 from ....mathematics.whole_body_qp import TaskRows
 from ....robots.description import RobotDescription
@@ -17,6 +18,7 @@ from .foot_joints import leg_joints
 from .task import Situation, Task
 
 Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
 Indices = NDArray[np.int64]
 
 
@@ -56,7 +58,7 @@ class JointTargets(NamedTuple):
     acceleration: Array
 
 
-class Posture(Task[Feedback]):
+class Posture(Task[KernelCall]):
     """Joints accelerate by q_ref'' + K_p (q_ref - q) + K_d (q_ref' - q'), one row a joint.
 
     Joints that the robot's description holds stand still at their angle; others follow the
@@ -73,7 +75,11 @@ class Posture(Task[Feedback]):
         n = len(self._joints)
         self._reference = JointTargets(np.zeros(n), np.zeros(n), np.zeros(n))
         robot = situation.robot
-        self._is_held = [joint.name in robot.held for joint in robot.joints]
+        target = situation.target
+        self._planned = JointTargets(
+            target.joint_position, target.joint_velocity, target.joint_acceleration
+        )
+        self._is_held: Flags = np.array([joint.name in robot.held for joint in robot.joints])
         self._held = np.array([robot.held.get(joint.name, 0.0) for joint in robot.joints])
 
     @classmethod
@@ -88,7 +94,7 @@ class Posture(Task[Feedback]):
             if not any(fnmatchcase(name, pattern) for name in names):
                 yield f"no joint of {robot.name} is called {pattern!r}; there are {', '.join(names)}"
 
-    def prepare(self, gains: PostureChoice) -> Feedback:
+    def prepare(self, gains: PostureChoice) -> KernelCall:
         robot = self.situation.robot
         chosen = chosen_joints(robot, gains)
         self._joints[:] = chosen
@@ -99,24 +105,15 @@ class Posture(Task[Feedback]):
             for pattern, weight in patterns.items():
                 if fnmatchcase(robot.joints[joint].name, pattern):
                     by_row[row] = weight
-        return Feedback(by_row, gains.posture_stiffness, gains.posture_damping)
-
-    def update(self, gains: Feedback) -> None:
-        terms, target = self.situation.terms, self.situation.target
-        reference = self._reference
-        for row in range(self._joints.shape[0]):
-            joint = int(self._joints[row])
-            if self._is_held[joint]:
-                reference.position[row] = self._held[joint]
-                reference.velocity[row] = reference.acceleration[row] = 0.0
-            else:
-                reference.position[row] = target.joint_position[joint]
-                reference.velocity[row] = target.joint_velocity[joint]
-                reference.acceleration[row] = target.joint_acceleration[joint]
-        posture_rows(
-            self._joints, self.situation.joints.position, terms.velocity, reference, gains,
-            self.rows,
+        feedback = Feedback(by_row, gains.posture_stiffness, gains.posture_damping)
+        return KernelCall(
+            posture_task, self._joints, self._is_held, self._held, self._planned,
+            self.situation.joints.position, self.situation.terms.velocity, self._reference,
+            feedback, self.rows,
         )  # fmt: skip
+
+    def update(self, gains: KernelCall) -> None:
+        gains.run()
 
 
 def chosen_joints(robot: RobotDescription, gains: PostureChoice) -> list[int]:
@@ -126,6 +123,37 @@ def chosen_joints(robot: RobotDescription, gains: PostureChoice) -> list[int]:
         return [k for k, n in enumerate(names) if any(fnmatchcase(n, p) for p in gains.joints)]
     legs = {joint for foot in range(len(robot.feet)) for joint in leg_joints(robot, foot)}
     return [k for k, name in enumerate(names) if k not in legs or name in robot.held]
+
+
+@kernel
+def posture_task(
+    joints: Indices,
+    is_held: Flags,
+    held: Array,
+    planned: JointTargets,
+    position: Array,
+    velocity: Array,
+    reference: JointTargets,
+    gains: Feedback,
+    rows: TaskRows,
+) -> None:
+    """``posture_rows`` towards the plan, or for held joints towards their angle.
+
+    Args:
+        is_held, held: which joints are held, and at which angle [rad], (n_joints,) each.
+        planned: the plan's joints, (n_joints,) each.
+        reference: scratch, by row.
+    """
+    for row in range(joints.shape[0]):
+        joint = int(joints[row])
+        if is_held[joint]:
+            reference.position[row] = held[joint]
+            reference.velocity[row] = reference.acceleration[row] = 0.0
+        else:
+            reference.position[row] = planned.position[joint]
+            reference.velocity[row] = planned.velocity[joint]
+            reference.acceleration[row] = planned.acceleration[joint]
+    posture_rows(joints, position, velocity, reference, gains, rows)
 
 
 @kernel

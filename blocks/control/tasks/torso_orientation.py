@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ....mathematics.compiling.kernel_call import KernelCall
 from ....mathematics.kernel import kernel
 from ....mathematics.rotations import conjugate, from_matrix, logarithm, multiply
 from ....mathematics.whole_body_qp import TaskRows
@@ -45,7 +46,7 @@ class Attitude(NamedTuple):
     angular_velocity: Array
 
 
-class TorsoOrientation(Task[Feedback]):
+class TorsoOrientation(Task[KernelCall]):
     """The base's angular acceleration is K_p Log(R' R_ref) + K_d (w_ref - w) (paper, V, task 3).
 
     The rows select the base's angular acceleration [rad/s^2, body].
@@ -64,15 +65,33 @@ class TorsoOrientation(Task[Feedback]):
     def row_count(cls, robot: RobotDescription, gains: TorsoGains) -> int:
         return 3
 
-    def prepare(self, gains: TorsoGains) -> Feedback:
-        return Feedback(
+    def prepare(self, gains: TorsoGains) -> KernelCall:
+        feedback = Feedback(
             np.array(gains.torso_weight), np.array(gains.torso_stiffness),
             np.array(gains.torso_damping),
         )  # fmt: skip
+        return KernelCall(
+            torso_task, self.situation.terms.base_rotation, self._measured, self._target, feedback,
+            self._error, self._quaternion, self.rows,
+        )  # fmt: skip
 
-    def update(self, gains: Feedback) -> None:
-        from_matrix(self.situation.terms.base_rotation, self._measured.orientation)
-        torso_rows(self._measured, self._target, gains, self._error, self._quaternion, self.rows)
+    def update(self, gains: KernelCall) -> None:
+        gains.run()
+
+
+@kernel
+def torso_task(
+    rotation: Array,
+    measured: Attitude,
+    target: Attitude,
+    gains: Feedback,
+    error: Array,
+    quaternion: Array,
+    rows: TaskRows,
+) -> None:
+    """``torso_rows`` for a base whose ``rotation`` (3, 3) is given instead of its quaternion."""
+    from_matrix(rotation, measured.orientation)
+    torso_rows(measured, target, gains, error, quaternion, rows)
 
 
 @kernel
@@ -89,7 +108,9 @@ def torso_rows(
     Args:
         error, quaternion: scratch (3,) and (4,).
     """
-    rows.jacobian[:, :] = 0.0
+    for i in range(3):
+        for k in range(rows.jacobian.shape[1]):
+            rows.jacobian[i, k] = 0.0
     conjugate(measured.orientation, quaternion)
     multiply(quaternion, target.orientation, quaternion)
     logarithm(quaternion, error)

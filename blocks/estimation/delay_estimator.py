@@ -1,0 +1,173 @@
+"""Measures the delay from sensing to torque, and compares it with what the graph says."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Literal
+
+import numpy as np
+
+from ...runtime.language.block import Block, Input, Metric, Output, State
+from ...runtime.language.parameters import Parameters, parameter
+from ...runtime.language.signals import Field, Signal
+from ..signals import DelayEstimate, JointCommand, JointState
+
+LAGS = 12
+"""Delays up to this many periods less one can be measured."""
+
+
+class DelayMemory(Signal):
+    """The state of ``DelayEstimator``."""
+
+    command = Field("n_joints", unit="N m", text="the last command's torques")
+    torque = Field("n_joints", unit="N m", text="the last measured torques")
+    changes = Field(
+        (LAGS, "n_joints"), unit="N m", text="changes of the last commands, newest first"
+    )
+    square = Field((LAGS, LAGS), text="sum of the products of changes, by their lags")
+    product = Field(LAGS, text="sum of the products with the measured changes")
+    energy = Field(text="sum of the squares of the measured changes")
+    ticks = Field(dtype="int64", text="ticks so far")
+    delay = Field(unit="s", text="measured; negative while it is not known")
+    matched = Field(unit="", text="share of the measured changes that this delay explains")
+
+
+class DelayEstimator(Block):
+    """The delay from sensing to torque, which the graph says once, measured by the torques.
+
+    The command that is computed in tick k, at t_k, takes effect at t_k + d. The measured torques
+    are means over the tick before. With d = (j + share) T, T being the period of this block, their
+    changes are therefore those of the commands j and j + 1 periods older::
+
+        change(tau)_n = (1 - share) change(u)_{n-1-j} + share change(u)_{n-2-j}
+
+    Over the first ``duration`` of a run j and the share are found by least squares. What the
+    sensors' noise does to the commands is enough to tell them. The measurement counts when the
+    change of the commands explains at least ``least_match`` of the change of the torques, so only
+    while the drives get torques and no joint feedback.
+
+    ``told`` is what the graph says: ``{from: robot.delay}`` is what the robot's driver or the
+    simulator says. With ``follow: measured`` the output is the measured delay as soon as it counts,
+    less ``usual``, by which it is longer than what is told where that is right, and at first and
+    otherwise what is told. With ``follow: told`` it is always that. The result of a run has a
+    caution where both differ by more than ``tolerance``.
+
+    It is a Moore block, so the plan that leads by its output may be what the command follows from.
+    """
+
+    class Params(Parameters):
+        told: float = parameter(
+            0.002, unit="s", ge=0.0, le=0.02, text="the delay that the graph says"
+        )
+        follow: Literal["measured", "told"] = parameter(
+            "measured", text="which of both is the output"
+        )
+        duration: float = parameter(
+            0.6, unit="s", gt=0.0, text="the first part of a run, in which it is measured"
+        )
+        least_time: float = parameter(
+            0.1, unit="s", gt=0.0, text="time after which the measurement may count"
+        )
+        least_match: float = parameter(
+            0.8, gt=0.0, le=1.0, text="share of the torques' changes that it must explain"
+        )
+        usual: float = parameter(
+            0.00075, unit="s", ge=0.0, text="jitter and sampling, which nobody tells"
+        )
+        tolerance: float = parameter(
+            0.001, unit="s", gt=0.0, text="difference of both without a caution"
+        )
+
+    needs = ("robot",)
+    params: Params
+    command = Input(JointCommand, text="what the drives were sent")
+    joints = Input(JointState, text="the torques that they report")
+    estimate = Output(DelayEstimate, text="the delay to compensate")
+    memory = State(DelayMemory, text="sums over the run so far")
+
+    def setup(self) -> None:
+        n = len(self.robot.joints)
+        self._change, self._product = np.zeros(n), np.zeros(LAGS)
+        self._square = np.zeros((LAGS, LAGS))
+        self._last = round(self.params.duration / self.period)
+        self._least = round(self.params.least_time / self.period)
+
+    def start(self) -> None:
+        self.memory.delay[()] = -1.0
+
+    def emit(self) -> None:
+        p, measured = self.params, float(self.memory.delay)
+        counts = measured >= 0.0
+        self.estimate.measured[()] = max(measured, 0.0)
+        self.estimate.known[()] = counts
+        follows = counts and p.follow == "measured"
+        self.estimate.delay[()] = max(measured - p.usual, 0.0) if follows else p.told
+
+    def update(self) -> None:
+        memory = self.memory
+        if memory.ticks > self._last:
+            return
+        ticks = int(memory.ticks)
+        if ticks > LAGS + 1:  # before, some changes are those from nothing to the first command
+            self._add()
+        for lag in range(LAGS - 1, 0, -1):
+            memory.changes[lag] = memory.changes[lag - 1]
+        np.subtract(self.command.torque, memory.command, out=memory.changes[0])
+        memory.command[...] = self.command.torque
+        memory.torque[...] = self.joints.torque
+        memory.ticks[()] = ticks + 1
+        if ticks >= self._least and (ticks % 25 == 0 or ticks == self._last):
+            self._solve()
+
+    def _add(self) -> None:
+        """Add the changes of this tick to the sums."""
+        memory = self.memory
+        np.subtract(self.joints.torque, memory.torque, out=self._change)
+        np.dot(memory.changes, memory.changes.T, out=self._square)
+        memory.square += self._square
+        np.dot(memory.changes, self._change, out=self._product)
+        memory.product += self._product
+        memory.energy += float(np.dot(self._change, self._change))
+
+    def _solve(self) -> None:
+        """The number of periods and the share of one that leave the least unexplained."""
+        memory, square, product = self.memory, self.memory.square, self.memory.product
+        energy = float(memory.energy)
+        if energy <= 0.0:
+            return
+        best, delay = energy, -1.0
+        for j in range(LAGS - 1):
+            own, cross, other = square.item(j, j), square.item(j, j + 1), square.item(j + 1, j + 1)
+            length = own - 2.0 * cross + other
+            if length <= 0.0:
+                continue
+            here, there = product.item(j), product.item(j + 1)
+            share = min(max((there - here - cross + own) / length, 0.0), 1.0)
+            error = energy - 2.0 * ((1.0 - share) * here + share * there)
+            error += (1.0 - share) ** 2 * own + 2.0 * share * (1.0 - share) * cross
+            error += share * share * other
+            if error < best:
+                best, delay = error, (j + share) * self.period
+        matched = 1.0 - best / energy
+        memory.matched[()] = matched
+        memory.delay[()] = delay if matched >= self.params.least_match else -1.0
+
+    def metrics(self) -> Mapping[str, Metric]:
+        """What was told and measured."""
+        values: dict[str, Metric] = {"delay_told_ms": 1e3 * self.params.told}
+        if self.memory.delay >= 0.0:
+            values["delay_measured_ms"] = 1e3 * float(self.memory.delay)
+        return values
+
+    def cautions(self) -> Sequence[str]:
+        """Say where the measured delay is not the one that was told."""
+        p, measured = self.params, float(self.memory.delay)
+        if measured < 0.0 or abs(measured - p.usual - p.told) <= p.tolerance:
+            return ()
+        followed = "is compensated" if p.follow == "measured" else "is not compensated"
+        return (
+            (
+                f"the delay from sensing to torque is {1e3 * measured:.1f} ms as measured, which "
+                f"{followed}, and {1e3 * p.told:g} ms as told; correct `told` or the robot's delay"
+            ),
+        )

@@ -1,0 +1,110 @@
+"""The arguments of a kernel as machine code gets them: types, and one row of 64-bit words.
+
+A number is one word. An array is the record that numba keeps for it: two words that are zero
+because the memory belongs to the caller, the number of elements, the bytes of an element, the
+address, the shape and the strides. A named tuple is its parts, one after the other. Before the
+arguments there are two words with which machine code reports a division by zero to Python.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+HEADER = 2
+"""The number of words before the arguments."""
+
+
+@dataclass(frozen=True)
+class NumberType:
+    """A number of Python: ``float``, ``int`` or ``bool``."""
+
+    kind: str
+
+    def __str__(self) -> str:
+        return self.kind
+
+
+@dataclass(frozen=True)
+class ArrayType:
+    """An array: its dtype's name, its number of dimensions, and its order in memory.
+
+    ``order`` is C (rows in sequence), F (columns in sequence) or A (any strides).
+    """
+
+    dtype: str
+    dimensions: int
+    order: str
+
+    def __str__(self) -> str:
+        return f"{self.dtype}[{self.dimensions}{self.order}]"
+
+
+@dataclass(frozen=True)
+class RecordType:
+    """A named tuple: its class and the types of its parts."""
+
+    kind: type
+    parts: tuple[ArgumentType, ...]
+
+    def __str__(self) -> str:
+        parts = ",".join(map(str, self.parts))
+        names = ",".join(getattr(self.kind, "_fields", ()))
+        return f"{self.kind.__module__}.{self.kind.__qualname__}:{names}({parts})"
+
+
+ArgumentType = NumberType | ArrayType | RecordType
+
+
+def type_of(argument: Any) -> ArgumentType:
+    """The type of an argument. Raises ``TypeError`` for what a kernel cannot take."""
+    if isinstance(argument, np.ndarray):
+        flags = argument.flags
+        order = "C" if flags.c_contiguous else "F" if flags.f_contiguous else "A"
+        return ArrayType(argument.dtype.name, argument.ndim, order)
+    if isinstance(argument, tuple) and hasattr(argument, "_fields"):
+        return RecordType(type(argument), tuple(type_of(part) for part in argument))
+    if isinstance(argument, bool | np.bool_):
+        return NumberType("bool")
+    if isinstance(argument, int):
+        return NumberType("int")
+    if isinstance(argument, float):
+        return NumberType("float")
+    raise TypeError(
+        f"a kernel takes arrays, floats, ints, bools and named tuples of these, and not a "
+        f"{type(argument).__name__}"
+    )
+
+
+def pack(arguments: tuple[Any, ...]) -> NDArray[np.int64]:
+    """The words of all arguments in a row. They hold addresses: keep the arrays alive."""
+    words = list(_error_words())
+    for argument in arguments:
+        _append(argument, words)
+    return np.array(words, dtype=np.int64)
+
+
+@cache
+def _error_words() -> tuple[int, int]:
+    """The address of Python's function that sets an error, and that of the error."""
+    report = ctypes.cast(ctypes.pythonapi.PyErr_SetString, ctypes.c_void_p).value
+    return report or 0, id(ZeroDivisionError)
+
+
+def _append(argument: Any, words: list[int]) -> None:
+    if isinstance(argument, np.ndarray):
+        words += (0, 0, argument.size, argument.itemsize, argument.ctypes.data)
+        words += argument.shape
+        words += argument.strides
+    elif isinstance(argument, tuple):
+        for part in argument:
+            _append(part, words)
+    elif isinstance(argument, float):
+        words.append(int(np.float64(argument).view(np.int64)))
+    else:
+        words.append(int(argument))

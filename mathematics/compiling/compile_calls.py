@@ -1,0 +1,103 @@
+"""Gives calls of kernels their machine code: from memory, from the cache, or by compiling it now."""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from functools import partial
+
+from ..kernel import kernels
+from . import store
+from .arguments import ArgumentType, pack, type_of
+from .fingerprint import fingerprint
+from .kernel_call import KernelCall
+from .machine_code import MachineCode, tools
+from .translate import CompileError, Translator
+
+Watcher = Callable[[int, int], None]
+
+watchers: list[Watcher] = []
+"""Called with the number of kernels that are compiled and with how many there are, before each one;
+not called where everything comes from the cache."""
+
+_loaded: dict[str, MachineCode] = {}
+_names: dict[tuple[Callable[..., None], tuple[ArgumentType, ...]], str] = {}
+
+
+def compile_calls(calls: Sequence[KernelCall]) -> str:
+    """Let calls run as machine code.
+
+    Returns:
+        Why some or all of them run as plain Python instead; empty where all are compiled. The
+        results are the same bits either way.
+    """
+    try:
+        return _Compilation(calls).finish()
+    except (ImportError, CompileError, OSError, RuntimeError, TypeError, ValueError) as error:
+        for call in calls:
+            call.use_plain()
+        return str(error) or type(error).__name__
+
+
+class _Compilation:
+    """The machine code for some calls; kernels whose code is nowhere are compiled one by one."""
+
+    def __init__(self, calls: Sequence[KernelCall]) -> None:
+        self._calls = calls
+        self._types = [tuple(type_of(a) for a in call.arguments) for call in calls]
+        self._names = [_name(call, types) for call, types in zip(calls, self._types, strict=True)]
+
+    def finish(self) -> str:
+        """Compile what is missing, and change over all calls; returns what did not compile."""
+        missing: dict[str, int] = {}
+        for k, name in enumerate(self._names):
+            if name not in _loaded and not self._load_from_cache(name):
+                missing.setdefault(name, k)
+        refused = self._compile(missing)
+        for call, name in zip(self._calls, self._names, strict=True):
+            if name not in _loaded:
+                call.use_plain()
+                continue
+            code, words = _loaded[name], pack(call.arguments)
+            address = ctypes.c_size_t(words.ctypes.data)
+            call.run = partial(code.function, address)
+            call.compiled = code, words
+        return "; ".join(refused)
+
+    def _load_from_cache(self, name: str) -> bool:
+        code = store.load(name)
+        if code is None:
+            return False
+        with suppress(RuntimeError, ValueError):  # of another LLVM, or damaged: compiled again
+            _loaded[name] = MachineCode(code)
+        return name in _loaded
+
+    def _compile(self, missing: dict[str, int]) -> list[str]:
+        """Compile kernels, given by name and the place of a call; returns why some are refused."""
+        refused: list[str] = []
+        if not missing:
+            return refused
+        translator = Translator()
+        for count, (name, k) in enumerate(missing.items()):
+            for watch in watchers:
+                watch(count, len(missing))
+            try:
+                code = translator.object_code(self._calls[k].kernel, self._types[k])
+                _loaded[name] = MachineCode(code)
+                store.save(name, code)
+            except CompileError as error:
+                refused.append(str(error))
+        for watch in watchers:
+            watch(len(missing), len(missing))
+        return refused
+
+
+def _name(call: KernelCall, types: tuple[ArgumentType, ...]) -> str:
+    """The name of a call's machine code in the cache."""
+    key = call.kernel, types
+    if key not in _names:
+        if kernels().get(call.name) is not call.kernel:
+            raise CompileError(f"{call.name} is not marked with @kernel")
+        _names[key] = fingerprint(call.kernel, types, tools())
+    return _names[key]

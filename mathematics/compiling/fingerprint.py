@@ -1,0 +1,70 @@
+"""What the machine code of a kernel depends on, as a short text that names its file in the cache.
+
+It covers the byte code of the kernel and of all kernels that it calls, in whichever module, and the
+constants that they read. Comments, line numbers and the place of the source count for nothing.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import types
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any
+
+from ..kernel import kernels
+from .arguments import ArgumentType
+
+
+def fingerprint(kernel: Callable[..., Any], signature: tuple[ArgumentType, ...], tools: str) -> str:
+    """The name (32 hexadecimal digits) of the machine code of ``kernel`` for these types.
+
+    Args:
+        tools: whatever else decides on the machine code: versions, options, the processor.
+    """
+    digest = hashlib.blake2b(digest_size=16)
+    digest.update(tools.encode())
+    for part in signature:
+        digest.update(f"|{part}".encode())
+    marked = {id(function) for function in kernels().values()}
+    for function in _closure(kernel, marked):
+        digest.update(f"|{function.__qualname__}".encode())
+        for text in _texts(function, marked):
+            digest.update(text.encode())
+    return digest.hexdigest()
+
+
+def _closure(kernel: Any, marked: set[int]) -> list[Any]:
+    """The kernel and all that it calls, each once, in the order in which they are met."""
+    found: list[Any] = []
+    pending = [kernel]
+    while pending:
+        function = pending.pop()
+        if any(function is other for other in found):
+            continue
+        found.append(function)
+        values = (function.__globals__.get(name) for name in function.__code__.co_names)
+        pending += [value for value in values if id(value) in marked]
+    return found
+
+
+def _texts(function: Any, marked: set[int]) -> Iterator[str]:
+    """The byte code of a function, and the constants of its module that it reads."""
+    yield from _code_texts(function.__code__)
+    scope: Mapping[str, Any] = function.__globals__
+    for name in function.__code__.co_names:
+        if name in scope and id(scope[name]) not in marked:
+            value = scope[name]
+            plain = isinstance(value, types.ModuleType | type) or callable(value)
+            yield f"|{name}={getattr(value, '__name__', '') if plain else repr(value)}"
+
+
+def _code_texts(code: types.CodeType) -> Iterator[str]:
+    yield code.co_code.hex()
+    yield repr((code.co_names, code.co_varnames, code.co_freevars, code.co_cellvars))
+    yield str(code.co_argcount)
+    documented = bool(code.co_consts) and isinstance(code.co_consts[0], str)
+    for constant in code.co_consts[1:] if documented else code.co_consts:
+        if isinstance(constant, types.CodeType):
+            yield from _code_texts(constant)
+        else:
+            yield f"|{constant!r}"

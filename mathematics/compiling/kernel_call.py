@@ -1,0 +1,69 @@
+"""A kernel with the arrays it works on: what a block calls in a tick.
+
+::
+
+    self._advance = KernelCall(advance, self.estimate.position, self.imu.specific_force, 0.002)
+    ...
+    self._advance.run()
+
+As long as nothing else is said, ``run`` calls the kernel as plain Python. ``compile_calls`` replaces
+it by the machine code of the same kernel on the same memory, which computes the same bits.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import partial
+from typing import Any
+
+
+class KernelCall:
+    """One call of a kernel, whose arguments are fixed once.
+
+    Arrays are views that keep their place in memory, so a tick changes what is in them and passes
+    nothing. Numbers and flags keep their value; what changes between two ticks belongs in an array.
+
+    Args:
+        kernel: a function marked with ``@kernel`` that returns nothing.
+        arguments: arrays, floats, ints, bools, and named tuples of these.
+
+    Attributes:
+        run: performs the call. It is replaced when the kernel is compiled, so keep the call and not
+            this attribute.
+    """
+
+    __slots__ = ("arguments", "compiled", "kernel", "run")
+
+    def __init__(self, kernel: Callable[..., None], *arguments: Any) -> None:
+        self.kernel = kernel
+        self.arguments = arguments
+        self.run: Callable[[], Any] = partial(kernel, *arguments)
+        self.compiled: object = None
+        """What keeps the machine code and the packed arguments alive; none for plain Python."""
+        for calls in _collecting:
+            calls.append(self)
+
+    @property
+    def name(self) -> str:
+        """The kernel's name with its module."""
+        return f"{self.kernel.__module__}.{self.kernel.__qualname__}"
+
+    def use_plain(self) -> None:
+        """Go back to plain Python."""
+        self.run = partial(self.kernel, *self.arguments)
+        self.compiled = None
+
+
+_collecting: list[list[KernelCall]] = []
+
+
+@contextmanager
+def collect_calls() -> Iterator[list[KernelCall]]:
+    """A list of all calls that are made within the context, in their order."""
+    calls: list[KernelCall] = []
+    _collecting.append(calls)
+    try:
+        yield calls
+    finally:
+        _collecting.remove(calls)

@@ -1,0 +1,86 @@
+"""Machine code in memory: an object file becomes a function that takes one address.
+
+Only LLVM is needed for that. numba, which takes longer to import, is imported where a kernel has to
+be compiled.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Callable
+from functools import cache
+from importlib.metadata import version
+from typing import Any
+
+ENTRY = "aloft_entry"
+"""The name of the only function that the object file of a kernel exports."""
+OPTIONS = "strict floating point, errors as in Python, no allocation, 1"
+"""What is asked of the compiler; the number at the end counts changes of the calling convention."""
+
+
+@cache
+def tools() -> str:
+    """The versions, options and processor on which machine code depends.
+
+    Raises:
+        ImportError: there is no LLVM, or no numba to compile with.
+    """
+    import platform
+
+    binding = _binding()
+    features = binding.get_host_cpu_features().flatten()
+    names = (
+        f"python {platform.python_version()}",
+        f"numba {version('numba')}",
+        f"llvmlite {version('llvmlite')}",
+        f"{binding.get_process_triple()} {binding.get_host_cpu_name()} {features}",
+        OPTIONS,
+    )
+    return "; ".join(names)
+
+
+@cache
+def _binding() -> Any:
+    from llvmlite import binding
+
+    binding.initialize_native_target()
+    binding.initialize_native_asmprinter()
+    return binding
+
+
+def target_machine() -> Any:
+    """The processor of this computer, for LLVM."""
+    binding = _binding()
+    return binding.Target.from_default_triple().create_target_machine(
+        cpu=binding.get_host_cpu_name(),
+        features=binding.get_host_cpu_features().flatten(),
+        opt=3,
+        reloc="pic",
+        codemodel="jitdefault",
+    )
+
+
+def assemble(assembly: str) -> bytes:
+    """The object file of a module in LLVM's language, which has been optimised already."""
+    module = _binding().parse_assembly(assembly)
+    code: bytes = target_machine().emit_object(module)
+    return code
+
+
+class MachineCode:
+    """The function in an object file, ready to be called with the address of packed arguments."""
+
+    def __init__(self, code: bytes) -> None:
+        binding = _binding()
+        self._engine: Any = binding.create_mcjit_compiler(
+            binding.parse_assembly(""), target_machine()
+        )
+        self._engine.add_object_file(binding.ObjectFileRef.from_data(code))
+        self._engine.finalize_object()
+        self.address: int = self._engine.get_function_address(ENTRY)
+        if not self.address:
+            raise ValueError(f"the machine code has no function {ENTRY}")
+        # This kind of prototype keeps the interpreter's lock and reports a Python error that the
+        # function has set.
+        function: Any = ctypes.PYFUNCTYPE(None, ctypes.c_size_t)(self.address)
+        self.function: Callable[[ctypes.c_size_t], None] = function

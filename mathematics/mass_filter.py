@@ -1,0 +1,174 @@
+"""The equations by which a standing robot's torques tell its mass, as pure functions.
+
+With base rows b and joint rows j of the equations of motion, and the forces f of the feet,
+
+    M_b a + n_b = J_b' f,        M_j a + n_j = tau - c + J_j' f,
+
+where c is the joints' friction. If the torques of the legs' joints determine the wrench of each
+foot, f can be eliminated by the map G = J_b' (J_j')^+ from joint torques to forces on the base:
+
+    (M_b a + n_b) - G (M_j a + n_j) + G (tau - c) = 0,
+
+six equations that are linear in the masses. No function here allocates memory.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .kernel import kernel
+from .least_squares import solve_positive_columns
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+DAMPING = 1e-8
+"""Added to the squared levers [m^2] of the joints, so that a straight leg has a finite inverse."""
+
+
+class LegScratch(NamedTuple):
+    """Scratch for ``base_force_map``: ``normal`` (n, n) and ``right`` (n, 6) for legs of up to n
+    joints."""
+
+    normal: Array
+    right: Array
+
+
+@kernel
+def base_force_map(
+    jacobian: Array,
+    stance: NDArray[np.bool_],
+    foot_of_point: Indices,
+    chains: Indices,
+    scratch: LegScratch,
+    out: Array,
+) -> None:
+    """The map G (6, n_joints) from joint torques to the generalised force on a floating base.
+
+    Args:
+        jacobian: of the contact points, (n_contacts, 3, 6 + n_joints).
+        stance: which points carry load.
+        foot_of_point: the foot of each point.
+        chains: the joints of each foot's leg, (n_feet, n), filled up with -1.
+    """
+    normal, right = scratch
+    out[:] = 0.0
+    longest = chains.shape[1]
+    for foot in range(chains.shape[0]):
+        normal[:] = 0.0
+        right[:] = 0.0
+        loaded = False
+        for point in range(foot_of_point.shape[0]):
+            if int(foot_of_point[point]) != foot or not stance[point]:
+                continue
+            loaded = True
+            for axis in range(3):
+                row = jacobian[point, axis]
+                for i in range(longest):
+                    if int(chains[foot, i]) < 0:
+                        continue
+                    lever = float(row[6 + int(chains[foot, i])])
+                    for k in range(i + 1):
+                        normal[i, k] += lever * float(row[6 + int(chains[foot, k])])
+                    for k in range(6):
+                        right[i, k] += lever * float(row[k])
+        if not loaded:
+            continue
+        for i in range(longest):
+            normal[i, i] += DAMPING
+        solve_positive_columns(normal, right)
+        for i in range(longest):
+            joint = int(chains[foot, i])
+            if joint >= 0:
+                for k in range(6):
+                    out[k, joint] = float(right[i, k])
+
+
+@kernel
+def split_friction(
+    speed: Array, friction: Array, damping: Array, threshold: float, left: float,
+    known: Array, unknown: Array,
+) -> None:  # fmt: skip
+    """The part of the joints' friction that their speed tells, and the share that stays unknown.
+
+    Args:
+        speed: of the joints [rad/s], low-pass filtered.
+        friction, damping: of the joints [N m, N m s/rad].
+        threshold: speed [rad/s] above which friction surely acts against the motion.
+        left: the share of friction that stays unknown in a fast joint.
+        known: becomes the known torque [N m], positive against positive motion.
+        unknown: becomes the share, 1 for a joint at rest.
+    """
+    for i in range(speed.shape[0]):
+        share = math.tanh(float(speed[i]) / threshold)
+        known[i] = float(friction[i]) * share + float(damping[i]) * float(speed[i])
+        unknown[i] = 1.0 - (1.0 - left) * abs(share)
+
+
+@kernel
+def torso_moment(rotation: Array, weight: float, out: Array) -> None:
+    """How the moment on the base (3) changes with the torso's centre of mass (3): out, (3, 3).
+
+    At rest the weight at d needs the moment d x (R' e_z) weight, in the base's axes.
+
+    Args:
+        rotation: R, from the base to the world, (3, 3).
+        weight: of the torso [N].
+    """
+    x, y, z = (
+        weight * float(rotation[2, 0]), weight * float(rotation[2, 1]),
+        weight * float(rotation[2, 2]),
+    )  # fmt: skip
+    out[0, 0], out[0, 1], out[0, 2] = 0.0, z, -y
+    out[1, 0], out[1, 1], out[1, 2] = -z, 0.0, x
+    out[2, 0], out[2, 1], out[2, 2] = y, -x, 0.0
+
+
+@kernel
+def fade(estimate: Array, covariance: Array, first: int, factor: float, variance: float) -> None:
+    """One step in which the unknowns from ``first`` on are forgotten towards zero.
+
+    Each follows a process whose correlation over the step is ``factor`` and whose stationary
+    variance is ``variance``; the unknowns before ``first`` are constant.
+    """
+    n = estimate.shape[0]
+    fresh = (1.0 - factor * factor) * variance
+    for i in range(first, n):
+        estimate[i] *= factor
+        for k in range(n):
+            covariance[i, k] *= factor
+            covariance[k, i] *= factor
+        covariance[i, i] += fresh
+
+
+@kernel
+def correct_row(
+    estimate: Array, covariance: Array, row: Array, residual: float, noise: float, gate: float,
+    seen: Array, product: Array,
+) -> bool:  # fmt: skip
+    """Correct the estimate by one measured number, unless it is an outlier; whether it was used.
+
+    Args:
+        estimate, covariance: of the unknowns x, (n,) and (n, n).
+        row: h in residual = h x_error + noise, (n,).
+        residual: the measurement minus what the estimate gives.
+        noise: its standard deviation.
+        gate: a residual of more standard deviations than this is not used.
+        seen, product: scratch (n,) and (n, n).
+    """
+    np.dot(covariance, row, seen)
+    variance = noise * noise
+    for i in range(row.shape[0]):
+        variance += float(row[i]) * float(seen[i])
+    if residual * residual > gate * gate * variance:
+        return False
+    for i in range(row.shape[0]):
+        estimate[i] += float(seen[i]) * residual / variance
+    np.multiply(seen.reshape(-1, 1), seen, product)
+    np.divide(product, variance, product)
+    np.subtract(covariance, product, covariance)
+    return True

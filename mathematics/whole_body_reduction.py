@@ -1,0 +1,387 @@
+"""The whole-body program in the contact forces alone: accelerations and torques eliminated exactly.
+
+The program of ``whole_body_qp`` in x = [a; f] has the equations of motion of the base as equality
+constraints. For given forces f these and the tasks determine a; so what remains is a program in f
+with the same minimum. With Q = sum_i w_i J_i' J_i + w_a 1, c = sum_i w_i d_i J_i' and the base's
+equations M_b a + h_b = B f, B = J_b'::
+
+    Q = U'U,   W = M_b U^-1,   y = U'^-1 c
+    S = W W' = R'R,   K = R'^-1 B,   k = R'^-1 (h_b + W y)
+    minimise  1/2 f' (K'K + w_f 1) f - k'K f
+    a = U^-1 y + X (K f - k),   X = U^-1 W' R^-1
+
+Limits on torques tau = M_j a + h_j - J_j' f restrict a as well as f. Where they matter the program
+has further unknowns e, one for every joint: a = (as above) + N e with M_b N = 0 and N'Q N = 1, so
+they add 1/2 |e|^2 to the cost and nothing else.
+
+Matrices are stored by rows, so that inner loops run along memory; in the records below W, X and N
+are transposed.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .kernel import kernel
+from .triangular import factorise, solve_rows_transposed, solve_transposed, solve_upper
+from .whole_body_qp import Bounds, RigidBodyTerms, TaskRows
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+
+class Reduction(NamedTuple):
+    """The matrices of the elimination, for n velocities, 6 of the base, and up to m force elements.
+
+    ``factor`` U (n, n), ``base`` W (6, n), ``wanted`` y (n,), ``shape`` R (6, 6), ``lever`` K (6, m),
+    ``pull`` k (6,), ``response`` X' (6, n), ``rest`` the acceleration without forces (n,), ``price``
+    (6,) the cost of pushing the base, ``free`` N' (n - 6, n), ``mirrors`` (6, n) the reflections
+    that make N, ``torque_map`` (n - 6, m + n - 6) and ``torque_rest`` (n - 6,) the torques as an affine
+    function of f and e.
+    """
+
+    factor: Array
+    base: Array
+    wanted: Array
+    shape: Array
+    lever: Array
+    pull: Array
+    response: Array
+    rest: Array
+    price: Array
+    free: Array
+    mirrors: Array
+    torque_map: Array
+    torque_rest: Array
+
+
+def reduction_memory(n: int, m: int) -> Reduction:
+    """Zero memory for n velocities and up to m elements of force."""
+    shapes = (
+        (n, n), (6, n), n, (6, 6), (6, m), 6, (6, n), n, 6, (n - 6, n), (6, n),
+        (n - 6, m + n - 6), n - 6,
+    )  # fmt: skip
+    return Reduction(*(np.zeros(shape) for shape in shapes))
+
+
+@kernel
+def eliminate(
+    tasks: TaskRows,
+    terms: RigidBodyTerms,
+    active: Indices,
+    count: int,
+    acceleration_weight: float,
+    reduction: Reduction,
+) -> bool:
+    """Compute everything in ``reduction`` but the torques. Returns whether it can be done.
+
+    Args:
+        active: the points in stance, of which the first ``count`` are used.
+    """
+    factor, wanted, base = reduction.factor, reduction.wanted, reduction.base
+    n = wanted.shape[0]
+    for i in range(n):
+        wanted[i] = 0.0
+        for k in range(n):
+            factor[i, k] = 0.0
+        factor[i, i] = acceleration_weight
+    for row in range(tasks.jacobian.shape[0]):
+        weight = float(tasks.weights[row])
+        if weight == 0.0:
+            continue
+        desired = float(tasks.desired[row])
+        for i in range(n):
+            value = weight * float(tasks.jacobian[row, i])
+            if value != 0.0:
+                wanted[i] = float(wanted[i]) + value * desired
+                for k in range(i, n):
+                    factor[i, k] = float(factor[i, k]) + value * float(tasks.jacobian[row, k])
+    if not factorise(factor, 0.0):
+        return False
+    solve_transposed(factor, wanted)
+    for k in range(6):
+        for i in range(n):
+            base[k, i] = terms.mass_matrix[k, i]
+        solve_transposed(factor, base[k])
+    shape, pull, lever = reduction.shape, reduction.pull, reduction.lever
+    for k in range(6):
+        for j in range(k, 6):
+            total = 0.0
+            for i in range(n):
+                total += float(base[k, i]) * float(base[j, i])
+            shape[k, j] = total
+        total = float(terms.nonlinear[k])
+        for i in range(n):
+            total += float(base[k, i]) * float(wanted[i])
+        pull[k] = total
+        for j in range(count):
+            for axis in range(3):
+                lever[k, 3 * j + axis] = terms.jacobian[active[j], axis, k]
+    if not factorise(shape, 0.0):
+        return False
+    solve_transposed(shape, pull)
+    solve_rows_transposed(shape, 3 * count, lever)
+    response, rest = reduction.response, reduction.rest
+    for k in range(6):
+        for i in range(n):
+            response[k, i] = base[k, i]
+    solve_rows_transposed(shape, n, response)
+    for k in range(6):
+        solve_upper(factor, response[k])
+    for i in range(n):
+        rest[i] = wanted[i]
+    solve_upper(factor, rest)
+    for k in range(6):
+        value = float(pull[k])
+        for i in range(n):
+            rest[i] = float(rest[i]) - value * float(response[k, i])
+    return True
+
+
+@kernel
+def force_program(
+    reduction: Reduction,
+    size: int,
+    extra: int,
+    force_weight: float,
+    hessian: Array,
+    gradient: Array,
+) -> None:
+    """The cost in the first ``size`` elements of force and the first ``extra`` elements of e."""
+    lever, pull = reduction.lever, reduction.pull
+    for i in range(size + extra):
+        gradient[i] = 0.0
+        for j in range(size + extra):
+            hessian[i, j] = 0.0
+        hessian[i, i] = force_weight if i < size else 1.0
+    for k in range(6):
+        for i in range(size):
+            value = float(lever[k, i])
+            gradient[i] = float(gradient[i]) - value * float(pull[k])
+            for j in range(size):
+                hessian[i, j] = float(hessian[i, j]) + value * float(lever[k, j])
+
+
+@kernel
+def force_gradient(
+    reduction: Reduction,
+    terms: RigidBodyTerms,
+    active: Indices,
+    count: int,
+    extra: int,
+    force_weight: float,
+    unknowns: Array,
+    out: Array,
+) -> None:
+    """The gradient of the cost: w_f f + B'R^-1 (K f - k), then e; (3 count + extra,).
+
+    It has no rounding errors along forces that do not move the base, where only w_f decides and
+    K'K + w_f 1 has lost most of its digits.
+    """
+    size, price = 3 * count, reduction.price
+    for k in range(6):
+        total = -float(reduction.pull[k])
+        for i in range(size):
+            total += float(reduction.lever[k, i]) * float(unknowns[i])
+        price[k] = total
+    solve_upper(reduction.shape, price)
+    for j in range(count):
+        for axis in range(3):
+            i = 3 * j + axis
+            total = force_weight * float(unknowns[i])
+            for k in range(6):
+                total += float(terms.jacobian[active[j], axis, k]) * float(price[k])
+            out[i] = total
+    for k in range(size, size + extra):
+        out[k] = unknowns[k]
+
+
+@kernel
+def friction_rows(
+    count: int,
+    extra: int,
+    friction: float,
+    least: float,
+    most: float,
+    matrix: Array,
+    bound: Array,
+) -> int:
+    """Six rows for each point: |f_x| <= mu f_z, |f_y| <= mu f_z, least <= f_z <= most.
+
+    Returns the number of rows.
+    """
+    for row in range(6 * count):
+        for k in range(3 * count + extra):
+            matrix[row, k] = 0.0
+        bound[row] = 0.0
+    for j in range(count):
+        row, column = 6 * j, 3 * j
+        for k in range(2):
+            matrix[row + 2 * k, column + k], matrix[row + 2 * k + 1, column + k] = 1.0, -1.0
+        for k in range(4):
+            matrix[row + k, column + 2] = -friction
+        matrix[row + 4, column + 2], bound[row + 4] = 1.0, most
+        matrix[row + 5, column + 2], bound[row + 5] = -1.0, -least
+    return 6 * count
+
+
+@kernel
+def free_motions(reduction: Reduction) -> None:
+    """Compute N, the accelerations that do not push the base, by reflections (Householder)."""
+    mirrors, free = reduction.mirrors, reduction.free
+    n = reduction.rest.shape[0]
+    for k in range(6):
+        for i in range(n):
+            mirrors[k, i] = reduction.base[k, i]
+    for k in range(6):
+        square = 0.0
+        for i in range(k, n):
+            square += float(mirrors[k, i]) * float(mirrors[k, i])
+        head = float(mirrors[k, k])
+        mirrors[k, k] = head + math.copysign(math.sqrt(square), head)
+        square += float(mirrors[k, k]) * float(mirrors[k, k]) - head * head
+        scale = math.sqrt(2.0 / square) if square > 0.0 else 0.0
+        for i in range(k):
+            mirrors[k, i] = 0.0
+        for i in range(k, n):
+            mirrors[k, i] = float(mirrors[k, i]) * scale
+        for other in range(k + 1, 6):
+            reflect(mirrors[k], mirrors[other])
+    for j in range(n - 6):
+        for i in range(n):
+            free[j, i] = 0.0
+        free[j, 6 + j] = 1.0
+        for k in range(5, -1, -1):
+            reflect(mirrors[k], free[j])
+        solve_upper(reduction.factor, free[j])
+
+
+@kernel
+def reflect(mirror: Array, vector: Array) -> None:
+    """Replace x by x - v (v'x), a reflection where v has the length sqrt(2)."""
+    total = 0.0
+    for i in range(vector.shape[0]):
+        total += float(mirror[i]) * float(vector[i])
+    for i in range(vector.shape[0]):
+        vector[i] = float(vector[i]) - total * float(mirror[i])
+
+
+@kernel
+def torque_rows(
+    reduction: Reduction,
+    terms: RigidBodyTerms,
+    active: Indices,
+    count: int,
+    transmission: Array,
+    bounds: Bounds,
+    first: int,
+    matrix: Array,
+    bound: Array,
+) -> int:
+    """Two rows in [f; e] for each limited torque, from row ``first`` on; returns the number in all.
+
+    Args:
+        transmission: from joint torques to those that are limited, (n_joints, n_joints).
+    """
+    response, lever, free = reduction.response, reduction.lever, reduction.free
+    torque_map, torque_rest = reduction.torque_map, reduction.torque_rest
+    joints, n, size = torque_rest.shape[0], reduction.rest.shape[0], 3 * count
+    for j in range(joints):
+        rest = float(terms.nonlinear[6 + j])
+        for i in range(n):
+            rest += float(terms.mass_matrix[6 + j, i]) * float(reduction.rest[i])
+        torque_rest[j] = rest
+        for point in range(count):
+            for axis in range(3):
+                torque_map[j, 3 * point + axis] = -terms.jacobian[active[point], axis, 6 + j]
+        for k in range(6):
+            total = 0.0
+            for i in range(n):
+                total += float(terms.mass_matrix[6 + j, i]) * float(response[k, i])
+            for i in range(size):
+                torque_map[j, i] = float(torque_map[j, i]) + total * float(lever[k, i])
+        for k in range(joints):
+            total = 0.0
+            for i in range(n):
+                total += float(terms.mass_matrix[6 + j, i]) * float(free[k, i])
+            torque_map[j, size + k] = total
+    for motor in range(joints):
+        high, low = first + motor, first + joints + motor
+        for i in range(size + joints):
+            matrix[high, i] = 0.0
+        rest = 0.0
+        for j in range(joints):
+            share = float(transmission[motor, j])
+            if share != 0.0:
+                rest += share * float(torque_rest[j])
+                for i in range(size + joints):
+                    matrix[high, i] = float(matrix[high, i]) + share * float(torque_map[j, i])
+        for i in range(size + joints):
+            matrix[low, i] = -float(matrix[high, i])
+        bound[high] = float(bounds.upper[motor]) - rest
+        bound[low] = rest - float(bounds.lower[motor])
+    return int(first + 2 * joints)
+
+
+@kernel
+def within_limits(torque: Array, transmission: Array, bounds: Bounds) -> bool:
+    """Whether torques (n_joints,) [N m] keep their limits, up to 1e-10 N m."""
+    for motor in range(torque.shape[0]):
+        total = 0.0
+        for j in range(torque.shape[0]):
+            total += float(transmission[motor, j]) * float(torque[j])
+        if total > float(bounds.upper[motor]) + 1e-10:
+            return False
+        if total < float(bounds.lower[motor]) - 1e-10:
+            return False
+    return True
+
+
+@kernel
+def recover_acceleration(
+    reduction: Reduction, size: int, extra: int, unknowns: Array, out: Array
+) -> None:
+    """The acceleration (n,) for ``size`` elements of force and ``extra`` elements of e."""
+    response, lever, free = reduction.response, reduction.lever, reduction.free
+    for i in range(out.shape[0]):
+        out[i] = reduction.rest[i]
+    for k in range(6):
+        value = 0.0
+        for i in range(size):
+            value += float(lever[k, i]) * float(unknowns[i])
+        for i in range(out.shape[0]):
+            out[i] = float(out[i]) + value * float(response[k, i])
+    for k in range(extra):
+        value = float(unknowns[size + k])
+        for i in range(out.shape[0]):
+            out[i] = float(out[i]) + value * float(free[k, i])
+
+
+@kernel
+def recover_torque(
+    terms: RigidBodyTerms,
+    active: Indices,
+    count: int,
+    acceleration: Array,
+    force: Array,
+    torque: Array,
+) -> None:
+    """The joint torques M_j a + h_j - J_j' f (paper, opt_torque), (n_joints,) [N m].
+
+    Args:
+        force: of the first ``count`` points of ``active``, three elements each.
+    """
+    for j in range(torque.shape[0]):
+        total = float(terms.nonlinear[6 + j])
+        for i in range(acceleration.shape[0]):
+            total += float(terms.mass_matrix[6 + j, i]) * float(acceleration[i])
+        for point in range(count):
+            for axis in range(3):
+                total -= float(terms.jacobian[active[point], axis, 6 + j]) * float(
+                    force[3 * point + axis]
+                )
+        torque[j] = total

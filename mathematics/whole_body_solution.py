@@ -1,0 +1,229 @@
+"""The whole-body controller's program from its terms to torques, as one kernel.
+
+It puts the elimination (``whole_body_reduction``) and the active-set method (``active_set``) in
+order for one tick.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .active_set import ActiveSetMemory, Program, active_set_memory, polish, solve_program
+from .kernel import kernel
+from .whole_body_qp import (
+    Bounds,
+    RigidBodyTerms,
+    TaskRows,
+    TorqueSpeedCurves,
+    motor_limits,
+)
+from .whole_body_reduction import (
+    Reduction,
+    eliminate,
+    force_gradient,
+    force_program,
+    free_motions,
+    friction_rows,
+    recover_acceleration,
+    recover_torque,
+    reduction_memory,
+    torque_rows,
+    within_limits,
+)
+
+Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+Indices = NDArray[np.int64]
+
+NO_CONTACT = 0
+"""Result where no point is in stance: nothing to solve."""
+SOLVED = 1
+ILL_POSED = -4
+"""The terms or the tasks are not finite, or leave no positive definite matrix."""
+
+POLISHING = 2
+"""Newton steps after the solution; each divides the error by more than a thousand."""
+
+NO_LIMITS, JOINT_LIMITS, MOTOR_LIMITS = 0, 1, 2
+"""Kinds of torque limits."""
+
+
+class Weights(NamedTuple):
+    """Numbers that may change during a run, each an array of one element.
+
+    ``acceleration`` w_a and ``force`` w_f are weights, ``friction`` is the pyramid's coefficient, and
+    ``force_min`` and ``force_max`` [N] bound the normal force of a point.
+    """
+
+    acceleration: Array
+    force: Array
+    friction: Array
+    force_min: Array
+    force_max: Array
+
+
+class Motors(NamedTuple):
+    """The motors: speeds from joint velocities, torques from joint torques, and their limits.
+
+    ``to_speed`` and ``to_torque`` are (n, n); ``speed`` (n,) is scratch.
+    """
+
+    to_speed: Array
+    to_torque: Array
+    curves: TorqueSpeedCurves
+    speed: Array
+    bounds: Bounds
+
+
+class Solution(NamedTuple):
+    """The result: torques (n_joints,), accelerations (n,), forces (n_contacts, 3); ``code`` (1,)."""
+
+    torque: Array
+    acceleration: Array
+    force: Array
+    code: Indices
+
+
+class SolutionMemory(NamedTuple):
+    """Memory for intermediate results; ``unknowns`` are the forces and the e of the reduction."""
+
+    reduction: Reduction
+    program: Program
+    memory: ActiveSetMemory
+    unknowns: Array
+    gradient: Array
+    active: Indices
+
+
+def solution_memory(n_velocities: int, n_contacts: int) -> SolutionMemory:
+    """Zero memory for a robot of that size."""
+    joints = n_velocities - 6
+    n, m = 3 * n_contacts + joints, 6 * n_contacts + 2 * joints
+    return SolutionMemory(
+        reduction_memory(n_velocities, 3 * n_contacts),
+        Program(np.zeros((n, n)), np.zeros(n), np.zeros((m, n)), np.zeros(m)),
+        active_set_memory(n, m),
+        np.zeros(n),
+        np.zeros(n),
+        np.zeros(n_contacts, dtype=np.int64),
+    )
+
+
+@kernel
+def solve_whole_body(
+    tasks: TaskRows,
+    terms: RigidBodyTerms,
+    stance: Flags,
+    joint_velocity: Array,
+    weights: Weights,
+    limits: int,
+    motors: Motors,
+    memory: SolutionMemory,
+    solution: Solution,
+) -> None:
+    """Solve the program of ``whole_body_qp`` and write torques, accelerations and forces.
+
+    ``solution.code`` becomes SOLVED, NO_CONTACT, ILL_POSED or a negative code of ``active_set``. Only
+    with SOLVED the other results are of use.
+
+    First the program is solved without the limits on torque. If its solution keeps them, it is the
+    solution; otherwise the larger program is solved that has them.
+
+    Args:
+        stance: the points in stance, (n_contacts,).
+        joint_velocity: (n_joints,) [rad/s], for the motors' limits.
+        limits: one of the kinds of torque limits.
+    """
+    active, reduction = memory.active, memory.reduction
+    count = 0
+    for point in range(stance.shape[0]):
+        if stance[point]:
+            active[count] = point
+            count += 1
+    if count == 0:
+        solution.code[0] = NO_CONTACT
+        return
+    if not eliminate(tasks, terms, active, count, float(weights.acceleration[0]), reduction):
+        solution.code[0] = ILL_POSED
+        return
+    if limits != NO_LIMITS:
+        limit_motors(joint_velocity, limits, motors)
+    code = solve_forces(terms, weights, motors, count, 0, memory, solution)
+    if (
+        code >= 0
+        and limits != NO_LIMITS
+        and not within_limits(solution.torque, motors.to_torque, motors.bounds)
+    ):
+        free_motions(reduction)
+        joints = solution.torque.shape[0]
+        code = solve_forces(terms, weights, motors, count, joints, memory, solution)
+    if code < 0:
+        solution.code[0] = code
+        return
+    for point in range(stance.shape[0]):
+        for axis in range(3):
+            solution.force[point, axis] = 0.0
+    for j in range(count):
+        for axis in range(3):
+            solution.force[active[j], axis] = memory.unknowns[3 * j + axis]
+    solution.code[0] = SOLVED
+
+
+@kernel
+def solve_forces(
+    terms: RigidBodyTerms,
+    weights: Weights,
+    motors: Motors,
+    count: int,
+    extra: int,
+    memory: SolutionMemory,
+    solution: Solution,
+) -> int:
+    """Solve the program in forces, and with ``extra`` unknowns also with the limits on torque.
+
+    Writes ``memory.unknowns``, the acceleration and the torque. Returns the result of
+    ``solve_program``.
+    """
+    active, program, reduction = memory.active, memory.program, memory.reduction
+    size, force_weight = 3 * count, float(weights.force[0])
+    force_program(reduction, size, extra, force_weight, program.hessian, program.gradient)
+    rows = friction_rows(
+        count, extra, float(weights.friction[0]), float(weights.force_min[0]),
+        float(weights.force_max[0]), program.matrix, program.bound,
+    )  # fmt: skip
+    if extra > 0:
+        rows = torque_rows(
+            reduction, terms, active, count, motors.to_torque, motors.bounds, rows,
+            program.matrix, program.bound,
+        )  # fmt: skip
+    code = solve_program(size + extra, rows, program, memory.memory, memory.unknowns)
+    if code < 0:
+        return code
+    for _ in range(POLISHING):
+        force_gradient(
+            reduction, terms, active, count, extra, force_weight, memory.unknowns,
+            memory.gradient,
+        )  # fmt: skip
+        polish(size + extra, memory.gradient, memory.memory, memory.unknowns)
+    recover_acceleration(reduction, size, extra, memory.unknowns, solution.acceleration)
+    recover_torque(terms, active, count, solution.acceleration, memory.unknowns, solution.torque)
+    return code
+
+
+@kernel
+def limit_motors(joint_velocity: Array, limits: int, motors: Motors) -> None:
+    """The bounds on the torques: of motors at their present speed, or of joints at any speed."""
+    for i in range(motors.speed.shape[0]):
+        if limits == JOINT_LIMITS:
+            motors.bounds.upper[i] = motors.curves.peak[i]
+            motors.bounds.lower[i] = -motors.curves.peak[i]
+            continue
+        total = 0.0
+        for j in range(joint_velocity.shape[0]):
+            total += float(motors.to_speed[i, j]) * float(joint_velocity[j])
+        motors.speed[i] = total
+    if limits == MOTOR_LIMITS:
+        motor_limits(motors.speed, motors.curves, motors.bounds)
