@@ -8,12 +8,15 @@ from __future__ import annotations
 
 import os
 import platform
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
+from .frontier import frontier
+from .links import links
 from .planner import planner
+from .random_jumps import jumps
 from .recorder import recorder
 from .rows import Row
 from .scheduler import scheduler
@@ -22,16 +25,27 @@ BENCHMARKS: Mapping[str, Callable[..., list[Row]]] = {
     "scheduler": scheduler,
     "planner": planner,
     "recorder": recorder,
+    "links": links,
+    "jumps": jumps,
+    "frontier": frontier,
 }
 """All benchmarks by name; each returns its rows."""
+LONG = ("jumps", "frontier")
+"""Those that take an hour or more and run only where they are named."""
+COUNTED = ("jumps",)
+"""Those that can be told how many cases to draw (``count``), and with which ``seed``."""
+SEEDED = ("frontier",)
+"""Those that can be told the ``seeds`` of the trial to run with."""
 TIMED = ("recorder",)
 """Those that can be told how many ``seconds`` to run in real time."""
 
 
 def run_benchmarks(
-    names: Iterable[str] | None = None, seconds: float | None = None
-) -> dict[str, Any]:
-    """Run the named benchmarks, by default all; ``seconds`` is for those in ``TIMED``.
+    names: Iterable[str] | None = None, seconds: float | None = None,
+    count: int | None = None, seed: int | None = None, seeds: Sequence[int] | None = None,
+) -> dict[str, Any]:  # fmt: skip
+    """Run the named benchmarks, by default all but those in ``LONG``; ``seconds`` is for those in
+    ``TIMED``, ``count`` and ``seed`` for those in ``COUNTED``, ``seeds`` for those in ``SEEDED``.
 
     Returns:
         ``machine``, ``load`` (averages before and after) and ``rows``, as plain data for JSON.
@@ -39,14 +53,16 @@ def run_benchmarks(
     Raises:
         KeyError: there is no such benchmark; the message names those that exist.
     """
-    chosen = tuple(BENCHMARKS) if names is None else tuple(names)
+    chosen = tuple(n for n in BENCHMARKS if n not in LONG) if names is None else tuple(names)
     for name in chosen:
         if name not in BENCHMARKS:
             raise KeyError(f"no benchmark {name!r}; there is {', '.join(BENCHMARKS)}")
     before = _load()
     rows = []
     for name in chosen:
-        given = {} if seconds is None or name not in TIMED else {"seconds": seconds}
+        told = {"seconds": (seconds, TIMED), "count": (count, COUNTED), "seed": (seed, COUNTED),
+                "seeds": (seeds, SEEDED)}  # fmt: skip
+        given = {k: v for k, (v, known) in told.items() if v is not None and name in known}
         rows += BENCHMARKS[name](**given)
     return {
         "machine": _machine(),

@@ -54,7 +54,7 @@ def planner(rounds: int = 3) -> list[Row]:
     robot = find_robot("bruce")
     rows, times, valid = [], [], 0
     for name, values in BASIC.items():
-        task = make_task({"name": name, **values})
+        task = make_task({"name": name, "recipe": "paper", **values})
         seconds, plan = _measure(task, rounds)
         if plan is None:
             rows.append(Row(f"plan {name}", None, "s", goal=WORST_GOAL, note="no plan"))
@@ -70,10 +70,12 @@ def planner(rounds: int = 3) -> list[Row]:
     rows.append(Row("plan, worst of basic tasks", float(max(times)), "s", goal=WORST_GOAL))
     rows.append(Row("basic tasks without a valid plan", float(len(BASIC) - valid), "", goal=0.0))
     for count, (knots, goal) in GRIDS.items():
-        first = make_task({"name": "first", **BASIC["in situ 15 cm"], "knots": knots})
+        first = make_task(
+            {"name": "first", "recipe": "paper", **BASIC["in situ 15 cm"], "knots": knots}
+        )
         plan = solve_jump(first, robot)
         for name, values in NEAR.items():
-            near = make_task({"name": name, **values, "knots": knots})
+            near = make_task({"name": name, "recipe": "paper", **values, "knots": knots})
             seconds, found = _measure(near, rounds, plan)
             note = "" if found is None else f"{found.statistics['iterations']} iterations"
             title = f"plan {name}, warm, {count} intervals"

@@ -25,8 +25,8 @@ Exit codes:
 """
 
 VERBS = (
-    "run", "view", "replay", "check", "graph", "graphs", "blocks", "plan", "bench", "study", "test", "params",
-    "log", "robot",
+    "new", "run", "jump", "view", "plot", "replay", "check", "graph", "graphs", "blocks", "plan", "bench", "study", "test", "params",
+    "log", "robot", "twin",
 )  # fmt: skip
 """All verbs, in the order of the help. The file of each has its name, and so has what it offers:
 a command, or a group of commands."""

@@ -23,12 +23,22 @@ def bench(
         float | None,
         typer.Option(help="Length of the run in real time of 'recorder'; by default 60.", min=1.0),
     ] = None,
+    count: Annotated[
+        int | None, typer.Option(help="How many tasks 'jumps' draws; by default 200.", min=1)
+    ] = None,
+    seed: Annotated[
+        int | None, typer.Option(help="The seed that 'jumps' draws them by.", min=0)
+    ] = None,
+    seeds: Annotated[
+        str, typer.Option(help="Seeds of the trial for 'frontier'; by default 9000:9020.")
+    ] = "",
     as_json: Annotated[
         bool, typer.Option("--json", help="Tables go to standard error, one JSON object to output.")
     ] = False,
 ) -> None:
     """Measure the runtime beside hand-written loops and peers; exit with 1 if a goal is missed."""
-    from ..benchmarks import BENCHMARKS, TIMED, run_benchmarks
+    from ..benchmarks import BENCHMARKS, COUNTED, SEEDED, TIMED, run_benchmarks
+    from ..studies.batch.seeds import parse_seeds
 
     out = console(to_stderr=as_json)
     with errors_reported(as_json):
@@ -36,8 +46,15 @@ def bench(
             raise AloftError(f"there is no benchmark {name!r}; there is {', '.join(BENCHMARKS)}")
         if seconds is not None and name not in TIMED:
             raise AloftError(f"--seconds is for {', '.join(TIMED)}, not for {name or 'all'}")
+        if (count, seed) != (None, None) and name not in COUNTED:
+            raise AloftError(
+                f"--count and --seed are for {', '.join(COUNTED)}, not for {name or 'all'}"
+            )
+        if seeds and name not in SEEDED:
+            raise AloftError(f"--seeds is for {', '.join(SEEDED)}, not for {name or 'all'}")
+        chosen = parse_seeds(seeds) if seeds else None
         with out.status("measuring"):
-            results = run_benchmarks([name] if name else None, seconds)
+            results = run_benchmarks([name] if name else None, seconds, count, seed, chosen)
     print_results(out, results)
     if as_json:
         print_json(results)

@@ -35,7 +35,11 @@ def check(
     with errors_reported(as_json):
         checked = load(graph, overrides or [])
     if as_json:
-        print_json({"success": True, "file": str(graph), "ok": True, "count": 0, "problems": []})
+        found = {"file": str(graph), "ok": True, "count": 0, "problems": []}
+        print_json({"success": True, **found, "unchecked": list(checked.unchecked)})
     else:
-        count = len(checked.blocks)
-        typer.echo(f"{graph}: no problems; {count} blocks at {checked.base_rate:g} Hz")
+        for text in checked.unchecked:
+            typer.echo(f"unit not checked: {text}")
+        count, machines = len(checked.blocks), len(checked.machines)
+        spread = f" on {machines} machine{'s' if machines > 1 else ''}" if machines else ""
+        typer.echo(f"{graph}: no problems; {count} blocks at {checked.base_rate:g} Hz{spread}")

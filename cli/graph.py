@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -29,22 +30,94 @@ def graph(
         bool, typer.Option("--flat", help="As one YAML file: all expanded, overrides applied.")
     ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="As one JSON object.")] = False,
+    svg: Annotated[
+        Path | None, typer.Option("--svg", help="As a block diagram, into this SVG file.")
+    ] = None,
+    png: Annotated[
+        Path | None, typer.Option("--png", help="As a block diagram, into this PNG file.")
+    ] = None,
+    dark: Annotated[bool, typer.Option("--dark", help="A dark PNG file.")] = False,
+    web: Annotated[
+        bool, typer.Option("--web", help="As a block diagram in the browser, to click on.")
+    ] = False,
+    closed: Annotated[
+        list[str] | None,
+        typer.Option("--closed", help="A sub-graph whose box the diagram keeps closed, or 'all'."),
+    ] = None,
 ) -> None:
-    """Print the order of execution, rates, offsets, delays, and every wire with its type."""
+    """Print the order of execution, rates, offsets, delays, and every wire with its type.
+
+    With --svg, --png or --web, draw the blocks with their ports and wires.
+    """
     from ..runtime.loading import load, picture
+    from ..runtime.placement.picture import placement_json
+    from ..runtime.placement.place import place
 
     with errors_reported(as_json):
-        if as_table + mermaid + flat + as_json > 1:
-            raise AloftError("choose one of --table, --mermaid, --flat and --json")
+        if as_table + mermaid + flat + as_json + web > 1:
+            raise AloftError("choose one of --table, --mermaid, --flat, --json and --web")
         checked = load(graph, overrides or [])
+        if svg or png:
+            draw_files(checked, closed or (), svg, png, dark=dark)
     if as_json:
-        print_json(picture.table_json(checked))
+        placement = placement_json(place(checked)) if checked.machines else {}
+        print_json({**picture.table_json(checked), **placement})
     elif mermaid:
         typer.echo(picture.mermaid(checked), nl=False)
     elif flat:
         typer.echo(checked.text, nl=False)
-    else:
+    elif web:
+        serve(checked)
+    elif as_table or not (svg or png):
         print_table(console(), checked)
+
+
+def draw_files(
+    graph: CheckedGraph, closed: Collection[str], svg: Path | None, png: Path | None, *, dark: bool
+) -> None:
+    """Write the block diagram into files.
+
+    Raises:
+        AloftError: there is no such sub-graph, or a file cannot be written.
+    """
+    from ..runtime.drawing.diagram import diagram, subgraphs
+    from ..runtime.drawing.placing import draw
+    from ..runtime.drawing.svg import svg as svg_text
+    from ..runtime.loading.problems import listing
+
+    known = subgraphs(graph)
+    for path in closed:
+        if path not in (*known, "all"):
+            raise AloftError(f"there is no sub-graph {path!r}; there is {listing(known)}")
+    drawing = draw(diagram(graph, known if "all" in closed else closed))
+    try:
+        if svg is not None:
+            svg.write_text(svg_text(drawing, graph.name), encoding="utf-8")
+            typer.echo(f"diagram: {svg}", err=True)
+        if png is not None:
+            from ..runtime.drawing.png import save_png
+
+            save_png(drawing, png, dark=dark)
+            typer.echo(f"diagram: {png}", err=True)
+    except OSError as error:
+        raise AloftError(f"cannot write the diagram: {error}") from error
+
+
+def serve(graph: CheckedGraph) -> None:
+    """Show the diagram in a browser until Ctrl-C is pressed."""
+    from ..runtime.drawing.page_server import ADDRESS, page_server
+    from .view import open_page
+
+    server = page_server(graph)
+    page = f"http://{ADDRESS}:{server.server_address[1]}/"
+    typer.echo(f"{page}\nthe page is there until you press Ctrl-C")
+    open_page(page)
+    try:
+        server.serve_forever()
+    except KeyboardInterrupt:
+        pass
+    finally:
+        server.server_close()
 
 
 def print_table(out: Console, graph: CheckedGraph) -> None:
@@ -63,3 +136,32 @@ def print_table(out: Console, graph: CheckedGraph) -> None:
         rate = f"{row.rate_hz:g} Hz{offset}"
         rows.append((str(row.order), row.path, row.use, rate, row.machine, inputs))
     out.print(table("", (">order", "block", "is", ">rate", "machine", "inputs"), rows))
+    if graph.links.paths:
+        print_ages(out, graph)
+    if graph.machines:
+        print_machines(out, graph)
+
+
+def print_ages(out: Console, graph: CheckedGraph) -> None:
+    """Print the worst age on each path for which the graph allows one."""
+    from ..runtime.placement.age import worst_age
+
+    rows = []
+    for path, limit in graph.links.paths.items():
+        source, _, target = (part.strip() for part in path.partition("->"))
+        age = worst_age(graph, source, target)
+        rows.append((path, "none" if age is None else f"{age * 1e3:g} ms", f"{limit * 1e3:g} ms"))
+    out.print(table("age of the newest sample", ("path", ">at worst", ">allowed"), rows))
+
+
+def print_machines(out: Console, graph: CheckedGraph) -> None:
+    """Print which machine runs which blocks, and one row for each link between them."""
+    from ..runtime.placement.picture import link_rows, machine_rows
+    from ..runtime.placement.place import place
+
+    placed = place(graph)
+    columns = ("machine", "endpoint", "runs", "sends", "receives")
+    out.print(table("machines", columns, machine_rows(placed)))
+    if placed.links:
+        columns = ("source", "link", ">rate", ">payload", "is read by")
+        out.print(table("links", columns, link_rows(placed)))

@@ -174,6 +174,48 @@ def repair(file: File, as_json: AsJson = False) -> None:
     say(console(), f"{file} is mended: {cut}{kept}")
 
 
+@log.command("merge")
+def merge(
+    files: Annotated[list[Path], typer.Argument(help="The recordings of all parts of one run.")],
+    output: Annotated[Path, typer.Option("--output", "-o", help="The recording to write.")],
+    as_json: AsJson = False,
+) -> None:
+    """Put the recordings of a run's parts, made on several machines, together into one."""
+    from ..logs.recording.merged_run import (
+        machine_of,
+        merge_recordings,
+        merged_outcome,
+        read_parts,
+        run_hash_of,
+    )
+    from ..logs.replay.opened_run import OpenedRun
+    from ..runtime.placement.place import place
+    from ..runtime.running.memory import BoundGraph
+
+    with errors_reported(as_json):
+        runs = {file: read(file) for file in files}
+        placed = place(OpenedRun.of(files[0]).graph)
+        paths: dict[str, Path] = {}
+        for file, run in runs.items():
+            machine = machine_of(placed, run)
+            if machine in paths:
+                raise AloftError(f"{paths[machine]} and {file} are both of machine {machine!r}")
+            paths[machine] = file
+        parts = read_parts(placed, paths)
+        run_hash, ticks = run_hash_of(placed, parts)
+        outcome = merged_outcome(placed, parts, run_hash, ticks)
+        try:
+            written = merge_recordings(output, placed, BoundGraph(placed.graph), parts, outcome)
+        except OSError as error:
+            raise AloftError(f"{output} cannot be written: {error.strerror or error}") from error
+    if as_json:
+        about = {"recording": str(written), "run_hash": run_hash, "ticks": ticks}
+        print_json({"success": True, **about})
+        return
+    count = f"{ticks} ticks of {len(parts)} parts"
+    typer.echo(f"{written}: {count}, run hash {run_hash}; `aloft replay --check {written}` runs it")
+
+
 def read(file: Path, *, damaged: bool = False) -> RecordedRun:
     """The recording. Raises ``AloftError`` if it cannot be read."""
     from ..logs.file import reader

@@ -20,6 +20,7 @@ from .plan_output import (
     recorded_motion,
     summary,
 )
+from .rehearse import REHEARSE_HELP, rehearsal_of_file
 from .view import how_to_view
 
 if TYPE_CHECKING:
@@ -61,8 +62,11 @@ def plan(
     ] = False,
     nearest: Annotated[
         bool,
-        typer.Option(help="Where a task has no plan, search the nearest one that has; up to 20 s."),
+        typer.Option(
+            help="Where a task has no plan, search the nearest one that has; up to 6 s of CPU."
+        ),
     ] = True,
+    rehearse: Annotated[bool, typer.Option("--rehearse", help=REHEARSE_HELP)] = False,
     as_json: Annotated[
         bool, typer.Option("--json", help="Tables go to standard error, one JSON object to output.")
     ] = False,
@@ -72,6 +76,8 @@ def plan(
         raise typer.BadParameter("give task files, or --library with a grid file, or --list")
     if prune and (keep is None or not tasks):
         raise typer.BadParameter("--prune goes with task files and --keep")
+    if rehearse and not tasks:
+        raise typer.BadParameter("--rehearse goes with task files")
     screen = console(to_stderr=as_json)
     with errors_reported(as_json):
         if listed:
@@ -80,7 +86,9 @@ def plan(
             code = plan_grid(grid, keep, anew, workers, cluster, screen, as_json)
         else:
             folder = None if no_pictures else out
-            code = plan_tasks(tasks or [], keep, anew, folder, nearest, prune, screen, as_json)
+            code = plan_tasks(
+                tasks or [], keep, anew, folder, nearest, prune, rehearse, screen, as_json
+            )
     raise typer.Exit(code)
 
 
@@ -91,6 +99,7 @@ def plan_tasks(
     out: Path | None,
     nearest: bool,
     prune: bool,
+    rehearse: bool,
     screen: Console,
     as_json: bool,
 ) -> ExitCode:
@@ -115,7 +124,10 @@ def plan_tasks(
     rows: list[dict[str, Any]] = []
     for path, task in zip(paths, tasks, strict=True):
         library = PlanLibrary(find_robot(task.robot, path.parent), keep)
-        rows.append(plan_task(task, library, anew, out, nearest, screen))
+        row = plan_task(task, library, anew, out, nearest, screen)
+        if row["success"]:
+            row |= rehearsal_of_file(path, task, library, keep, rehearse, screen)
+        rows.append(row)
     failed = [row["task"] for row in rows if not row["success"]]
     if prune and not failed:
         for name in dict.fromkeys(task.robot for task in tasks):
@@ -132,9 +144,10 @@ def plan_tasks(
 
 def plan_task(
     task: JumpTask, library: PlanLibrary, anew: bool, out: Path | None, nearest: bool,
-    screen: Console,
+    screen: Console, *, tests: bool = True,
 ) -> dict[str, Any]:  # fmt: skip
-    """Plan one task, print and draw the plan, and return its row."""
+    """Plan one task, print and draw the plan, and return its row. Without ``tests`` those of a valid
+    plan are not printed."""
     from ..planner.checking.validity import InvalidPlanError
     from ..planner.solving.bounded import cpu_time
     from ..planner.task.errors import PlanError
@@ -153,7 +166,7 @@ def plan_task(
         return row | (search_nearest(task, library, error.family, screen) if nearest else {})
     row = plan_json(found, robot, library.path_of(task), kept, reason)
     row["cpu_s"] = None if kept else cpu_time() - started
-    print_plan(screen, found)
+    print_plan(screen, found, tests=tests or not found.valid)
     if not found.valid:
         print_error(reason)
     if out is not None:

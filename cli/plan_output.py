@@ -26,8 +26,15 @@ if TYPE_CHECKING:
 SHOWN_STATISTICS = ("solver", "iterations", "cpu_s", "violation", "cost", "warm")
 
 
-def print_plan(screen: Console, plan: JumpPlan) -> None:
-    """Print what the plan does, how it was solved, and every test."""
+def print_plan(screen: Console, plan: JumpPlan, *, tests: bool = True) -> None:
+    """Print what the recipe chose, what the plan does, how it was solved, and every test."""
+    chosen = [
+        (each["parameter"], _shown(each["value"]), each["why"])
+        for each in plan.statistics.get("chosen", ())
+    ]
+    if chosen:
+        title = f"{plan.task.name}: chosen by the recipe"
+        screen.print(table(title, ("parameter", "value", "why"), chosen))
     figures = [(name, number(value)) for name, value in plan.report["figures"].items()]
     figures += [
         (name, number(plan.statistics[name]))
@@ -35,6 +42,8 @@ def print_plan(screen: Console, plan: JumpPlan) -> None:
         if name in plan.statistics
     ]
     screen.print(table(f"{plan.task.name}: the plan", ("figure", ">value"), figures))
+    if not tests:
+        return
     rows = [
         (
             test["name"],
@@ -50,6 +59,21 @@ def print_plan(screen: Console, plan: JumpPlan) -> None:
     screen.print(table(f"{plan.task.name}: validity", columns, rows))
 
 
+def _shown(value: Any) -> str:
+    """What the recipe chose, as text: a sequence of phases by their times."""
+    if isinstance(value, list):
+        return ", ".join(
+            f"{span['phase']}{' on ' + span['contacts'] if span['contacts'] != 'all' else ''}"
+            + (f" {span['time']:g} s" if "time" in span else "")
+            for span in value
+        )
+    if isinstance(value, dict) and "thrust" in value:
+        return ", ".join(f"{count} {name}" for name, count in value.items())
+    if isinstance(value, dict):
+        return ", ".join(f"{name} {low:g} to {high:g} rad" for name, (low, high) in value.items())
+    return number(value) if isinstance(value, float) else str(value).lower()
+
+
 def plan_json(
     plan: JumpPlan, robot: RobotDescription, path: Path | None, kept: bool, reason: str
 ) -> dict[str, Any]:
@@ -62,6 +86,7 @@ def plan_json(
         "path": str(path) if path else None,
         "kept": kept,
         "cpu_s": plan.statistics.get("cpu_s"),
+        "chosen": list(plan.statistics.get("chosen", ())),
         "statistics": dict(plan.statistics),
         **plan.report,
     }
@@ -88,6 +113,7 @@ def nearest_json(found: NearestFeasible, path: Path) -> dict[str, Any]:
         "value": found.value,
         "beyond": found.beyond,
         "text": found.text,
+        "binds": list(found.binds),
         "solves": found.solves,
         "cpu_s": found.cpu_s,
         "path": str(path),

@@ -50,3 +50,22 @@ def progress_bar(out: Console, text: str, total: int | None) -> Iterator[tuple[P
         refresh_per_second=5,
     ) as progress:
         yield progress, progress.add_task(text, total=total)
+
+
+@contextmanager
+def compiling_shown(progress: Progress) -> Iterator[None]:
+    """Show a second bar while kernels are compiled, which only the first run on a machine does."""
+    from ..mathematics.compiling.compile_calls import watchers
+
+    bars: list[TaskID] = []
+
+    def watch(done: int, total: int) -> None:
+        if not bars:
+            bars.append(progress.add_task("compiling, on the first run only", total=total))
+        progress.update(bars[0], completed=done, visible=done < total)
+
+    watchers.append(watch)
+    try:
+        yield
+    finally:
+        watchers.remove(watch)

@@ -83,6 +83,8 @@ def replay(
         done = execute(opened, changed, inputs, first, until, output is not None, out)
         done.result.raise_if_failed() if not done.signals.compared else None
         written = write(output, opened, done) if output is not None else None
+    for kept in opened.restored.said:
+        print_warning(kept)
     other = opened.what_is_other_now() if done.first is not None else []
     verdict = describe(opened, done)
     print_differences(out, done)
@@ -93,7 +95,8 @@ def replay(
     if written is not None:
         say(out, f"recorded and replayed side by side: {written}")
     if as_json:
-        print_json(as_data(recording, done, verdict, other, written))
+        restored = list(opened.restored.said)
+        print_json(as_data(recording, done, verdict, other, restored, written))
     else:
         same = done.identical
         color = typer.colors.GREEN if same else typer.colors.YELLOW
@@ -214,7 +217,12 @@ def _units(done: Replayed) -> dict[str, str]:
 
 
 def as_data(
-    recording: Path, done: Replayed, verdict: str, other: list[str], written: Path | None
+    recording: Path,
+    done: Replayed,
+    verdict: str,
+    other: list[str],
+    restored: list[str],
+    written: Path | None,
 ) -> dict[str, Any]:
     """The whole result as plain data."""
     first = done.first
@@ -243,6 +251,7 @@ def as_data(
         },
         "notes": list(done.notes),
         "other_since": other,
+        "restored": restored,
         "outcome": {"success": done.result.success, "reason": done.result.reason},
         "output": None if written is None else str(written),
     }

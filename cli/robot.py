@@ -1,4 +1,4 @@
-"""``aloft robot``: look at a robot, import one from URDF or MJCF, write one as URDF."""
+"""``aloft robot``: look at a robot, import one, write one as URDF, and bring one up on a bench."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ import typer
 
 from ..runtime.language.errors import AloftError, ExitCode
 from .output import console, errors_reported, print_error, print_json, say, table
+from .robot_bench import add_bench_verbs
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -19,10 +20,12 @@ if TYPE_CHECKING:
 
 robot = typer.Typer(
     name="robot",
-    help="Look at a robot, import one from URDF or MJCF, write one as URDF.",
+    help="Look at a robot, import one, write one as URDF, and bring one up on a bench.",
     no_args_is_help=True,
     rich_markup_mode=None,
 )
+
+add_bench_verbs(robot)
 
 Name = Annotated[str, typer.Argument(help="A robot of ours, or a YAML, URDF or MJCF file.")]
 ModelFile = Annotated[Path, typer.Argument(help="The URDF or MJCF file.")]

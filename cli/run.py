@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import closing
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Protocol
 
 import typer
 
@@ -24,13 +24,14 @@ from .output import (
     say,
     table,
 )
+from .run_output import print_result, print_verdict
 from .stopping import stopped_by_signals
 
 if TYPE_CHECKING:
     from rich.console import Console
 
     from ..logs.viewing.viewer import Viewer
-    from ..runtime.graph import Graph
+    from ..runtime.language.stages import CheckedGraph
     from ..runtime.parameter_endpoint import ParameterEndpoint
     from ..runtime.running.run_result import RunResult
     from ..runtime.running.sinks import Sink
@@ -69,6 +70,10 @@ def run(
     keep: Annotated[
         int, typer.Option(min=0, help="How many earlier recordings of that name are kept.")
     ] = 0,
+    split: Annotated[
+        str,
+        typer.Option(help="Go on in a new recording after this time of the graph, e.g. '10 min'."),
+    ] = "",
     no_record: Annotated[bool, typer.Option("--no-record", help="Write no recording.")] = False,
     params: Annotated[
         str,
@@ -84,6 +89,16 @@ def run(
     traceback: Annotated[
         bool, typer.Option("--traceback", help="Print the whole traceback of a block that fails.")
     ] = False,
+    machine: Annotated[
+        str, typer.Option(help="Run only the part of this machine, together with the others.")
+    ] = "",
+    local: Annotated[
+        bool, typer.Option("--local", help="Run the parts of all machines as processes here.")
+    ] = False,
+    plain: Annotated[
+        bool,
+        typer.Option("--plain", help="Compile nothing: slower, with the same bytes."),
+    ] = False,
 ) -> None:
     """Run a graph; print its metrics and the time each block took; write a recording."""
     from ..runtime.graph import load
@@ -96,23 +111,52 @@ def run(
             raise AloftError("--record is for one run; with --seeds nothing is recorded")
         if seeds and rerun is not Live.NONE:
             raise AloftError("--rerun is for one run; with --seeds nothing is shown")
-        if seeds:
-            code = run_many(graph, settings, parse_seeds(seeds), out, as_json)
+        if (machine or local) and (seeds or (machine and local)):
+            raise AloftError("choose one of --machine, --local and --seeds")
+        if local:
+            from .run_local import Wishes, run_local
+
+            place = None if no_record else record
+            wishes = Wishes(settings, place, not no_record, params, as_json, traceback, plain)
+            code = run_local(graph, wishes, out)
+        elif seeds:
+            code = run_many(graph, settings, parse_seeds(seeds), out, as_json, plain=plain)
         else:
-            loaded = load(graph, settings)
-            default = Path("recordings") / f"{loaded.checked.name}.rrd"
-            endpoint = open_endpoint(loaded, params)
+            loaded: Runs = load(graph, settings)
+            name = loaded.checked.name
+            if machine:
+                from .run_part import Part
+
+                loaded, name = Part(loaded.checked, machine), f"{name}-{machine}"
+            default = Path("recordings") / f"{name}.rrd"
+            endpoint = open_endpoint(loaded, params, name)
             sinks = [endpoint] if endpoint is not None else []
             place = None if no_record else record or default
             said: list[str] = []
             viewer = open_viewer(rerun, said)
             code = run_once(
                 loaded, place, out, as_json, sinks, viewer,
-                keep=keep, said=said, traceback=traceback,
+                keep=keep, split=split_time(split), said=said, traceback=traceback, plain=plain,
             )  # fmt: skip
             if viewer is not None:
                 leave_viewer(viewer, wait=not as_json and sys.stdin.isatty())
     raise typer.Exit(code)
+
+
+def split_time(text: str) -> float:
+    """The time [s] in ``--split``; zero if it is empty. Raises ``AloftError``."""
+    from ..runtime.language.errors import UnitError
+    from ..runtime.language.units import parse_quantity
+
+    if not text:
+        return 0.0
+    try:
+        found = parse_quantity(text, "s")
+    except UnitError as error:
+        raise AloftError(f"--split {text}: {error}") from error
+    if found <= 0.0:
+        raise AloftError(f"--split {text}: expected a time above zero, e.g. '10 min'")
+    return found
 
 
 def open_viewer(live: Live, said: list[str]) -> Viewer | None:
@@ -147,14 +191,14 @@ def leave_viewer(viewer: Viewer, *, wait: bool) -> None:
         viewer.stop()
 
 
-def open_endpoint(graph: Graph, name: str) -> ParameterEndpoint | None:
+def open_endpoint(graph: Runs, name: str, default: str) -> ParameterEndpoint | None:
     """Open the endpoint at which ``aloft params`` reaches the run. Unless it was asked for, it may fail."""
     from . import endpoints
 
     if name == "none" or not (name or graph.checked.clock.kind != "free"):
         return None
     try:
-        return endpoints.open_endpoint(name or graph.checked.name)
+        return endpoints.open_endpoint(name or default)
     except AloftError as error:
         if name:
             raise
@@ -162,8 +206,22 @@ def open_endpoint(graph: Graph, name: str) -> ParameterEndpoint | None:
         return None
 
 
+class Runs(Protocol):
+    """What ``run_once`` runs: a graph, or one machine's part of it."""
+
+    @property
+    def checked(self) -> CheckedGraph:
+        """The graph that runs."""
+
+    def run(self, *, sinks: Sequence[Sink], log: bool, plain: bool) -> RunResult:
+        """Run it once."""
+
+    def about(self) -> Mapping[str, Any]:
+        """What the JSON object says beside the result of the run."""
+
+
 def run_once(
-    graph: Graph,
+    graph: Runs,
     record: Path | None,
     out: Console,
     as_json: bool,
@@ -171,28 +229,40 @@ def run_once(
     viewer: Viewer | None = None,
     *,
     keep: int = 0,
+    split: float = 0.0,
     said: Sequence[str] = (),
+    also: Mapping[str, Any] | None = None,
+    times: bool = True,
     traceback: bool = False,
+    plain: bool = False,
 ) -> ExitCode:
-    """Run the graph, record and show it, and print the result; ``said`` are warnings so far."""
+    """Run the graph, record and show it, and print the result; ``said`` are warnings so far,
+    ``also`` is what else the JSON object has, and ``times`` says whether those of blocks are
+    printed."""
     from ..logs.recording.recorder import Recorder
-    from .progress import TickCounter, progress_bar
+    from .progress import TickCounter, compiling_shown, progress_bar
     from .view import how_to_view
 
     name = graph.checked.name
     recorder = None
     if record is not None or viewer is not None:
         live = viewer.source if viewer is not None else ""
-        recorder = Recorder(record, keep=keep, live=live, on_warning=print_warning)
-    with progress_bar(out, f"running {name}", graph.checked.ticks) as (progress, task):
+        recorder = Recorder(record, keep=keep, split=split, live=live, on_warning=print_warning)
+    with (
+        progress_bar(out, f"running {name}", graph.checked.ticks) as (progress, task),
+        compiling_shown(progress),
+    ):
         counter = TickCounter(progress, task)
         recorders = [recorder] if recorder is not None else []
-        result = graph.run(sinks=[*recorders, counter, *sinks], log=False)
+        result = graph.run(sinks=[*recorders, counter, *sinks], log=False, plain=plain)
     recording = recorder.recording if recorder is not None else None
-    print_result(out, name, result)
+    print_result(out, name, result, times=times)
     if recorder is not None and recording is not None:
         missing = f" ({recorder.missing} ticks are not in it)" if recorder.missing else ""
         say(out, f"recording: {recording}{missing}; to see it: {how_to_view(recording)}")
+        if recorder.files:
+            say(out, f"the recording is in {len(recorder.files)} files: "
+                f"{', '.join(file.name for file in recorder.files)}")  # fmt: skip
         if recorder.before:
             say(out, recorder.before)
     for problem in (*result.cautions, *result.stop_problems):
@@ -201,8 +271,11 @@ def run_once(
         shown = str(recording) if recording else None
         overrides = dict(graph.checked.overrides)
         warnings = [*said, *result.warnings]
-        about = {**result.to_json(), "warnings": warnings, "recording": shown}
-        print_json({"graph": name, "overrides": overrides, **about})
+        files = [str(file) for file in recorder.files] if recorder is not None else []
+        about = {**result.to_json(), "warnings": warnings, "recording": shown, "files": files}
+        print_json(
+            {"graph": name, "overrides": overrides, **(also or {}), **about, **graph.about()}
+        )
     else:
         print_verdict(result)
         if result.error is not None:
@@ -210,37 +283,14 @@ def run_once(
     return result.exit_code
 
 
-def print_result(out: Console, name: str, result: RunResult) -> None:
-    """Print the metrics and the times of a run."""
-    metrics = [(key, number(value)) for key, value in result.metrics.items()]
-    if metrics:
-        out.print(table(f"{name}: metrics", ("metric", ">value"), metrics))
-    rows = [
-        (path, str(t.calls), f"{t.p50_us:.1f}", f"{t.p99_us:.1f}", f"{t.max_us:.1f}")
-        for path, t in result.blocks.items()
-    ]
-    columns = ("block", ">runs", ">median [us]", ">99 % [us]", ">longest [us]")
-    out.print(table(f"{name}: time a run of each block takes", columns, rows))
-    speed = result.duration_s / result.wall_time_s if result.wall_time_s else 0.0
-    say(
-        out,
-        f"{result.ticks} ticks, {result.duration_s:.3f} s of the graph in "
-        f"{result.wall_time_s:.2f} s ({speed:.1f} x real time); run hash {result.run_hash}",
-    )
-    if result.overruns:
-        say(out, f"{result.overruns} overruns, {result.skipped_periods} periods skipped")
-
-
-def print_verdict(result: RunResult) -> None:
-    """Print whether the run succeeded and why, also with ``--quiet``."""
-    if result.success:
-        typer.secho(f"success: {result.reason}", fg=typer.colors.GREEN)
-    else:
-        typer.secho(f"no success: {result.reason}", fg=typer.colors.RED, err=True)
-
-
 def run_many(
-    path: Path, overrides: list[str], seeds: list[int], out: Console, as_json: bool
+    path: Path,
+    overrides: list[str],
+    seeds: list[int],
+    out: Console,
+    as_json: bool,
+    *,
+    plain: bool = False,
 ) -> ExitCode:
     """Run the graph once with each seed; print a row for each, and how many succeeded."""
     from ..studies.batch.seeds import run_seeds
@@ -250,7 +300,7 @@ def run_many(
     with (
         stopped_by_signals() as received,
         progress_bar(out, f"running {len(seeds)} seeds", len(seeds)) as (progress, task),
-        closing(run_seeds(path, overrides, seeds)) as results,
+        closing(run_seeds(path, overrides, seeds, plain=plain)) as results,
     ):
         for row in results:
             rows.append(row)

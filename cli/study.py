@@ -43,6 +43,13 @@ def study(
     ] = None,
     workers: Annotated[int, typer.Option(help="Processes; 0: one a core.", min=0)] = 0,
     cluster: Annotated[str, typer.Option(help="Run on a Dask cluster: tcp://127.0.0.1:8786.")] = "",
+    number: Annotated[
+        int,
+        typer.Option("--open", help="Record run N of the worst runs (worst.md), and show it."),
+    ] = 0,
+    no_show: Annotated[
+        bool, typer.Option("--no-show", help="With --open: only write the recording.")
+    ] = False,
     as_json: Annotated[
         bool, typer.Option("--json", help="Tables go to standard error, one JSON object to output.")
     ] = False,
@@ -61,6 +68,10 @@ def study(
 
     screen = console(to_stderr=as_json)
     with errors_reported(as_json):
+        if number and (tune or dry_run or cluster):
+            raise AloftError("--open takes --where, --seeds, --out, --no-show and --json")
+        if no_show and not number:
+            raise AloftError("--no-show would do nothing; add --open N")
         if file == Path(NAME) and not file.exists():
             if where or tune or dry_run or cluster:
                 raise AloftError(f"'aloft study {NAME}' takes --out, --seeds, --workers and --json")
@@ -76,6 +87,12 @@ def study(
             code = tune_study(found, folder, workers, cluster, screen, as_json)
         else:
             part = part_of(found, where or [])
+            if number:
+                from .study_open import open_run
+
+                raise typer.Exit(
+                    open_run(found, part, chosen, folder, number, screen, as_json, show=not no_show)
+                )
             code = run_study(
                 found, part, chosen, folder, workers, cluster, screen, as_json, dry_run=dry_run
             )
@@ -102,6 +119,7 @@ def run_study(
     from ..studies.summary import summarise
     from ..studies.table import make_table, write_table
     from ..studies.tuning import extreme_cells, read_tuned, tuned_path, tuning_cells
+    from ..studies.worst import write_page
 
     tuned = {} if dry_run and not tuned_path(found).is_file() else read_tuned(found)
     chosen = [cell for cell in expand(found, tuned) if part.takes(cell.labels)]
@@ -123,13 +141,15 @@ def run_study(
         done = stopped
     rows = summarise(found, done)
     write_table(folder / "runs.parquet", make_table(done))
+    page = write_page(found, done, folder / "worst.md")
     result = study_json(found, rows, seeds, folder)
     plots, undrawn = write_plots(found, done, rows, folder)
-    result["tuned"] = tuned
+    result["tuned"], result["worst"] = tuned, str(page)
     result["plots"] = {name: str(path) for name, path in plots.items()}
     (folder / "summary.json").write_text(json_text(result), encoding="utf-8")
     print_rows(screen, found, rows, seeds)
     say(screen, f"table: {folder / 'runs.parquet'}; summary: {folder / 'summary.json'}")
+    say(screen, f"worst runs: {page}; to see the first: aloft study {found.path} --open 1")
     for path in plots.values():
         say(screen, f"picture: {path}")
     for problem in undrawn:

@@ -175,7 +175,7 @@ def write(
     if not block or not ticks:
         raise AloftError("--from needs --block NAME and --ticks FIRST:END")
     first, last = parse_ticks(ticks)
-    opened = OpenedRun.of(recording, folder)
+    opened = OpenedRun.of(recording, folder, restore=False)  # the test names present files
     if output is None:
         start = Path("tests") if Path("tests").is_dir() else Path()
         output = start / f"test_{block.replace('/', '_')}_{first}_{last}.py"

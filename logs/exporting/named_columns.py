@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -50,7 +51,7 @@ def named_columns(run: RecordedRun, names: Sequence[str] = ()) -> list[NamedColu
             "frame": field.frame or "",
             "text": field.text,
         }
-        flat = values.reshape(len(values), -1)
+        flat = values.reshape(len(values), math.prod(values.shape[1:]))
         for k, element in enumerate(element_labels(field, run.header.robot)):
             name = f"{field.name}[{element}]" if element else field.name
             unit = unit_of_element(field, run.header.robot, k)

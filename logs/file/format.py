@@ -6,8 +6,9 @@ output and a field. All but the static ones are on the timelines ``t`` (exact na
 
 ===================  ===============================================================================
 ``__properties``     ``aloft``: ``header`` (JSON of ``Header``) and its main parts once more, to be
-                     read in the viewer; ``outcome``: ``outcome`` (JSON of ``RunResult.to_json``),
-                     written last, so a recording without it was cut off
+                     read in the viewer; ``files``: ``contents`` (JSON of ``Header.contents``);
+                     ``outcome``: ``outcome`` (JSON of ``RunResult.to_json``), written last, so a
+                     recording without it was cut off
 ``graph``            the graph as it ran, after includes, sub-graphs and overrides, as text
 ``rows``             ``aloft:packed``: the bytes of the bus after each of some ticks without a
                      gap, at most half a second of them; see ``row_codec``
@@ -151,7 +152,9 @@ class Header:
         name: the name of the graph.
         graph: the graph's text after flattening.
         base_rate: the number of ticks in a second [Hz].
-        first_tick: zero, except for a run that began at a snapshot.
+        first_tick: zero, except for a run that began at a snapshot, and for the later files of a run
+            that was recorded into several.
+        run_begin: in such a later file, the first tick of the run.
         clock: ``free``, ``paced`` or ``robot``.
         ticks: the number of ticks that the graph runs, if it has a duration.
         overrides: the overrides of the graph file, by what they set.
@@ -167,6 +170,7 @@ class Header:
         source: the graph file as it was named for the run.
         terrain: the ground of the simulated world, if there is one.
         files: the SHA-256 of each file that a parameter names or a block has read, such as plans.
+        contents: the content of these files by their SHA-256, compressed, as text.
         project: the git commit of the project that the graph's file belongs to.
     """
 
@@ -177,6 +181,7 @@ class Header:
     state: RecordedLayout
     bus_start: bytes
     first_tick: int = 0
+    run_begin: int | None = None
     clock: str = "free"
     ticks: int | None = None
     overrides: Mapping[str, Any] = field(default_factory=dict)
@@ -190,8 +195,14 @@ class Header:
     source: str = ""
     terrain: Terrain | None = None
     files: Mapping[str, str] = field(default_factory=dict)
+    contents: Mapping[str, str] = field(default_factory=dict)
     project: str = ""
     format: int = FORMAT
+
+    @property
+    def earlier_ticks(self) -> int:
+        """The ticks of the run before the first tick of this file."""
+        return 0 if self.run_begin is None else self.first_tick - self.run_begin
 
     @property
     def schema_hashes(self) -> dict[str, str]:

@@ -10,12 +10,13 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 from ...runtime.language.layout import Layout
+from ...runtime.language.quantities import Quantity
 from ...runtime.language.signals import Field, Signal
 from ...runtime.language.stages import BlockSpec, CheckedGraph
 from ...runtime.language.terrain import Terrain
 from ...runtime.running.memory import BoundGraph
 from .format import Header, RecordedBlock, RecordedField, RecordedLayout
-from .surroundings import files_read, parameter_files, project_state
+from .surroundings import contents, digests, files_read, parameter_files, project_state
 
 RECORDED_VERSIONS = (
     "aloft", "numpy", "numba", "mujoco-core", "pin", "qpsolvers", "daqp", "casadi", "rerun-sdk",
@@ -38,7 +39,8 @@ def header_of(bound: BoundGraph) -> Header:
         first_tick=bound.clock.tick,
         clock=bound.clock.kind,
     )
-    return replace(header, files=files_read(bound))
+    files = files_read(bound)
+    return replace(header, files=digests(files), contents=contents(files))
 
 
 def make_header(
@@ -51,11 +53,12 @@ def make_header(
     clock: str = "",
 ) -> Header:
     """The header of a run of ``graph``; without ``state``, one that can hold no keyframes."""
+    files = parameter_files(graph)
     return Header(
         name=graph.name,
         graph=graph.text,
         base_rate=graph.base_rate,
-        bus=_recorded(bus, {**dict(_outputs(graph)), **dict(_constants(graph))}),
+        bus=_recorded(bus, {**dict(_outputs(graph)), **dict(_constants(graph))}, _carried(graph)),
         state=_recorded(state, dict(_states(graph))) if state is not None else _NOTHING,
         bus_start=bus_start,
         first_tick=first_tick,
@@ -74,7 +77,8 @@ def make_header(
         order=graph.order,
         robot=graph.robot,
         terrain=next((found for spec in graph.blocks if (found := terrain_of(spec))), None),
-        files=parameter_files(graph),
+        files=digests(files),
+        contents=contents(files),
         project=project_state(Path(graph.file).parent) if graph.file else "",
         source=graph.file or next((spec.where.file for spec in graph.blocks if spec.where), ""),
     )
@@ -123,10 +127,25 @@ def _states(graph: CheckedGraph) -> Iterator[tuple[str, Declared]]:
                 yield f"{spec.path}.{port}.{name}", (state.signal, field, False)
 
 
-def _recorded(layout: Layout, declared: Mapping[str, Declared]) -> RecordedLayout:
+def _carried(graph: CheckedGraph) -> dict[str, Quantity]:
+    """Unit and frame of the outputs that carry what is wired, by ``block.port.field``."""
+    return {
+        f"{spec.path}.{name}": quantity
+        for spec in graph.blocks
+        for name, quantity in spec.quantities.items()
+        if name.partition(".")[0] in spec.block_type.outputs
+    }
+
+
+def _recorded(
+    layout: Layout,
+    declared: Mapping[str, Declared],
+    carried: Mapping[str, Quantity] | None = None,
+) -> RecordedLayout:
     fields = []
     for name, slot in layout.slots.items():
         signal, field, constant = declared[name]
+        quantity = (carried or {}).get(name) or Quantity(field.unit, field.frame)
         fields.append(
             RecordedField(
                 name=name,
@@ -134,8 +153,8 @@ def _recorded(layout: Layout, declared: Mapping[str, Declared]) -> RecordedLayou
                 start=slot.start,
                 shape=slot.shape,
                 dimensions=field.shape,
-                unit=None if field.unit is None else str(field.unit),
-                frame=field.frame,
+                unit=None if quantity.unit is None else str(quantity.unit),
+                frame=quantity.frame,
                 text=field.text,
                 values={int(v): v.name.lower() for v in field.values or ()},
                 constant=constant,

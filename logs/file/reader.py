@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from functools import cached_property
 from os import PathLike
@@ -191,7 +191,8 @@ class RecordedRun:
         between recorded ticks and, if the outcome is there, those at the beginning and the end."""
         ticks = self.ticks
         if self.outcome is not None and "ticks" in self.outcome:
-            return max(0, int(self.outcome["ticks"]) - len(ticks))
+            whole = int(self.outcome["ticks"]) - self.header.earlier_ticks
+            return max(0, whole - len(ticks))
         return int(ticks[-1] - self.header.first_tick + 1 - len(ticks)) if len(ticks) else 0
 
 
@@ -235,7 +236,9 @@ def read(path: str | PathLike[str], *, damaged: bool = False) -> RecordedRun:
     ]
     outcome = json.loads(texts["outcome"]) if "outcome" in texts else None
     ordered = tuple(note for _, note in sorted(notes, key=lambda entry: entry[0]))
-    return RecordedRun(path, Header.from_json(texts["header"]), outcome, ordered, found)
+    header = Header.from_json(texts["header"])
+    header = replace(header, contents=json.loads(texts.get("contents", "{}")))
+    return RecordedRun(path, header, outcome, ordered, found)
 
 
 def _properties(found: Scan) -> dict[str, str]:

@@ -1,9 +1,17 @@
-"""What a run depended on beside its graph: the files that parameters name, and the user's project."""
+"""What a run depended on beside its graph: the files that parameters name, and the user's project.
+
+A file is known by an entry and by the SHA-256 of its content. The entry of a file that a parameter
+names is ``block.parameter: value``. A file that a block found in a folder, which one of its
+parameters names, has the entry ``block.parameter/name``; a file that a block found otherwise has
+the entry ``block: name``.
+"""
 
 from __future__ import annotations
 
 import subprocess
-from collections.abc import Mapping
+import zlib
+from base64 import b64decode, b64encode
+from collections.abc import Iterator, Mapping
 from hashlib import sha256
 from importlib.resources import files
 from pathlib import Path
@@ -15,30 +23,58 @@ from ...runtime.running.memory import BoundGraph
 _SHIPPED = Path(str(files(__package__.partition(".logs")[0]) / "graphs"))
 MOST_BYTES = 1 << 26
 """Files that are larger are not looked at."""
+MOST_CARRIED = 1 << 24
+"""The bytes of all files that a recording carries, compressed; further files are only named."""
 
 
-def parameter_files(graph: CheckedGraph) -> dict[str, str]:
-    """The SHA-256 of every file that a parameter names, by ``block.parameter: name``.
+def parameter_files(graph: CheckedGraph) -> dict[str, Path]:
+    """Every file that a parameter names, by its entry.
 
     A file is looked for beside the graph, and then among the shipped graphs.
     """
-    found = {}
-    for spec in graph.blocks:
-        for name, value in spec.params:
-            path = _file(value, Path(spec.folder))
-            if path is not None:
-                found[f"{spec.path}.{name}: {value}"] = sha256(path.read_bytes()).hexdigest()
-    return found
+    return {
+        f"{spec.path}.{name}: {value}": path
+        for spec in graph.blocks
+        for name, value in spec.params
+        if (path := named_file(value, Path(spec.folder))) is not None
+    }
 
 
-def files_read(bound: BoundGraph) -> dict[str, str]:
+def files_read(bound: BoundGraph) -> dict[str, Path]:
     """As ``parameter_files``, with the files that blocks have found themselves when they were set up,
-    such as plans: those in a block's attribute ``files_read``."""
+    such as plans: those in a block's attribute ``files_read``. The block's attribute ``files_folder``
+    may name the parameter that says in which folder they are looked for first."""
     found = parameter_files(bound.graph)
     for path, block in bound.blocks.items():
+        folder = getattr(block, "files_folder", "")
         for file in getattr(block, "files_read", ()):
-            found[f"{path}: {file.name}"] = sha256(file.read_bytes()).hexdigest()
+            found[f"{path}.{folder}/{file.name}" if folder else f"{path}: {file.name}"] = file
     return found
+
+
+def digests(files: Mapping[str, Path]) -> dict[str, str]:
+    """The SHA-256 of every file, by its entry."""
+    return {entry: sha256(path.read_bytes()).hexdigest() for entry, path in files.items()}
+
+
+def contents(files: Mapping[str, Path]) -> dict[str, str]:
+    """The content of files as text, by SHA-256, as far as ``MOST_CARRIED`` allows."""
+    return dict(_contents(files))
+
+
+def _contents(files: Mapping[str, Path]) -> Iterator[tuple[str, str]]:
+    room = MOST_CARRIED
+    for path in files.values():
+        data = path.read_bytes()
+        packed = zlib.compress(data, 6)
+        if len(packed) <= room:
+            room -= len(packed)
+            yield sha256(data).hexdigest(), b64encode(packed).decode()
+
+
+def unpacked(content: str) -> bytes:
+    """The bytes of a file from the text that ``contents`` made."""
+    return zlib.decompress(b64decode(content))
 
 
 def other_files(then: Mapping[str, str], now: Mapping[str, str]) -> list[str]:
@@ -52,7 +88,8 @@ def other_files(then: Mapping[str, str], now: Mapping[str, str]) -> list[str]:
     return found
 
 
-def _file(value: Any, folder: Path) -> Path | None:
+def named_file(value: Any, folder: Path) -> Path | None:
+    """The file that a parameter's value names, beside the graph or among the shipped graphs."""
     if not isinstance(value, str | Path) or not str(value) or "\n" in str(value):
         return None
     try:

@@ -120,6 +120,11 @@ class Place:
                 place += len(piece)
 
 
+def split_name(path: Path, number: int) -> Path:
+    """The name of a later file of a recording in several: ``jump-part002.rrd`` follows ``jump.rrd``."""
+    return path.with_name(f"{path.stem}-part{number:03d}{path.suffix}")
+
+
 def _numbered(path: Path, number: int) -> Path:
     return path.with_name(f"{path.stem}.{number}{path.suffix}")
 

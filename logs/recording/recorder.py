@@ -13,6 +13,7 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import asdict
 from importlib.util import find_spec
 from os import PathLike
@@ -50,6 +51,9 @@ class Recorder:
             process that is killed loses no more than that.
         sync_period: seconds after which it is put on the disk; a power cut takes no more than that.
         ring_time: seconds of the run that fit into the ring.
+        split: seconds of the graph's time after which the recording goes on in a new file, at the
+            next keyframe: ``jump.rrd``, ``jump-part002.rrd`` ... Each can be read and replayed by
+            itself. Zero for one file.
         live: where a viewer listens (``viewer.Viewer.source``) that is to show the run while it
             goes on; a viewer that dies or hangs is a warning.
         on_warning: called with each warning at once, where ``warnings`` is looked at in the end.
@@ -73,9 +77,12 @@ class Recorder:
         flush_period: float = 0.5,
         sync_period: float = 5.0,
         ring_time: float = 4.0,
+        split: float = 0.0,
         live: str = "",
         on_warning: Callable[[str], object] | None = None,
     ) -> None:
+        if split and keyframe_period <= 0:
+            raise ValueError("a recording in several files needs keyframes: keyframe_period > 0")
         self.path = Path(path) if path is not None else None
         self.warnings: list[str] = []
         self.dropped = 0
@@ -88,11 +95,16 @@ class Recorder:
         self._when_full = when_full
         self._keyframe_period = keyframe_period
         self._periods = flush_period, sync_period
-        self._ring_time = ring_time
+        self._ring_time, self._split = ring_time, split
         self._live = live
         self._on_warning = on_warning
         self._gap: tuple[int, int, int] | None = None
         self._told_of_stall = False
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """The files of a recording in several, when the run has ended; none if it is in one."""
+        return tuple(map(Path, self.report.files)) if self.report is not None else ()
 
     @property
     def recording(self) -> Path | None:
@@ -138,7 +150,8 @@ class Recorder:
                 self.before = replaced(self.path, self._keep)
                 for text in place.said:
                     self._warn(text)
-            self.link = RecorderLink(place, header, capacity, *self._periods, self._live)
+            split = round(self._split * self._bound.graph.base_rate)
+            self.link = RecorderLink(place, header, capacity, *self._periods, self._live, split)
         except OSError as error:
             return f"{self.path} cannot be written ({error.strerror or error})"
         return ""
@@ -259,17 +272,29 @@ class Recorder:
         if self.path is None:
             self._warn(f"the run was not shown to its end: {problem}")
             return
-        self.path = part_of(self.path)
-        try:
-            count = len(read(self.path, damaged=True).ticks)
-        except (AloftError, OSError):
-            count = 0
+        count, self.path = self._ticks_found(self.path)
         self.missing = self._seen - count
         what = f"'aloft log repair {self.path}' completes it" if count else "nothing can be saved"
         self._warn(
             f"the recording is not whole: {problem}; {count} ticks are in {self.path}, "
             f"{self.missing} were run but are not recorded; {what}"
         )
+
+    def _ticks_found(self, path: Path) -> tuple[int, Path]:
+        """The ticks in the files that the process left, and the name of the last of them."""
+        count = 0
+        while self._split:
+            try:
+                closed = read(path)
+            except (AloftError, OSError):
+                break
+            following = (closed.outcome or {}).get("goes_on_in")
+            if following is None:
+                break
+            count, path = count + len(closed.ticks), path.with_name(following)
+        with suppress(AloftError, OSError):
+            count += len(read(part_of(path), damaged=True).ticks)
+        return count, part_of(path)
 
 
 def _encoded(note: Note) -> bytes:

@@ -37,7 +37,7 @@ class RecorderLink:
         place: the file's place, if there is to be a file. The process takes it over.
         header: of the recording, as text.
         capacity: least size of the ring [bytes].
-        flush_period, sync_period, live: see ``Task``.
+        flush_period, sync_period, live, split: see ``Task``.
 
     Raises:
         OSError: the process cannot be started.
@@ -51,6 +51,7 @@ class RecorderLink:
         flush_period: float,
         sync_period: float,
         live: str = "",
+        split: int = 0,
     ) -> None:
         text = header.encode()
         capacity = max(1 << 16, capacity + space_of(len(text)))
@@ -61,7 +62,9 @@ class RecorderLink:
             self.ring.write(HEADER, 0, text)
             path = str(place.target.absolute()) if place is not None else ""
             file, keep = (place.descriptor, place.keep) if place is not None else (-1, 0)
-            task = Task(descriptor, capacity, path, file, keep, flush_period, sync_period, live)
+            task = Task(
+                descriptor, capacity, path, file, keep, flush_period, sync_period, live, split
+            )
             folders = json.dumps([str(Path(folder).absolute()) for folder in sys.path])
             # not forked, as a copy of this process would hold its robot; and in a session of its
             # own, so that nobody's Ctrl-C ends it before the run has come to rest

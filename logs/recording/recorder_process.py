@@ -18,7 +18,7 @@ import threading
 import time
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -29,7 +29,7 @@ from ...runtime.running.memory import Snapshot
 from ...runtime.running.notes import Note
 from ..file.format import Header
 from .live_feed import LiveFeed
-from .place import Place
+from .place import Place, split_name, take_place
 from .ring import Record, RingReader
 from .writer import RecordingWriter, warm_up
 
@@ -59,6 +59,8 @@ class Task:
         flush_period: seconds after which what has come is handed to the operating system.
         sync_period: seconds after which that is told to put it on the disk.
         live: where a viewer listens that shows the run while it goes on, if one does.
+        split: ticks after which the recording goes on in a new file, at the next keyframe; zero for
+            never.
     """
 
     descriptor: int
@@ -69,6 +71,7 @@ class Task:
     flush_period: float
     sync_period: float
     live: str = ""
+    split: int = 0
 
 
 @dataclass
@@ -76,8 +79,9 @@ class Report:
     """What was done.
 
     Attributes:
-        rows: the number of ticks in the file.
-        size: the file's size [bytes].
+        rows: the number of ticks in the file, or in all files together.
+        size: the size of the file or of all files [bytes].
+        files: the files, if there are several.
         memory: the most memory used [bytes].
         problem: what went wrong with the file, if anything.
         lost: the number of ticks that were taken from the ring and are not in the file.
@@ -92,6 +96,7 @@ class Report:
     lost: int = 0
     odd: str = ""
     live_problem: str = ""
+    files: tuple[str, ...] = ()
 
 
 class RecorderProcess:
@@ -111,6 +116,9 @@ class RecorderProcess:
         self._notes: list[Note] = []
         self._last_tick = header.first_tick
         self._syncing = threading.Thread()
+        self._header = header
+        self._rows_before = self._size_before = 0
+        self._files: list[str] = []
         self._writer: RecordingWriter | None = None
         self._failed: RecordingWriter | None = None
         self._place: Place | None = None
@@ -124,7 +132,36 @@ class RecorderProcess:
 
     def _open(self, header: Header) -> None:
         assert self._place is not None
-        self._writer = RecordingWriter(self._task.path, header, place=self._place)
+        self._writer = RecordingWriter(self._place.target, header, place=self._place)
+
+    def _split(self, tick: int) -> None:
+        """Close the file, and go on in a new one with the tick ``tick``."""
+        writer, place = self._writer, self._place
+        if writer is None or place is None:
+            return
+        following = split_name(Path(self._task.path), len(self._files) + 2)
+        self._write_batch()
+        self._write_notes()
+        ticks = tick - self._begun_at()
+        self._write(lambda writer: writer.write_outcome(_went_on(following, ticks)))
+        self._guard(self._close)
+        if self.report.problem:
+            return
+        self._files.append(str(place.target))
+        self._rows_before += writer.recorded
+        self._size_before += place.target.stat().st_size
+        self._writer = None
+        self._header = replace(self._header, first_tick=tick, run_begin=self._begun_at())
+        self._guard(lambda: self._open_following(following))
+
+    def _begun_at(self) -> int:
+        """The first tick of the run."""
+        header = self._header
+        return header.first_tick if header.run_begin is None else header.run_begin
+
+    def _open_following(self, path: Path) -> None:
+        self._place = take_place(path, self._task.keep)
+        self._open(self._header)
 
     def take(self) -> None:
         """Take all records out of the ring, and flush if it is time."""
@@ -151,6 +188,8 @@ class RecorderProcess:
                 self._write_batch()
         elif record.kind == KEYFRAME:
             bus, state = bytes(record.data[: self._bus_size]), bytes(record.data[self._bus_size :])
+            if 0 < self._task.split <= record.tick - self._header.first_tick:
+                self._split(record.tick)
             self._write(lambda writer: writer.write_keyframe(Snapshot(record.tick, bus, state)))
         elif record.kind == NOTE:
             note = Note(**json.loads(bytes(record.data)))
@@ -196,22 +235,25 @@ class RecorderProcess:
         if self.feed is not None:
             self.feed.finish(outcome)
             self.report.live_problem = self.feed.problem
-        if self._task.path and Path(self._task.path).is_file():
-            self.report.size = Path(self._task.path).stat().st_size
+        if self._place is not None and self._place.target.is_file():
+            self.report.size = self._size_before + self._place.target.stat().st_size
+            if self._files:
+                self.report.files = (*self._files, str(self._place.target))
         self.report.memory = _memory()
         return self.report
 
     def _close(self) -> None:
         """Close the file; one that could not be written to its end gets its name as it is."""
         if self._writer is not None:
-            self.report.odd = self._writer.close()
+            odd = self._writer.close()
+            self.report.odd = "; ".join(filter(None, (self.report.odd, odd)))
         elif self._place is not None:
             self._place.publish()
 
     def _count(self) -> None:
         """Count the ticks in the file, and those that are not."""
         writer = self._writer or self._failed
-        self.report.rows = writer.recorded if writer is not None else 0
+        self.report.rows = self._rows_before + (writer.recorded if writer is not None else 0)
         self.report.lost = self._taken - self.report.rows if self._task.path else 0
 
     def problems(self) -> list[str]:
@@ -253,6 +295,20 @@ class RecorderProcess:
         except Exception as error:  # noqa: BLE001  # whatever it is, the robot goes on
             self.report.problem = describe(error)
             self._failed, self._writer = self._writer or self._failed, None
+
+
+def _went_on(path: Path, ticks: int) -> dict[str, Any]:
+    """The outcome in a file of a run that goes on in the file ``path``; ``ticks`` were run so far."""
+    return {
+        "success": False,
+        "reason": f"the run goes on in {path.name}",
+        "exit_code": 0,
+        "run_hash": "",
+        "ticks": ticks,
+        "metrics": {},
+        "blocks": {},
+        "goes_on_in": path.name,
+    }
 
 
 def _memory() -> int:

@@ -11,6 +11,7 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Sequence
+from dataclasses import replace
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -83,7 +84,7 @@ class RecordingWriter:
 
         header = self.header
         about = {
-            "header": header.to_json(),
+            "header": replace(header, contents={}).to_json(),
             "name": header.name,
             "graph": header.graph,
             "base_rate_hz": repr(header.base_rate),
@@ -94,6 +95,8 @@ class RecordingWriter:
             "schema_hashes": json.dumps(header.schema_hashes),
         }
         self._stream.send_property("aloft", rr.AnyValues(**about))
+        files = json.dumps(dict(header.contents))
+        self._stream.send_property("files", rr.AnyValues(contents=files))
         self._put(Content.START)
         layout = recording_blueprint(header)
         rr.send_blueprint(layout, make_active=False, make_default=True, recording=self._stream)

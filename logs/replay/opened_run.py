@@ -1,13 +1,18 @@
-"""Opens a recording so that it can be replayed: the graph is loaded from the text in the recording."""
+"""Opens a recording so that it can be replayed: the graph is loaded from the text in the recording.
+
+Files that the graph names, such as tasks and plans, and the robot's description are those that the
+recording carries, where the present ones are others; see ``carried_files``.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from tempfile import TemporaryDirectory
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +26,8 @@ from ...runtime.loading.earlier_versions import in_present_form
 from ...runtime.running.memory import BoundGraph, Snapshot
 from ..file.header import machine, versions
 from ..file.reader import RecordedRun, read
-from ..file.surroundings import files_read, other_files
+from ..file.surroundings import digests, files_read, other_files
+from .carried_files import Restored, restored
 
 
 @dataclass(frozen=True)
@@ -31,13 +37,22 @@ class OpenedRun:
     Attributes:
         file: the recording.
         folder: the folder of the graph file, to which file names in the graph are relative.
+        restore: whether files that have changed or gone since are taken from the recording.
     """
 
     file: RecordedRun
     folder: Path
+    restore: bool = True
+    _place: TemporaryDirectory[str] = field(
+        default_factory=lambda: TemporaryDirectory(prefix="aloft-replay-"),
+        repr=False,
+        compare=False,
+    )
 
     @classmethod
-    def of(cls, path: str | PathLike[str], folder: Path | None = None) -> OpenedRun:
+    def of(
+        cls, path: str | PathLike[str], folder: Path | None = None, *, restore: bool = True
+    ) -> OpenedRun:
         """Open the recording at ``path``.
 
         Raises:
@@ -47,14 +62,28 @@ class OpenedRun:
         file = read(path)
         if not len(file.ticks):
             raise AloftError(f"{path} holds no tick")
-        return cls(file, folder or _folder(Path(path), Path(file.header.source)))
+        return cls(file, folder or _folder(Path(path), Path(file.header.source)), restore)
 
-    def load(self, overrides: Mapping[str, Any] | Sequence[str] = ()) -> CheckedGraph:
-        """The recorded graph with further overrides. Raises ``LoadError``."""
+    @cached_property
+    def restored(self) -> Restored:
+        """The graph's text, and the files that were taken from the recording."""
         header = self.file.header
-        name = Path(header.source).name or f"{header.name}.yaml"
         text = in_present_form(header.graph, header.versions.get("aloft", ""), header.robot)
-        return load_text(text, self.folder / name, overrides)
+        if not self.restore:
+            return Restored(text, {}, (), frozenset())
+        return restored(header, text, self.folder, Path(self._place.name))
+
+    def load(self, overrides: Sequence[str] = ()) -> CheckedGraph:
+        """The recorded graph with further overrides. Raises ``LoadError``."""
+        header, kept = self.file.header, self.restored
+        name = Path(header.source).name or f"{header.name}.yaml"
+        changed = [text.partition("=")[0] for text in overrides]
+        files = [
+            f"{parameter}={json.dumps(file)}"
+            for parameter, file in kept.overrides.items()
+            if parameter not in changed and f"{parameter.rpartition('.')[0]}.use" not in changed
+        ]
+        return load_text(kept.text, self.folder / name, [*files, *overrides])
 
     @cached_property
     def graph(self) -> CheckedGraph:
@@ -92,7 +121,9 @@ class OpenedRun:
         outcome = self.file.outcome or {}
         if outcome.get("exit_code") != ExitCode.RUN_FAILED:
             return False
-        return int(self.ticks[-1]) + 1 - self.file.header.first_tick == outcome.get("ticks")
+        header = self.file.header
+        done = int(self.ticks[-1]) + 1 - header.first_tick + header.earlier_ticks
+        return done == outcome.get("ticks")
 
     def rows(self, first: int, last: int) -> tuple[NDArray[np.int64], NDArray[np.uint8]]:
         """The ticks from ``first`` up to ``last``, and their rows."""
@@ -113,7 +144,9 @@ class OpenedRun:
             for name in then
             if then[name] != now.get(name)
         ]
-        return found + other_files(header.files, files_read(BoundGraph(self.graph)))
+        kept = self.restored.entries
+        files = {entry: digest for entry, digest in header.files.items() if entry not in kept}
+        return found + other_files(files, digests(files_read(BoundGraph(self.graph))))
 
 
 def _folder(recording: Path, source: Path) -> Path:

@@ -40,8 +40,8 @@ PUSH = Role("ExternalForce", ("force", "point"))
 IMU = Role("ImuReading", ("angular_velocity", "specific_force"))
 ROLES = (TRUTH, LOADS, GROUND, BASE, JOINTS, TERMS, FORCES, PLAN, FEET, PUSH, IMU)
 OTHERS = (
-    "ContactState", "ContactSwitches", "EstimatorHealth", "JointCommand", "JointTarget",
-    "JointTorque", "PhaseState", "WholeBodyTarget",
+    "ContactState", "ContactSwitches", "DelayEstimate", "EstimatorHealth", "JointCommand",
+    "JointTarget", "JointTorque", "MassEstimate", "PhaseState", "RobotHealth", "WholeBodyTarget",
 )  # fmt: skip
 """Signals of the common vocabulary that have no role: similar fields do not give them one."""
 

@@ -58,16 +58,18 @@ def overrides_for(graph: Graph, overrides: Sequence[str], seed: int) -> list[str
 
 
 def run_seeds(
-    path: Path, overrides: Sequence[str], seeds: Sequence[int]
+    path: Path, overrides: Sequence[str], seeds: Sequence[int], *, plain: bool = False
 ) -> Generator[SeedRow, None, None]:
     """Run the graph once with each seed. A run does not depend on the others beside it.
+
+    With ``plain`` the kernels run as plain Python.
 
     Raises:
         LoadError: the graph may not run.
         AloftError: the graph has no parameter called ``seed``.
     """
     graph = load(path, overrides)
-    jobs = [(path, overrides_for(graph, overrides, seed), seed) for seed in seeds]
+    jobs = [(path, overrides_for(graph, overrides, seed), seed, plain) for seed in seeds]
     rows: dict[int, SeedRow] = {}
     done = 0
     # When this generator is closed, the robots of runs under way come to rest first.
@@ -80,8 +82,8 @@ def run_seeds(
                 done += 1
 
 
-def _run_one(job: tuple[Path, Sequence[str], int]) -> SeedRow:
-    path, overrides, seed = job
-    result = load(path, overrides).run(log=False)
+def _run_one(job: tuple[Path, Sequence[str], int, bool]) -> SeedRow:
+    path, overrides, seed, plain = job
+    result = load(path, overrides).run(log=False, plain=plain)
     data = result.to_json()
     return SeedRow(seed, result.success, result.reason, data["metrics"], result.run_hash)

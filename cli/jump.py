@@ -1,0 +1,226 @@
+"""``aloft jump``: plans a jump that is asked for in words and runs it, in one line."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from ..runtime.language.errors import AloftError, ExitCode, UnitError
+from .jump_graphs import graph_of
+from .output import SET_HELP, console, errors_reported, print_json, say
+from .rehearse import REHEARSE_HELP, rehearsal
+from .run import run_many, run_once
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from ..planner.library.library import PlanLibrary
+    from ..planner.task.task import JumpTask
+    from ..runtime.graph import Graph
+
+ABOVE_A_STEP = 0.07
+"""How much higher than the step a jump onto it rises, if it is not said [m]."""
+HELP = {
+    "rise": "Apex of the centre of mass above standing: 12cm; by default what the graph's task says.",
+    "forward": "How far ahead it lands: 20cm.",
+    "back": "How far behind.",
+    "left": "How far to the left.",
+    "right": "How far to the right.",
+    "up": "How much higher it lands; brings the step.",
+    "down": "How much lower; brings the platform it starts on.",
+    "turn": "How far it turns, to the left: 30deg; to the right: -30deg.",
+}
+FIELDS = {
+    "forward": ("distance_x", 1.0), "back": ("distance_x", -1.0), "left": ("distance_y", 1.0),
+    "right": ("distance_y", -1.0), "up": ("landing_height", 1.0), "down": ("landing_height", -1.0),
+}  # fmt: skip
+"""The lengths of the command line as parameters of a task, and their sign there."""
+
+
+def jump(
+    rise: Annotated[str, typer.Option(help=HELP["rise"])] = "",
+    forward: Annotated[str, typer.Option(help=HELP["forward"])] = "",
+    back: Annotated[str, typer.Option(help=HELP["back"])] = "",
+    left: Annotated[str, typer.Option(help=HELP["left"])] = "",
+    right: Annotated[str, typer.Option(help=HELP["right"])] = "",
+    up: Annotated[str, typer.Option(help=HELP["up"])] = "",
+    down: Annotated[str, typer.Option(help=HELP["down"])] = "",
+    turn: Annotated[str, typer.Option(help=HELP["turn"])] = "",
+    robot: Annotated[str, typer.Option(help="Which robot jumps.")] = "bruce",
+    graph: Annotated[
+        Path | None, typer.Option(help="The graph; by default the robot's shipped jump.")
+    ] = None,
+    trial: Annotated[
+        str, typer.Option(help="nominal, standard or robust; by default as the graph says.")
+    ] = "",
+    seed: Annotated[int, typer.Option(min=0, help="The seed of the trial.")] = 0,
+    seeds: Annotated[
+        str, typer.Option(help="Run once a seed instead: 0:20 or 1,5,7; nothing is recorded.")
+    ] = "",
+    overrides: Annotated[list[str] | None, typer.Option("--set", help=SET_HELP)] = None,
+    record: Annotated[
+        Path | None, typer.Option(help="Where the recording goes; by default recordings/jump.rrd.")
+    ] = None,
+    no_record: Annotated[bool, typer.Option("--no-record", help="Write no recording.")] = False,
+    nearest: Annotated[
+        bool,
+        typer.Option(help="Where there is no plan, search the nearest jump that has; about 6 s."),
+    ] = True,
+    rehearse: Annotated[bool, typer.Option("--rehearse", help=REHEARSE_HELP)] = False,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Tables go to standard error, one JSON object to output.")
+    ] = False,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print the verdict only.")] = False,
+) -> None:
+    """Plan a jump and run it: aloft jump --forward 20cm --up 5cm --turn 30deg."""
+    from ..studies.batch.seeds import parse_seeds
+
+    out = console(to_stderr=as_json, quiet=quiet)
+    lengths = {"forward": forward, "back": back, "left": left, "right": right, "up": up,
+               "down": down}  # fmt: skip
+    with errors_reported(as_json):
+        if seeds and (record is not None or seed):
+            raise AloftError(
+                "--seeds runs many seeds and records nothing: leave out --seed, --record"
+            )
+        path = graph or graph_of(robot)
+        asked = task_changes(lengths, rise, turn, path)
+        settings = [*settings_for(asked, trial), *(overrides or [])]
+        many = parse_seeds(seeds) if seeds else []
+        loaded = load_jump(path, settings, None if seeds else seed)
+        task = task_of(loaded)
+        say(out, f"{task.robot} jumps: {task.name}")
+        planned = plan_of(task, loaded, nearest, out)
+        if not planned["success"]:
+            if as_json:
+                why = {"success": False, "reason": planned["reason"], "recording": None}
+                print_json({"asked": asked, "plan": planned, **why})
+            raise typer.Exit(ExitCode.NOT_SUCCESSFUL)
+        library = library_of(loaded)
+        planned |= rehearsal(path, settings, task, library, rehearse, out)
+        if rehearse:  # what was learnt is part of the graph
+            loaded = load_jump(path, settings, None if seeds else seed)
+        if many:
+            code = run_many(path, settings, many, out, as_json)
+        else:
+            place = None if no_record else record or Path("recordings") / "jump.rrd"
+            also = {"asked": asked, "plan": planned}
+            code = run_once(loaded, place, out, as_json, also=also, times=False)
+    raise typer.Exit(code)
+
+
+def task_changes(lengths: dict[str, str], rise: str, turn: str, path: Path) -> dict[str, float]:
+    """What the command line says of the task, in SI units, by the task's parameters.
+
+    Raises:
+        AloftError: a quantity has no unit or a wrong one, or two contradict each other.
+    """
+    found: dict[str, float] = {}
+    said: dict[str, str] = {}
+    for name, text in lengths.items():
+        if not text:
+            continue
+        field, sign = FIELDS[name]
+        if field in said:
+            raise AloftError(f"--{said[field]} and --{name} contradict each other: give one")
+        said[field] = name
+        found[field] = sign * quantity(name, text, "m", "20cm")
+    if turn:
+        found["twist"] = quantity("turn", turn, "rad", "30deg")
+    if rise:
+        found["rise"] = quantity("rise", rise, "m", "12cm")
+    elif found.get("landing_height", 0.0) > 0.0:
+        usual = usual_rise(path)
+        needed = round(found["landing_height"] + ABOVE_A_STEP, 6)
+        if usual is None or needed > usual:
+            found["rise"] = needed
+    return found
+
+
+def quantity(name: str, text: str, unit: str, example: str) -> float:
+    """A quantity of the command line in ``unit``; it must say its own."""
+    from ..runtime.language.units import parse_quantity
+
+    try:
+        float(text)
+    except ValueError:
+        pass
+    else:
+        raise AloftError(
+            f"--{name} {text}: the unit is missing; expected such as --{name} {example}"
+        )
+    try:
+        return parse_quantity(text, unit)
+    except UnitError as error:
+        raise AloftError(
+            f"--{name} {text}: {error}; expected such as --{name} {example}"
+        ) from error
+
+
+def usual_rise(path: Path) -> float | None:
+    """The rise that the graph's own task asks for [m]."""
+    return task_of(load_jump(path, [], None)).rise
+
+
+def settings_for(asked: dict[str, float], trial: str) -> list[str]:
+    """The overrides of a graph for what was asked."""
+    from ..runtime.loading.nodes import text_of
+    from ..studies.trials import trial_settings
+
+    return [
+        *(f"{key}={text_of(value)}" for key, value in trial_settings(trial).items()),
+        *(f"plan.task.{key}={value!r}" for key, value in asked.items()),
+    ]
+
+
+def load_jump(path: Path, settings: list[str], seed: int | None) -> Graph:
+    """The graph, which has a block ``plan`` for a task, and its seed set.
+
+    Raises:
+        LoadError: the graph may not run.
+        AloftError: it does not plan.
+    """
+    from ..blocks.jumping.jump_plan import JumpPlan
+    from ..runtime.graph import load
+    from ..studies.batch.seeds import overrides_for
+
+    loaded = load(path, settings)
+    planning = [s.path for s in loaded.checked.blocks if issubclass(s.block_type, JumpPlan)]
+    if planning != ["plan"]:
+        raise AloftError(
+            f"{path} does not jump by a plan: it needs a block 'plan' that uses blocks.JumpPlan"
+        )
+    return loaded if seed is None else load(path, overrides_for(loaded, settings, seed))
+
+
+def task_of(graph: Graph) -> JumpTask:
+    """The task that a graph's plan is for."""
+    from ..blocks.jumping.jump_plan import JumpPlan, read_or_make_task
+    from ..runtime.language.block import Clock, Context
+
+    checked = graph.checked
+    spec = checked.block("plan")
+    context = Context("plan", Clock(checked.base_period), robot=checked.robot, folder=spec.folder)
+    assert isinstance(spec.params, JumpPlan.Params)
+    return read_or_make_task(spec.params.task, context)
+
+
+def plan_of(task: JumpTask, graph: Graph, nearest: bool, out: Console) -> dict[str, Any]:
+    """Plan the task as the graph will, show the plan, and return it as in ``aloft plan --json``."""
+    from .plan import plan_task
+
+    row = plan_task(task, library_of(graph), False, None, nearest, out, tests=False)
+    if row["success"]:
+        say(out, f"the plan is valid: it passes all {len(row['tests'])} tests with exact dynamics")
+    return row
+
+
+def library_of(graph: Graph) -> PlanLibrary:
+    """The library of a graph's plan."""
+    from ..blocks.jumping.jump_plan import JumpPlan, plan_library
+
+    params, robot = graph.checked.block("plan").params, graph.checked.robot
+    assert isinstance(params, JumpPlan.Params) and robot is not None
+    return plan_library(params, robot)

@@ -1,0 +1,139 @@
+"""``aloft plot``: some signals of a recording over time, as a picture or in the terminal."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import numpy as np
+import typer
+
+from ..runtime.language.errors import AloftError
+from .output import errors_reported
+
+if TYPE_CHECKING:
+    from ..logs.file.reader import RecordedRun
+    from ..plotting import Panel
+
+_WIDTH, _HEIGHT = 72, 12
+"""Characters of a plot in the terminal."""
+_DOTS = ((0x01, 0x02, 0x04, 0x40), (0x08, 0x10, 0x20, 0x80))
+"""The bits of a Braille character's dots, by column and row."""
+
+
+def plot(
+    run: Annotated[Path, typer.Argument(help="The recording, a file .rrd.")],
+    signals: Annotated[
+        list[str],
+        typer.Argument(help="block.port.field, all fields of block.port, or one element: a.b.c[2]"),
+    ],
+    png: Annotated[Path | None, typer.Option("--png", help="Draw into this PNG file.")] = None,
+    svg: Annotated[Path | None, typer.Option("--svg", help="Draw into this SVG file.")] = None,
+    start: Annotated[float | None, typer.Option("--from", help="From this time [s].")] = None,
+    end: Annotated[float | None, typer.Option("--to", help="Up to this time [s].")] = None,
+) -> None:
+    """Plot signals of a recording: in the terminal, or into a file with --png or --svg."""
+    from ..logs import read
+
+    with errors_reported(False):
+        recorded = read(run)
+        panels = [panel for name in signals for panel in panels_of(recorded, name, start, end)]
+        if svg is not None or png is not None:
+            _draw(panels, run.stem, svg, png)
+            return
+    for panel in panels:
+        typer.echo(in_terminal(panel))
+
+
+def panels_of(run: RecordedRun, name: str, start: float | None, end: float | None) -> list[Panel]:
+    """One panel for every field that ``name`` says.
+
+    Raises:
+        AloftError: there is no such signal or element, or nothing was recorded in that time.
+    """
+    from ..runtime.loading.selection import Selection, read_selection, select
+
+    known = run.signals()
+    source, selection = read_selection(name) or (name, Selection())
+    base = f"{source}.{selection.field}" if selection.field else source
+    found = [base] if base in known else [n for n in known if n.rpartition(".")[0] == base]
+    if not found:
+        try:
+            run.nearest(name)
+        except KeyError as error:
+            raise AloftError(str(error.args[0])) from error
+    kept = np.ones(len(run.time), bool)
+    kept &= run.time >= start if start is not None else True
+    kept &= run.time <= end if end is not None else True
+    if not kept.any():
+        raise AloftError(f"nothing was recorded between {start} s and {end} s")
+    joints = tuple(joint.name for joint in run.header.robot.joints) if run.header.robot else ()
+    panels = []
+    for each in found:
+        field = known[each]
+        names = joints if field.dimensions and field.dimensions[0] == "n_joints" else ()
+        try:
+            places = select(Selection("", selection.indices), field.shape, names).reshape(-1)
+        except ValueError as error:
+            raise AloftError(f"{name}: {error}") from error
+        panels.append(_panel(run, each, places.tolist(), kept))
+    return panels
+
+
+def _panel(run: RecordedRun, name: str, places: Sequence[int], kept: Any) -> Panel:
+    from ..logs.viewing.signal_names import element_names, unit_of
+    from ..plotting import Line, Panel
+
+    field = run.signals()[name]
+    values = run[name][kept].reshape(int(kept.sum()), -1).astype(np.float64)
+    labels = element_names(field, run.header.robot) or [str(k) for k in range(values.shape[1])]
+    lines = [Line(labels[k] if field.shape else "", run.time[kept], values[:, k]) for k in places]
+    unit = unit_of(field)
+    return Panel(f"{name} [{unit}]" if unit else name, lines)
+
+
+def _draw(panels: Sequence[Panel], title: str, svg: Path | None, png: Path | None) -> None:
+    """Write the panels one below the other. Raises ``AloftError`` if a file cannot be written."""
+    from ..plotting import draw_panels, image, new_figure, style, svg_text
+
+    with style():
+        figure = new_figure(9.0, 0.6 + 2.4 * len(panels), title)
+        axes = figure.subplots(len(panels), 1, squeeze=False)[:, 0]
+        draw_panels(list(zip(axes, panels, strict=True)))
+        try:
+            for path in (svg, png):
+                if path is None:
+                    continue
+                if path == svg:
+                    path.write_text(svg_text(figure), encoding="utf-8")
+                else:
+                    image(figure).save(path, format="PNG")
+                typer.echo(f"plot: {path}", err=True)
+        except OSError as error:
+            raise AloftError(f"cannot write the plot: {error}") from error
+
+
+def in_terminal(panel: Panel) -> str:
+    """A panel as text: Braille dots, the range of values on the left, that of time below."""
+    x = np.asarray(panel.lines[0].x)
+    y = np.array([line.y for line in panel.lines])
+    finite = y[np.isfinite(y)]
+    low, high = (float(finite.min()), float(finite.max())) if finite.size else (0.0, 0.0)
+    if low == high:
+        low, high = low - 0.5, high + 0.5
+    span = float(x[-1] - x[0]) or 1.0
+    columns = np.clip((x - x[0]) / span * (2 * _WIDTH - 1), 0, 2 * _WIDTH - 1).astype(int)
+    cells = np.full((_HEIGHT, _WIDTH), 0x2800)
+    for line in y:
+        good = np.isfinite(line)
+        rows = ((high - line[good]) / (high - low) * (4 * _HEIGHT - 1)).round().astype(int)
+        for column, row in zip(columns[good].tolist(), rows.tolist(), strict=True):
+            cells[row // 4, column // 2] |= _DOTS[column % 2][row % 4]
+    rows_of_text = ["".join(map(chr, row)) for row in cells.tolist()]
+    labels = {0: f"{high:.4g}", _HEIGHT - 1: f"{low:.4g}"}
+    names = [line.name for line in panel.lines if line.name]
+    head = panel.title + (f": {', '.join(names)}" if len(names) > 1 else "")
+    body = [f"{labels.get(number, ''):>10} {row}" for number, row in enumerate(rows_of_text)]
+    foot = f"{'':>10} {x[0]:<10.4g}{'time [s]':^{_WIDTH - 20}}{x[-1]:>10.4g}"
+    return "\n".join([head, *body, foot])

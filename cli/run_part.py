@@ -1,0 +1,54 @@
+"""``aloft run --machine``: runs one machine's part of a graph, over Zenoh, together with the others."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from ..runtime.language.stages import CheckedGraph
+from ..runtime.links.part import BoundPart, run_part
+from ..runtime.links.zenoh_transport import ZenohTransport
+from ..runtime.placement.place import place
+from ..runtime.running.run_result import RunResult
+from ..runtime.running.sinks import Sink
+
+
+class Part:
+    """One machine's part, bound and ready to run once.
+
+    Raises:
+        PlacementError: the graph names no such machine.
+        RunError: a block could not be set up.
+    """
+
+    def __init__(self, graph: CheckedGraph, machine: str) -> None:
+        placed = place(graph)
+        transport = ZenohTransport(graph.name, placed.machines, wait=graph.links.mode == "lockstep")
+        self.bound = BoundPart(placed, machine, transport)
+        self._result: RunResult | None = None
+
+    @property
+    def checked(self) -> CheckedGraph:
+        """The graph of this part."""
+        return self.bound.graph
+
+    def run(self, *, sinks: Sequence[Sink], log: bool, plain: bool = False) -> RunResult:
+        """Run the part once."""
+        self._result = run_part(self.bound, sinks=sinks, log=log, plain=plain)
+        return self._result
+
+    def about(self) -> Mapping[str, Any]:
+        """The machine, the metrics of each of its blocks, what its links have carried, and the others' clocks."""
+        error = self._result.error if self._result is not None else None
+        metrics = {path: dict(block.metrics()) for path, block in self.bound.blocks.items()}
+        return {
+            "machine": self.bound.machine,
+            "heard": bool(getattr(error, "heard", False)),
+            "metrics_by_block": {path: found for path, found in metrics.items() if found},
+            "links": [inbox.about() for inbox in self.bound.inboxes],
+            "clocks": {
+                name: {"offset_s": clock.offset * 1e-9, "uncertainty_s": clock.uncertainty * 1e-9}
+                for name in self.bound.others.names
+                for clock in (self.bound.others.clock_of(name),)
+            },
+        }

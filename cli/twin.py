@@ -1,0 +1,119 @@
+"""``aloft twin``: a robot's twin behind serial ports, for a driver in another process."""
+
+from __future__ import annotations
+
+import signal
+import time
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from ..runtime.language.errors import AloftError
+from .output import console, errors_reported, print_json, say
+
+
+def twin(
+    robot: Annotated[str, typer.Argument(help="The robot.")] = "bruce",
+    hardware: Annotated[
+        Path | None, typer.Option(help="Its hardware's file; the ports are the twin's own.")
+    ] = None,
+    write: Annotated[
+        Path, typer.Option(help="Where to write the hardware's file with the twin's ports.")
+    ] = Path("twin.yaml"),
+    virtual: Annotated[
+        bool, typer.Option("--virtual", help="Time goes on with the exchanges on the bus.")
+    ] = False,
+    set_: Annotated[
+        list[str] | None,
+        typer.Option("--set", help="Of the simulator: seed=3, gyro_noise=0.02, friction=0.5 ..."),
+    ] = None,
+    fault: Annotated[
+        list[str] | None,
+        typer.Option(help="What goes wrong: 'dead 0.5 left_knee_motor', 'lost 1 * share=0.1'."),
+    ] = None,
+    seconds: Annotated[float, typer.Option(help="End after so long; 0: with Ctrl-C.")] = 0.0,
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
+) -> None:
+    """Serve the drives and the sensor board of a robot on pseudo-terminals, with physics behind.
+
+    Run a graph with hal.BearRobot against it: the file that is written names the ports.
+    """
+    import yaml
+
+    from ..hal.bear.configuration import Hardware
+    from ..hal.simulated.parameters import SimulatorParameters
+    from ..hal.twin.server import TwinServer
+    from ..hal.twin.standing_twin import standing_twin
+    from ..hal.twin.written_faults import read_fault
+    from ..robots.description import find_robot
+
+    with errors_reported(as_json):
+        try:
+            description = find_robot(robot)
+        except LookupError as error:
+            raise AloftError(str(error.args[0])) from error
+        settings = _settings(set_ or [])
+        params = SimulatorParameters.model_validate(settings)
+        faults = tuple(read_fault(text) for text in fault or [])
+        found = (
+            Hardware.read(hardware, description)
+            if hardware is not None
+            else Hardware.for_twin(description)
+        )
+        made = standing_twin(description, params, found, faults=faults)
+        with TwinServer(made, virtual=virtual, period=found.bus.period) as server:
+            data = found.model_dump(mode="json")
+            data["bus"] |= {"port": server.bus_path}
+            data["board"] |= {"port": server.board_path}
+            data["dead_man"] = {"kind": "none"}
+            if virtual:
+                data["bus"] |= {"reply_time": 5.0}
+            write.write_text(yaml.safe_dump(data, sort_keys=False), encoding="utf-8")
+            if as_json:
+                print_json({"bus": server.bus_path, "board": server.board_path, "file": str(write)})
+            else:
+                out = console()
+                say(out, f"drives on {server.bus_path}, sensor board on {server.board_path}")
+                say(out, f"wrote {write}: --set robot.hardware={write.resolve()}")
+            _wait(seconds)
+        if not as_json and server.behind > 0.1:
+            say(console(), f"the twin's time is {server.behind:.1f} s behind the clock")
+
+
+def _wait(seconds: float) -> None:
+    """Until SIGINT or SIGTERM, or the end of the time."""
+    ended = False
+
+    def end(number: int, frame: object) -> None:
+        nonlocal ended
+        ended = True
+
+    before = [signal.signal(number, end) for number in (signal.SIGINT, signal.SIGTERM)]
+    finish = time.monotonic() + seconds if seconds > 0.0 else float("inf")
+    try:
+        while not ended and time.monotonic() < finish:
+            time.sleep(0.05)
+    finally:
+        for number, handler in zip((signal.SIGINT, signal.SIGTERM), before, strict=True):
+            signal.signal(number, handler)
+
+
+def _settings(texts: list[str]) -> dict[str, object]:
+    """``name=value`` texts as parameters. Raises ``AloftError``."""
+    import yaml
+
+    from ..hal.simulated.parameters import SimulatorParameters
+    from ..robots.validation.faults import nearest
+
+    found: dict[str, object] = {}
+    for text in texts:
+        name, equals, value = text.partition("=")
+        if not equals:
+            raise AloftError(f"--set {text}: expected name=value")
+        if name not in SimulatorParameters.model_fields:
+            near = nearest(name, SimulatorParameters.model_fields)
+            hint = f"; did you mean {near}?" if near else ""
+            raise AloftError(f"--set {text}: the simulator has no parameter {name!r}{hint}")
+        found[name] = yaml.safe_load(value)
+    return found

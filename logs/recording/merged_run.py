@@ -1,0 +1,195 @@
+"""Puts the recordings of a run's parts, which several machines made, together into one.
+
+The result is what one process would have recorded of the same run, so it can be viewed and replayed
+like any other. It holds the ticks that every part has recorded.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from hashlib import blake2b
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ...runtime.language.errors import AloftError
+from ...runtime.links.whole import Whole
+from ...runtime.placement.placed import PlacedGraph
+from ...runtime.running.memory import BoundGraph, Memory, Snapshot
+from ...runtime.running.notes import Note
+from ..file.header import header_of
+from ..file.reader import RecordedRun, read
+from .writer import RecordingWriter
+
+_OF_ALL = ("life", "parameter")
+"""The kinds of notes that every part has; one of them is enough."""
+_STAND_IN = "runtime.links.inbox:Received"
+"""What the types of those blocks contain that only stand for a block of another machine."""
+
+
+def machine_of(placed: PlacedGraph, part: RecordedRun) -> str:
+    """The machine whose part a recording is of.
+
+    Raises:
+        AloftError: it is no recording of a part of this graph.
+    """
+    own = {block.path for block in part.header.blocks if _STAND_IN not in block.type}
+    for machine in placed.machines:
+        mine = [spec.path for spec in placed.blocks_on(machine.name)]
+        if mine and all(path in own for path in mine):
+            return machine.name
+    raise AloftError(f"{part.path} is not the recording of one part of {placed.graph.name}")
+
+
+def merged_outcome(
+    placed: PlacedGraph, parts: Mapping[str, RecordedRun], run_hash: str, ticks: int
+) -> dict[str, Any]:
+    """The outcome of the whole run, from those of its parts.
+
+    The reason is that of the part with the gravest exit code. Metrics are those of all parts; where
+    two have one of the same name, that of the first machine counts.
+
+    Raises:
+        AloftError: a part was cut off.
+    """
+    outcomes = {}
+    for machine, part in parts.items():
+        if part.outcome is None:
+            raise AloftError(f"{part.path} was cut off; `aloft log repair` completes it")
+        outcomes[machine] = part.outcome
+    worst = max(outcomes.values(), key=lambda outcome: int(outcome["exit_code"]))
+    metrics: dict[str, Any] = {}
+    for outcome in reversed(outcomes.values()):
+        metrics |= outcome["metrics"]
+    blocks = {}
+    for path in placed.graph.order:
+        found = outcomes[placed.graph.block(path).machine]["blocks"]
+        if path in found:
+            blocks[path] = found[path]
+    changed = {"run_hash": run_hash, "ticks": ticks, "metrics": metrics, "blocks": blocks}
+    return {**worst, **changed}
+
+
+def read_parts(
+    placed: PlacedGraph, paths: Mapping[str, str | PathLike[str]]
+) -> dict[str, RecordedRun]:
+    """The recordings of all parts of a graph, by machine.
+
+    Raises:
+        AloftError: a part is missing, is no recording, or is of another graph.
+        FileNotFoundError: there is no such file.
+    """
+    missing = [machine.name for machine in placed.machines if machine.name not in paths]
+    if missing:
+        raise AloftError(f"the recordings of {', '.join(missing)} are missing")
+    parts = {machine.name: read(paths[machine.name]) for machine in placed.machines}
+    try:
+        _whole_bus(placed, parts)
+    except (KeyError, ValueError) as error:
+        text = ", ".join(str(part.path) for part in parts.values())
+        raise AloftError(f"{text} are not of one run of {placed.graph.name}: {error}") from error
+    return parts
+
+
+def _whole_bus(placed: PlacedGraph, parts: Mapping[str, RecordedRun]) -> Whole:
+    """What takes the bus of the whole from those of the parts, which may hold more."""
+    layout = Memory(placed.graph.blocks, placed.graph.robot).bus.layout
+    return Whole(placed, layout, {m: part.header.bus.layout() for m, part in parts.items()})
+
+
+def run_hash_of(placed: PlacedGraph, parts: Mapping[str, RecordedRun]) -> tuple[str, int]:
+    """The run hash of the whole, as one process would have it, and the number of its ticks."""
+    made = blake2b(digest_size=16)
+    count = 0
+    for _, rows in _pieces(placed, parts):
+        made.update(np.ascontiguousarray(rows).data)
+        count += len(rows)
+    return made.hexdigest(), count
+
+
+def merge_recordings(
+    path: str | PathLike[str],
+    placed: PlacedGraph,
+    bound: BoundGraph,
+    parts: Mapping[str, RecordedRun],
+    outcome: dict[str, Any],
+) -> Path:
+    """Write the recording of the whole run.
+
+    Args:
+        path: the file; one that is there is replaced.
+        placed: the graph as it was spread.
+        bound: the same graph, bound in one process and not run.
+        parts: what each machine has recorded.
+        outcome: of the whole run, as ``RunResult.to_json`` gives it.
+
+    Returns:
+        The file, which has another name if a run is being recorded there.
+
+    Raises:
+        OSError: the file cannot be written.
+        ImportError: Rerun is not installed.
+    """
+    first = next(iter(parts.values())).header
+    header = replace(header_of(bound), first_tick=first.first_tick, clock=first.clock)
+    writer = RecordingWriter(path, header, outcome["run_hash"])
+    try:
+        for ticks, rows in _pieces(placed, parts):
+            writer.write_rows(ticks, rows)
+        for snapshot in _keyframes(placed, bound, parts):
+            writer.write_keyframe(snapshot)
+        writer.write_notes(_notes(parts))
+        writer.write_outcome(outcome)
+    finally:
+        writer.close()
+    return writer.path
+
+
+def _pieces(placed: PlacedGraph, parts: Mapping[str, RecordedRun]) -> Any:
+    """Ticks (n,) and rows (n, bytes) of the whole, some hundred at a time."""
+    whole = _whole_bus(placed, parts)
+    first, *others = (part.ticks for part in parts.values())
+    common = first
+    for ticks in others:
+        common = np.intersect1d(common, ticks, assume_unique=True)
+    for start in range(0, len(common), 512):
+        ticks = common[start : start + 512]
+        rows = {}
+        for machine, part in parts.items():
+            found, piece = part.window(int(ticks[0]), int(ticks[-1]) + 1)
+            rows[machine] = piece[np.searchsorted(found, ticks)]
+        yield ticks, whole.rows(rows)
+
+
+def _keyframes(
+    placed: PlacedGraph, bound: BoundGraph, parts: Mapping[str, RecordedRun]
+) -> Sequence[Snapshot]:
+    """The keyframes of the whole, before those ticks for which every part has one."""
+    bus = _whole_bus(placed, parts)
+    state = Whole(
+        placed, bound.memory.state.layout, {m: p.header.state.layout() for m, p in parts.items()}
+    )
+    first, *others = (part.keyframes for part in parts.values())
+    made = []
+    for tick in first:
+        if all(tick in keyframes for keyframes in others):
+            kept = {machine: part.snapshot(tick) for machine, part in parts.items()}
+            rows = {m: np.frombuffer(s.bus, np.uint8)[None] for m, s in kept.items()}
+            states = {m: np.frombuffer(s.state, np.uint8)[None] for m, s in kept.items()}
+            made.append(Snapshot(tick, bus.rows(rows).tobytes(), state.rows(states).tobytes()))
+    return made
+
+
+def _notes(parts: Mapping[str, RecordedRun]) -> list[Note]:
+    """The notes of all parts; those that every part has are taken from the first."""
+    found: list[Note] = []
+    for number, (machine, part) in enumerate(parts.items()):
+        for note in part.notes:
+            if note.kind not in _OF_ALL:
+                found.append(replace(note, text=f"{machine}: {note.text}"))
+            elif number == 0:
+                found.append(note)
+    return sorted(found, key=lambda note: note.tick)
