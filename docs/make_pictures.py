@@ -13,11 +13,13 @@ from pathlib import Path
 from rich.console import Console
 
 from aloft import LoadError, load
-from aloft.cli.graph import print_table
 from aloft.cli.output import say
-from aloft.cli.run import print_result
+from aloft.cli.run_output import print_result
 from aloft.logs.recording.recorder import Recorder
 from aloft.logs.viewing.viewer import ViewerError, start_viewer
+from aloft.runtime.drawing.diagram import diagram
+from aloft.runtime.drawing.placing import draw
+from aloft.runtime.drawing.svg import svg
 
 FOLDER = Path(__file__).parent
 JUMP = FOLDER.parent / "graphs" / "jump.yaml"
@@ -78,9 +80,8 @@ def main() -> None:
     say(out, f"{'success' if result.success else 'no success'}: {result.reason}")
     save(out, "run.svg", "aloft run graphs/jump.yaml")
 
-    out = console(150)
-    print_table(out, graph.checked)
-    save(out, "graph.svg", "aloft graph graphs/jump.yaml")
+    drawing = draw(diagram(graph.checked))
+    (FOLDER / "graph.svg").write_text(svg(drawing, "the graph of graphs/jump.yaml"))
 
     wrong = Path("wrong.yaml")
     wrong.write_text(MISTAKES)

@@ -1,9 +1,10 @@
-"""Writes the tables of the landing study's page from the study's summary and its tuned gains.
+"""Writes the tables of the landing study's page from the summaries of its two studies.
 
 ::
 
     aloft study graphs/studies/push_polar.yaml
-    python docs/refresh_landing.py results/push_polar/summary.json
+    aloft study graphs/studies/push_polar_12cm.yaml
+    python docs/refresh_landing.py results/push_polar/summary.json results/push_polar_12cm/summary.json
 """
 
 from __future__ import annotations
@@ -15,11 +16,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 ROOT = Path(__file__).parent.parent
 PAGE = ROOT / "docs" / "landing.md"
-TUNED = ROOT / "graphs" / "studies" / "push_polar.tuned.yaml"
 QUARTERS = {"ahead": 0, "left": 90, "back": 180, "right": 270}
 """Each with the directions within 45 degrees of it, those at its edges counted half on each side."""
 
@@ -65,24 +63,6 @@ def quarter_table(rows: Sequence[Row]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def gains_table(tuned: Mapping[str, Any]) -> str:
-    """What the search found for every arm."""
-    lines = ["| arm | succeeded in the search | gains |", "|---|---|---|"]
-    for arm, found in tuned["arms"].items():
-        gains = ", ".join(
-            f"`{key.removeprefix('landing.')}` {_rounded(value)}"
-            for key, value in found["set"].items()
-        )
-        lines.append(f"| {arm} | {found['successes']} of {found['n']} | {gains or 'as written'} |")
-    return "\n".join(lines) + "\n"
-
-
-def _rounded(value: Any) -> str:
-    if isinstance(value, list):
-        return "(" + ", ".join(_rounded(each) for each in value) + ")"
-    return f"{float(value):.3g}"
-
-
 def replaced(text: str, mark: str, table: str) -> str:
     """The page with what is between the marks of that name replaced."""
     pattern = re.compile(rf"(<!-- {mark} -->\n).*?(<!-- end of {mark} -->)", re.DOTALL)
@@ -92,9 +72,9 @@ def replaced(text: str, mark: str, table: str) -> str:
 
 
 if __name__ == "__main__":
-    every = json.loads(Path(sys.argv[1]).read_text())["rows"]
     page = PAGE.read_text()
-    page = replaced(page, "impulses", impulse_table(every))
-    page = replaced(page, "quarters", quarter_table(every))
-    page = replaced(page, "gains", gains_table(yaml.safe_load(TUNED.read_text())))
+    for mark, file in zip(("", " 12 cm"), sys.argv[1:], strict=False):
+        every = json.loads(Path(file).read_text())["rows"]
+        page = replaced(page, "impulses" + mark, impulse_table(every))
+        page = replaced(page, "quarters" + mark, quarter_table(every))
     PAGE.write_text(page)
