@@ -1,7 +1,7 @@
 # Everything starts here. Needs git, make and Python 3.11 to 3.14; all else goes into .venv.
 #
-#   make jump    set up, let BRUCE jump, write the recording
-#   make test    set up, run the tests that take a few minutes in all
+#   make jump    install what running needs, let BRUCE jump, write the recording
+#   make test    install the rest, run the tests that take a few minutes in all
 #   make test-all  the longer ones too
 #
 # PYTHON=/path/to/python chooses the interpreter; by default the first that will do is taken.
@@ -9,6 +9,8 @@
 VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/ready
+COMPLETE := $(VENV)/complete
+PIP := $(BIN)/python -m pip install -qq --disable-pip-version-check
 RECORDING := recordings/jump.rrd
 # One thread for each test process: the workers already take every core.
 SINGLE := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
@@ -18,41 +20,46 @@ SINGLE := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 help:  ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*##/\1:/p' $(MAKEFILE_LIST)
 
-setup: $(READY)  ## create .venv with everything
+setup: $(COMPLETE)  ## create .venv with everything
 
 $(READY): pyproject.toml scripts/find_python.sh
 	@python="$$(sh scripts/find_python.sh $(PYTHON))" && \
-	echo "setting up $(VENV) with $$python; the first time this downloads some 600 MB" && \
+	echo "setting up $(VENV) with $$python; the first time this downloads several hundred MB" && \
 	"$$python" -m venv $(VENV)
-	@$(BIN)/python -m pip install -qq --disable-pip-version-check --upgrade 'pip>=25.1'
-	@$(BIN)/python -m pip install -qq --disable-pip-version-check --editable . --group dev
+	@$(PIP) --upgrade 'pip>=25.1'
+	@$(PIP) --editable .
+	@touch $@
+
+$(COMPLETE): $(READY)
+	@echo "installing what tests and development need besides"
+	@$(PIP) --editable . --group dev
 	@touch $@
 
 jump: $(READY)  ## run graphs/jump.yaml and write recordings/jump.rrd
 	@$(BIN)/aloft run graphs/jump.yaml --record $(RECORDING)
 
-test: $(READY)  ## run the tests, without the long ones
+test: $(COMPLETE)  ## run the tests, without the long ones
 	@$(SINGLE) $(BIN)/python -m pytest --numprocesses auto -m "not long"
 
-test-all: $(READY)  ## run all tests
+test-all: $(COMPLETE)  ## run all tests
 	@$(SINGLE) $(BIN)/python -m pytest --numprocesses auto
 
-lint: $(READY)  ## check style and types
+lint: $(COMPLETE)  ## check style and types
 	@$(BIN)/ruff check .
 	@$(BIN)/ruff format --check .
 	@sh scripts/check_types.sh
 
-format: $(READY)  ## rewrite the files in the project's style
+format: $(COMPLETE)  ## rewrite the files in the project's style
 	@$(BIN)/ruff check --fix .
 	@$(BIN)/ruff format .
 
-bench: $(READY)  ## run all benchmarks
+bench: $(COMPLETE)  ## run all benchmarks
 	@$(SINGLE) $(BIN)/aloft bench
 
 plans: $(READY)  ## make the shipped plans anew, one for every file in graphs/tasks
 	@$(SINGLE) $(BIN)/aloft plan graphs/tasks/*.yaml --anew --prune --keep graphs/plans --no-pictures
 
-docs: $(READY)  ## make what is generated under docs/
+docs: $(COMPLETE)  ## make what is generated under docs/
 	@$(BIN)/aloft blocks --markdown > docs/blocks.md
 	@$(BIN)/python docs/refresh_task_parameters.py
 	@$(BIN)/python docs/refresh_excerpts.py

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from .logs.recording.finished_run import write_recording
+    from .runtime.building import GraphBuilder
     from .runtime.graph import Graph, load
     from .runtime.language.block import Block, Input, Output, State
     from .runtime.language.errors import AloftError, BlockError, RunError
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
     from .runtime.language.signals import Field, Signal
     from .runtime.loading import LoadError
     from .runtime.running.run_result import RunResult
+    from .runtime.running.stepping import SteppedRun
 
 __version__ = "0.2.0"
 
@@ -25,6 +27,8 @@ _HOMES = {
     **dict.fromkeys(("Block", "Input", "Output", "State"), "runtime.language.block"),
     **dict.fromkeys(("AloftError", "BlockError", "RunError"), "runtime.language.errors"),
     **dict.fromkeys(("Graph", "load"), "runtime.graph"),
+    "GraphBuilder": "runtime.building",
+    "SteppedRun": "runtime.running.stepping",
     "LoadError": "runtime.loading",
     **dict.fromkeys(("Parameters", "live_parameter", "parameter"), "runtime.language.parameters"),
     "RunResult": "runtime.running.run_result",
@@ -37,6 +41,7 @@ __all__ = [
     "BlockError",
     "Field",
     "Graph",
+    "GraphBuilder",
     "Input",
     "LoadError",
     "Output",
@@ -45,6 +50,7 @@ __all__ = [
     "RunResult",
     "Signal",
     "State",
+    "SteppedRun",
     "__version__",
     "live_parameter",
     "load",

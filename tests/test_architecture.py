@@ -22,10 +22,21 @@ ALLOWED: dict[str, tuple[str, ...]] = {
     "mathematics": (),
     "robots": ("mathematics",),
     "runtime/language": ("robots",),
-    "runtime/running": ("runtime/language", "robots"),
-    "runtime/loading": ("runtime/language", "robots"),
-    "runtime/testing": ("runtime/language", "runtime/loading", "runtime/running", "robots"),
-    "runtime": ("runtime/language", "runtime/loading", "runtime/running", "robots"),
+    "runtime/running": ("runtime/language", "robots", "mathematics/compiling"),
+    "runtime/loading": ("runtime/language", "runtime/placement", "robots"),
+    "runtime/placement": ("runtime/language", "robots"),
+    "runtime/links": (
+        "runtime/language", "runtime/loading", "runtime/running", "runtime/placement", "robots",
+    ),
+    "runtime/drawing": ("runtime/language", "runtime/loading", "robots"),
+    "runtime/testing": (
+        "runtime/language", "runtime/loading", "runtime/running", "runtime/placement",
+        "runtime/links", "robots", "mathematics/compiling",
+    ),
+    "runtime": (
+        "runtime/language", "runtime/loading", "runtime/running", "runtime/placement",
+        "runtime/links", "runtime/drawing", "robots",
+    ),
     "blocks/signals": ("runtime/language",),
     "blocks": (),
     "planner": (),
@@ -56,12 +67,15 @@ ALLOWED: dict[str, tuple[str, ...]] = {
     "hal": ("blocks/signals", "mathematics", "robots", "runtime/language"),
     "logs/file": ("robots", "runtime/language", "runtime/running"),
     "logs/viewing": ("logs/file", "robots", "runtime/language"),
-    "logs/recording": ("logs/file", "logs/viewing", "robots", "runtime/language", "runtime/running"),
+    "logs/recording": (
+        "logs/file", "logs/viewing", "robots", "runtime/language", "runtime/running",
+        "runtime/placement", "runtime/links",
+    ),
     "logs/replay": ("logs/file", "logs/viewing", "robots", "runtime"),
     "logs/exporting": ("logs/file", "logs/viewing", "robots", "runtime/language"),
     "logs": ("logs/file",),
-    "studies": ("robots", "runtime", "planner", "blocks", "hal", "logs"),
-    "benchmarks": ("robots", "runtime", "planner", "blocks", "hal", "logs"),
+    "studies": ("mathematics", "robots", "runtime", "planner", "blocks", "hal", "logs"),
+    "benchmarks": ("robots", "runtime", "planner", "blocks", "hal", "logs", "studies"),
     "cli": PACKAGES,
     "graphs": (),
 }  # fmt: skip
@@ -77,6 +91,7 @@ HEAVY = {
     "numba",
     "pyarrow",
     "PIL",
+    "zenoh",
     "matplotlib",
 }
 LONGEST = 400

@@ -3,7 +3,7 @@
 import pytest
 
 from aloft.robots.shipped import robot_names
-from aloft.runtime.language.errors import BlockError
+from aloft.runtime.language.errors import AloftError, BlockError
 from aloft.runtime.language.registry import find_block, known_names
 from aloft.runtime.testing.bench import BlockBench
 from aloft.runtime.testing.conformance import check_block, conformance_cases, misfits
@@ -18,8 +18,12 @@ OF_ROBOTS = [name for name in known_names() if find_block(name).needs]
 NOT_FOR_BRUCE = {
     "blocks.GravityCompensation": "for a fixed base; checked with an arm in its own test",
 }
+NEEDS_DRIVES = {
+    "hal.BearRobot": "needs drives on serial ports; hal.TwinRobot is the same driver without them",
+}
 BEYOND = {
     ("bolt", "hal.MujocoRobot"): "its centre of mass is .* outside its contact points",
+    ("bolt", "hal.TwinRobot"): "its centre of mass is .* outside its contact points",
     ("simple_humanoid", "hal.MujocoRobot"): "motor WAIST_P has 30 N m and would need",
 }
 """What a robot cannot do although it fits, and how the error says so."""
@@ -31,6 +35,11 @@ def test_conformance(name: str, case: str) -> None:
     if name in NOT_FOR_BRUCE:
         assert misfits(find_block(name), robot="bruce")
         pytest.skip(NOT_FOR_BRUCE[name])
+    if name in NEEDS_DRIVES:
+        assert not misfits(find_block(name), robot="bruce")
+        with pytest.raises(AloftError, match=r"the serial port .* cannot be opened"):
+            BlockBench(find_block(name), find_block(name).example_parameters(), robot="bruce")
+        pytest.skip(NEEDS_DRIVES[name])
     check_block(find_block(name), robot="bruce", cases=[case])
 
 

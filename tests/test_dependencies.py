@@ -15,6 +15,7 @@ NOT_SHIPPED = ("tests", "docs", "scripts")
 BY = {
     "PIL": "pillow",
     "dask": "distributed",
+    "llvmlite": "numba",
     "mujoco": "mujoco-core",
     "pinocchio": "pin",
     "pydantic_core": "pydantic",
@@ -22,6 +23,7 @@ BY = {
     "rerun": "rerun-sdk",
     "serial": "pyserial",
     "yaml": "pyyaml",
+    "zenoh": "eclipse-zenoh",
 }
 """Who brings a module, where that is not a distribution of its name."""
 

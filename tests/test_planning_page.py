@@ -6,6 +6,7 @@ from typing import Any
 
 import pytest
 
+import aloft
 from aloft.cli.task_page import BEGIN, END, task_tables
 from aloft.planner.library.library import SHIPPED
 from aloft.planner.task.read_task import read_task
@@ -25,7 +26,7 @@ def test_the_task_and_the_grid_are_what_the_page_says(tmp_path: Path) -> None:
     for name, text in FILES.items():
         (tmp_path / name).write_text(text)
     hop = read_task(tmp_path / "hop.yaml")
-    assert (hop.name, hop.rise, hop.distance_x, hop.effort) == ("hop", 0.12, 0.08, 0.9)
+    assert (hop.name, hop.rise, hop.distance_x) == ("hop", 0.12, 0.08)
     assert hop.twist == pytest.approx(0.1745, abs=1e-4)
     grid = read_grid(tmp_path / "grid.yaml")
     assert len(grid) == 15
@@ -45,8 +46,19 @@ def test_commands_of_the_page_have_options_that_are_there() -> None:
 
     from aloft.cli import make_app
 
-    known = {option for parameter in get_command(make_app()).commands["plan"].params  # type: ignore[attr-defined]
+    commands = get_command(make_app()).commands  # type: ignore[attr-defined]
+    known = {option for verb in ("plan", "jump", "run") for parameter in commands[verb].params
              for option in (*parameter.opts, *parameter.secondary_opts)}  # fmt: skip
     prose = PAGE.partition("The cluster needs")[0]
     used = set(re.findall(r"--[a-z][a-z-]+", prose))
     assert used <= known, used - known
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("seed", [9000, 9001])
+def test_the_task_of_the_page_lands(tmp_path: Path, seed: int) -> None:
+    task = tmp_path / "hop.yaml"
+    task.write_text(FILES["hop.yaml"])
+    sets = {"plan.task": str(task), "plan.library": str(tmp_path / "kept"), "robot.seed": seed}
+    result = aloft.load(ROOT / "graphs" / "jump.yaml", sets).run(log=False)
+    assert result.success, result.reason

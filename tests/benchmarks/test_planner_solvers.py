@@ -40,7 +40,9 @@ def test_without_drake_the_rows_say_how_to_get_it(monkeypatch: pytest.MonkeyPatc
 
 def test_snopt_confirms_the_optimum_of_the_same_problem() -> None:
     pytest.importorskip("pydrake")
-    problem = make_problem(make_task({"name": "low", **JUMP}), find_robot("bruce"))
+    problem = make_problem(
+        make_task({"recipe": "paper", "name": "low", **JUMP}), find_robot("bruce")
+    )
     own = solve(problem, ballistic_guess(problem))
     found = SnoptProgram(problem).solve(own.values, time_limit=30.0)
     assert found.solved

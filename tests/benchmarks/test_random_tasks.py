@@ -19,11 +19,16 @@ def test_every_kind_is_drawn_within_its_range() -> None:
     tasks = random_tasks(200, 1)
     kinds = {task.name.rpartition(" ")[0] for task in tasks}
     assert kinds == set(module._KINDS)
-    assert all(0.05 <= (task.rise or 0.0) <= 0.18 for task in tasks)
-    assert max(task.distance_x for task in tasks) <= 0.20
-    assert max(abs(task.distance_y) for task in tasks) <= 0.15
+    assert all(0.04 <= (task.rise or 0.0) <= 0.22 for task in tasks)
+    assert 0.40 < max(task.distance_x for task in tasks) <= 0.50
+    assert -0.25 <= min(task.distance_x for task in tasks) < -0.15
+    assert 0.20 < max(abs(task.distance_y) for task in tasks) <= 0.30
+    assert 1.5 < max(abs(task.twist) for task in tasks) <= 2.1
+    assert -0.35 <= min(task.landing_height for task in tasks) < -0.25
+    assert 0.08 < max(task.landing_height for task in tasks) <= 0.12
     assert {task.profile for task in tasks} == {""}, "the one that the robot is used with"
-    assert {task.effort for task in tasks} == {1.0}
+    said = {name for task in tasks for name in task.model_fields_set}
+    assert said == {"name", "rise", "distance_x", "distance_y", "twist", "landing_height"}
 
 
 def test_what_fails_is_counted_and_named(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -32,7 +37,7 @@ def test_what_fails_is_counted_and_named(monkeypatch: pytest.MonkeyPatch) -> Non
             raise PlanError("no plan", family="apex")
 
     monkeypatch.setattr(module, "solve_and_check", solve)
-    share, _, _ = random_rows(16, 2)
+    share, *_ = random_rows(16, 2)
     failed = [t for t in random_tasks(16, 2) if not t.distance_y and not t.twist]
     assert share.value == len(failed) / 16 > 0.0
     assert f"{failed[0].name} (apex)" in share.note

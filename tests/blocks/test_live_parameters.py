@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 from aloft.blocks.signals import Phase
+from aloft.mathematics.compiling.compile_calls import compile_calls
 from aloft.runtime.language.block import Block
 from aloft.runtime.language.parameter_change import Adjustment
 from aloft.runtime.language.parameters import Parameters, is_live
@@ -118,6 +119,17 @@ def pushed(tick: int) -> Inputs:
     }
 
 
+def reacting(tick: int) -> Inputs:
+    """The same with legs whose motion turns the torso, which tilts."""
+    inputs, rng = pushed(tick), np.random.default_rng(1)
+    turned = {"base_rotation": [[0.8, 0.0, 0.6], [0.0, 1.0, 0.0], [-0.6, 0.0, 0.8]]}
+    matrices = {
+        "centroidal_matrix": rng.normal(size=(6, 16)),
+        "contact_jacobian": rng.normal(size=(4, 3, 16)),
+    }
+    return {**inputs, "terms": {**inputs["terms"], **turned, **matrices}}
+
+
 SCENES: Mapping[str, list[Scene]] = {
     "blocks.Step": [Scene({"at": 0.1})],
     "blocks.Timer": [Scene({"duration": 0.1}, lambda tick: {"u": {"value": True}})],
@@ -137,7 +149,13 @@ SCENES: Mapping[str, list[Scene]] = {
         Scene({"place_gain": 0.5}, displaced),
         Scene({}, recovering),
     ],
-    "blocks.LandingHeuristic": [Scene({"p_max": (0.1, 0.1)}), Scene({}, flying), Scene({}, pushed)],
+    "blocks.LandingHeuristic": [
+        Scene({"p_max": (0.1, 0.1)}),
+        Scene({}, flying),
+        Scene({}, pushed),
+        Scene({"law": "predicted"}, reacting),
+        Scene({"law": "predicted", "height_range": (0.0, 0.0)}, reacting),
+    ],
     "blocks.LegInverseKinematics": [Scene({"speed_limit": 0.5})],
     "blocks.WholeBodyController": [
         Scene({"force_max": 20.0, "force_min": 1.0}),
@@ -188,6 +206,7 @@ def trace(
     """A checksum of all memory after each tick, with a change of parameters on the way."""
     bench = BlockBench(kind, params, robot="bruce")
     live = LiveParameters({"block": bench.block})
+    live.compile = compile_calls
     rng = np.random.default_rng(0)
     for tick in range(TICKS):
         if tick == BEFORE and changed is not None:

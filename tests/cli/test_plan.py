@@ -53,7 +53,7 @@ def test_a_plan_that_is_not_valid_says_which_test_failed(
     robot = find_robot("bruce")
     kept = PlanLibrary(robot, Path("nowhere")).find(read_task(TASKS / "in_situ.yaml"))
     assert kept is not None
-    higher = make_task({"name": "higher", "rise": 0.16})
+    higher = make_task({"name": "higher", "rise": 0.16}).resolved(robot)
     PlanLibrary(robot, folder / "library").add(replace(kept, task=higher))
     (folder / "higher.yaml").write_text("rise: 16 cm\n")
     arguments = ("plan", "higher.yaml", "--keep", "library", "--no-pictures", "--no-nearest")
@@ -76,12 +76,12 @@ def test_where_there_is_no_plan_the_nearest_task_is_found_and_kept(
         if abs((task.rise or 0.0) - 0.15) > 2e-3:
             raise PlanError("no plan: apex is missed", family="apex", violation=0.1)
         assert kept is not None
-        return replace(kept, task=task)
+        return replace(kept, task=task.resolved(find_robot("bruce")))
 
     monkeypatch.setattr(solve, "solve_jump", stand_in)
     monkeypatch.setattr(nearest_feasible, "AXES", {"rise": Axis(0.15, 0.05, 100.0, "cm")})
     monkeypatch.setattr(library, "solve_task", stand_in)
-    (folder / "high.yaml").write_text("rise: 40 cm\nthrust_time: 260 ms\n")
+    (folder / "high.yaml").write_text("rise: 40 cm\nfriction: 0.55\n")
     arguments = ("plan", "high.yaml", "--keep", "library", "--no-pictures")
     (row,) = call_json(*arguments, code=1)["plans"]
     assert (row["family"], row["violation"]) == ("apex", 0.1)
@@ -136,7 +136,9 @@ def test_a_wrong_task_is_refused(folder: Path, call_json: CallJson, call: Call) 
 
 
 def test_a_grid_takes_what_is_kept(folder: Path, call_json: CallJson) -> None:
-    (folder / "grid.yaml").write_text("task: {rise: 15 cm}\ngrid: {distance_x: [0 cm, 10 cm]}\n")
+    (folder / "grid.yaml").write_text(
+        "task: {recipe: paper, rise: 15 cm}\ngrid: {distance_x: [0 cm, 10 cm]}\n"
+    )
     result = call_json("plan", "--library", "grid.yaml")
     assert result["counts"] == {"planned": 0, "kept": 2, "failed": 0, "known": 0}
     assert [row["outcome"] for row in result["rows"]] == ["kept", "kept"]

@@ -116,7 +116,7 @@ def test_killed_and_resumed_with_nothing_lost_or_made_twice(
     assert len(lines) == 60 == len({json.loads(line)["key"] for line in lines})
     assert journal.read_bytes().startswith(kept)
     again = call_json("study", "grid.yaml", "--out", "fresh", "--workers", "1", code=1)
-    assert {**again, "table": ""} == {**result, "table": ""}
+    assert {**again, "table": "", "worst": ""} == {**result, "table": "", "worst": ""}
     first, second = (folder / name / "runs.parquet" for name in ("results/grid", "fresh"))
     assert table_bytes(first, folder) == table_bytes(second, folder)
     assert table_bytes(first, folder) != table_bytes(first, folder)[:-1]
@@ -199,3 +199,23 @@ def test_part_of_a_study_and_plots_that_cannot_be_drawn(
     done = call(*options, "--seeds", "1000")
     assert "plot 'odd': no run has a metric 'nothing'" in done.stderr
     assert "axis 'arm' has no hgih" in call("study", "grid.yaml", "--where=arm=hgih", code=2).stderr
+
+
+def test_the_worst_runs_are_listed_and_any_can_be_recorded(
+    study: Path, folder: Path, call_json: CallJson, call: Call
+) -> None:
+    refused = call("study", "grid.yaml", "--open", "1", "--no-show", code=2)
+    assert "run the study first: aloft study grid.yaml" in refused.stderr
+    page = Path(call_json("study", "grid.yaml", "--workers", "1")["worst"])
+    lines = (folder / page).read_text().splitlines()
+    assert lines[2].startswith("2 of 16 runs did not succeed.")
+    assert lines[6] == "| 1 | task count, arm high, stop_s 1.0, seed 1002 | counted too far |  |"
+    opened = call_json("study", "grid.yaml", "--open", "1", "--no-show")
+    assert opened["run"] == "task count, arm high, stop_s 1.0, seed 1002"
+    assert (opened["run_succeeded"], opened["same_bytes"]) == (False, True)
+    again = call_json("log", "info", opened["recording"])
+    assert again["run_hash"] == opened["run_hash"]
+    beyond = call("study", "grid.yaml", "--open", "17", "--no-show", code=2)
+    assert "there is no run 17 in the list of the worst: it has 1 to 16" in beyond.stderr
+    alone = call("study", "grid.yaml", "--no-show", code=2)
+    assert "add --open N" in alone.stderr

@@ -16,7 +16,7 @@ def test_a_jump_driven_by_the_invariant_filter() -> None:
     found = result.metrics
     assert found["estimator_flights"] == 1
     for name, bound in (
-        ("velocity_lift_off_m_s", 0.012), ("velocity_touchdown_m_s", 0.014),
+        ("velocity_lift_off_m_s", 0.012), ("velocity_touchdown_m_s", 0.018),
         ("position_touchdown_m", 0.006), ("attitude_touchdown_rad", 0.008),
     ):  # fmt: skip
         value = found[f"estimator_{name}"]

@@ -15,6 +15,7 @@ PUSH = Path(aloft.__file__).parent / "graphs" / "push.yaml"
 
 def test_the_graph_has_no_problems():
     assert check(PUSH).ok
+    assert check(PUSH.with_name("push_12cm.yaml")).ok
 
 
 @pytest.mark.parametrize("angle", [0.0, np.pi, np.pi / 2.0])
@@ -25,7 +26,7 @@ def test_a_push_in_the_air_is_landed(angle):
 
 def test_without_the_landing_heuristic_the_push_from_behind_ends_in_a_fall():
     strong = {"robot.seed": 70, "push.force": 100.0}
-    off = {"landing.w_l": [0.0, 0.0], "landing.w_k": [0.0, 0.0], "landing.w_c": 0.0}
+    off = {"landing.law": "paper", "landing.w_l": [0.0, 0.0], "landing.w_c": 0.0}
     assert aloft.load(PUSH, strong).run(log=False).success
     result = aloft.load(PUSH, strong | off).run(log=False)
     assert not result.success

@@ -107,7 +107,8 @@ def test_json(monkeypatch: pytest.MonkeyPatch) -> None:
                 "expected": "m",
                 "found": "mm",
                 "nearest": [],
-                "fix": "multiply by 0.001 in a block between: 1 mm is 0.001 m",
+                "fix": "multiply by 0.001 in a block between: 1 mm is 0.001 m; blocks.Gain with "
+                "{gain: 0.001, unit: m/mm}",
             }
         ],
     }

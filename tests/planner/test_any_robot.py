@@ -30,7 +30,14 @@ BIPED = legged_robot(
 @lru_cache(maxsize=2)
 def planned(robot_name: str) -> JumpPlan:
     robot = {"quadruped": QUADRUPED, "biped": BIPED}[robot_name]
-    asked = {"name": "jump", "rise": 0.08, "distance_x": 0.1, "impact": True, "effort": 0.9}
+    asked = {
+        "recipe": "paper",
+        "name": "jump",
+        "rise": 0.08,
+        "distance_x": 0.1,
+        "impact": True,
+        "effort": 0.9,
+    }
     more = {"knots": KNOTS if robot is QUADRUPED else FINER}
     return solve_jump(make_task({**asked, **more}), robot, compiled=False)
 

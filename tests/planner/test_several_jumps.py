@@ -39,7 +39,7 @@ TOES = [
 
 @cache
 def steps() -> JumpPlan:
-    return solve_jump(make_task({"name": "steps", **STEPS}), ROBOT)
+    return solve_jump(make_task({"recipe": "paper", "name": "steps", **STEPS}), ROBOT)
 
 
 def failed(plan: JumpPlan) -> set[str]:
@@ -80,7 +80,7 @@ def test_a_file_of_several_jumps(tmp_path: Path) -> None:
 
 
 def test_a_near_plan_of_several_jumps_saves_iterations() -> None:
-    near = make_task({"name": "near", **STEPS, "rise": 0.118})
+    near = make_task({"recipe": "paper", "name": "near", **STEPS, "rise": 0.118})
     cold, warm = (solve_jump(near, ROBOT, warm_start=start) for start in (None, steps()))
     assert warm.statistics["warm"]
     assert warm.statistics["iterations"] < 0.7 * cold.statistics["iterations"]
@@ -108,12 +108,14 @@ def test_the_table_has_every_jump() -> None:
     ],
 )
 def test_plans_are_valid(task: dict[str, Any]) -> None:
-    plan = solve_jump(make_task({"name": "jump", **task}), ROBOT)
+    plan = solve_jump(make_task({"recipe": "paper", "name": "jump", **task}), ROBOT)
     assert check_plan(plan, ROBOT).explain() == ""
 
 
 def test_heels_are_off_the_ground_while_the_toes_push() -> None:
-    plan = solve_jump(make_task({"name": "toes", "rise": 0.1, "phases": TOES}), ROBOT)
+    plan = solve_jump(
+        make_task({"recipe": "paper", "name": "toes", "rise": 0.1, "phases": TOES}), ROBOT
+    )
     on_toes = (plan.contact == [True, False, True, False]).all(axis=1)
     assert on_toes.sum() == 6
     assert set(plan.phase[on_toes].tolist()) == {int(Phase.THRUST)}
@@ -126,7 +128,9 @@ def test_heels_are_off_the_ground_while_the_toes_push() -> None:
 
 
 def test_an_impact_stops_the_feet_by_an_impulse() -> None:
-    plan = solve_jump(make_task({"name": "hit", "rise": 0.1, "impact": True}), ROBOT)
+    plan = solve_jump(
+        make_task({"recipe": "paper", "name": "hit", "rise": 0.1, "impact": True}), ROBOT
+    )
     assert check_plan(plan, ROBOT).explain() == ""
     knot = plan.knot_at(plan.touchdown_time) - 1
     assert plan.time[knot] == plan.time[knot + 1] == plan.touchdown_time
@@ -144,7 +148,9 @@ def test_an_impact_stops_the_feet_by_an_impulse() -> None:
 )
 def test_equations_are_independent_at_the_guess(task: dict[str, Any]) -> None:
     few = {"squat": 2, "thrust": 4, "flight": 5, "landing": 4}
-    problem = make_problem(make_task({"name": "rank", "knots": few, **task}), ROBOT)
+    problem = make_problem(
+        make_task({"recipe": "paper", "name": "rank", "knots": few, **task}), ROBOT
+    )
     functions = problem.assembly.functions()
     rng = np.random.default_rng(3)
     guess = ballistic_guess(problem) + 1e-3 * rng.normal(size=problem.assembly.variables)
@@ -159,7 +165,8 @@ def test_equations_are_independent_at_the_guess(task: dict[str, Any]) -> None:
 def test_free_times_out_of_the_plane_are_those_straight_ahead() -> None:
     free = {"rise": 0.1, "squat_time": "free", "thrust_time": "free"}
     ahead, aside = (
-        make_task({"name": name, **free, "distance_y": y}) for name, y in (("a", 0.0), ("b", 0.05))
+        make_task({"recipe": "paper", "name": name, **free, "distance_y": y})
+        for name, y in (("a", 0.0), ("b", 0.05))
     )
     straight = solve_jump(ahead, ROBOT)
     plan = solve_jump(aside, ROBOT)
@@ -170,7 +177,7 @@ def test_free_times_out_of_the_plane_are_those_straight_ahead() -> None:
 
 
 def test_several_jumps_aside_and_round() -> None:
-    task = make_task({"name": "aside", "rise": 0.08, "jumps": [{"distance_y": 0.05}, {"twist": 0.3}],
+    task = make_task({"recipe": "paper", "name": "aside", "rise": 0.08, "jumps": [{"distance_y": 0.05}, {"twist": 0.3}],
                       "contact_time": 0.3})  # fmt: skip
     given = with_ground_times(task, ROBOT)
     assert given == with_times(task, [0.0] * 7), "there is nothing to be found"

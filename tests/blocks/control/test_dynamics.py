@@ -260,3 +260,34 @@ def test_a_foot_with_one_contact_point_rolls(seed):
     rate = (after["contact_velocity"] - before["contact_velocity"]) / (2.0 * step)
     acceleration = terms["contact_jacobian"] @ state.acceleration + terms["contact_drift"]
     assert rate == pytest.approx(acceleration, abs=2e-4)
+
+
+def test_the_model_has_the_mass_and_torso_at_the_input(bench):
+    state = State(3)
+    scale, offset = 1.07, np.array([0.006, -0.004, 0.008])
+    bench.set("mass", mass=scale * ROBOT.total_mass, com_offset=offset)
+    found = evaluate(bench, state)
+    built = build_pinocchio_model(ROBOT)
+    model = built.model
+    for inertia in model.inertias:
+        inertia.mass *= scale
+        inertia.inertia = scale * inertia.inertia
+    torso = model.inertias[model.getJointId("base")]
+    torso.lever = torso.lever + offset
+    data = model.createData()
+    pin.computeAllTerms(model, data, state.q, state.v)
+    np.testing.assert_allclose(found["mass_matrix"], data.M + built.rotor_coupling, atol=1e-12)
+    np.testing.assert_allclose(found["nonlinear_effects"], data.nle, atol=1e-10)
+    np.testing.assert_allclose(found["com"], data.com[0], atol=1e-12)
+    np.testing.assert_allclose(found["centroidal_matrix"], data.Ag, atol=1e-12)
+    assert found["mass_matrix"][0, 0] == pytest.approx(scale * ROBOT.total_mass)
+
+
+def test_a_mass_of_zero_is_the_description(bench):
+    state = State(4)
+    bench.set("mass", mass=1.1 * ROBOT.total_mass, com_offset=0.01)
+    evaluate(bench, state)
+    bench.set("mass", mass=0.0, com_offset=0.0)
+    found = evaluate(bench, state)
+    pin.computeAllTerms(state.model, state.data, state.q, state.v)
+    np.testing.assert_allclose(found["nonlinear_effects"], state.data.nle, atol=1e-10)

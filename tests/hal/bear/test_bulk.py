@@ -22,13 +22,23 @@ class Wire:
         self.timeout: float | None = None
         self.sent = b""
         self._waiting = b""
+        self._now = 0.0
 
-    def write(self, data: bytes) -> int:
+    def now(self) -> float:
+        return self._now
+
+    @property
+    def in_waiting(self) -> int:
+        return len(self._waiting)
+
+    def write(self, data: bytes | bytearray) -> int:
         self.sent = bytes(data)
         self._waiting += self.bus.receive(self.sent)
         return len(data)
 
     def read(self, size: int = 1) -> bytes:
+        if not self._waiting:
+            self._now += self.timeout or 0.0
         part, self._waiting = self._waiting[:size], self._waiting[size:]
         return part
 
@@ -119,6 +129,25 @@ def test_damaged_and_shortened_answers_are_left_out() -> None:
         emulated.fault = lambda device, answer: answer
         assert bulk.exchange() == 10
         assert bulk.values[:, 0].tolist() == [0.25 * k for k in range(1, 11)]
+
+
+def test_an_answer_that_cannot_be_is_none() -> None:
+    # the checksum has 8 bits: one in 256 pieces of damage passes it
+    bulk, emulated, _ = exchange(2)
+    bulk.plausible[0] = -60.0, 60.0
+    bulk.largest_step[0] = 0.3
+    first = emulated.actuators[1]
+    assert bulk.exchange() == 2
+    for value in (float("nan"), float("inf"), 61.0, 0.25 + 0.31):
+        first.status["present_position"] = value
+        assert bulk.exchange() == 1
+        assert bulk.values[0, 0] == 0.25 and bulk.ages.tolist() == [1, 0]
+        assert bulk.bus.counts.damaged > 0
+        first.status["present_position"] = 0.25
+        assert bulk.exchange() == 2
+    first.status["present_position"] = 0.25 + 0.5
+    assert bulk.exchange() == 1
+    assert bulk.exchange() == 2, "in two exchanges it may have moved so far"
 
 
 def test_a_cycle_makes_no_array() -> None:

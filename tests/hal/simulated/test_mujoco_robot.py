@@ -44,7 +44,7 @@ def hold(robot: BlockBench[MujocoRobot]) -> None:
 
 def lift(robot: BlockBench[MujocoRobot], height: float = 3.0) -> None:
     """Put the robot high up, legs in their standing pose, at rest and without gravity's pull yet."""
-    data: Any = robot.block._data
+    data: Any = robot.block.plant.data
     data.qpos[2] += height
     data.qvel[:] = 0.0
     robot.block.freeze()
@@ -201,7 +201,7 @@ def test_modes() -> None:
     robot.block.emit()
     np.testing.assert_array_equal(robot.get("joints").torque, 0.0)
     lift(robot, 0.0)
-    robot.block._data.qvel[6:] = 2.0  # type: ignore[attr-defined]
+    robot.block.plant.data.qvel[6:] = 2.0  # type: ignore[attr-defined]
     robot.set("command", mode=CommandMode.DAMPING, torque=5.0, stiffness=100.0, damping=99.0)
     robot.step()
     speeds = [np.abs(truth(robot).joint_velocity).max()]
@@ -283,7 +283,7 @@ def test_robust_world_is_drawn_from_the_seed_within_its_ranges() -> None:
     for seed in range(20):
         robot = bench(seed=seed, friction_range=[0.5, 1.0], mass_spread=0.05, base_com_spread=0.005,
                       contact_stiffness_spread=4.0)  # fmt: skip
-        drawn.append(robot.block._variation)
+        drawn.append(robot.block.plant.variation)
     assert all(0.5 <= v.friction <= 1.0 for v in drawn)
     assert all(0.95 <= v.mass <= 1.05 for v in drawn)
     assert all(0.25 <= v.contact_stiffness <= 4.0 for v in drawn)
@@ -295,12 +295,21 @@ def test_robust_world_is_drawn_from_the_seed_within_its_ranges() -> None:
 
 def test_platform_and_step_tell_the_ground_under_each_point() -> None:
     robot = bench(scene="platform", platform_height=0.35, platform_edge=0.08)
-    robot.block._data.qpos[0] += 0.06  # type: ignore[attr-defined]
+    robot.block.plant.data.qpos[0] += 0.06  # type: ignore[attr-defined]
     robot.block.freeze()
     robot.block.thaw()
     heights = truth(robot).ground_height
     np.testing.assert_array_equal(heights, [-0.35, 0.0, -0.35, 0.0])
     np.testing.assert_array_equal(truth(bench(scene="step")).ground_height, 0.0)
+
+
+def test_ground_may_be_described_as_a_floor_and_boxes() -> None:
+    scene = {"floor": "-50 cm", "boxes": [{"x": [-0.6, 0.08], "top": 0, "bottom": -0.5}]}
+    described = bench(scene=scene).block.params.build_scene()  # type: ignore[attr-defined]
+    assert described.ground_height(0.0, 0.0) == 0.0
+    assert described.floor == -0.5
+    with pytest.raises(ValidationError, match=r"must have an extent along x: 0.1 to 0 m"):
+        bench(scene={"boxes": [{"x": [0.1, 0.0], "top": 0.1}]})
 
 
 def test_errors_say_what_is_there() -> None:

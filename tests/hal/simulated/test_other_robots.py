@@ -37,15 +37,15 @@ def test_a_fixed_arm_starts_held_and_swings_as_a_pendulum_when_let_go(arm: Data)
     seen = truth(robot)
     assert seen.joint_position == pytest.approx([0.5, 0.7], abs=1e-3)
     assert not robot.get("imu").specific_force.any() and len(robot.get("contacts").closed) == 0
-    energy, kept = [], robot.block._data
-    robot.block._model.opt.enableflags |= int(mujoco.mjtEnableBit.mjENBL_ENERGY)
-    robot.block._model.dof_frictionloss[:] = 0.0
-    robot.block._model.dof_damping[:] = 0.0
+    energy, kept = [], robot.block.plant.data
+    robot.block.plant.model.opt.enableflags |= int(mujoco.mjtEnableBit.mjENBL_ENERGY)
+    robot.block.plant.model.dof_frictionloss[:] = 0.0
+    robot.block.plant.model.dof_damping[:] = 0.0
     robot.set("command", mode=CommandMode.OFF)
     for _ in range(200):
         robot.step()
-        mujoco.mj_energyPos(robot.block._model, kept)
-        mujoco.mj_energyVel(robot.block._model, kept)
+        mujoco.mj_energyPos(robot.block.plant.model, kept)
+        mujoco.mj_energyVel(robot.block.plant.model, kept)
         energy.append(sum(kept.energy))
     assert abs(truth(robot).joint_position[0]) > 0.6
     assert max(energy) - min(energy) < 0.02 * (1.6 * 9.81 * 0.4)
@@ -159,7 +159,7 @@ def test_holding_gains_grow_with_the_robot(quadruped: Data, mass: float) -> None
         link["inertia"] = [mass * value for value in link["inertia"]]
     quadruped["profiles"]["motor"]["rotor_inertia"] *= mass
     quadruped["profiles"]["motor"]["peak_torque"] *= mass
-    stiffness: Any = bench(quadruped).block._stiffness
+    stiffness: Any = bench(quadruped).block.plant.stiffness
     assert stiffness == pytest.approx(18.0 * 9.81 * 12.0 * mass * 0.272, rel=0.06)
 
 

@@ -28,7 +28,7 @@ def hold(robot: BlockBench[MujocoRobot]) -> None:
 
 def lift(robot: BlockBench[MujocoRobot], height: float = 3.0) -> None:
     """Put the robot high up, legs in their standing pose, at rest and without gravity's pull yet."""
-    data: Any = robot.block._data
+    data: Any = robot.block.plant.data
     data.qpos[2] += height
     data.qvel[:] = 0.0
     robot.block.freeze()
@@ -111,6 +111,6 @@ def test_switches_open_in_the_air_and_chatter_when_they_bounce() -> None:
 
 def test_threshold_is_between_its_limits_and_per_switch() -> None:
     robot = bench(switch_threshold=[0.5, 3.0], seed=1)
-    thresholds: Any = robot.block._sensors.switch_threshold
+    thresholds: Any = robot.block.plant.sensors.switch_threshold
     assert len(set(thresholds.tolist())) == 4
     assert (thresholds >= 0.5).all() and (thresholds <= 3.0).all()

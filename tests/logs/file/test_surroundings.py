@@ -5,7 +5,7 @@ from hashlib import sha256
 from pathlib import Path
 
 from aloft.logs.file.header import header_of, machine
-from aloft.logs.file.surroundings import other_files, project_state
+from aloft.logs.file.surroundings import other_files, project_state, unpacked
 from aloft.runtime.language.block import Block, Output
 from aloft.runtime.language.parameters import Parameters, parameter
 from aloft.runtime.language.signals import Field, Signal
@@ -37,10 +37,15 @@ def test_files_are_known_by_their_content(tmp_path: Path) -> None:
     (tmp_path / "plan.npz").write_text("2")
     name = str(tmp_path / "table.csv")
     bound = BoundGraph(checked_graph({"r": Use(Reads, {"table": name})}))
-    then = header_of(bound).files
+    header = header_of(bound)
+    then = header.files
     assert then == {
         f"r.table: {name}": sha256(b"1").hexdigest(),
         "r: plan.npz": sha256(b"2").hexdigest(),
+    }
+    assert {digest: unpacked(text) for digest, text in header.contents.items()} == {
+        sha256(b"1").hexdigest(): b"1",
+        sha256(b"2").hexdigest(): b"2",
     }
     (tmp_path / "plan.npz").write_text("another plan")
     now = header_of(bound).files

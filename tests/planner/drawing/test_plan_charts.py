@@ -65,7 +65,8 @@ def test_no_torque_leaves_what_its_speed_allows(step_up: Evidence) -> None:
 
 
 def test_limits_are_drawn(step_up: Evidence) -> None:
-    for title, limit in (("friction", 100.0), ("motor torque [%", 100.0), ("motor speed", 100.0)):
+    effort = 100.0 * step_up.plan.task.effort
+    for title, limit in (("friction", 100.0), ("motor torque [%", effort), ("motor speed", effort)):
         (level,) = limits(panel(step_up, title))
         assert level.y.tolist() == [limit, limit]
         highest = max(float(np.nanmax(line.y)) for line in panel(step_up, title).lines)

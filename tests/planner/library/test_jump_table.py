@@ -92,3 +92,33 @@ def test_contacts_of_a_table_hold_on_the_ground():
     assert reference.contact.tolist() == [True, False, True, False]
     reader.read(0.45, reference)
     assert not reference.contact.any()
+
+
+def test_what_is_held_is_the_mean_over_the_time_it_is_held():
+    """Also over an instant with two rows, and beyond the table's ends."""
+    plan = table()
+    times = np.array([0.0, 0.5, 0.5, 1.0])
+    push = np.array([2.0, 4.0, -9.0, -9.0])
+    columns = {
+        name: np.stack([np.full(rows.shape[1:], value) for value in push])
+        for name, rows in plan.columns.items()
+        if name != "orientation"
+    }
+    columns["orientation"] = np.tile([0.0, 0.0, 0.0, 1.0], (4, 1))
+    reader = JumpTableReader(replace(plan, time=times, columns=columns))
+    reference = JumpReference.allocate(find_robot("bruce").dimensions)
+    fine = np.linspace(-0.2, 1.4, 1600001)
+    value = np.interp(fine, [0.0, 0.5, 0.5 + 1e-9, 1.0], push)
+    for time, lead, hold in [
+        (0.1, 0.0, 0.1),
+        (0.42, 0.05, 0.1),
+        (0.95, 0.0, 0.2),
+        (-0.15, 0.0, 0.3),
+    ]:
+        reader.read(time, reference, lead, hold)
+        begin = time + lead
+        mean = value[(fine >= begin) & (fine <= begin + hold)].mean()
+        np.testing.assert_allclose(reference.com_acceleration, mean, atol=2e-4)
+        np.testing.assert_allclose(reference.joint_torque, mean, atol=2e-4)
+    reader.read(0.25, reference, 0.0, 0.1)
+    np.testing.assert_allclose(reference.com, 3.0, err_msg="what is not fed forward is of now")

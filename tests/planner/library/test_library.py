@@ -34,7 +34,7 @@ class Planner:
         self.started_from.append(warm_start.task.name if warm_start else None)
         if self.plan is None or (self.fails_warm and warm_start is not None):
             raise PlanError("no plan", family="apex")
-        return replace(self.plan, task=task)
+        return replace(self.plan, task=task.resolved(robot))
 
 
 @pytest.fixture(scope="module")
@@ -46,7 +46,7 @@ def good() -> JumpPlan:
 
 def near(name: str = "near", **values: object) -> JumpTask:
     """A task whose plan of 15 cm in place is valid too."""
-    return make_task({"name": name, "rise": 0.1503, **values})
+    return make_task({"name": name, "rise": 0.1503, **values}).resolved(ROBOT)
 
 
 def test_a_kept_plan_needs_no_solver(tmp_path: Path, good: JumpPlan) -> None:
@@ -84,13 +84,18 @@ def test_anew_starts_from_nothing(tmp_path: Path, good: JumpPlan) -> None:
 
 def test_a_plan_that_is_not_valid_is_never_kept(tmp_path: Path, good: JumpPlan) -> None:
     with pytest.raises(InvalidPlanError, match="rise: how far the apex") as caught:
-        PlanLibrary(ROBOT, tmp_path).plan(make_task({"name": "high", "rise": 0.2}), Planner(good))
+        PlanLibrary(ROBOT, tmp_path).plan(
+            make_task({"recipe": "paper", "name": "high", "rise": 0.2}), Planner(good)
+        )
     assert not caught.value.plan.valid
     assert list(tmp_path.iterdir()) == []
 
 
 def test_a_kept_plan_that_is_not_valid_is_not_handed_over(tmp_path: Path, good: JumpPlan) -> None:
-    library, task = PlanLibrary(ROBOT, tmp_path), make_task({"name": "high", "rise": 0.2})
+    library, task = (
+        PlanLibrary(ROBOT, tmp_path),
+        make_task({"recipe": "paper", "name": "high", "rise": 0.2}),
+    )
     library.add(replace(good, task=task, report={"valid": True}))
     with pytest.raises(InvalidPlanError, match="'high' is not valid"):
         library.plan(task, Planner(good))
@@ -144,7 +149,8 @@ def test_the_nearest_is_by_scaled_distance(tmp_path: Path, good: JumpPlan) -> No
 def test_tasks_that_differ_in_kind_have_no_distance() -> None:
     base = near()
     assert task_distance(base, near("other")) == 0.0
-    assert task_distance(base, near(rise=0.2003)) == pytest.approx(1.0)
+    some, more = near(effort=0.9), near(rise=0.2003, effort=0.9)
+    assert task_distance(some, more) == pytest.approx(1.0)
     assert task_distance(base, near(formulation="paper")) is None
     assert task_distance(base, near(knots={"flight": 30})) is None
     assert task_distance(base, near(flight_time=0.3)) is None

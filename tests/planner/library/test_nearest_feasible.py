@@ -17,7 +17,7 @@ from aloft.planner.task.task import JumpTask, make_task
 from aloft.robots.description import RobotDescription, find_robot
 
 ROBOT = find_robot("bruce")
-TASK = make_task({"name": "high", "rise": 0.4, "twist": 1.0})
+TASK = make_task({"recipe": "paper", "name": "high", "rise": 0.4, "twist": 1.0})
 
 
 class Planner:
@@ -63,7 +63,8 @@ def test_it_finds_the_last_round_value_that_can_be_planned() -> None:
     assert found.solves == len(solve.asked) <= 8
     assert found.plan.task.rise == 0.24
     assert found.text.startswith(
-        f"the nearest that can be planned is rise: 24 cm; 24.5 cm cannot ({found.solves} solves, "
+        "rise: 40 cm is beyond the robot; the nearest that can be planned is rise: 24 cm; 24.5 cm "
+        "cannot; what binds: "
     )
     assert all(task.twist == 1.0 for task in solve.asked), "one parameter changes at a time"
     assert solve.warm == [False, *[True] * (found.solves - 1)]
@@ -72,9 +73,9 @@ def test_it_finds_the_last_round_value_that_can_be_planned() -> None:
 def test_the_family_decides_what_is_tried_first() -> None:
     assert candidates(TASK, "apex") == ["rise", "twist"]
     assert candidates(TASK, "leg clearance") == ["twist", "rise"]
-    side = make_task({"name": "side", "rise": 0.15, "distance_y": 0.6})
+    side = make_task({"recipe": "paper", "name": "side", "rise": 0.15, "distance_y": 0.6})
     assert candidates(side, "") == ["distance_y", "rise"], "the furthest first"
-    assert candidates(make_task({"name": "hop", "rise": 0.08}), "") == []
+    assert candidates(make_task({"recipe": "paper", "name": "hop", "rise": 0.08}), "") == []
 
 
 def test_another_parameter_is_tried_where_the_first_does_not_help() -> None:
@@ -86,20 +87,30 @@ def test_another_parameter_is_tried_where_the_first_does_not_help() -> None:
 
 
 def test_values_come_from_both_sides_and_onto_a_step() -> None:
-    low = make_task({"name": "low", "rise": 0.06, "landing_height": 0.03, "distance_x": -0.025})
+    low = make_task(
+        {
+            "recipe": "paper",
+            "name": "low",
+            "rise": 0.06,
+            "landing_height": 0.03,
+            "distance_x": -0.025,
+        }
+    )
     assert values_towards(low, "rise") == [0.11, 0.105, 0.1, 0.095, 0.09, 0.085, 0.08, 0.075, 0.07,
                                            0.065, 0.06]  # fmt: skip
     assert values_towards(low, "distance_x") == [0.0, -0.01, -0.02, -0.025]
     assert values_towards(low, "take_off_speed") == []
     assert values_towards(low, "friction") == []
-    slippery = make_task({"name": "ice", "rise": 0.1, "friction": 0.65})
+    slippery = make_task({"recipe": "paper", "name": "ice", "rise": 0.1, "friction": 0.65})
     assert values_towards(slippery, "friction") == [0.7, 0.675, 0.65]
 
 
 def test_the_search_is_bounded() -> None:
     solve = Planner(lambda _: False)
     odd = dict.fromkeys(("distance_x", "distance_y", "landing_height", "foot_clearance"), 0.3)
-    task = make_task({"name": "odd", "rise": 1.0, "friction": 0.1, "effort": 0.2, **odd})
+    task = make_task(
+        {"recipe": "paper", "name": "odd", "rise": 1.0, "friction": 0.1, "effort": 0.2, **odd}
+    )
     assert nearest_feasible(task, ROBOT, solve=solve) is None
     assert len(solve.asked) <= module.MOST_SOLVES
     solve = Planner(lambda _: True)

@@ -36,7 +36,12 @@ REDUCED = [(formulation, jump) for formulation in ("paper", "srbm") for jump in 
 
 @lru_cache(maxsize=16)
 def planned(formulation: str, jump: str) -> JumpPlan:
-    values: dict[str, Any] = {"name": jump, "formulation": formulation, **JUMPS[jump]}
+    values: dict[str, Any] = {
+        "recipe": "paper",
+        "name": jump,
+        "formulation": formulation,
+        **JUMPS[jump],
+    }
     values |= {"knots": COARSE} if formulation == "paper" else {}
     return solve_jump(make_task(values), ROBOT)
 
@@ -46,7 +51,11 @@ def knot(plan: JumpPlan, time: float) -> int:
 
 
 def test_every_formulation_of_a_task_is_there() -> None:
-    names = make_task({"name": "x", "rise": 0.1}).__class__.model_fields["formulation"].annotation
+    names = (
+        make_task({"recipe": "paper", "name": "x", "rise": 0.1})
+        .__class__.model_fields["formulation"]
+        .annotation
+    )
     assert set(FORMULATIONS) == set(names.__args__)  # type: ignore[union-attr]
 
 
@@ -140,12 +149,16 @@ def test_the_validity_check_says_what_the_formulation_leaves_out(
 def test_what_only_full_can_do_is_refused(
     formulation: str, change: dict[str, Any], named: str
 ) -> None:
-    task = make_task({"name": "odd", "rise": 0.1, "formulation": formulation, **change})
+    task = make_task(
+        {"recipe": "paper", "name": "odd", "rise": 0.1, "formulation": formulation, **change}
+    )
     with pytest.raises(PlanError, match=f"{named}.*use formulation: full"):
         solve_jump(task, ROBOT)
 
 
 def test_legs_that_do_not_reach_are_named() -> None:
-    task = make_task({"name": "far", "rise": 0.1, "distance_x": 0.9, "formulation": "srbm"})
+    task = make_task(
+        {"recipe": "paper", "name": "far", "rise": 0.1, "distance_x": 0.9, "formulation": "srbm"}
+    )
     with pytest.raises(PlanError, match=r"no plan for 'far'|legs cannot follow"):
         solve_jump(task, ROBOT)

@@ -34,7 +34,9 @@ FEW = {"squat": 4, "thrust": 6, "flight": 8, "landing": 6}
 )
 def test_equations_are_independent_in_all_coordinates(task: dict[str, Any]) -> None:
     problem = make_problem(
-        make_task({"name": "jump", "knots": FEW, **task}), ROBOT, coordinates="full"
+        make_task({"recipe": "paper", "name": "jump", "knots": FEW, **task}),
+        ROBOT,
+        coordinates="full",
     )
     assert problem.coordinates.name == "full"
     functions = problem.assembly.functions()
@@ -52,7 +54,7 @@ from aloft.planner.task.plan import ARRAYS
 from aloft.planner.solving.solve import solve_jump
 from aloft.planner.task.task import make_task
 from aloft.robots.description import find_robot
-plan = solve_jump(make_task({"name": "x", "rise": 0.12, "distance_x": 0.08}), find_robot("bruce"))
+plan = solve_jump(make_task({"recipe": "paper", "name": "x", "rise": 0.12, "distance_x": 0.08}), find_robot("bruce"))
 print(hashlib.sha256(b"".join(getattr(plan, name).tobytes() for name in ARRAYS)).hexdigest())
 """
 
@@ -77,10 +79,20 @@ def momenta(plan: JumpPlan) -> tuple[float, float]:
 
 @pytest.mark.parametrize("where", ["lift_off", "touchdown"])
 def test_angular_momentum_can_be_bounded(where: str) -> None:
-    free = solve_jump(make_task({"name": "back", "rise": 0.15, "distance_x": -0.1}), ROBOT)
+    free = solve_jump(
+        make_task({"recipe": "paper", "name": "back", "rise": 0.15, "distance_x": -0.1}), ROBOT
+    )
     before = momenta(free)
     most = 0.5 * min(before)
-    task = make_task({"name": "back", "rise": 0.15, "distance_x": -0.1, f"{where}_momentum": most})
+    task = make_task(
+        {
+            "recipe": "paper",
+            "name": "back",
+            "rise": 0.15,
+            "distance_x": -0.1,
+            f"{where}_momentum": most,
+        }
+    )
     plan = solve_jump(task, ROBOT)
     index = ("lift_off", "touchdown").index(where)
     assert before[index] > most + 1e-3
@@ -93,7 +105,7 @@ def test_angular_momentum_can_be_bounded(where: str) -> None:
 
 def test_a_somersault_without_angular_momentum_is_refused() -> None:
     task = make_task(
-        {"name": "stiff", "rise": 0.15, "rotation": "360 deg", "lift_off_momentum": 0.0,
+        {"recipe": "paper", "name": "stiff", "rise": 0.15, "rotation": "360 deg", "lift_off_momentum": 0.0,
          "flight_time": 0.2, "knots": FEW}
     )  # fmt: skip
     with pytest.raises(PlanError, match="no plan for 'stiff'"):

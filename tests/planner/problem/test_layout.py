@@ -13,7 +13,7 @@ ROBOT = find_robot("bruce")
 
 
 def test_a_single_jump() -> None:
-    task = make_task({"name": "a", "rise": 0.1})
+    task = make_task({"recipe": "paper", "name": "a", "rise": 0.1})
     squat, thrust, flight, landing = layout(task, ROBOT)
     assert [s.phase for s in (squat, thrust, flight, landing)] == [
         Phase.SQUAT, Phase.THRUST, Phase.FLIGHT, Phase.LANDING,
@@ -26,7 +26,10 @@ def test_a_single_jump() -> None:
 
 def test_free_times_are_states_within_bounds() -> None:
     squat, thrust, _, landing = layout(
-        make_task({"name": "a", "rise": 0.1, "squat_time": "free", "thrust_time": None}), ROBOT
+        make_task(
+            {"recipe": "paper", "name": "a", "rise": 0.1, "squat_time": "free", "thrust_time": None}
+        ),
+        ROBOT,
     )
     assert (squat.piece, thrust.piece, landing.piece) == ("free_stance", "free_stance", "stance")
     low, high = thrust.bounds
@@ -36,7 +39,9 @@ def test_free_times_are_states_within_bounds() -> None:
 
 
 def test_every_touchdown_has_its_impact() -> None:
-    found = layout(make_task({"name": "a", "rise": 0.1, "impact": True, "repeat": 2}), ROBOT)
+    found = layout(
+        make_task({"recipe": "paper", "name": "a", "rise": 0.1, "impact": True, "repeat": 2}), ROBOT
+    )
     assert [s.piece for s in found] == [
         "stance", "stance", "flight", "impact", "free_stance", "free_stance", "flight", "impact",
         "stance",
@@ -51,4 +56,4 @@ def test_points_that_are_not_there() -> None:
         {"phase": "landing"},
     ]  # fmt: skip
     with pytest.raises(TaskError, match="no contact point of bruce is named like 'claw'"):
-        layout(make_task({"name": "a", "rise": 0.1, "phases": phases}), ROBOT)
+        layout(make_task({"recipe": "paper", "name": "a", "rise": 0.1, "phases": phases}), ROBOT)

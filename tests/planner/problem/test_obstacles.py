@@ -37,7 +37,7 @@ def heights(x: float, **hop: float) -> dict[str, float]:
     import casadi as ca
 
     coordinates = full_coordinates(MODEL)
-    task = make_task({"name": "step", "rise": 0.15, **hop}).hops()[0]
+    task = make_task({"recipe": "paper", "name": "step", "rise": 0.15, **hop}).hops()[0]
     w = step_parameters(task, hop.get("step_edge"), 0.0, 0.3)
     q = ca.SX.sym("q", coordinates.size)
     rows = ca.vertcat(*heights_above_step(MODEL, coordinates, q, w))
@@ -78,7 +78,7 @@ def test_which_points_are_watched() -> None:
         ({"landing_height": 0.05, "distance_x": 0.1}, 6, 6),
         ({"rotation": "360 deg"}, 25, 21),
     ):
-        task = make_task({"name": "jump", "rise": 0.15, **values})
+        task = make_task({"recipe": "paper", "name": "jump", "rise": 0.15, **values})
         hop, edge = task.hops()[0], 0.05 if values.get("distance_x") else None
         squat, _, flight, _ = layout(task, ROBOT)
         assert len(rows.rows(hop, edge, flight, False)) == in_flight
@@ -87,5 +87,11 @@ def test_which_points_are_watched() -> None:
 
 @pytest.mark.parametrize("ahead", [0.15, 0.2])
 def test_a_high_step_is_jumped_onto_and_not_touched(ahead: float) -> None:
-    task = {"name": "up", "rise": 0.15, "landing_height": 0.1, "distance_x": ahead}
+    task = {
+        "recipe": "paper",
+        "name": "up",
+        "rise": 0.15,
+        "landing_height": 0.1,
+        "distance_x": ahead,
+    }
     assert solve_and_check(make_task(task), ROBOT).valid

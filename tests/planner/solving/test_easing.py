@@ -19,7 +19,7 @@ from aloft.robots.description import find_robot
 from aloft.robots.kinematics import matrices_of_quaternions
 
 ROBOT = find_robot("bruce")
-TASK = make_task({"name": "jump", "rise": 0.15, "distance_x": 0.1})
+TASK = make_task({"recipe": "paper", "name": "jump", "rise": 0.15, "distance_x": 0.1})
 
 
 def test_only_the_motors_are_made_stronger() -> None:
@@ -43,7 +43,7 @@ def test_limits_come_down_to_the_real_ones() -> None:
 
 
 def test_limits_out_of_reach_are_not_reached() -> None:
-    high = make_problem(make_task({"name": "high", "rise": 0.45}), ROBOT)
+    high = make_problem(make_task({"recipe": "paper", "name": "high", "rise": 0.45}), ROBOT)
     easy = solve(eased(high, 2.0), ballistic_guess(high), solver="fatrop")
     assert easy.solved
     assert tighten(high, easy.values, 2.0) is None

@@ -15,7 +15,7 @@ from aloft.planner.task.task import make_task
 from aloft.robots.description import find_robot
 
 ROBOT = find_robot("bruce")
-HIGH = make_task({"name": "high", "rise": 0.2})
+HIGH = make_task({"recipe": "paper", "name": "high", "rise": 0.2})
 
 
 def failing(plan: JumpPlan, *tests: tuple[str, float, float]) -> JumpPlan:
@@ -43,7 +43,7 @@ def test_only_a_failed_plan_of_that_very_task_asks_for_finer(by_hand: JumpPlan) 
     failed = failing(replace(by_hand, task=HIGH), ("flight_position", 2e-3, 1e-3))
     assert asks_for_finer(HIGH, failed)
     assert asks_for_finer(HIGH.model_copy(update={"name": "other"}), failed)
-    assert not asks_for_finer(make_task({"name": "low", "rise": 0.1}), failed)
+    assert not asks_for_finer(make_task({"recipe": "paper", "name": "low", "rise": 0.1}), failed)
     assert not asks_for_finer(HIGH, replace(by_hand, task=HIGH))
     assert not asks_for_finer(HIGH, None)
 
@@ -70,7 +70,7 @@ def test_a_high_jump_is_valid_on_the_grid_it_needs() -> None:
     ],
 )
 def test_the_reach_of_the_real_actuators(task: dict[str, Any]) -> None:
-    plan = solve_and_check(make_task({"name": "far", **task}), ROBOT)
+    plan = solve_and_check(make_task({"recipe": "paper", "name": "far", **task}), ROBOT)
     assert plan.valid
     assert plan.statistics["violation"] <= 1e-6
 
@@ -90,10 +90,12 @@ def test_an_invalid_plan_is_not_refined_without_end(by_hand: JumpPlan) -> None:
 
 
 def test_a_plan_on_another_grid_is_a_start() -> None:
-    first = make_task({"name": "low", "rise": 0.14})
+    first = make_task({"recipe": "paper", "name": "low", "rise": 0.14})
     fine = solve_jump(first, ROBOT, knots=finer_knots(solve_jump(first, ROBOT)))
-    warm = solve_jump(make_task({"name": "near", "rise": 0.15}), ROBOT, warm_start=fine)
+    warm = solve_jump(
+        make_task({"recipe": "paper", "name": "near", "rise": 0.15}), ROBOT, warm_start=fine
+    )
     assert warm.statistics["warm"]
     assert len(warm.time) < len(fine.time)
-    cold = solve_jump(make_task({"name": "near", "rise": 0.15}), ROBOT)
+    cold = solve_jump(make_task({"recipe": "paper", "name": "near", "rise": 0.15}), ROBOT)
     assert np.abs(warm.com - cold.com).max() < 2e-3

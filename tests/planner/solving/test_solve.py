@@ -16,7 +16,7 @@ from aloft.planner.task.task import make_task
 from aloft.robots.description import find_robot
 
 ROBOT = find_robot("bruce")
-FORWARD = make_task({"name": "forward", "rise": 0.15, "distance_x": 0.1})
+FORWARD = make_task({"recipe": "paper", "name": "forward", "rise": 0.15, "distance_x": 0.1})
 
 
 @pytest.mark.parametrize(
@@ -30,7 +30,7 @@ FORWARD = make_task({"name": "forward", "rise": 0.15, "distance_x": 0.1})
     ],
 )
 def test_a_jump_straight_ahead_is_valid(task: dict[str, Any]) -> None:
-    plan = solve_jump(make_task({"name": "jump", **task}), ROBOT)
+    plan = solve_jump(make_task({"recipe": "paper", "name": "jump", **task}), ROBOT)
     assert check_plan(plan, ROBOT).explain() == ""
     assert plan.statistics["violation"] <= 1e-6
     assert plan.statistics["solver"] == "fatrop"
@@ -57,7 +57,7 @@ def test_without_a_compiler_the_plan_is_the_same() -> None:
 
 
 def test_a_near_plan_saves_iterations() -> None:
-    near = make_task({"name": "near", "rise": 0.15, "distance_x": 0.09})
+    near = make_task({"recipe": "paper", "name": "near", "rise": 0.15, "distance_x": 0.09})
     cold, warm = (
         solve_jump(near, ROBOT),
         solve_jump(near, ROBOT, warm_start=solve_jump(FORWARD, ROBOT)),
@@ -69,7 +69,7 @@ def test_a_near_plan_saves_iterations() -> None:
 
 def test_a_jump_beyond_the_motors_is_refused_with_a_family() -> None:
     with pytest.raises(PlanError, match="no plan for 'moon'") as caught:
-        solve_jump(make_task({"name": "moon", "rise": 0.8}), ROBOT)
+        solve_jump(make_task({"recipe": "paper", "name": "moon", "rise": 0.8}), ROBOT)
     assert caught.value.family
     assert caught.value.violation > 1e-6
 
@@ -82,7 +82,7 @@ def test_a_jump_beyond_the_motors_is_refused_with_a_family() -> None:
     ],
 )
 def test_what_cannot_be_planned_is_named(change: dict[str, Any], message: str) -> None:
-    task = make_task({"name": "odd", "rise": 0.1, **change})
+    task = make_task({"recipe": "paper", "name": "odd", "rise": 0.1, **change})
     with pytest.raises(PlanError, match=message):
         solve_jump(task, ROBOT)
 
@@ -91,7 +91,7 @@ def test_derivatives_are_those_of_the_constraints() -> None:
     problem = make_problem(FORWARD, ROBOT)
     functions, parameters = problem.assembly.functions(), problem.parameters
     rng = np.random.default_rng(1)
-    x = ballistic_guess(problem) + 0.01 * rng.normal(size=problem.assembly.variables)
+    x = ballistic_guess(problem) + 0.001 * rng.normal(size=problem.assembly.variables)
     way, step = rng.normal(size=len(x)), 1e-6
     weights = rng.normal(size=problem.assembly.constraints)
 

@@ -44,7 +44,12 @@ def test_an_unknown_joint_is_named_with_the_nearest() -> None:
         "nee"
     ]
     task = make_task(
-        {"name": "a", "rise": 0.1, "margins": {"landing_limits": {"nee": [-1.0, 0.0]}}}
+        {
+            "recipe": "paper",
+            "name": "a",
+            "rise": 0.1,
+            "margins": {"landing_limits": {"nee": [-1.0, 0.0]}},
+        }
     )
     assert contradictions(task, ROBOT)[0] == (
         "margins.landing_limits.nee", "bruce has no joint nee; the nearest is knee",
@@ -52,9 +57,11 @@ def test_an_unknown_joint_is_named_with_the_nearest() -> None:
 
 
 def test_without_margins_the_hash_stays() -> None:
-    plain = make_task({"name": "a", "rise": 0.1})
+    plain = make_task({"recipe": "paper", "name": "a", "rise": 0.1})
     assert "margins" not in plain.content()
-    assert plain.hash(ROBOT) != make_task({"name": "a", "rise": 0.1, "margins": {}}).hash(ROBOT)
+    assert plain.hash(ROBOT) != make_task(
+        {"recipe": "paper", "name": "a", "rise": 0.1, "margins": {}}
+    ).hash(ROBOT)
 
 
 def test_a_plan_keeps_them() -> None:
@@ -62,7 +69,9 @@ def test_a_plan_keeps_them() -> None:
         "squat_lean": 0.8, "landing_lean": 0.1, "joints": 0.05, "pressure": 0.2,
         "landing_limits": {"knee": [-2.1, -0.5]},
     }  # fmt: skip
-    plan = solve_jump(make_task({"name": "a", "rise": 0.09, "margins": wanted}), ROBOT)
+    plan = solve_jump(
+        make_task({"recipe": "paper", "name": "a", "rise": 0.09, "margins": wanted}), ROBOT
+    )
     assert check_plan(plan, ROBOT).explain() == ""
     phases = plan.phase
     before = np.arange(len(phases)) <= int(np.argmax(phases == Phase.FLIGHT))

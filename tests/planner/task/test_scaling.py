@@ -13,14 +13,14 @@ HEAVY = quadruped().changed(
 
 
 def test_the_robot_of_the_defaults_changes_none() -> None:
-    robot, task = find_robot("bruce"), make_task({"name": "a", "rise": 0.1})
+    robot, task = find_robot("bruce"), make_task({"recipe": "paper", "name": "a", "rise": 0.1})
     assert standing_height(robot) == pytest.approx(0.3287, abs=1e-4)
     assert scaled_defaults(task, robot) == {}
     assert task.resolved(robot).content() == task.content() | {"profile": "koala"}
 
 
 def test_a_heavier_robot_pays_less_for_forces() -> None:
-    task = make_task({"name": "a", "rise": 0.1})
+    task = make_task({"recipe": "paper", "name": "a", "rise": 0.1})
     light, heavy = (task.resolved(robot) for robot in (quadruped(), HEAVY))
     assert heavy.weights.force == pytest.approx(light.weights.force / 16.0, rel=0.02)
     assert heavy.weights.impulse == pytest.approx(light.weights.impulse / 16.0, rel=0.02)
@@ -30,7 +30,13 @@ def test_a_heavier_robot_pays_less_for_forces() -> None:
 
 
 def test_what_is_said_stays() -> None:
-    said = {"name": "a", "rise": 0.1, "thrust_time": 0.25, "weights": {"force": 0.001}}
+    said = {
+        "recipe": "paper",
+        "name": "a",
+        "rise": 0.1,
+        "thrust_time": 0.25,
+        "weights": {"force": 0.001},
+    }
     task = make_task(said).resolved(HEAVY)
     assert (task.thrust_time, task.weights.force) == (0.25, 0.001)
     assert task.weights.impulse < 0.05
@@ -38,7 +44,7 @@ def test_what_is_said_stays() -> None:
 
 
 def test_a_plans_file_says_all_so_that_it_is_never_scaled_again() -> None:
-    task = make_task({"name": "a", "rise": 0.1}).resolved(HEAVY)
+    task = make_task({"recipe": "paper", "name": "a", "rise": 0.1}).resolved(HEAVY)
     again = make_task(task.model_dump(mode="json"))
     assert again.hash(HEAVY) == task.hash(HEAVY)
     assert again.resolved(HEAVY).content() == task.content()

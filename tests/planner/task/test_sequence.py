@@ -12,7 +12,7 @@ from aloft.robots.description import find_robot
 
 
 def task(**values: Any) -> JumpTask:
-    return make_task({"name": "a", **values})
+    return make_task({"recipe": "paper", "name": "a", **values})
 
 
 def test_a_jump_alone_is_one_of_a_row() -> None:

@@ -13,7 +13,7 @@ from aloft.runtime.loading.nodes import plain
 from aloft.runtime.loading.problems import Problems
 
 ROOT = Path(__file__).parents[3]
-NO_GRAPHS = {ROOT / "graphs" / "tasks", ROOT / "graphs" / "studies"}
+NO_GRAPHS = {ROOT / "graphs" / name for name in ("tasks", "studies", "hardware")}
 SHIPPED = sorted(p for p in (ROOT / "graphs").rglob("*.yaml") if p.parent not in NO_GRAPHS)
 
 

@@ -48,3 +48,16 @@ def test_a_caution_is_in_the_result_and_told_to_the_sinks() -> None:
     assert result.to_json()["cautions"] == ["b0: the check was waived"]
     (note,) = (note for note in listener.notes if note.kind == "caution")
     assert (note.tick, note.level, note.text) == (0, "WARN", "b0: the check was waived")
+
+
+class Finder(Waiver):
+    """Finds something out while it runs."""
+
+    def cautions(self) -> list[str]:
+        found = ["it ran"] if self.tick else []
+        return [*super().cautions(), *found]
+
+
+def test_what_a_block_has_found_out_in_the_run_is_added_once() -> None:
+    result = run(checked_graph({"b0": Use(Finder, {})}, ticks=3))
+    assert result.cautions == ("b0: the check was waived", "b0: it ran")

@@ -56,7 +56,7 @@ def solver(monkeypatch: pytest.MonkeyPatch) -> list[str]:
         assert warm_start is None, "what is in a library must not depend on the order"
         if task.rise is not None and task.rise > 0.2:
             raise PlanError("no plan: apex is missed", family="apex")
-        return replace(kept, task=task)
+        return replace(kept, task=task.resolved(robot))
 
     monkeypatch.setattr(library, "solve_task", solve)
     return asked

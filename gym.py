@@ -1,0 +1,161 @@
+"""A graph as a Gymnasium environment (extra ``gym``).
+
+::
+
+    env = aloft.gym.make(
+        "cart_pole.yaml",
+        action="force",                       # a block blocks.External
+        observation=["robot.joints.position", "robot.joints.velocity"],
+        reward="score.y",                     # a signal of one number, or a function of the run
+        action_limits=(-10.0, 10.0),
+        ticks=5,
+    )
+
+An episode begins at the graph's start. ``reset(seed=k)`` gives every parameter called ``seed`` the
+value k; without it episodes have seeds that are drawn from the environment's own generator. A block
+that asks for the end of the run terminates the episode, and the graph's duration truncates it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from os import PathLike
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .runtime.graph import Graph, load
+from .runtime.language.errors import AloftError
+from .runtime.running.stepping import SteppedRun
+
+try:
+    import gymnasium
+except ModuleNotFoundError as error:
+    raise ModuleNotFoundError("aloft.gym needs Gymnasium: pip install 'aloft[gym]'") from error
+
+Reward = str | Callable[[SteppedRun], float]
+Array = NDArray[np.float64]
+_MOST_SEEDS = 2**31
+
+
+class GraphEnvironment(gymnasium.Env[Array, Array]):
+    """An environment that steps one graph; ``make`` makes it."""
+
+    metadata: dict[str, Any] = {"render_modes": []}
+
+    def __init__(
+        self,
+        graph: Graph,
+        action: str,
+        observation: Sequence[str],
+        reward: Reward,
+        action_limits: tuple[Any, Any],
+        ticks: int,
+    ) -> None:
+        self.graph = graph
+        self._action = action
+        self._observed = tuple(observation)
+        self._reward = reward
+        self._ticks = ticks
+        self._seeded = bool(graph.seed_parameters)
+        self._run: SteppedRun | None = None
+        run = self._open(0 if self._seeded else None)
+        shape = run[f"{action}.y.value"].shape
+        low, high = (np.broadcast_to(np.asarray(a, np.float64), shape) for a in action_limits)
+        self.action_space = gymnasium.spaces.Box(low.copy(), high.copy(), dtype=np.float64)
+        size = self._observation().shape
+        self.observation_space = gymnasium.spaces.Box(-np.inf, np.inf, size, np.float64)
+        self._reward_now()
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Array, dict[str, Any]]:
+        """Begin an episode; see the module's text. The first observation is that of tick 0."""
+        super().reset(seed=seed)
+        if self._seeded:
+            chosen = seed if seed is not None else int(self.np_random.integers(_MOST_SEEDS))
+            self._open(chosen % _MOST_SEEDS)
+        elif self._run is None:
+            self._open(None)
+        else:
+            self._run.reset()
+        run = self._running()
+        run.step()
+        return self._observation(), {"time": run.time}
+
+    def step(self, action: Array) -> tuple[Array, float, bool, bool, dict[str, Any]]:
+        """Set the action, run some ticks, and return observation, reward, terminated, truncated."""
+        run = self._running()
+        run[self._action] = action
+        run.step(self._ticks)
+        over = run.graph.ticks is not None and run.tick >= run.graph.ticks
+        terminated = bool(run.reason) and not over
+        info = {"time": run.time, **({"reason": run.reason} if run.reason else {})}
+        return self._observation(), self._reward_now(), terminated, over, info
+
+    def close(self) -> None:
+        """Close the graph's blocks."""
+        if self._run is not None:
+            self._run.close()
+            self._run = None
+
+    def _open(self, seed: int | None) -> SteppedRun:
+        self.close()
+        self._run = self.graph.open(seed=seed)
+        return self._run
+
+    def _running(self) -> SteppedRun:
+        if self._run is None:
+            raise AloftError("this environment is closed; call reset()")
+        return self._run
+
+    def _observation(self) -> Array:
+        run = self._running()
+        parts = [np.asarray(run[name], np.float64).ravel() for name in self._observed]
+        return np.concatenate(parts)
+
+    def _reward_now(self) -> float:
+        run = self._running()
+        if not isinstance(self._reward, str):
+            return float(self._reward(run))
+        value = np.asarray(run[self._reward])
+        if value.size != 1:
+            raise AloftError(f"the reward {self._reward} has {value.size} numbers, expected one")
+        return float(value.reshape(()))
+
+
+def make(
+    graph: str | PathLike[str] | Mapping[str, Any] | Graph,
+    *,
+    action: str,
+    observation: str | Sequence[str],
+    reward: Reward,
+    action_limits: tuple[Any, Any] = (-1.0, 1.0),
+    ticks: int = 1,
+) -> GraphEnvironment:
+    """An environment of a graph. Many may live in one process.
+
+    Args:
+        graph: a graph, or whatever ``aloft.load`` takes.
+        action: the path of a block ``blocks.External``.
+        observation: signals, ``block.port.field``; their numbers follow each other.
+        reward: a signal with one number, or a function of the run.
+        action_limits: the least and the greatest action, each a number or one for every element.
+        ticks: how many ticks of the graph a step is.
+
+    Raises:
+        LoadError: the graph may not run.
+        KeyError: there is no such signal.
+        AloftError: the action's block is not there, or a number makes no sense.
+    """
+    loaded = graph if isinstance(graph, Graph) else load(graph)
+    found = [spec for spec in loaded.checked.blocks if spec.path == action]
+    if not found or found[0].block_type.__name__ != "External":
+        raise AloftError(f"the action {action!r} is no block blocks.External of the graph")
+    if ticks < 1:
+        raise AloftError(f"a step is at least 1 tick, not {ticks}")
+    observed = (observation,) if isinstance(observation, str) else tuple(observation)
+    if not observed:
+        raise AloftError("an environment needs at least one observation")
+    return GraphEnvironment(loaded, action, observed, reward, action_limits, ticks)

@@ -1,0 +1,105 @@
+"""Every command that reads a recording or a plan, on files that were damaged at random.
+
+A command ends with a result or with one error that names the file; never with a traceback or a
+crash. The number of tries is small so that the test takes a bounded time; ``ALOFT_FUZZ=1000`` makes
+it longer.
+"""
+
+import io
+import os
+import random
+import sys
+from contextlib import redirect_stderr, redirect_stdout
+from pathlib import Path
+
+import pytest
+
+from aloft.cli import main
+from aloft.planner.library.shipped import shipped_graphs
+
+TRIES = int(os.environ.get("ALOFT_FUZZ", "12"))
+
+
+def outcome(*arguments: str) -> tuple[int, str]:
+    """The exit code and all that was printed."""
+    printed = io.StringIO()
+    with (
+        pytest.MonkeyPatch.context() as patch,
+        redirect_stdout(printed),
+        redirect_stderr(printed),
+        pytest.raises(SystemExit) as left,
+    ):
+        patch.setattr(sys, "argv", ["aloft", *arguments])
+        patch.setenv("COLUMNS", "200")
+        main()
+    assert isinstance(left.value.code, int)
+    return left.value.code, printed.getvalue()
+
+
+def damaged(data: bytes, draw: random.Random) -> bytes:
+    """The bytes with one change of a kind that disks, copies and cables make."""
+    kind, at = draw.randrange(6), draw.randrange(len(data))
+    if kind == 0:  # a bit turned
+        return data[:at] + bytes([data[at] ^ 1 << draw.randrange(8)]) + data[at + 1 :]
+    if kind == 1:  # cut off
+        return data[:at]
+    if kind == 2:  # a sector of zeros
+        return data[:at] + bytes(len(data[at : at + 512])) + data[at + 512 :]
+    if kind == 3:  # bytes missing
+        return data[:at] + data[at + draw.randrange(1, 64) :]
+    if kind == 4:  # a piece twice
+        return data[: at + 64] + data[at:]
+    return data[:at] + draw.randbytes(draw.randrange(1, 64)) + data[at:]
+
+
+@pytest.fixture
+def recording(folder: Path) -> Path:
+    """A small recording."""
+    code, printed = outcome("run", "count.yaml", "--record", "run.rrd", "--quiet")
+    assert code == 0, printed
+    return folder / "run.rrd"
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        ["log", "info", "{}"],
+        ["replay", "{}", "--check"],
+        ["log", "export", "{}", "--parquet", "-o", "out.parquet"],
+        ["log", "export", "{}", "--mcap", "-o", "out.mcap"],
+        ["log", "export", "{}", "--csv", "-o", "out.csv"],
+        ["log", "compare", "whole.rrd", "{}"],
+        ["view", "{}", "--with", "whole.rrd", "--save", "both.rrd", "--no-show"],
+        ["log", "repair", "{}"],
+    ],
+    ids="-".join,
+)
+def test_a_damaged_recording(command: list[str], recording: Path, folder: Path) -> None:
+    data, draw = recording.read_bytes(), random.Random(" ".join(command))
+    (folder / "whole.rrd").write_bytes(data)
+    good, said = outcome(*(part.format("whole.rrd") for part in command))
+    assert good == 0, said
+    refused = 0
+    for number in range(TRIES):
+        file = folder / f"damaged{number}.rrd"
+        file.write_bytes(damaged(data, draw))
+        code, printed = outcome(*(part.format(file.name) for part in command))
+        assert code in (0, 1, 2), printed
+        assert "Traceback" not in printed
+        if code == 2:
+            refused += 1
+            assert file.name in printed
+    assert refused or command[:2] == ["log", "repair"]
+
+
+def test_a_damaged_plan(folder: Path) -> None:
+    draw = random.Random("plan")
+    plan = min((shipped_graphs() / "plans").glob("*.npz"))
+    data, kept = plan.read_bytes(), folder / "kept"
+    kept.mkdir()
+    for number in range(TRIES):
+        file = kept / f"damaged{number}.npz"
+        file.write_bytes(damaged(data, draw))
+        code, printed = outcome("plan", "--list", "--keep", str(kept), "--json")
+        assert code in (0, 2), printed
+        assert "Traceback" not in printed

@@ -1,0 +1,122 @@
+"""``aloft jump``: what is asked for in words becomes a task, its plan, a run and a recording."""
+
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from aloft.cli.jump import load_jump, settings_for, task_changes, task_of
+from aloft.cli.jump_graphs import graph_of
+from aloft.planner.library import library
+from aloft.runtime.language.errors import AloftError
+from aloft.studies.trials import trial_settings
+
+Call = Callable[..., subprocess.CompletedProcess[str]]
+CallJson = Callable[..., dict[str, Any]]
+BRUCE = graph_of("bruce")
+
+
+def changes(rise: str = "", turn: str = "", **lengths: str) -> dict[str, float]:
+    return task_changes(lengths, rise, turn, BRUCE)
+
+
+@pytest.mark.parametrize(
+    ("words", "task"),
+    [
+        ({"forward": "20cm"}, {"distance_x": 0.2}),
+        ({"back": "10 cm", "right": "50 mm"}, {"distance_x": -0.1, "distance_y": -0.05}),
+        ({"left": "0.1 m", "rise": "15cm"}, {"distance_y": 0.1, "rise": 0.15}),
+        ({"turn": "-30deg"}, {"twist": pytest.approx(-0.5236, abs=1e-4)}),
+        ({"forward": "20cm", "down": "15cm"}, {"distance_x": 0.2, "landing_height": -0.15}),
+        ({"forward": "20cm", "up": "3cm"}, {"distance_x": 0.2, "landing_height": 0.03}),
+        (
+            {"forward": "20cm", "up": "8cm"},
+            {"distance_x": 0.2, "landing_height": 0.08, "rise": 0.15},
+        ),
+        (
+            {"forward": "20cm", "up": "8cm", "rise": "13cm"},
+            {"distance_x": 0.2, "landing_height": 0.08, "rise": 0.13},
+        ),
+        ({}, {}),
+    ],
+)
+def test_words_become_a_task(words: dict[str, str], task: dict[str, Any]) -> None:
+    assert changes(**words) == task
+
+
+@pytest.mark.parametrize(
+    ("words", "error"),
+    [
+        ({"forward": "20"}, "--forward 20: the unit is missing; expected such as --forward 20cm"),
+        ({"turn": "30"}, "--turn 30: the unit is missing; expected such as --turn 30deg"),
+        ({"turn": "30cm"}, "--turn 30cm: '30cm' is not in rad; expected such as --turn 30deg"),
+        ({"rise": "high"}, "--rise high: "),
+        ({"up": "5cm", "down": "5cm"}, "--up and --down contradict each other: give one"),
+    ],
+)
+def test_what_cannot_be_understood_is_said(words: dict[str, str], error: str) -> None:
+    with pytest.raises(AloftError) as caught:
+        changes(**words)
+    assert str(caught.value).startswith(error)
+
+
+def test_the_step_the_score_and_the_trial_are_in_the_graph() -> None:
+    asked = {"distance_x": 0.2, "landing_height": 0.05}
+    graph = load_jump(BRUCE, settings_for(asked, "robust"), 7)
+    robot, score = graph.checked.block("robot").params, graph.checked.block("score").params
+    assert (robot.model_dump()["seed"], robot.model_dump()["mass_spread"]) == (7, 0.05)
+    assert robot.model_dump()["scene"]["boxes"][0]["top"] == 0.05
+    assert score.model_dump()["distance"] == [0.2, 0.0]
+    assert score.model_dump()["landing_height"] == 0.05
+    assert task_of(graph).name == "12 cm high, 20 cm ahead, 5 cm up"
+
+
+def test_a_trial_takes_back_what_only_another_sets() -> None:
+    nominal = load_jump(BRUCE, settings_for({}, "nominal"), 0).checked.block("robot").params
+    assert nominal.model_dump()["gyro_noise"] == 0.0
+    assert nominal.model_dump()["latency"] == 0.0
+    assert nominal.model_dump()["timestep"] == 0.0005
+    go2 = graph_of("go2")
+    standard = load_jump(go2, settings_for({}, "standard"), 0).checked.block("robot").params
+    assert standard.model_dump()["mass_spread"] == 0.0
+    assert standard.model_dump()["gyro_noise"] == 0.02
+    with pytest.raises(AloftError, match="--trial windy: there is nominal, robust, standard"):
+        trial_settings("windy")
+
+
+def test_every_robot_with_a_shipped_jump_can_be_named() -> None:
+    assert graph_of("go2").name == "go2_jump.yaml"
+    with pytest.raises(AloftError, match=r"--robot atlas: no shipped graph lets it jump; .* bruce"):
+        graph_of("atlas")
+
+
+def test_wrong_words_leave_with_exit_code_2(folder: Path, call: Call, call_json: CallJson) -> None:
+    assert "the unit is missing" in call("jump", "--forward", "20", code=2).stderr
+    assert "contradict" in call_json("jump", "--up", "1cm", "--down", "1cm", code=2)["reason"]
+    graph = str(folder / "count.yaml")
+    assert "needs a block 'plan'" in call_json("jump", "--graph", graph, code=2)["reason"]
+    words = ("jump", "--set", "plan.task.rize=3")
+    assert "the nearest is rise" in call_json(*words, code=2)["problems"][0]["message"]
+
+
+def test_a_jump_beyond_the_motors_says_so(
+    folder: Path, call_json: CallJson, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(library, "user_folder", lambda: folder / "kept")
+    found = call_json("jump", "--rise", "90cm", "--no-nearest", code=1)
+    assert found["success"] is False
+    assert found["plan"]["success"] is False
+    assert "90 cm high" in found["reason"]
+    assert found["asked"] == {"rise": 0.9}
+
+
+@pytest.mark.long
+def test_one_line_plans_runs_and_records(folder: Path, call_json: CallJson) -> None:
+    found = call_json("jump", "--forward", "20cm", "--rise", "8cm", "--seed", "3")
+    assert found["success"] is True
+    assert found["asked"] == {"distance_x": 0.2, "rise": 0.08}
+    assert found["plan"]["valid"] is True
+    assert found["metrics"]["jump_distance_x_m"] == pytest.approx(0.2, abs=0.02)
+    assert (folder / "recordings" / "jump.rrd").stat().st_size > 100_000

@@ -1,0 +1,265 @@
+"""``aloft run --local``: parts as processes over Zenoh give one result, whatever becomes of them."""
+
+import json
+import os
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from aloft.logs.file.reader import read
+
+from .conftest import run_for_json, run_here
+
+BLOCKS = """
+import time
+from aloft import Block, BlockError, Field, Input, Output, Parameters, Signal, State, parameter
+
+
+class Number(Signal):
+    value = Field(text="a number")
+
+
+class Robot(Block):
+    class Params(Parameters):
+        pace: float = parameter(0.0, text="seconds a tick takes")
+
+    params: Params
+    u = Input(Number)
+    y = Output(Number)
+    count = State(Number)
+
+    def start(self):
+        open("enabled.txt", "w").close()
+
+    def emit(self):
+        self.y.value[()] = self.count.value
+
+    def update(self):
+        time.sleep(self.params.pace)
+        self.count.value += 1.0 + 0.5 * self.u.value
+
+    def stop_cycle(self):
+        with open("damping.txt", "a") as file:
+            file.write(f"{time.monotonic()}\\n")
+
+
+class Controller(Block):
+    class Params(Parameters):
+        fail_at: int = parameter(-1, text="the tick at which it raises")
+        stop_at: int = parameter(-1, text="the tick at which it ends the run")
+        good: bool = parameter(True, text="what it says of the run")
+
+    params: Params
+    u = Input(Number)
+    y = Output(Number)
+
+    def step(self):
+        if self.tick == self.params.fail_at:
+            raise BlockError("the spring broke")
+        if self.tick == self.params.stop_at:
+            self.request_stop("balanced")
+        self.y.value[()] = -0.3 * self.u.value
+
+    def metrics(self):
+        verdict = {"success": self.params.good, "reason": "" if self.params.good else "it fell"}
+        return {"last": float(self.y.value), **verdict}
+"""
+GRAPH = """
+rate: 200 Hz
+duration: 300 ms
+machines: {onboard: tcp/127.0.0.1:7450, ground: tcp/127.0.0.1:7451}
+blocks:
+  robot: {use: "pieces:Robot", in: {u: controller.y}}
+  controller: {use: "pieces:Controller", in: {u: robot.y}, on: ground}
+"""
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    (tmp_path / "pieces.py").write_text(BLOCKS)
+    (tmp_path / "graph.yaml").write_text(GRAPH)
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def free_port() -> int:
+    with socket.socket() as made:
+        made.bind(("127.0.0.1", 0))
+        return int(made.getsockname()[1])
+
+
+def alone(*settings: str) -> dict[str, Any]:
+    return run_for_json("run", "graph.yaml", "--no-record", *settings, code=0)
+
+
+def test_one_result_and_one_recording_with_the_bytes_of_one_process(here: Path) -> None:
+    together = run_for_json("run", "graph.yaml", "--local")
+    expected = run_for_json("run", "graph.yaml", "--record", "alone.rrd")
+    for key in ("success", "reason", "run_hash", "ticks", "metrics", "exit_code"):
+        assert together[key] == expected[key], key
+    assert list(together["blocks"]) == list(expected["blocks"])
+    assert together["recording"] == "recordings/graph.rrd"
+    one, other = read("alone.rrd"), read("recordings/graph.rrd")
+    assert (one.rows == other.rows).all() and one.ticks.tolist() == other.ticks.tolist()
+    assert other.header.bus == one.header.bus and other.header.state == one.header.state
+    assert other.whole
+    links = [link for part in together["machines"].values() for link in part["links"]]
+    assert [(link["name"], link["received"], link["damaged"]) for link in links] == [
+        ("controller@ground -> onboard", 60, 0), ("robot@onboard -> ground", 60, 0),
+    ]  # fmt: skip
+    assert "identical" in run_here("replay", "--check", "recordings/graph.rrd").stdout
+
+
+def test_the_verdict_of_any_part_is_the_verdict(here: Path) -> None:
+    result = run_for_json(
+        "run", "graph.yaml", "--local", "--no-record", "--set", "controller.good=false",
+        "--set", "controller.stop_at=20", code=1,
+    )  # fmt: skip
+    assert result["reason"].startswith("it fell") and result["ticks"] == 21
+    assert result["recording"] is None
+
+
+def test_the_fault_of_a_part_is_the_reason(here: Path) -> None:
+    settings = ("--set", "controller.fail_at=20")
+    result = run_for_json("run", "graph.yaml", "--local", *settings, code=3)
+    assert result["reason"] == "block 'controller' failed at tick 20 (0.100 s): the spring broke"
+    assert result["error"]["block"] == "controller" and result["error"]["tick"] == 20
+    assert read("recordings/graph.rrd").ticks.tolist() == list(range(20))
+
+
+def test_what_cannot_be_asked_for(here: Path) -> None:
+    (here / "plain.yaml").write_text(
+        GRAPH.replace("machines:", "_machines:").replace(", on: ground", "")
+    )
+    for arguments, reason in [
+        (("graph.yaml", "--local", "--machine", "ground"), "choose one of --machine, --local"),
+        (("graph.yaml", "--machine", "air"), "has no machine 'air'; it has onboard, ground"),
+        (("plain.yaml", "--local"), "the graph plain names no machines"),
+    ]:
+        assert reason in run_for_json("run", *arguments, code=2)["reason"]
+
+
+def test_parts_that_are_started_one_by_one_and_their_recordings_merged(here: Path) -> None:
+    ports = [f"--set=machines.{name}=tcp/127.0.0.1:{free_port()}" for name in ("onboard", "ground")]
+    command = [sys.executable, "-m", "aloft", "run", "graph.yaml", *ports, "--json", "--machine"]
+    parts = [
+        subprocess.Popen(
+            [*command, name], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        )
+        for name in ("ground", "onboard")
+    ]
+    for part, name in zip(parts, ("ground", "onboard"), strict=True):
+        output, errors = part.communicate(timeout=120)
+        assert part.returncode == 0, errors
+        told = json.loads(output.splitlines()[-1])
+        assert told["machine"] == name and told["recording"] == f"recordings/graph-{name}.rrd"
+    files = [f"recordings/graph-{name}.rrd" for name in ("ground", "onboard")]
+    merged = run_for_json("log", "merge", *files, "-o", "whole.rrd")
+    assert merged["run_hash"] == alone()["run_hash"] and merged["ticks"] == 60
+    assert "identical" in run_here("replay", "--check", "whole.rrd").stdout
+    again = run_for_json("log", "merge", files[0], files[0], "-o", "x.rrd", code=2)
+    assert "the recordings of onboard are missing" in again["reason"]
+    shutil.copy(files[0], "copy.rrd")
+    again = run_for_json("log", "merge", files[0], "copy.rrd", "-o", "x.rrd", code=2)
+    assert "copy.rrd are both of machine 'ground'" in again["reason"]
+
+
+# -- processes that are killed, frozen or interrupted ----------------------------------------------
+
+
+@pytest.fixture
+def started(here: Path) -> Iterator[subprocess.Popen[str]]:
+    """A spread run that goes on for a minute, with its actuators enabled."""
+    command = [
+        sys.executable, "-m", "aloft", "run", "graph.yaml", "--local", "--json", "--no-record",
+        "--set", "duration=60 s", "--set", "robot.pace=0.004",
+    ]  # fmt: skip
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    try:
+        end = time.monotonic() + 120.0
+        while len(parts_of(process)) < 2 or not (here / "enabled.txt").exists():
+            assert time.monotonic() < end and process.poll() is None
+            time.sleep(0.05)
+        time.sleep(1.0)
+        yield process
+    finally:
+        for pid in [*parts_of(process).values(), process.pid]:
+            try:
+                os.kill(pid, signal.SIGKILL)
+            except ProcessLookupError:
+                continue
+        process.communicate()
+
+
+def parts_of(process: subprocess.Popen[str]) -> dict[str, int]:
+    """The process of each machine."""
+    found = {}
+    for task in Path(f"/proc/{process.pid}/task").glob("*/children"):
+        for pid in task.read_text().split():
+            words = Path(f"/proc/{pid}/cmdline").read_bytes().split(b"\0")
+            if b"--machine" in words:
+                found[words[words.index(b"--machine") + 1].decode()] = int(pid)
+    return found
+
+
+def result_of(process: subprocess.Popen[str]) -> dict[str, Any]:
+    output, errors = process.communicate(timeout=60)
+    assert output, errors
+    return dict(json.loads(output.splitlines()[-1]))
+
+
+def wait_for_damping(folder: Path, since: float, limit: float) -> float:
+    """The seconds until the first stop cycle after ``since``."""
+    end = time.monotonic() + limit
+    while time.monotonic() < end:
+        if (folder / "damping.txt").exists():
+            times = [float(t) for t in (folder / "damping.txt").read_text().split()]
+            if times:
+                return times[0] - since
+        time.sleep(0.005)
+    raise AssertionError(f"no damping within {limit} s")
+
+
+@pytest.mark.long
+def test_a_part_that_is_killed(started: subprocess.Popen[str], here: Path) -> None:
+    since = time.monotonic()
+    os.kill(parts_of(started)["ground"], signal.SIGKILL)
+    assert wait_for_damping(here, since, 10.0) < 5.0
+    output, _ = started.communicate(timeout=60)
+    told = json.loads(output.splitlines()[-1])
+    assert not told["success"]
+    assert "the part on 'ground' ended with code -9" in told["reason"]
+    assert started.returncode != 0
+
+
+@pytest.mark.long
+def test_a_part_that_freezes(started: subprocess.Popen[str], here: Path) -> None:
+    since = time.monotonic()
+    ground = parts_of(started)["ground"]
+    os.kill(ground, signal.SIGSTOP)
+    assert wait_for_damping(here, since, 10.0) < 5.0
+    os.kill(ground, signal.SIGCONT)  # it finds that the others have gone on without it
+    result = result_of(started)
+    assert result["exit_code"] == 3
+    assert "is gone: its process ended or froze, or the network to it is cut" in result["reason"]
+
+
+@pytest.mark.long
+def test_an_interrupt_ends_all_parts_after_one_tick(
+    started: subprocess.Popen[str], here: Path
+) -> None:
+    started.send_signal(signal.SIGINT)
+    result = result_of(started)
+    assert started.returncode == result["exit_code"] == 130
+    assert result["reason"] == "stopped by SIGINT"
+    ticks = dict.fromkeys(part["ticks"] for part in result["machines"].values())
+    assert list(ticks) == [result["ticks"]]
+    assert len((here / "damping.txt").read_text().split()) == 5

@@ -1,0 +1,34 @@
+"""Every shipped graph, spread over three machines at random, gives the bytes of one process."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from aloft.runtime.loading import load
+from aloft.runtime.loading.shipped import shipped_graphs
+from aloft.runtime.placement.place import spread
+from aloft.runtime.running.executor import run
+from aloft.runtime.testing.spread import run_spread
+
+MACHINES = {name: f"tcp/127.0.0.1:{7450 + k}" for k, name in enumerate("abc")}
+TICKS = 25
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("address", [a for a in shipped_graphs() if a != "aloft:robots/jump"])
+def test_bytes_do_not_depend_on_the_split(address: str) -> None:
+    graph = load(shipped_graphs()[address])
+    rng = np.random.default_rng(len(address))
+    places = {spec.path: str(rng.choice(list(MACHINES))) for spec in graph.blocks}
+    alone = run(graph, TICKS)
+    spread_out = run_spread(spread(graph, MACHINES, places), TICKS, patience=60.0, wall_time=200.0)
+    assert spread_out.ticks == alone.ticks
+    assert spread_out.run_hash == alone.run_hash
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("path", sorted((Path(__file__).parents[2] / "graphs/machines").glob("*")))
+def test_shipped_placements(path: Path) -> None:
+    graph = load(path)
+    assert run_spread(graph, TICKS, patience=60.0).run_hash == run(graph, TICKS).run_hash

@@ -1,0 +1,101 @@
+"""Jumps through the driver of the real robot: in a graph, behind serial ports, and replayed."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import yaml
+
+import aloft
+from aloft.hal.bear.configuration import Hardware
+from aloft.hal.simulated.parameters import SimulatorParameters
+from aloft.hal.twin.server import TwinServer
+from aloft.hal.twin.standing_twin import standing_twin
+from aloft.robots.description import find_robot
+from aloft.runtime.running.executor import Executor
+
+GRAPHS = Path(aloft.__file__).parent / "graphs"
+ROBOT = find_robot("bruce")
+STANDARD = {
+    "gyro_noise": 0.02, "gyro_bias": 0.01, "accelerometer_noise": 0.1, "accelerometer_bias": 0.1,
+    "encoder_offset": 0.003, "joint_velocity_noise": 0.05, "switch_threshold": [0.5, 3.0],
+    "switch_bounce": 0.002, "initial_attitude_error": 0.01, "jitter": 0.0005,
+    "random_start_phase": True, "seed": 3,
+}  # fmt: skip
+
+
+@pytest.mark.long
+def test_the_shipped_jump_lands_through_the_driver() -> None:
+    result = Executor(aloft.load(GRAPHS / "jump_twin.yaml").checked, log=False).run()
+    assert result.success, result.reason
+    assert result.metrics["drives_at_end"] == "damped" and result.metrics["lost_answers"] == 0
+
+
+@pytest.mark.long
+def test_it_lands_although_answers_are_lost() -> None:
+    graph = aloft.load(
+        GRAPHS / "jump_twin.yaml", {"robot.faults": [{"kind": "lost", "share": 0.02}]}
+    )
+    result = Executor(graph.checked, log=False).run()
+    assert result.success, result.reason
+    assert result.metrics["lost_answers"] > 100  # type: ignore[operator]
+
+
+def run_behind_ports(folder: Path) -> tuple[str, float]:
+    """Run jump_robot.yaml in another process; gives its hash, and how high the twin's torso was."""
+    hardware = Hardware.for_twin(ROBOT)
+    twin = standing_twin(ROBOT, SimulatorParameters.model_validate(STANDARD), hardware)
+    highest, send = 0.0, twin._send_packet
+
+    def watched() -> None:
+        nonlocal highest
+        highest = max(highest, float(twin.plant.data.qpos[2]))
+        send()
+
+    twin._send_packet = watched  # type: ignore[method-assign]
+    with TwinServer(twin, virtual=True, period=0.001) as server:
+        data = hardware.model_dump(mode="json")
+        data["bus"] |= {"port": server.bus_path, "reply_time": 5.0}
+        data["board"] |= {"port": server.board_path}
+        (folder / "twin.yaml").write_text(yaml.safe_dump(data))
+        done = subprocess.run(
+            [
+                sys.executable, "-m", "aloft", "run", str(GRAPHS / "jump_robot.yaml"), "--json",
+                "--no-record", "--set", f"robot.hardware={folder / 'twin.yaml'}", "--set", "robot.time=virtual",
+                "--set", "robot.armed=true", "--set", "robot.latency=2ms",
+            ],
+            capture_output=True, text=True, timeout=600, check=False,
+            env={**os.environ, "PYTHONPATH": str(Path(aloft.__file__).parents[1])},
+        )  # fmt: skip
+    found = json.loads(done.stdout[done.stdout.index("{") :])
+    assert found["success"], found["reason"]
+    assert {actuator.status["torque_enable"] for actuator in twin.actuators} == {3}
+    return found["run_hash"], highest
+
+
+@pytest.mark.long
+def test_the_same_bytes_behind_serial_ports_in_every_run(tmp_path: Path) -> None:
+    first, highest = run_behind_ports(tmp_path)
+    assert highest > 0.45, "it has jumped: it stands at 0.38 m"
+    assert run_behind_ports(tmp_path)[0] == first
+
+
+@pytest.mark.long
+def test_a_run_on_the_twin_is_replayed_bit_for_bit(tmp_path: Path) -> None:
+    env = {**os.environ, "PYTHONPATH": str(Path(aloft.__file__).parents[1])}
+    recording = tmp_path / "run.rrd"
+    for arguments in (
+        ["run", str(GRAPHS / "jump_twin.yaml"), "--record", str(recording), "--json"],
+        ["replay", str(recording), "--check", "--json"],
+    ):
+        done = subprocess.run(
+            [sys.executable, "-m", "aloft", *arguments],
+            capture_output=True, text=True, timeout=600, env=env, check=False,
+        )  # fmt: skip
+        found = json.loads(done.stdout[done.stdout.index("{") :])
+        assert found["success"], found

@@ -1,0 +1,45 @@
+"""The dead man's switch is held only while somebody holds it."""
+
+import os
+import struct
+from pathlib import Path
+
+import pytest
+
+from aloft.hal.bear.bus import BusError
+from aloft.hal.bear.configuration import DeadMan
+from aloft.hal.bear.dead_man import AlwaysHeld, GamepadButton, open_switch, wait_until_held
+
+
+def test_a_gamepads_button(tmp_path: Path) -> None:
+    device = tmp_path / "js0"
+    os.mkfifo(device)
+    keep = os.open(device, os.O_RDWR)
+
+    def event(value: int, kind: int, number: int) -> None:
+        os.write(keep, struct.pack("<IhBB", 0, value, kind, number))
+
+    switch = open_switch(DeadMan(device=str(device), button=4))
+    assert isinstance(switch, GamepadButton) and not switch.held()
+    event(1, 0x01, 3)
+    event(900, 0x02, 4)  # an axis of the same number
+    assert not switch.held()
+    event(1, 0x81, 4)  # what the system tells at first
+    assert switch.held() and switch.held()
+    event(0, 0x01, 4)
+    assert not switch.held()
+    switch.close()
+    os.close(keep)
+
+
+def test_what_is_not_there_or_not_held(tmp_path: Path) -> None:
+    with pytest.raises(BusError, match=r"the dead man's switch .*js9 cannot be opened: No such"):
+        open_switch(DeadMan(device=str(tmp_path / "js9")))
+    wait_until_held(AlwaysHeld(), 0.0)
+
+    class Never(AlwaysHeld):
+        def held(self) -> bool:
+            return False
+
+    with pytest.raises(BusError, match=r"within 0\.05 s: nothing was enabled"):
+        wait_until_held(Never(), 0.05)

@@ -1,0 +1,58 @@
+"""Bytes of the drives' bus behind a pseudo-terminal: whole instructions, however they arrive."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+
+from aloft.hal.bear.bulk import BulkExchange
+from aloft.hal.bear.bus import BearBus, open_port
+from aloft.hal.bear.configuration import Hardware
+from aloft.hal.bear.frames import FrameReader, Instruction, frame_bytes
+from aloft.hal.bear.measurement import READ
+from aloft.hal.bear.sense_board import SenseBoard
+from aloft.hal.simulated.parameters import SimulatorParameters
+from aloft.hal.twin.server import TwinServer
+from aloft.hal.twin.standing_twin import standing_twin
+from aloft.robots.description import find_robot
+
+ROBOT = find_robot("bruce")
+
+
+@pytest.fixture(scope="module")
+def server() -> Iterator[TwinServer]:
+    hardware = Hardware.for_twin(ROBOT)
+    twin = standing_twin(ROBOT, SimulatorParameters(timestep=0.001), hardware)
+    with TwinServer(twin, virtual=True, period=0.001) as served:
+        yield served
+
+
+def test_pieces_and_garbage(server: TwinServer) -> None:
+    bus = os.open(server.bus_path, os.O_RDWR | os.O_NOCTTY)
+    ping = frame_bytes(2, Instruction.PING)
+    reader, answers = FrameReader(), []
+    for piece in (b"\x00garb\xff", b"\xff\xff\xff\x00\x00", ping[:3], ping[3:] + ping, ping[:1]):
+        os.write(bus, piece)
+    os.write(bus, ping[1:])
+    while len(answers) < 3:
+        answers += reader.feed(os.read(bus, 256))
+    assert {answer.device for answer in answers} == {2}
+    os.close(bus)
+
+
+def test_the_packet_of_an_exchange_is_there_before_its_answers(server: TwinServer) -> None:
+    port = open_port(server.bus_path)
+    board = SenseBoard(open_port(server.board_path))
+    bulk = BulkExchange(BearBus(port, reply_time=5.0), range(1, 11), READ, ())
+    board.poll()
+    for _ in range(50):
+        before, exchanges = board.packets, server.twin.exchanges
+        assert bulk.exchange() == 10
+        assert board.poll() == 1 and board.packets == before + 1
+        assert server.twin.exchanges == exchanges + 1
+    np.testing.assert_allclose(board.specific_force[2], 9.81, atol=0.3)
+    port.close()
+    board.port.close()

@@ -1,0 +1,46 @@
+"""The name of machine code changes with everything that the code depends on, and with nothing else."""
+
+import types
+
+import numpy as np
+
+from aloft.mathematics.compiling.arguments import type_of
+from aloft.mathematics.compiling.fingerprint import fingerprint
+from aloft.mathematics.kernel import _kernels
+
+SOURCE = """
+SCALE = {scale}
+
+def inner(x: float) -> float:
+    {comment}return {inner}
+
+def outer(values, n):
+    {doc}
+    values[0] = SCALE * inner(values[n])
+"""
+TYPES = (type_of(np.zeros(3)), type_of(1))
+
+
+def name(monkeypatch, signature=TYPES, tools="tools", **parts):
+    values = {"scale": 2.0, "inner": "x + 1.0", "comment": "", "doc": '"""One."""', **parts}
+    module = types.ModuleType("some_kernels")
+    exec(SOURCE.format(**values), vars(module))  # noqa: S102  # the source is the text above
+    for function in ("inner", "outer"):
+        monkeypatch.setitem(_kernels, f"some_kernels.{function}", vars(module)[function])
+    return fingerprint(module.outer, signature, tools)
+
+
+def test_what_counts(monkeypatch):
+    first = name(monkeypatch)
+    assert first == name(monkeypatch)
+    assert first == name(monkeypatch, comment="# a comment\n    ", doc='"""Two."""')
+    others = [
+        name(monkeypatch, inner="x + 2.0"),
+        name(monkeypatch, inner="x - 1.0"),
+        name(monkeypatch, scale=3.0),
+        name(monkeypatch, tools="other tools"),
+        name(monkeypatch, signature=(type_of(np.zeros((3, 3))), type_of(1))),
+        name(monkeypatch, signature=(type_of(np.zeros(6)[::2]), type_of(1))),
+        name(monkeypatch, signature=(type_of(np.zeros(3)), type_of(1.0))),
+    ]
+    assert len({first, *others}) == 1 + len(others)

@@ -1,0 +1,122 @@
+"""What a task of a few lines leaves unsaid is chosen from task and robot; what it says stays."""
+
+import pytest
+from tests.robots.limbed_robots import quadruped
+
+from aloft.planner.task.recipe import choices, demand
+from aloft.planner.task.task import JumpTask, make_task
+from aloft.robots.description import find_robot
+
+BRUCE = find_robot("bruce")
+ASKED = {"name": "a", "rise": "12 cm", "distance_x": "8 cm", "twist": "10 deg"}
+
+
+def resolved(**values: object) -> JumpTask:
+    return make_task({**ASKED, **values}).resolved(BRUCE)
+
+
+def test_three_lines_are_the_whole_recipe() -> None:
+    task = resolved()
+    assert (task.impact, task.effort, task.profile) == (True, 0.85, "koala")
+    assert (task.weights.force, task.weights.orientation, task.weights.impulse) == (0.01, 20.0, 5.0)
+    spans = [(span.phase, span.time, span.contacts) for span in task.spans()]
+    assert spans == [
+        ("squat", 0.4, "all"), ("thrust", 0.21, "all"), ("thrust", 0.04, "toe"),
+        ("flight", None, "all"), ("landing", 0.5, "all"),
+    ]  # fmt: skip
+    assert task.spans()[2].knots == 8
+    assert task.margins is not None
+    assert task.margins.landing_lean == 0.1
+    assert task.margins.landing_limits == {"knee": (-2.1, -0.4)}
+    assert (task.margins.joints, task.margins.squat_lean) == (0.06, None)
+
+
+def test_every_choice_says_why() -> None:
+    found = choices(make_task(ASKED), BRUCE)
+    assert [each.parameter for each in found] == [
+        "impact", "effort", "knots", "phases", "weights.force", "weights.orientation", "weights.impulse",
+        "margins.landing_lean", "margins.landing_limits", "margins.joints",
+    ]  # fmt: skip
+    assert all(each.why for each in found)
+    assert "asks for 0.75" in found[1].why
+
+
+@pytest.mark.parametrize(
+    ("said", "left"),
+    [
+        ({"effort": 0.7}, "effort"),
+        ({"impact": False}, "impact"),
+        ({"phases": None}, "phases"),
+        ({"weights": {"force": 0.002}}, "weights.force"),
+        ({"margins": {"joints": 0.01}}, "margins.joints"),
+    ],
+)
+def test_what_is_said_stays_and_the_rest_is_chosen(said: dict[str, object], left: str) -> None:
+    all_of_it = {each.parameter for each in choices(make_task(ASKED), BRUCE)}
+    task = make_task({**ASKED, **said})
+    assert {each.parameter for each in choices(task, BRUCE)} == all_of_it - {left}
+    group, _, name = left.partition(".")
+    kept, wanted = getattr(task.resolved(BRUCE), group), said[group]
+    assert (getattr(kept, name) if name else kept) == (wanted[name] if name else wanted)  # type: ignore[index]
+
+
+def test_no_margins_at_all_may_be_said() -> None:
+    assert resolved(margins=None).margins is None
+
+
+def test_the_times_that_are_said_are_those_of_the_phases() -> None:
+    task = resolved(thrust_time=0.3, squat_time="free")
+    assert [span.time for span in task.spans()] == [None, 0.26, 0.04, None, 0.5]
+    assert resolved(thrust_time="free").phases is None, "a free thrust is one on flat feet"
+
+
+def test_the_papers_own_settings_are_one_word() -> None:
+    task = make_task({**ASKED, "recipe": "paper"})
+    assert choices(task, BRUCE) == ()
+    whole = task.resolved(BRUCE)
+    assert (whole.impact, whole.effort, whole.phases, whole.margins) == (False, 1.0, None, None)
+
+
+@pytest.mark.parametrize("other", [{"formulation": "srbm"}, {"rotation": "360 deg"}])
+def test_other_formulations_and_somersaults_are_what_they_say(other: dict[str, object]) -> None:
+    assert choices(make_task({**ASKED, **other}), BRUCE) == ()
+
+
+def test_what_is_chosen_is_chosen_once_and_part_of_the_hash() -> None:
+    task = make_task(ASKED)
+    whole = task.resolved(BRUCE)
+    assert whole.resolved(BRUCE) == whole
+    again = make_task(whole.model_dump(mode="json"))
+    assert again.hash(BRUCE) == whole.hash(BRUCE) == task.hash(BRUCE)
+    assert choices(again, BRUCE) == ()
+    assert task.hash(BRUCE) != make_task({**ASKED, "recipe": "paper"}).hash(BRUCE)
+    said = {name: getattr(whole, name) for name in ("impact", "effort", "knots", "phases")}
+    said |= {
+        "weights": whole.weights,
+        "margins": whole.margins,
+        "recipe": "paper",
+        "squat_time": 0.4,
+        "landing_time": 0.5,
+    }
+    assert make_task({**ASKED, **said}).hash(BRUCE) == task.hash(BRUCE)
+
+
+def test_more_is_spent_on_what_asks_for_more() -> None:
+    efforts = [resolved(rise=rise, distance_x=0.0, twist=0.0).effort for rise in (0.1, 0.2, 0.3)]
+    assert efforts[0] == 0.85 < efforts[1] < efforts[2] == 0.92
+    low, high = ({"name": "a", "rise": rise, "landing_height": 0.05} for rise in (0.1, 0.2))
+    assert demand(make_task(low), BRUCE) < demand(make_task(high), BRUCE)
+
+
+def test_far_jumps_keep_the_torso_off_the_thighs() -> None:
+    far = resolved(distance_x=0.5, twist=0.0)
+    assert far.margins is not None
+    assert far.margins.squat_lean == 0.9
+
+
+def test_a_robot_without_soles_has_no_toe_phase() -> None:
+    robot = quadruped()
+    task = make_task({"name": "a", "robot": "quadruped", "rise": 0.1}).resolved(robot)
+    assert task.phases is None
+    assert task.margins is not None
+    assert task.margins.landing_limits, "it has knees all the same"

@@ -1,0 +1,117 @@
+"""Messages over Zenoh on the loopback; nothing is searched for and nothing is left to defaults."""
+
+import json
+import socket
+import threading
+import time
+from collections.abc import Callable, Iterator
+
+import pytest
+
+from aloft.runtime.language.errors import AloftError
+from aloft.runtime.language.stages import MachineSpec
+from aloft.runtime.links.zenoh_transport import LEASE, ZenohTransport, as_chunk, session_config
+
+
+def free_port() -> int:
+    with socket.socket() as made:
+        made.bind(("127.0.0.1", 0))
+        return int(made.getsockname()[1])
+
+
+def wait_for(condition: Callable[[], bool], seconds: float = 10.0) -> bool:
+    end = time.monotonic() + seconds
+    while not condition() and time.monotonic() < end:
+        time.sleep(0.01)
+    return condition()
+
+
+@pytest.fixture
+def machines() -> tuple[MachineSpec, ...]:
+    return tuple(MachineSpec(name, f"tcp/127.0.0.1:{free_port()}") for name in ("a", "b"))
+
+
+Pair = tuple[ZenohTransport, ZenohTransport, list[str]]
+
+
+@pytest.fixture
+def pair(machines: tuple[MachineSpec, ...]) -> Iterator[Pair]:
+    """Two open transports, and the machines that the first has lost."""
+    lost: list[str] = []
+    first, second = ZenohTransport("test", machines), ZenohTransport("test", machines)
+    try:
+        second.open("b", lambda name: None)  # the one that connects may be there first
+        first.open("a", lost.append)
+        yield first, second, lost
+    finally:
+        first.close()
+        second.close()
+
+
+def test_messages_arrive_in_order(pair: Pair) -> None:
+    first, second, _ = pair
+    heard: list[bytes] = []
+    second.subscribe("data/a/b/left/gain~delay", heard.append)
+    send = first.publisher("data/a/b/left/gain~delay")
+    assert wait_for(lambda: send(b"probe") or bool(heard))  # type: ignore[func-returns-value]
+    time.sleep(0.2)
+    heard.clear()
+    for k in range(500):
+        send(k.to_bytes(4, "little") * 50)
+    assert wait_for(lambda: len(heard) == 500)
+    assert [int.from_bytes(data[:4], "little") for data in heard] == list(range(500))
+
+
+def test_a_machine_that_closes_is_lost_at_once(pair: Pair) -> None:
+    first, second, lost = pair
+    heard: list[bytes] = []
+    first.subscribe("x", heard.append)
+    send = second.publisher("x")
+    assert wait_for(lambda: send(b"there") or bool(heard))  # type: ignore[func-returns-value]
+    assert lost == []
+    began = time.monotonic()
+    second.close()
+    assert wait_for(lambda: lost == ["b"])
+    assert time.monotonic() - began < 5.0
+
+
+def test_an_endpoint_that_is_taken(machines: tuple[MachineSpec, ...]) -> None:
+    port = int(machines[0].endpoint.rpartition(":")[2])
+    transport = ZenohTransport("test", machines)
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", port))
+        taken.listen()
+        with pytest.raises(AloftError) as caught:
+            transport.open("a", lambda name: None)
+    transport.close()
+    assert f"machine 'a' cannot listen at tcp/127.0.0.1:{port}" in str(caught.value)
+    assert "--set machines.a=" in str(caught.value)
+
+
+def test_the_configuration_searches_for_nobody() -> None:
+    config = session_config(["tcp/127.0.0.1:7450"], ["tcp/127.0.0.1:7451"])
+
+    def get(key: str) -> object:
+        return json.loads(config.get_json(key))
+
+    assert get("scouting/multicast/enabled") is False
+    assert get("scouting/gossip/enabled") is False
+    assert get("listen/endpoints") == ["tcp/127.0.0.1:7450"]
+    assert get("connect/endpoints") == ["tcp/127.0.0.1:7451"]
+    assert get("transport/link/tx/lease") == LEASE
+    assert get("transport/shared_memory/enabled") is False
+
+
+def test_no_thread_of_ours_is_left(pair: Pair) -> None:
+    first, second, _ = pair
+    before = threading.active_count()
+    first.subscribe("y", lambda data: None)
+    second.publisher("y")(b"1")
+    assert threading.active_count() == before
+
+
+@pytest.mark.parametrize(
+    ("name", "chunk"), [("left/gain~to~b", "left/gain~to~b"), ("a*b?c#d$e f", "a_b_c_d_e_f")]
+)
+def test_names_in_keys(name: str, chunk: str) -> None:
+    assert as_chunk(name) == chunk

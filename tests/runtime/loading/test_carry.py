@@ -1,0 +1,227 @@
+"""Units and frames through the general blocks: what arrives, what is refused, and what is said."""
+
+from pathlib import Path
+
+import pytest
+
+from aloft.runtime.language.block import Block
+from aloft.runtime.language.registry import all_blocks
+from aloft.runtime.loading import check, load, load_text
+from aloft.runtime.loading.problems import Problem
+
+SENSOR = """\
+from aloft import Block, Field, Input, Output, Parameters, Signal, parameter
+from aloft.blocks.general.vector import Vector
+
+class Millimetres(Signal):
+    value = Field("n", unit="mm", frame="body", text="a position")
+
+class Metres(Signal):
+    value = Field("n", unit="m", frame="body", text="a position")
+
+class World(Signal):
+    value = Field("n", unit="m", frame="world", text="a position")
+
+class Unsaid(Signal):
+    value = Field("n", text="a number")
+
+class Sized(Parameters):
+    n: int = parameter(1, text="elements")
+
+class Sensor(Block):
+    Params = Sized
+    mm = Output(Millimetres, text="in mm, body")
+    m = Output(Metres, text="in m, body")
+    w = Output(World, text="in m, world")
+    unsaid = Output(Unsaid, text="no unit")
+    def step(self): ...
+
+class Reader(Block):
+    Params = Sized
+    m = Input(Metres, text="in m, body", default={"value": 0.0})
+    w = Input(World, text="in m, world", default={"value": 0.0})
+    def step(self): ...
+
+class Silent(Block):
+    Params = Sized
+    u = Input(Vector, text="any")
+    y = Output(Vector, text="any")
+    def step(self): ...
+"""
+
+
+def problems_of(tmp_path: Path, blocks: str) -> list[Problem]:
+    (tmp_path / "parts.py").write_text(SENSOR)
+    head = "rate: 100 Hz\nblocks:\n  s: {use: parts:Sensor}\n"
+    (tmp_path / "graph.yaml").write_text(head + blocks)
+    return list(check(tmp_path / "graph.yaml").problems)
+
+
+def one(tmp_path: Path, blocks: str) -> Problem:
+    found = problems_of(tmp_path, blocks)
+    assert len(found) == 1, "\n".join(p.text() for p in found)
+    return found[0]
+
+
+def test_units_and_frames_pass_through_a_gain(tmp_path: Path) -> None:
+    blocks = "  g: {use: blocks.Gain, in: {u: s.mm}}\n  r: {use: parts:Reader, in: {m: g.y}}\n"
+    problem = one(tmp_path, blocks)
+    assert problem.code == "unit"
+    assert problem.message == "r.m does not fit g.y: field 'value' has another scale"
+    assert (problem.expected, problem.found) == ("m", "mm")
+    assert problem.fix.endswith("1 mm is 0.001 m; blocks.Gain with {gain: 0.001, unit: m/mm}")
+
+
+def test_the_fix_of_another_scale_is_one(tmp_path: Path) -> None:
+    blocks = (
+        "  g: {use: blocks.Gain, with: {gain: 0.001, unit: m/mm}, in: {u: s.mm}}\n"
+        "  r: {use: parts:Reader, in: {m: g.y}}\n"
+    )
+    assert not problems_of(tmp_path, blocks)
+
+
+def test_a_frame_arrives_behind_a_chain_written_backwards(tmp_path: Path) -> None:
+    blocks = (
+        "  r: {use: parts:Reader, in: {w: c.y}}\n"
+        "  c: {use: blocks.Saturation, in: {u: b.y}}\n"
+        "  b: {use: blocks.LowPass, with: {cutoff: 5}, in: {u: a.y}}\n"
+        "  a: {use: blocks.UnitDelay, in: {u: s.m}}\n"
+    )
+    problem = one(tmp_path, blocks)
+    assert (problem.code, problem.at) == ("frame", "r.w")
+    assert (problem.expected, problem.found) == ("world", "body")
+
+
+def test_a_sum_wants_one_quantity(tmp_path: Path) -> None:
+    problem = one(tmp_path, "  e: {use: blocks.Sum, in: {a: s.m, b: s.mm}}\n")
+    assert problem.message == "e.b is in mm in body: a and b must be the same quantity"
+    assert (problem.other, problem.expected) == ("e.a", "m in body")
+    assert problem.fix == "blocks.Gain with {gain: 0.001, unit: m/mm} between"
+    problem = one(tmp_path, "  e: {use: blocks.Sum, in: {a: s.m, b: s.w}}\n")
+    assert (problem.code, problem.expected, problem.found) == ("frame", "m in body", "m in world")
+
+
+def test_a_plain_number_is_no_length_and_the_fix_says_so(tmp_path: Path) -> None:
+    blocks = (
+        "  c: {use: blocks.Constant, with: {value: [1.0]}}\n"
+        "  r: {use: parts:Reader, in: {m: c.y}}\n"
+    )
+    problem = one(tmp_path, blocks)
+    assert (problem.expected, problem.found) == ("m", "1")
+    assert problem.fix == "say what its numbers are: with: {unit: m}"
+    assert not problems_of(tmp_path, blocks.replace("[1.0]", "[1.0], unit: m"))
+    assert not problems_of(tmp_path, blocks.replace("[1.0]", "[1.0 m]"))
+    assert not problems_of(tmp_path, blocks.replace("[1.0]", "[1.0], unit: unchecked"))
+
+
+def test_numbers_with_units_are_converted_to_the_first_one() -> None:
+    text = "rate: 1\nblocks:\n  c: {use: blocks.Constant, with: {value: [1 m, 20 cm]}}\n"
+    spec = load_text(text, Path("g.yaml")).block("c")
+    assert spec.params.value == [1.0, 0.2]  # type: ignore[attr-defined]
+    assert str(spec.quantities["y.value"]) == "m"
+
+
+def test_constants_on_wires_have_units(tmp_path: Path) -> None:
+    sums = "  e: {use: blocks.Sum, in: {a: s.mm, b: {value: {value: %s}}}}\n"
+    assert not problems_of(tmp_path, sums % "20 mm")
+    assert not problems_of(tmp_path, sums % "0")  # zero is zero in every unit
+    assert one(tmp_path, sums % "2 cm").found == "cm"
+    assert one(tmp_path, sums % "20").found == "plain numbers"
+
+
+def test_a_ring_has_the_units_that_enter_it(tmp_path: Path) -> None:
+    ring = (
+        "  e: {use: blocks.Sum, with: {weights: [1, -1]}, in: {a: s.m, b: x.y}}\n"
+        "  k: {use: blocks.Gain, with: {gain: 4 %s}, in: {u: e.y}}\n"
+        "  x: {use: blocks.Integrator, in: {u: k.y}}\n"
+    )
+    assert not problems_of(tmp_path, ring % "1/s")
+    problem = one(tmp_path, ring % "")
+    assert problem.message == "e.b is in m s in body: a and b must be the same quantity"
+
+
+def test_a_ring_that_nothing_enters_must_not_contradict_itself(tmp_path: Path) -> None:
+    ring = (
+        "  k: {use: blocks.Gain, with: {gain: -1 %s}, in: {u: x.y}}\n"
+        "  x: {use: blocks.Integrator, in: {u: k.y}}\n"
+    )
+    assert not problems_of(tmp_path, ring % "1/s")
+    problem = one(tmp_path, ring % "")
+    assert "is in a ring of blocks that makes" in problem.message
+    assert problem.fix == "a gain with unit: 1/s in the ring"
+
+
+@pytest.mark.parametrize(
+    ("blocks", "unit"),
+    [
+        ("y: {use: blocks.Integrator, in: {u: s.m}}", "m s in body"),
+        ("y: {use: blocks.TrapezoidalIntegrator, in: {u: s.m}}", "m s in body"),
+        ("y: {use: blocks.FilteredDerivative, in: {u: s.m}}", "m/s in body"),
+        ("y: {use: blocks.Product, in: {a: s.m, b: s.mm}}", "m mm in body"),
+        (
+            "y: {use: blocks.Product, with: {operation: divide}, in: {a: s.m, b: s.m}}",
+            "1 in body",
+        ),
+        ("y: {use: blocks.Function, with: {function: square}, in: {u: s.m}}", "m^2 in body"),
+        ("y: {use: blocks.Gain, with: {gain: 60 N/m}, in: {u: s.m}}", "N in body"),
+        ("y: {use: blocks.MatrixGain, with: {matrix: [[2 N/m]]}, in: {u: s.m}}", "N"),
+        (
+            "y: {use: blocks.LookupTable, with: {points: [0, 1], values: [0, 2 N]}, in: {u: s.m}}",
+            "N",
+        ),
+        ("y: {use: blocks.Expression, with: {expression: a / t}, in: {a: s.m}}", "m/s in body"),
+        ("y: {use: parts:Silent, in: {u: s.m}}", "a unit that is not checked"),
+        ("y: {use: blocks.Switch, in: {condition: {value: {}}, a: s.m, b: s.m}}", "m in body"),
+    ],
+)
+def test_what_blocks_make_of_units(tmp_path: Path, blocks: str, unit: str) -> None:
+    (tmp_path / "parts.py").write_text(SENSOR)
+    text = f"rate: 1\nblocks:\n  s: {{use: parts:Sensor}}\n  {blocks}\n"
+    graph = load_text(text, tmp_path / "graph.yaml")
+    assert str(graph.block("y").quantities["y.value"]) == unit
+
+
+def test_mistakes_in_formulas_and_functions(tmp_path: Path) -> None:
+    found = one(tmp_path, "  y: {use: blocks.Function, with: {function: sin}, in: {u: s.m}}\n")
+    assert found.message == "y.u is in m in body: sin takes angles in rad"
+    assert found.expected == "rad"
+    found = one(tmp_path, "  y: {use: blocks.Function, with: {function: sqrt}, in: {u: s.m}}\n")
+    assert found.message == "y.u is in m in body: the square root of m has no unit"
+    found = one(
+        tmp_path, "  y: {use: blocks.Expression, with: {expression: a + t}, in: {a: s.m}}\n"
+    )
+    assert found.message == "y.a is in m in body: in 'a + t' a is in m and t in s"
+
+
+def test_vectors_are_turned_from_the_frame_they_are_in(tmp_path: Path) -> None:
+    blocks = (
+        "  s3: {use: parts:Sensor, with: {n: 3}}\n"
+        "  t: {use: blocks.RotateVector, in: {rotation: {value: {value: [0, 0, 0, 1]}}, u: s3.%s}}\n"
+        "  r: {use: parts:Reader, with: {n: 3}, in: {w: t.y}}\n"
+    )
+    assert not problems_of(tmp_path, blocks % "m")
+    assert "the block turns vectors from body" in one(tmp_path, blocks % "w").message
+
+
+def test_a_unit_that_is_not_checked_is_said(tmp_path: Path) -> None:
+    (tmp_path / "parts.py").write_text(SENSOR)
+    text = (
+        "rate: 1\nblocks:\n  s: {use: parts:Sensor}\n  u: {use: parts:Silent, in: {u: s.mm}}\n"
+        "  r: {use: parts:Reader, in: {m: u.y, w: s.unsaid}}\n"
+    )
+    graph = load_text(text, tmp_path / "graph.yaml")
+    assert graph.unchecked == (
+        "u.y does not say its unit, and r.m reads value in m",
+        "s.unsaid does not say its unit, and r.w reads value in m",
+    )
+
+
+@pytest.mark.parametrize("name", ["jump", "hops", "robots/go2_jump"])
+def test_shipped_graphs_leave_no_unit_unchecked(name: str) -> None:
+    assert load(f"aloft:{name}").unchecked == ()
+
+
+def test_every_shipped_block_says_what_it_carries() -> None:
+    for name, block in all_blocks().items():
+        carries = any(f.carried for o in block.outputs.values() for f in o.signal.fields.values())
+        assert not carries or block.carried.__func__ is not Block.carried.__func__, name

@@ -1,0 +1,38 @@
+"""The key ``links``: how machines keep together, for all links and for those of single blocks."""
+
+from pathlib import Path
+
+from aloft.runtime.language.stages import LinkPolicy, LinkSettings
+from aloft.runtime.loading import load_text
+
+PATH = Path("graph.yaml")
+GRAPH = """
+rate: 100 Hz
+clock: {kind: paced}
+machines: {onboard: tcp/127.0.0.1:7450, ground: tcp/127.0.0.1:7451}
+blocks:
+  one: {use: blocks.Constant, with: {value: [1.0]}}
+  two: {use: blocks.Gain, in: {u: one.y}, on: ground}
+"""
+
+
+def settings(text: str, overrides: tuple[str, ...] = ()) -> LinkSettings:
+    return load_text(GRAPH + text, PATH, overrides).links
+
+
+def test_lockstep_is_the_default() -> None:
+    assert settings("") == LinkSettings("lockstep", LinkPolicy(None, "stop"), {})
+
+
+def test_policies() -> None:
+    found = settings("links: {mode: free, max_age: 10 ms, late: hold, of: {one: {max_age: 0.004}}}")
+    assert found.mode == "free" and found.policy == LinkPolicy(0.01, "hold")
+    assert found.policy_of("one") == LinkPolicy(0.004, "hold")
+    assert found.policy_of("two") == LinkPolicy(0.01, "hold")
+
+
+def test_overrides_and_the_flat_text() -> None:
+    overrides = ("links.mode=free", "links.max_age=20 ms", "links.late=safe")
+    graph = load_text(GRAPH, PATH, overrides)
+    assert graph.links == LinkSettings("free", LinkPolicy(0.02, "safe"))
+    assert load_text(graph.text, PATH).links == graph.links

@@ -1,0 +1,60 @@
+"""The page of the frontier: its criteria come first, and its table is made by a script that works."""
+
+from __future__ import annotations
+
+import importlib.util
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+ROOT = Path(__file__).parent.parent
+PAGE = (ROOT / "docs" / "frontier.md").read_text()
+FOUND = {
+    "name": "up", "what": "the rise", "unit": "cm", "reached": 23.0, "landed": 19, "runs": 20,
+    "ci_low": 0.764, "ci_high": 0.991, "fails_at": 24.0, "fails_landed": [2, 5],
+    "why": "fell", "gaps": [21.0], "planned": 26.0, "planned_ended": True, "theory": 31.0,
+    "theory_ended": False, "binds": "knee motor speed",
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def script() -> ModuleType:
+    spec = importlib.util.spec_from_file_location("refresh", ROOT / "docs/refresh_frontier.py")
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_a_direction_is_a_row(script: ModuleType) -> None:
+    nothing = {
+        **FOUND, "name": "back", "reached": 0.0, "runs": 0, "gaps": [], "fails_at": 2.5,
+        "fails_landed": None, "why": "no plan: motor speed", "planned": 0.0, "theory": 0.0,
+        "theory_ended": True, "binds": "",
+    }  # fmt: skip
+    table = script.frontier_table({"seeds": [9000, 9019], "directions": [FOUND, nothing]})
+    assert table.startswith("2 seeds a value, 9000 to 9019.\n")
+    assert table.splitlines()[-2:] == [
+        "| up: the rise | 23 cm (but not 21) | 19 of 20 | 76 % to 99 % | 24 cm (2 of 5): fell "
+        + "| 26 cm | 31 cm or more | knee motor speed |",
+        "| back: the rise | nothing | - | - | 2.5 cm: no plan: motor speed | 0 cm | 0 cm | - |",
+    ]
+
+
+def test_the_table_goes_to_its_place_below_the_criteria(script: ModuleType) -> None:
+    found = script.refreshed(PAGE, {"seeds": [9000], "directions": [FOUND]})
+    assert found.index("## Criteria") < found.index("| up: the rise |")
+    assert found.endswith("|\n<!-- end of frontier -->\n")
+    with pytest.raises(ValueError, match=r"frontier.md has no <!-- frontier -->"):
+        script.refreshed("", {"seeds": [9000], "directions": []})
+
+
+def test_the_page_says_what_the_search_does() -> None:
+    from aloft.benchmarks.directions import LOOSEST
+    from aloft.benchmarks.frontier_jobs import LEAST_RUNS, RATE
+    from aloft.benchmarks.frontier_search import MOST_CPU
+
+    assert LOOSEST == {"effort": 1.0, "margins": None, "foot_clearance": 0.02}
+    assert "`effort: 1`" in PAGE and "`margins: null`" in PAGE and "`foot_clearance: 2 cm`" in PAGE
+    assert (RATE, LEAST_RUNS) == (0.95, 4) and f"after {MOST_CPU:g} s of processor time" in PAGE

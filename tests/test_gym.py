@@ -1,0 +1,98 @@
+"""Graphs as Gymnasium environments: Gymnasium's own checker, seeds, ends, and mistakes."""
+
+import warnings
+
+import numpy as np
+import pytest
+
+from aloft import AloftError, load
+
+pytest.importorskip("gymnasium")
+
+from gymnasium.utils.env_checker import check_env
+
+from aloft import gym
+
+GRAPH = """
+rate: 100 Hz
+duration: 1 s
+blocks:
+  action: {use: blocks.External, with: {unit: m/s}}
+  noise: {use: blocks.WhiteNoise, with: {std: 0.1, unit: m/s}}
+  speed: {use: blocks.Sum, in: {a: action.y, b: noise.y}}
+  place: {use: blocks.Integrator, in: {u: speed.y}}
+  cost: {use: blocks.Function, with: {function: square}, in: {u: place.y}}
+  reward: {use: blocks.Gain, with: {gain: -1}, in: {u: cost.y}}
+  bounds: {use: blocks.Assertion, with: {upper: 0.3}, in: {u: place.y}}
+"""
+
+
+def environment(graph: str = GRAPH, **options: object) -> gym.GraphEnvironment:
+    return gym.make(
+        graph, action="action", observation=["place.y.value", "speed.y.value"],
+        reward="reward.y.value", ticks=5, action_limits=(-10.0, 10.0), **options,  # type: ignore[arg-type]
+    )  # fmt: skip
+
+
+def test_gymnasiums_checker_finds_nothing() -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # it advises finite observation limits
+        check_env(environment(), skip_render_check=True)
+
+
+def test_a_seed_repeats_an_episode_and_episodes_without_differ() -> None:
+    env = environment()
+    first, _ = env.reset(seed=3)
+    path = [env.step(np.zeros(1))[0] for _ in range(3)]
+    other, _ = env.reset()
+    again, _ = env.reset(seed=3)
+    assert np.array_equal(first, again) and not np.array_equal(first, other)
+    assert np.array_equal(path, [env.step(np.zeros(1))[0] for _ in range(3)])
+    env.close()
+
+
+def test_an_episode_ends_by_a_block_or_by_the_duration() -> None:
+    env = environment()
+    env.reset(seed=1)
+    ended = [env.step(np.array([10.0]))[2:] for _ in range(2)]
+    assert ended[1][:2] == (True, False) and "bounds" in ended[1][2]["reason"]
+    env.reset(seed=1)
+    steps = 0
+    while True:
+        _, reward, terminated, truncated, info = env.step(np.zeros(1))
+        steps += 1
+        assert reward <= 0.0 and not terminated
+        if truncated:
+            break
+    assert steps == 20 and info["reason"] == "the duration is over"
+
+
+def test_many_live_in_one_process() -> None:
+    graph = load(GRAPH)
+    environments = [
+        gym.make(graph, action="action", observation="place.y.value", reward=lambda run: run.time)
+        for _ in range(8)
+    ]
+    for number, env in enumerate(environments):
+        env.reset(seed=number)
+    found = [env.step(np.ones(1))[0].item() for env in environments]
+    assert len(set(found)) == 8
+    assert environments[0].step(np.ones(1))[1] == pytest.approx(0.03)
+
+
+@pytest.mark.parametrize(
+    ("options", "error", "message"),
+    [
+        ({"action": "speed"}, AloftError, "the action 'speed' is no block blocks.External"),
+        ({"observation": []}, AloftError, "at least one observation"),
+        ({"observation": "plaec.y.value"}, KeyError, "the nearest is place.y.value"),
+        ({"reward": "action"}, KeyError, "no signal 'action'"),
+        ({"ticks": 0}, AloftError, "a step is at least 1 tick, not 0"),
+    ],
+)
+def test_mistakes(options: dict[str, object], error: type[Exception], message: str) -> None:
+    base: dict[str, object] = {
+        "action": "action", "observation": "place.y.value", "reward": "reward.y.value",
+    }  # fmt: skip
+    with pytest.raises(error, match=message):
+        gym.make(GRAPH, **{**base, **options})  # type: ignore[arg-type]
