@@ -66,7 +66,9 @@ def test_a_viewer_that_fails_is_a_warning(tmp_path: Path, number: signal.Signals
         if number is signal.SIGKILL:
             (warning,) = result.warnings
             assert warning.startswith("the viewer did not show all of the run: ")
-            assert "the viewer has been closed" in warning
+            # On a loaded machine the run may end before a flush has told that the viewer is gone.
+            reasons = ("the viewer has been closed", "the viewer did not take the end of the run")
+            assert warning.endswith(reasons) or any(f"{reason};" in warning for reason in reasons)
     finally:
         os.kill(viewer.process.pid, signal.SIGCONT) if viewer.lives() else None
         viewer.stop()
