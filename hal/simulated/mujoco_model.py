@@ -9,7 +9,9 @@ Contact: spheres at the contact points and capsules for the rest of the robot. T
 with the ground and with other limbs, but not with their own limb or the base; a limb consists of
 all links that one joint of the base carries. Capsules of two limbs that overlap in the standing
 pose do not collide with each other, as they only approximate the links' shapes. Every contact of a
-capsule is a forbidden contact. Friction cones are elliptic.
+capsule is a forbidden contact, except that of a foot with the ground that all its contact points have
+sunk into: after a drop of 20 cm soft ground gives way by the few millimetres between points and foot.
+Friction cones are elliptic.
 
 MuJoCo scales the stiffness of a contact with the mass that it carries: a time constant and a
 damping ratio are given, so robots of any mass sink in by the same fraction of a millimetre.
@@ -118,6 +120,16 @@ def mujoco_spec(
 def body_name(link: str) -> str:
     """The name of a link's body in the model; the name ``world`` is reserved by MuJoCo."""
     return "link/world" if link == "world" else link
+
+
+def soles(model: MjModel, robot: RobotDescription) -> dict[int, tuple[int, ...]]:
+    """By geom, the shapes of the links that are feet: the numbers of the foot's contact points."""
+    found = {}
+    for foot in robot.feet:
+        points = tuple(k for k, each in enumerate(robot.contacts) if each.foot == foot.name)
+        for k in range(len(robot.link(foot.link).shapes)):
+            found[model.geom(f"{foot.link}/{k}").id] = points
+    return found
 
 
 def _overlaps(model: MjModel, robot: RobotDescription) -> list[tuple[str, str]]:

@@ -18,7 +18,7 @@ from ...robots.description import RobotDescription
 from ...runtime.language.block import Metric
 from .base import BASES
 from .holding import holding_gains, passive_joints
-from .mujoco_model import Variation, body_name
+from .mujoco_model import Variation, body_name, soles
 from .parameters import SimulatorParameters
 from .random_streams import WORDS, Purpose, RandomStreams, stream
 from .sensors import Sensors
@@ -93,6 +93,7 @@ class Plant:
         n = len(robot.joints)
         self._encoder, self._excess = np.zeros(n), np.zeros(n)
         self._mean_force = np.zeros(3)
+        self._soles = soles(self.model, robot)
         self.late = 0.0
         self._attach(mujoco.MjData(self.model))
 
@@ -203,7 +204,7 @@ class Plant:
             allowed = 0.0
             for point in self._load:
                 allowed += point.item(0)
-            if self._contacts.item(0) > allowed:
+            if self._contacts.item(0) > allowed and self._contacts.item(0) > allowed + self._sunk():
                 record.forbidden += 1
             self._step1(model, data)
             lower, upper = self._limits
@@ -214,6 +215,17 @@ class Plant:
             step += 1
         record.steps += steps
         self.physics.step[()] = step
+
+    def _sunk(self) -> int:
+        """How many contacts are those of a foot's own shape with the ground that all its contact
+        points have sunk into: a hard landing on soft ground."""
+        found, bodies = 0, self.model.geom_bodyid
+        for first, second in self.data.contact.geom:
+            ground, geom = (first, second) if bodies[first] == 0 else (second, first)
+            points = self._soles.get(int(geom), ())
+            if bodies[ground] == 0 and points:
+                found += all(self._load[point, 0] > 0.0 for point in points)
+        return found
 
     def _apply_push(self, push: ExternalForce) -> None:
         """Apply the external force at its point of its body, which moves with the body."""
