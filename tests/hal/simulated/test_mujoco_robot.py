@@ -18,6 +18,8 @@ from aloft.robots.description import find_robot
 from aloft.runtime.language.errors import BlockError
 from aloft.runtime.testing.bench import BlockBench
 
+from .simulated_bruce import bench, hold, lift
+
 ROBOT = find_robot("bruce")
 WEIGHT = 5.118 * 9.81
 STANDARD: dict[str, Any] = {
@@ -26,29 +28,6 @@ STANDARD: dict[str, Any] = {
     "switch_bounce": 0.002, "initial_attitude_error": 0.01, "latency": 0.002, "jitter": 0.0005,
     "random_start_phase": True,
 }  # fmt: skip
-
-
-def bench(rate: float = 500.0, **params: Any) -> BlockBench[MujocoRobot]:
-    return BlockBench(MujocoRobot, params, robot="bruce", rate=rate)
-
-
-def hold(robot: BlockBench[MujocoRobot]) -> None:
-    """Command the robot to hold the pose it is in."""
-    robot.block.emit()
-    joints = robot.get("joints")
-    robot.set(
-        "command", mode=CommandMode.ACTIVE, torque=joints.torque.copy(),
-        position=joints.position.copy(), velocity=0.0, stiffness=300.0, damping=1.5,
-    )  # fmt: skip
-
-
-def lift(robot: BlockBench[MujocoRobot], height: float = 3.0) -> None:
-    """Put the robot high up, legs in their standing pose, at rest and without gravity's pull yet."""
-    data: Any = robot.block.plant.data
-    data.qpos[2] += height
-    data.qvel[:] = 0.0
-    robot.block.freeze()
-    robot.block.thaw()
 
 
 def truth(robot: BlockBench[MujocoRobot]) -> Any:
