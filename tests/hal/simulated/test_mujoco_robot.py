@@ -6,6 +6,7 @@ import hashlib
 import subprocess
 import sys
 import tracemalloc
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -243,8 +244,8 @@ def digest(seed: int) -> str:
 
 def test_same_seed_same_bytes_in_every_process_on_every_cpu() -> None:
     code = (
-        f"import sys; sys.path.insert(0, {str(__file__).rpartition('/')[0]!r})\n"
-        "from test_mujoco_robot import digest\nprint(digest(11))"
+        f"import sys; sys.path.insert(0, {str(Path(__file__).parents[2])!r})\n"
+        "from hal.simulated.test_mujoco_robot import digest\nprint(digest(11))"
     )
     others = {
         subprocess.run(
