@@ -54,6 +54,9 @@ class LatestInbox:
         health: where to write how the link does.
         stop: called with the reason where the policy is to stop.
         clock: the monotonic time [ns].
+
+    Attributes:
+        heard_at: when the newest message came, by ``clock``; zero before the first.
     """
 
     def __init__(
@@ -69,6 +72,7 @@ class LatestInbox:
         self.link = link
         self.policy = policy
         self.received = self.lost = self.surplus = self.damaged = self.late_ticks = 0
+        self.heard_at = 0
         self._reader = reader
         self._others = others
         self._health = health
@@ -107,6 +111,7 @@ class LatestInbox:
             return
         self.lost += gap
         self.received += 1
+        self.heard_at = self._clock()
         self._latest = message
 
     def show(self, tick: int) -> None:

@@ -18,6 +18,7 @@ from ..running.executor import Executor
 from ..running.memory import BoundGraph
 from ..running.run_result import RunResult
 from ..running.sinks import Sink
+from .command_watch import CommandWatch
 from .conductor import Conductor, FaultTeller, Gate
 from .free_conductor import FreeConductor
 from .inbox import Inbox, Received, received_block_type
@@ -139,11 +140,14 @@ class BoundPart(BoundGraph):
         for path, phase in ((PREPARED, Phase.PREPARED), (STARTED, Phase.STARTED)):
             self._block(path, Gate).connect(conductor, phase)
         self._make_inboxes(patience)
+        self.watch = CommandWatch(placed, machine, self.inboxes)
+        if self.watch.links:
+            clock.heard, clock.command_limit = self.watch.heard, self.watch.limit
         conductor.connect(
             self.others, transport, self.inboxes,
             {link.name: self._block(sender_path(link), Send) for link in placed.sent_by(machine)},
             self.parameters, clock=clock, on_open=self._open_links, patience=patience,
-            connect_time=connect_time, moves=bool(self._moving()),
+            connect_time=connect_time, moves=bool(self._moving()), watch=self.watch,
             elsewhere={s.path: s.machine for s in placed.graph.blocks if s.machine != machine},
         )  # fmt: skip
         self.conductor = conductor

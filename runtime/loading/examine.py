@@ -23,7 +23,7 @@ from .declaration_check import check_defaults, check_emit
 from .fit import check_fit, lacks_robot
 from .flat import FlatBlock, FlatGraph
 from .inserted import insert_constant, insert_delay, read_values
-from .link_settings import check_paths, read_link_settings
+from .link_settings import check_paths, check_watchdog, read_link_settings
 from .machines import on_machines, read_machines
 from .parameter_check import check_parameters
 from .problems import Code, Problems, nearest
@@ -63,6 +63,7 @@ def examine(graph: FlatGraph, problems: Problems) -> CheckedGraph | None:
     checked = _assemble(graph, settings, settings.base_rate, drafts, values)
     checked = replace(on_machines(checked, graph, machines), links=links)
     check_paths(checked, graph, problems)
+    check_watchdog(checked, graph, problems)
     return None if len(problems) else checked
 
 

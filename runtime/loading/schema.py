@@ -56,6 +56,7 @@ _FIELDS: Schema = {
 _LINK_POLICY: Schema = {
     "max_age": {"anyOf": [{"type": "number", "exclusiveMinimum": 0}, {"type": "string"}]},
     "late": {"enum": ["hold", "safe", "stop"]},
+    "watch": {"type": "boolean", "description": "whether its silence counts for 'watchdog'"},
 }
 _VALUES: Schema = {"type": "object", "description": "values by field; the others are zero"}
 _WIRE: Schema = {
@@ -147,6 +148,10 @@ def graph_schema(blocks: Mapping[str, type[Block]] | None = None) -> Schema:
                         "type": "object",
                         "additionalProperties": _LINK_POLICY["max_age"],
                         "description": "block.output -> block.input: the largest age",
+                    },
+                    "watchdog": {
+                        **_LINK_POLICY["max_age"],
+                        "description": "how long a link that brings commands may be silent: 15 ms",
                     },
                 },
                 "description": "how the machines keep together",
