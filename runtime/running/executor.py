@@ -22,7 +22,7 @@ from .memory import BoundGraph
 from .notes import Note, TakesNotes
 from .pacing import TimeSource, WallTime
 from .run_result import RunResult, TakesResult, merge_metrics
-from .sinks import MemoryLog, RunHash, Sink
+from .sinks import GivesMetrics, MemoryLog, RunHash, Sink
 from .ticker import Ticker
 from .timing import block_times
 
@@ -217,7 +217,8 @@ class Executor:
         if error is None:
             self._add_cautions()
         by_block: dict[str, dict[str, Metric]] = {}
-        for path, block in self.bound.blocks.items():
+        measuring = {sink.name: sink for sink in self._opened if isinstance(sink, GivesMetrics)}
+        for path, block in {**self.bound.blocks, **measuring}.items():
             try:
                 by_block[path] = dict(block.metrics())
             except Exception as failure:  # noqa: BLE001  # the other blocks' metrics still count
