@@ -119,6 +119,7 @@ class BearRobot(DrivenRobot):
         driver = Driver(self.robot, hardware, bus_port, board_port, stiffness, damping)
         self.driver = driver
         self._opened_at = time.monotonic()
+        driver.loop.clock = self.now
         driver.connect()
         if params.armed:
             self._switch = open_switch(hardware.dead_man)

@@ -10,10 +10,9 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ...blocks.signals import RobotHealth
 from ...robots.description import RobotDescription
 from ...robots.transmission import MotorGains, motor_gains
-from ...runtime.language.block import Context, Metric, Misfit, Output
+from ...runtime.language.block import Context, Metric, Misfit
 from ...runtime.language.parameters import Parameters, parameter
 from ...runtime.language.per_joint import PerJoint
 from ..robot import Robot
@@ -56,7 +55,6 @@ class DrivenRobot(Robot):
 
     needs = ("robot", "imu", "switches")
     params: DriveParameters
-    health = Output(RobotHealth, text="voltages, temperatures, currents, conditions and ages")
 
     @classmethod
     def requires(cls, params: Parameters, robot: RobotDescription | None) -> Iterable[Misfit]:
@@ -87,8 +85,11 @@ class DrivenRobot(Robot):
         loop = self._driver.loop
         with loop.lock:
             loop.measured.publish(self.imu, self.joints, self.contacts)
-            loop.report(self.health, self.now())
+            loop.report(self.health)
             loop.measured.next_tick()
+
+    def report(self) -> None:
+        """Nothing more: ``read`` does it, so that the readings and their ages are of one exchange."""
 
     @abstractmethod
     def now(self) -> float:
