@@ -146,6 +146,8 @@ class ClockSpec:
     overrun: Literal["skip", "stop"] = "skip"
     stop_after: int = 1
     """The number of overruns in a row that end the run, if the overrun policy is ``stop``."""
+    hangs_after: float = 10.0
+    """The time [s] after which a call of a block is taken to hang, which ends the run."""
 
 
 @dataclass(frozen=True)

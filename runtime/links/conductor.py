@@ -65,6 +65,8 @@ class Conductor(Block):
     tick.
     """
 
+    waits_for_others = True
+
     def connect(
         self,
         others: Others,
@@ -298,6 +300,8 @@ class FaultTeller:
 
 class Gate(Block):
     """A block of the runtime whose ``start`` waits until all parts have come as far as this one."""
+
+    waits_for_others = True
 
     def connect(self, conductor: Conductor, phase: Phase) -> None:
         """Take what it waits with, and how far all must be."""

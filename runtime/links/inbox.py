@@ -113,6 +113,8 @@ class Received(Block):
     Subclasses made by ``received_block_type`` declare the ports.
     """
 
+    waits_for_others = True
+
     inbox: Shows | None = None
 
     def step(self) -> None:

@@ -202,6 +202,7 @@ def _clock_schema() -> Schema:
         "kind": {"enum": ["free", "paced", "robot"]},
         "overrun": {"enum": ["skip", "stop"]},
         "stop_after": {"type": "integer", "minimum": 1},
+        "hangs_after": {"type": ["number", "string"], "exclusiveMinimum": 0},
     }
     return {
         "type": "object",
