@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
-from ..language.stages import CheckedGraph, LinkPolicy, LinkSettings
+from ..language.stages import CheckedGraph, LinkPolicy, LinkSettings, Position
 from ..placement.age import worst_age
 from ..placement.commands import command_sources, silence_limit
 from ..placement.placed import PlacementError
@@ -68,8 +68,8 @@ def read_link_settings(graph: FlatGraph, clock: str, problems: Problems) -> Link
                 expected="the age at which 'late' takes effect",
                 fix="max_age: 10 ms",
             )
-    paths = _read_paths(graph.links, problems)
-    return LinkSettings(mode, policy, of, paths, found.get("watchdog"))
+    allowed = _read_paths(graph.links, problems)
+    return LinkSettings(mode, policy, of, allowed, found.get("watchdog"))
 
 
 def check_watchdog(checked: CheckedGraph, graph: FlatGraph, problems: Problems) -> None:
@@ -88,7 +88,9 @@ def check_watchdog(checked: CheckedGraph, graph: FlatGraph, problems: Problems) 
                 Code.AGE,
                 f"{source} brings commands to {machine.name} every {period * 1e3:.6g} ms, so one "
                 f"message that is lost would count as silence",
-                entry.value.where if entry is not None else spec.where or machine.where,
+                entry.value.where
+                if entry is not None
+                else spec.where or Position(graph.file, 1, 1),
                 at="links.watchdog",
                 expected=f"at least {2e3 * period:.6g} ms, or a link that is not watched",
                 found=f"{limit * 1e3:.6g} ms",

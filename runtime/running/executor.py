@@ -15,7 +15,7 @@ from dataclasses import replace
 from typing import Any
 
 from ...mathematics.compiling.compile_calls import compile_calls
-from ..language.block import Metric
+from ..language.block import Block, Metric
 from ..language.errors import AloftError, ExitCode, RunError
 from ..language.stages import CheckedGraph, ClockSpec
 from .failures import describe, locate
@@ -25,7 +25,7 @@ from .memory import BoundGraph
 from .notes import Note, TakesNotes
 from .pacing import TimeSource, WallTime
 from .run_result import RunResult, TakesAbandoned, TakesResult, merge_metrics
-from .sinks import MemoryLog, RunHash, Sink
+from .sinks import GivesMetrics, MemoryLog, RunHash, Sink
 from .ticker import Ticker, hang_text
 from .timing import block_times
 from .watchdog import Watchdog
@@ -256,7 +256,9 @@ class Executor:
         if error is None:
             self._add_cautions()
         by_block: dict[str, dict[str, Metric]] = {}
-        for path, block in self.bound.blocks.items():
+        giving: dict[str, Block | GivesMetrics] = {**self.bound.blocks}
+        giving |= {sink.name: sink for sink in self._opened if isinstance(sink, GivesMetrics)}
+        for path, block in giving.items():
             try:
                 by_block[path] = dict(block.metrics())
             except Exception as failure:  # noqa: BLE001  # the other blocks' metrics still count

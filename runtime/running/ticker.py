@@ -126,7 +126,8 @@ class Ticker:
                         break
                 program = table[tick % length]
                 if timing:
-                    row = [now()]
+                    clock.began = now()
+                    row = [clock.began]
                     for call in program.calls:
                         call()
                         row.append(now())
