@@ -18,10 +18,12 @@ from .actuator import (
     drive_motors,
     joint_feedback_torque,
 )
+from .motor_feedback import MotorFeedback
 from .state import DriveState, TickRecord
 
 Array = NDArray[np.float64]
 Counts = NDArray[np.int64]
+Flags = NDArray[np.bool_]
 
 _ACTIVE, _DAMPING = int(CommandMode.ACTIVE), int(CommandMode.DAMPING)
 
@@ -41,11 +43,12 @@ class Commands(NamedTuple):
 
 
 class Joints(NamedTuple):
-    """What the drives of all joints read and give in a physics step: the count of the step, (1,), and
-    the ``position`` that their encoders read [rad], the ``velocity`` [rad/s] and the ``torque`` [N m],
+    """What the drives of all joints read and give in a physics step: the count of the step, (1,),
+    whether a command has ``arrived`` in it, (1,), the ``position`` that their encoders read [rad], the ``velocity`` [rad/s] and the ``torque`` [N m],
     each (n_joints,)."""
 
     step: Counts
+    arrived: Flags
     position: Array
     velocity: Array
     torque: Array
@@ -59,11 +62,13 @@ def follow_commands(commands: Commands, released: Array, joints: Joints) -> None
         released: the damping in the damping mode [N m s/rad], (n_joints,).
     """
     active, pending = int(commands.active[()]), int(commands.pending[()])
+    joints.arrived[0] = False
     while pending > 0:
         following = (active + 1) % commands.due.shape[0]
         if commands.due[following] > joints.step[0]:
             break
         active, pending = following, pending - 1
+        joints.arrived[0] = True
     commands.active[()] = active
     commands.pending[()] = pending
     mode = int(commands.mode[active])
@@ -119,6 +124,16 @@ class MotorLimits:
         drive_motors(velocity, torque, self.motors, self.scratch, self.record)
 
 
+class Row(NamedTuple):
+    """One command of the ring, each field (n_joints,)."""
+
+    torque: Array
+    stiffness: Array
+    damping: Array
+    position: Array
+    velocity: Array
+
+
 class Drives:
     """Turns commands into joint torques at the physics rate, because drives close their own loops.
 
@@ -130,6 +145,8 @@ class Drives:
         damping: the damping of every joint in the damping mode [N m s/rad], (n_joints,).
         state: the active command and the commands that have not arrived yet.
         record: where saturation, peak torques and excesses over limits are noted.
+        feedback: closes the loops of commands per motor; without it every joint gets its command's
+            own feedback.
     """
 
     def __init__(
@@ -138,21 +155,28 @@ class Drives:
         damping: Array,
         state: DriveState,
         record: TickRecord,
+        feedback: MotorFeedback | None = None,
     ) -> None:
+        self._feedback = feedback
         self._state = state
         self._slots = len(state.due)
         self._rows = [
-            (state.torque[k], state.stiffness[k], state.damping[k], state.position[k],
-             state.velocity[k])
+            Row(state.torque[k], state.stiffness[k], state.damping[k], state.position[k],
+                state.velocity[k])
             for k in range(self._slots)
         ]  # fmt: skip
         limits = MotorLimits(robot, record)
         n = len(robot.joints)
-        self._joints = Joints(np.zeros(1, np.int64), *(np.zeros(n) for _ in range(3)))
-        self._drive = KernelCall(
-            drive_joints, Commands(*(getattr(state, name) for name in Commands._fields)), damping,
-            self._joints, limits.motors, limits.scratch, limits.record,
-        )  # fmt: skip
+        joints = self._joints = Joints(
+            np.zeros(1, np.int64), np.zeros(1, np.bool_), *(np.zeros(n) for _ in range(3))
+        )
+        commands = Commands(*(getattr(state, name) for name in Commands._fields))
+        motors = limits.motors, limits.scratch, limits.record
+        if feedback is None:
+            self._drive = KernelCall(drive_joints, commands, damping, joints, *motors)
+        else:
+            self._follow = KernelCall(follow_commands, commands, damping, joints)
+            self._limit = KernelCall(drive_motors, joints.velocity, joints.torque, *motors)
 
     def hold(self, position: Array, torque: Array, stiffness: Array, damping: Array) -> None:
         """Drop all commands and from now on hold the joints at a position with these gains.
@@ -162,6 +186,8 @@ class Drives:
             torque: the feedforward torques [N m], (n_joints,).
             stiffness, damping: the gains [N m/rad, N m s/rad], (n_joints,).
         """
+        if self._feedback is not None:
+            self._feedback.reset()
         self._state.active[()] = 0
         self._state.pending[()] = 0
         self._state.last_due[()] = 0
@@ -204,5 +230,14 @@ class Drives:
         joints.step[0] = step
         joints.position[...] = position
         joints.velocity[...] = velocity
-        self._drive.run()
+        if self._feedback is None:
+            self._drive.run()
+        else:
+            self._follow.run()
+            active = int(self._state.active)
+            if int(self._state.mode[active]) == CommandMode.ACTIVE:
+                self._feedback.write(
+                    self._rows[active], bool(joints.arrived[0]), position, velocity, joints.torque
+                )
+            self._limit.run()
         out[...] = joints.torque
