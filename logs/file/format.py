@@ -53,9 +53,9 @@ from ...runtime.language.layout import Layout
 from ...runtime.language.signals import Slot
 from ...runtime.language.terrain import Ground, Terrain
 
-FORMAT = 3
+FORMAT = 4
 """The number of this format."""
-READABLE = (2, 3)
+READABLE = (2, 3, 4)
 """The formats that can be read."""
 SIGNALS, STATES, KEYFRAMES, NOTES, EVENTS = "signals", "states", "keyframes", "notes", "events"
 LIMITS, TIMES, WORLD, GRAPH = "limits", "times", "world", "graph"

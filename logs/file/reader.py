@@ -32,6 +32,12 @@ from .row_sources import PackedRows, Piece, RowSource, SeriesRows
 
 __all__ = ["RecordedRun", "RecordingError", "read"]
 
+READ_ALONE = 3
+"""Signals that are each taken from the file for themselves. Who asks for more wants many, and one
+reading of everything is faster then."""
+MOST_KEPT = 2 << 30
+"""The bytes of all rows, at most, that are then kept in memory."""
+
 
 @dataclass(frozen=True)
 class RecordedRun:
@@ -82,9 +88,16 @@ class RecordedRun:
         known = self.signals()
         if name not in known:
             self.nearest(name)
-        if "rows" in self.__dict__:
+        self._asked.add(name)
+        whole = len(self.ticks) * self.header.bus.size
+        if "rows" in self.__dict__ or (len(self._asked) > READ_ALONE and whole <= MOST_KEPT):
             return self.header.bus.layout().view(self.rows, name)
         return self._source.signal(known[name])
+
+    @cached_property
+    def _asked(self) -> set[str]:
+        """The signals that were asked for; nothing depends on their order."""
+        return set()
 
     def nearest(self, name: str) -> NoReturn:
         """Raise the ``KeyError`` for an unknown signal; its message has the nearest names."""
@@ -223,7 +236,7 @@ def read(path: str | PathLike[str], *, damaged: bool = False) -> RecordedRun:
         newer = "update aloft" if number > max(READABLE) else "read it with an older one"
         raise RecordingError(
             f"{path} has format {number}, this version of aloft reads "
-            f"{' and '.join(map(str, READABLE))}; {newer}"
+            f"{', '.join(map(str, READABLE))}; {newer}"
         )
     notes = [
         (row, Note(**json.loads(text)))
