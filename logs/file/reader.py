@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from ...runtime.language.parameter_change import ParameterChange
 from ...runtime.running.memory import Snapshot
 from ...runtime.running.notes import Note
-from .contents import RecordingError, expect_intact, scanned, tables, tables_at
+from .contents import NoRunError, RecordingError, expect_intact, scanned, tables, tables_at
 from .format import BUS, KEYFRAMES, NOTE, NOTES, READABLE, STATE, Header, RecordedField
 from .messages import Content, Damage, Scan
 from .row_sources import PackedRows, Piece, RowSource, SeriesRows
@@ -219,7 +219,8 @@ def read(path: str | PathLike[str], *, damaged: bool = False) -> RecordedRun:
     Raises:
         FileNotFoundError: there is no such file.
         DamagedError: bytes have changed since they were written; the message names the lost ticks.
-        RecordingError: it is not a recording of aloft's, or was written by a later version.
+        NoRunError: it is a file of Rerun's, but no run was recorded into it.
+        RecordingError: it is no such file, or was written by a later version.
     """
     path = Path(path)
     found = scanned(path)
@@ -230,7 +231,7 @@ def read(path: str | PathLike[str], *, damaged: bool = False) -> RecordedRun:
         expect_intact(found)
         if found.sealed or not found.messages:
             raise RecordingError(f"{path} was cut off before its beginning was written")
-        raise RecordingError(f"{path} is a Rerun file, but not a recording of a run by aloft")
+        raise NoRunError(f"{path} is a Rerun file, but not a recording of a run by aloft")
     number = json.loads(texts["header"]).get("format", 0)
     if number not in READABLE:
         newer = "update aloft" if number > max(READABLE) else "read it with an older one"

@@ -78,9 +78,10 @@ def test_the_dearer_of_two_like_columns_is_predicted() -> None:
 
 def test_rows_of_format_3_are_read() -> None:
     """As they were packed: each word combined with the one before by exclusive or, by bytes."""
-    import pyarrow as pa
     from struct import pack as packed
     from zlib import crc32
+
+    import pyarrow as pa
 
     rows = rows_of(smooth(40), np.full(40, 1.5))[:, :13]
     words = np.zeros((40, 16), np.uint8)
