@@ -21,6 +21,7 @@ Exit codes:
   2    the graph, an override or the command line is wrong; nothing moved
   3    a block failed, a signal was not finite, or a policy ended the run
   130  stopped cleanly by SIGINT
+  137  a block hung in compiled code; the process was killed
   143  stopped cleanly by SIGTERM
 """
 

@@ -240,6 +240,8 @@ def run_once(
     ``also`` is what else the JSON object has, and ``times`` says whether those of blocks are
     printed."""
     from ..logs.recording.recorder import Recorder
+    from ..runtime.running.freeze_guard import FreezeGuard
+    from .last_words import LastWords
     from .progress import TickCounter, compiling_shown, progress_bar
     from .view import how_to_view
 
@@ -254,7 +256,11 @@ def run_once(
     ):
         counter = TickCounter(progress, task)
         recorders = [recorder] if recorder is not None else []
-        result = graph.run(sinks=[*recorders, counter, *sinks], log=False, plain=plain)
+        last_words = LastWords(name, as_json)
+        with FreezeGuard(graph.checked, as_json=as_json) as guard:
+            result = graph.run(
+                sinks=[*recorders, counter, last_words, *sinks, guard], log=False, plain=plain
+            )
     recording = recorder.recording if recorder is not None else None
     print_result(out, name, result, times=times)
     if recorder is not None and recording is not None:

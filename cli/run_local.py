@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..runtime.language.errors import AloftError, ExitCode, RunError
 from ..runtime.language.stages import CheckedGraph
+from ..runtime.links.path_ages import NAME
 from ..runtime.loading import load
 from ..runtime.placement.place import place
 from ..runtime.placement.placed import PlacedGraph
@@ -60,7 +61,7 @@ def run_local(path: Path, wishes: Wishes, out: Console) -> ExitCode:
         PlacementError: it names no machines.
         AloftError: a part said nothing when it ended.
     """
-    from ..logs.recording.merged_run import merge_recordings, read_parts, run_hash_of
+    from ..logs.recording.merged_run import merge_recordings, path_metrics, read_parts, run_hash_of
     from .view import how_to_view
 
     placed = place(load(path, wishes.settings))
@@ -70,7 +71,8 @@ def run_local(path: Path, wishes: Wishes, out: Console) -> ExitCode:
         said = _run_processes(path, wishes, placed, files)
         parts = read_parts(placed, files) if all(f.exists() for f in files.values()) else {}
         run_hash, ticks = run_hash_of(placed, parts) if parts else ("", 0)
-        result = _whole_result(placed, said, run_hash, ticks)
+        ages = path_metrics(placed, parts) if parts else {}
+        result = _whole_result(placed, said, ages, run_hash, ticks)
         recording = None
         if parts and wishes.keep:
             target = wishes.record or Path("recordings") / f"{graph.name}.rrd"
@@ -185,9 +187,13 @@ def _free_endpoints(count: int) -> list[str]:
 
 
 def _whole_result(
-    placed: PlacedGraph, said: Mapping[str, Mapping[str, Any]], run_hash: str, ticks: int
+    placed: PlacedGraph,
+    said: Mapping[str, Mapping[str, Any]],
+    ages: Mapping[str, Any],
+    run_hash: str,
+    ticks: int,
 ) -> RunResult:
-    """The result of the whole run, from what each part said of its own."""
+    """The result of the whole run, from what each part said of its own, and from measured ages."""
     graph = placed.graph
     by_block = {
         path: found
@@ -195,6 +201,8 @@ def _whole_result(
         for path, found in said[spec.machine].get("metrics_by_block", {}).items()
         if path == spec.path
     }
+    measured = (part.get("metrics_by_block", {}).get(NAME) for part in said.values())
+    by_block[NAME] = next((found for found in measured if found), ages)
     metrics, unmet, praise = merge_metrics(by_block)
     code, reason = _verdict(said, unmet, praise)
     failed = next(_in_order_of_guilt(said), None)

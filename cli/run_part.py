@@ -41,6 +41,7 @@ class Part:
         """The machine, the metrics of each of its blocks, what its links have carried, and the others' clocks."""
         error = self._result.error if self._result is not None else None
         metrics = {path: dict(block.metrics()) for path, block in self.bound.blocks.items()}
+        metrics |= {sink.name: dict(sink.metrics()) for sink in self.bound.path_ages}
         return {
             "machine": self.bound.machine,
             "heard": bool(getattr(error, "heard", False)),

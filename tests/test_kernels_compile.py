@@ -32,9 +32,9 @@ ROOMS = ("mathematics", "blocks", "hal")
 HOT = [path for room in ROOMS for path in sorted((ROOT / room).rglob("*.py"))]
 PLAIN = {"Array", "Flags", "Indices", "float", "int", "bool"}
 NOT_HOT = {
-    "hal.bear.conditions.conditions": "of an error byte, for people",
-    "hal.bear.conditions.describe": "of an error byte, for people",
-    "hal.bear.conditions.is_critical": "of an error byte, by integer arithmetic",
+    "blocks.signals.drive_conditions.conditions": "of an error byte, for people",
+    "blocks.signals.drive_conditions.describe": "of an error byte, for people",
+    "blocks.signals.drive_conditions.is_critical": "of an error byte, by integer arithmetic",
     "hal.simulated.start_check._millimetres": "for the text of an error, before a run",
     "hal.simulated.mujoco_robot._nearest_step": "for the text of an error, when a graph is loaded",
     "blocks.jumping.landing_heuristic.foot_sides": "of the description, when a graph is loaded",

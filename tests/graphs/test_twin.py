@@ -46,6 +46,18 @@ def test_it_lands_although_answers_are_lost() -> None:
     assert result.metrics["lost_answers"] > 100  # type: ignore[operator]
 
 
+def test_the_controllers_own_limits_act_before_the_drivers() -> None:
+    """13.1 V are within the driver's limit of 13 V and below the safety monitor's of 13.2 V."""
+    low = {"kind": "low_voltage", "start": 0.05, "value": 13.1, "target": "left_knee_motor"}
+    graph = aloft.load(GRAPHS / "jump_twin.yaml", {"robot.faults": [low]})
+    result = Executor(graph.checked, log=False).run()
+    text = "drive left_knee_motor: 13.1 V is below lowest_voltage, 13.2 V"
+    assert not result.success and result.reason == f"safety: {text}"
+    assert result.metrics["safety_fault"] == "voltage" and result.metrics["safety_reason"] == text
+    assert 0.05 < float(result.metrics["safety_fault_time_s"]) < 0.08  # type: ignore[arg-type]
+    assert result.metrics["drives_at_end"] == "damped"
+
+
 def run_behind_ports(folder: Path) -> tuple[str, float]:
     """Run jump_robot.yaml in another process; gives its hash, and how high the twin's torso was."""
     hardware = Hardware.for_twin(ROBOT)
