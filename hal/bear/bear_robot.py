@@ -10,11 +10,12 @@ from typing import Literal
 from ...blocks.signals import DrivePhase
 from ...runtime.language.block import Context, Misfit
 from ...runtime.language.parameters import Parameters, parameter
+from ..drive_gains import joint_gains
 from .bus import BusError, open_port
 from .command_queue import CommandQueue
 from .configuration import Hardware, HardwareError
 from .dead_man import AlwaysHeld, DeadMansSwitch, open_switch, wait_until_held
-from .driven_robot import DrivenRobot, DriveParameters, joint_gains, read_hardware
+from .driven_robot import DrivenRobot, DriveParameters, read_hardware
 from .driver import Driver
 from .motor_thread import MotorThread
 from .watchdog import Watchdog

@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from ...blocks.signals import CommandMode, DrivePhase, JointCommand, RobotHealth
 from ...robots.robot_description import RobotDescription
+from ..drive_goals import DriveGoals
 from .bulk import BulkExchange
 from .bus import BearBus, BusError
 from .configuration import Hardware
-from .drive_goals import DriveGoals
 from .measurement import FASTEST, LARGEST_STEP, PLAUSIBLE, READ, Measurement
 from .registers import Torque
 from .sense_board import SenseBoard

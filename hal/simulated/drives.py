@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
 from ...blocks.signals import CommandMode, JointCommand
 from ...robots.description import RobotDescription
 from .actuator import clip_joint_torque, joint_feedback_torque, motor_torque_limits
+from .motor_feedback import MotorFeedback
 from .state import DriveState, TickRecord
 
 Array = NDArray[np.float64]
@@ -56,6 +59,16 @@ class MotorLimits:
         np.add(record.joint_torque, torque, out=record.joint_torque)
 
 
+class Row(NamedTuple):
+    """One command of the ring, each field (n_joints,)."""
+
+    torque: Array
+    stiffness: Array
+    damping: Array
+    position: Array
+    velocity: Array
+
+
 class Drives:
     """Turns commands into joint torques at the physics rate, because drives close their own loops.
 
@@ -67,6 +80,8 @@ class Drives:
         damping: the damping of every joint in the damping mode [N m s/rad], (n_joints,).
         state: the active command and the commands that have not arrived yet.
         record: where saturation, peak torques and excesses over limits are noted.
+        feedback: closes the loops of commands per motor; without it every joint gets its command's
+            own feedback.
     """
 
     def __init__(
@@ -75,15 +90,17 @@ class Drives:
         damping: Array,
         state: DriveState,
         record: TickRecord,
+        feedback: MotorFeedback | None = None,
     ) -> None:
+        self._feedback = feedback
         self._negative_damping = -damping
         self._state = state
         self._limits = MotorLimits(robot, record)
         self._scratch = np.zeros(len(robot.joints))
         self._slots = len(state.due)
         self._rows = [
-            (state.torque[k], state.stiffness[k], state.damping[k], state.position[k],
-             state.velocity[k])
+            Row(state.torque[k], state.stiffness[k], state.damping[k], state.position[k],
+                state.velocity[k])
             for k in range(self._slots)
         ]  # fmt: skip
 
@@ -95,6 +112,8 @@ class Drives:
             torque: the feedforward torques [N m], (n_joints,).
             stiffness, damping: the gains [N m/rad, N m s/rad], (n_joints,).
         """
+        if self._feedback is not None:
+            self._feedback.reset()
         self._state.active[()] = 0
         self._state.pending[()] = 0
         self._state.last_due[()] = 0
@@ -136,20 +155,22 @@ class Drives:
         state = self._state
         pending = int(state.pending)
         active = int(state.active)
+        arrived = False
         while pending:
             following = (active + 1) % self._slots
             if state.due[following] > step:
                 break
-            active, pending = following, pending - 1
+            active, pending, arrived = following, pending - 1, True
             state.active[()] = active
             state.pending[()] = pending
         mode = int(state.mode[active])
         if mode == CommandMode.ACTIVE:
-            torque, stiffness, damping, target, target_velocity = self._rows[active]
-            joint_feedback_torque(
-                torque, stiffness, damping, target, target_velocity, position, velocity,
-                out, self._scratch,
-            )  # fmt: skip
+            command, feedback = self._rows[active], self._feedback
+            if feedback is None or not feedback.write(command, arrived, position, velocity, out):
+                joint_feedback_torque(
+                    command.torque, command.stiffness, command.damping, command.position,
+                    command.velocity, position, velocity, out, self._scratch,
+                )  # fmt: skip
         elif mode == CommandMode.DAMPING:
             np.multiply(velocity, self._negative_damping, out=out)
         else:

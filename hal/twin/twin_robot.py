@@ -13,8 +13,9 @@ from ...runtime.language.signals import Field, Signal
 from ...runtime.language.terrain import Ground, Terrain
 from ..bear.command_queue import CommandQueue
 from ..bear.configuration import Hardware
-from ..bear.driven_robot import DrivenRobot, DriveParameters, joint_gains, read_hardware
+from ..bear.driven_robot import DrivenRobot, DriveParameters, read_hardware
 from ..bear.driver import Driver
+from ..drive_gains import joint_gains
 from ..simulated.parameters import SimulatorParameters
 from ..simulated.plant import Plant
 from ..simulated.rotors import unfit_motor
