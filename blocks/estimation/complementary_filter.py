@@ -61,5 +61,5 @@ class ComplementaryFilter(InertialEstimator):
 
     starts_level = False
 
-    def tick(self, estimator: Estimator) -> KernelCall:
+    def make_call(self, estimator: Estimator) -> KernelCall:
         return KernelCall(filter_tick, estimator)

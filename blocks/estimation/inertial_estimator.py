@@ -125,7 +125,7 @@ class InertialEstimator(Block):
     learning = State(BiasSamples, text="what a bias is learnt from")
 
     @abstractmethod
-    def tick(self, estimator: Estimator) -> KernelCall:
+    def make_call(self, estimator: Estimator) -> KernelCall:
         """What takes a sample, corrects the orientation, weighs the points, and publishes."""
 
     def setup(self) -> None:
@@ -145,7 +145,7 @@ class InertialEstimator(Block):
         )  # fmt: skip
         self.settings = Settings(*(np.zeros(1) for _ in Settings._fields))
         period = self.period
-        self._tick = self.tick(
+        self._tick = self.make_call(
             Estimator(
                 sample,
                 Filter(*(getattr(estimate, name) for name in Filter._fields)),

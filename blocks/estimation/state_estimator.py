@@ -242,7 +242,7 @@ class StateEstimator(InertialEstimator):
         for name, value in zip(GroundSettings._fields, self.ground_settings, strict=True):
             value[0] = getattr(self.params, name)
 
-    def tick(self, estimator: Estimator) -> KernelCall:
+    def make_call(self, estimator: Estimator) -> KernelCall:
         trust = Trust(*(getattr(self.trust, name) for name in Trust._fields))
         return KernelCall(
             estimate_tick, estimator, trust, self.ground_settings, self.params.level_ground

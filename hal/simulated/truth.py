@@ -162,7 +162,9 @@ class TruthReport:
         self._instant = Instant(
             data.qpos[base.positions :],
             data.qvel[base.velocities :],
-            *(data.sensor(name).data for name in ("com", "com_velocity", "angular_momentum")),
+            data.sensor("com").data,
+            data.sensor("com_velocity").data,
+            data.sensor("angular_momentum").data,
             data.site_xpos,
             np.array([data.site(contact.name).id for contact in robot.contacts], dtype=np.int64),
             depth_of_contacts(robot),

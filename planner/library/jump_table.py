@@ -188,7 +188,7 @@ def take(values: Array, first: int, out: Array) -> int:
     """Fill ``out`` with the values from ``first`` on; returns where the next ones begin."""
     for k in range(out.shape[0]):
         out[k] = values[first + k]
-    return first + out.shape[0]
+    return first + len(out)
 
 
 @kernel
