@@ -314,7 +314,8 @@ def replaced(arguments, random):
     new = copy(arguments)
     for a in leaves(new):
         if isinstance(a, np.ndarray) and a.dtype == np.float64:
-            a += (0.1 * np.abs(a) + 1e-3) * random.standard_normal(a.shape)
+            by = (0.1 * np.abs(a) + 1e-3) * random.standard_normal(a.shape)
+            np.add(a, by, out=a, where=np.isfinite(a))
         elif isinstance(a, np.ndarray) and a.dtype == np.bool_:
             a[...] = random.random(a.shape) < 0.5
     return new
