@@ -160,6 +160,7 @@ class TwinRobot(DrivenRobot):
             tuple(params.faults),
         )  # fmt: skip
         self.twin.push = self.push
+        self.twin.plant.truth.attach(self.truth)
         self._hardware = hardware
         self.driver = _driver(robot, params, hardware, self.twin)
         self._queue = CommandQueue(self.driver.loop, robot, params.latency, self.period)
@@ -182,7 +183,7 @@ class TwinRobot(DrivenRobot):
     def read(self) -> None:
         """Publish the newest measurements, and the truth."""
         super().read()
-        self.twin.plant.truth.publish(self.record, self.truth)
+        self.twin.plant.truth.publish()
 
     def write(self) -> None:
         """Send the command on its way to the drives."""
