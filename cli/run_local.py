@@ -41,8 +41,8 @@ GRACE = 15.0
 @dataclass(frozen=True)
 class Wishes:
     """What the command line asks for: settings, where the recording goes (by default where one of
-    the graph goes) and whether it is kept, the name for ``aloft params``, how to print, and
-    whether nothing is compiled."""
+    the graph goes) and whether it is kept, the name for ``aloft params``, how to print,
+    whether nothing is compiled, and the folder of keys, for links over TLS."""
 
     settings: Sequence[str]
     record: Path | None
@@ -51,6 +51,7 @@ class Wishes:
     as_json: bool
     traceback: bool
     plain: bool
+    keys: Path | None = None
 
 
 def run_local(path: Path, wishes: Wishes, out: Console) -> ExitCode:
@@ -102,7 +103,7 @@ def _run_processes(
     Raises:
         AloftError: a part has said nothing.
     """
-    endpoints = _free_endpoints(len(files))
+    endpoints = _free_endpoints(len(files), "tcp" if wishes.keys is None else "tls")
     settings = [
         f"machines.{name}={endpoint}" for name, endpoint in zip(files, endpoints, strict=True)
     ]
@@ -115,6 +116,7 @@ def _run_processes(
                 sys.executable, "-m", "aloft", "run", str(path), *sets, "--machine", machine,
                 "--record", str(file), "--params", params, "--json", "--quiet",
                 *(["--plain"] if wishes.plain else []),
+                *(["--keys", str(wishes.keys)] if wishes.keys is not None else []),
             ]  # fmt: skip
             # in a group of its own, so that Ctrl-C reaches it once, from here
             process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, process_group=0)
@@ -177,13 +179,13 @@ def _wait_for_all(running: Mapping[str, subprocess.Popen[str]]) -> list[signal.S
     return received
 
 
-def _free_endpoints(count: int) -> list[str]:
+def _free_endpoints(count: int, protocol: str) -> list[str]:
     """Endpoints on the loopback that nobody uses at present."""
     with ExitStack() as stack:
         sockets = [stack.enter_context(socket.socket()) for _ in range(count)]
         for made in sockets:
             made.bind(("127.0.0.1", 0))
-        return [f"tcp/127.0.0.1:{made.getsockname()[1]}" for made in sockets]
+        return [f"{protocol}/127.0.0.1:{made.getsockname()[1]}" for made in sockets]
 
 
 def _whole_result(
