@@ -57,7 +57,8 @@ class TwinRobot(DrivenRobot):
 
     A gantry holds the robot in its standing pose until the drives are on and get a first current.
 
-    ``drive_damping`` is not used: drives in damping brake as shorted windings do.
+    ``drive_damping`` is not used: drives in damping brake as shorted windings do. Nor is
+    ``bus_period``: the file of the hardware has it.
     """
 
     outside = "simulated"
