@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,12 +15,14 @@ from .safety_faults import Fault
 
 Array = NDArray[np.float64]
 Counts = NDArray[np.int64]
+Flags = NDArray[np.bool_]
 
 _CRITICAL = 0x7C
 """The bits of a drive's condition with which it has switched its torque off."""
 _ANSWERED = 0x80
 """The bit that every condition has."""
 # What a compiled kernel can return.
+_SILENT_IMU = int(Fault.SILENT_IMU)
 _DRIVE, _SILENT_DRIVE = int(Fault.DRIVE), int(Fault.SILENT_DRIVE)
 _VOLTAGE, _TEMPERATURE, _CURRENT = int(Fault.VOLTAGE), int(Fault.TEMPERATURE), int(Fault.CURRENT)
 _INVALID_JOINTS, _INVALID_IMU = int(Fault.INVALID_JOINTS), int(Fault.INVALID_IMU)
@@ -81,67 +83,86 @@ class Drives(NamedTuple):
     strong: Counts
 
 
-class HealthLimits:
-    """Judges a robot's health once a tick.
+class Health(NamedTuple):
+    """A robot's health: what it reports, the limits, and how long each may be beyond them [ticks].
 
-    Args:
-        params: the limits.
-        period: the time from tick to tick [s].
-        health: what the robot reports.
-        low, hot, strong: ticks in a row each drive was beyond a limit, (n_joints,).
-        invalid: ticks in a row joints, IMU and switches were not valid, (3,).
-        stamps: the last stamp [s], and the number of ticks since it changed, (2,).
+    ``state``, ``imu_age``, ``stamp`` and the flags are fields of ``RobotHealth``; ``invalid`` (3,) and
+    ``stamps`` (2,) of ``SafetyState``.
     """
 
-    def __init__(
-        self, params: HealthParameters, period: float, health: RobotHealth, low: Counts, hot: Counts,
-        strong: Counts, invalid: Counts, stamps: Array,
-    ) -> None:  # fmt: skip
-        self._params, self._health = params, health
-        self._limits = Limits(
+    drives: Drives
+    limits: Limits
+    state: Counts
+    imu_age: Array
+    joints_valid: Flags
+    imu_valid: Flags
+    contacts_valid: Flags
+    stamp: Array
+    invalid: Counts
+    stamps: Array
+    largest_imu_age: float
+    hold: int
+    invalid_hold: int
+    stamp_hold: int
+
+
+class HealthTimers(Protocol):
+    """The memory of what is beyond its limit: see ``SafetyState``."""
+
+    low: Any
+    hot: Any
+    strong: Any
+    invalid: Any
+    stamps: Any
+
+
+def health_of(
+    params: HealthParameters, period: float, health: RobotHealth, timers: HealthTimers
+) -> Health:
+    """What ``judge_health`` judges once a tick, every ``period`` [s]."""
+    return Health(
+        Drives(
+            health.condition, health.age, health.voltage, health.temperature, health.current,
+            timers.low, timers.hot, timers.strong,
+        ),
+        Limits(
             params.lowest_voltage or 0.0,
             params.highest_temperature,
             params.largest_current or np.inf,
             params.answer_age,
-        )
-        self._drives = Drives(
-            health.condition, health.age, health.voltage, health.temperature, health.current,
-            low, hot, strong,
-        )  # fmt: skip
-        self._invalid, self._stamps = invalid, stamps
-        self._hold = round(params.health_hold / period)
-        self._invalid_hold = round(params.invalid_hold / period)
-        self._stamp_hold = max(1, round(params.stamp_age / period))
+        ),
+        health.state, health.imu_age, health.joints_valid, health.imu_valid,
+        health.contacts_valid, health.stamp, timers.invalid, timers.stamps, params.imu_age,
+        round(params.health_hold / period), round(params.invalid_hold / period),
+        max(1, round(params.stamp_age / period)),
+    )  # fmt: skip
 
-    def judge(self) -> tuple[Fault, int, float]:
-        """The gravest fault of this tick, the drive it befell, and the value that was measured."""
-        health, params = self._health, self._params
-        fault, place = judge_drives(self._drives, self._limits, self._hold)
-        if fault == Fault.NONE and float(health.imu_age) > params.imu_age:
-            fault = int(Fault.SILENT_IMU)
-        sensors = judge_sensors(
-            bool(health.joints_valid), bool(health.imu_valid), bool(health.contacts_valid),
-            float(health.stamp), self._invalid, self._stamps, self._invalid_hold, self._stamp_hold,
-        )  # fmt: skip
-        found = Fault(fault or sensors)
-        return found, place, self._measured(found, place)
 
-    def _measured(self, fault: Fault, place: int) -> float:
-        drives = self._drives
-        match fault:
-            case Fault.DRIVE:
-                return float(drives.condition[place])
-            case Fault.SILENT_DRIVE:
-                return float(drives.age[place])
-            case Fault.VOLTAGE:
-                return float(drives.voltage[place])
-            case Fault.TEMPERATURE:
-                return float(drives.temperature[place])
-            case Fault.CURRENT:
-                return float(drives.current[place])
-            case Fault.SILENT_IMU:
-                return float(self._health.imu_age)
-        return 0.0
+@kernel
+def judge_health(health: Health) -> tuple[int, int, float]:
+    """The gravest fault of this tick, the drive it befell, and the value that was measured."""
+    fault, place = judge_drives(health.drives, health.limits, health.hold)
+    if fault == 0 and float(health.imu_age[()]) > health.largest_imu_age:
+        fault = _SILENT_IMU
+    sensors = judge_sensors(
+        bool(health.joints_valid[()]), bool(health.imu_valid[()]), bool(health.contacts_valid[()]),
+        float(health.stamp[()]), health.invalid, health.stamps, health.invalid_hold,
+        health.stamp_hold,
+    )  # fmt: skip
+    found, drives, value = fault if fault != 0 else sensors, health.drives, 0.0
+    if found == _DRIVE:
+        value = float(drives.condition[place])
+    elif found == _SILENT_DRIVE:
+        value = float(drives.age[place])
+    elif found == _VOLTAGE:
+        value = float(drives.voltage[place])
+    elif found == _TEMPERATURE:
+        value = float(drives.temperature[place])
+    elif found == _CURRENT:
+        value = float(drives.current[place])
+    elif found == _SILENT_IMU:
+        value = float(health.imu_age[()])
+    return found, place, value
 
 
 def health_text(fault: Fault, who: str, value: float, params: HealthParameters) -> str:
