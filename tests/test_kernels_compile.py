@@ -18,6 +18,7 @@ import numpy as np
 import pytest
 
 import aloft
+from aloft.mathematics.body_tree import BodyMotion
 from aloft.mathematics.flight_prediction import LandingCost, flight_map
 from aloft.mathematics.joint_feedback import Feedback, Motion, SoftStops
 from aloft.mathematics.kernel import kernel, kernels
@@ -40,6 +41,8 @@ NOT_HOT = {
     "blocks.jumping.landing_heuristic.foot_sides": "of the description, when a graph is loaded",
     "hal.simulated.random_streams._signed": "of exact integers, when a run is restored",
     "hal.bear.supervision._first_lasting": "of plain numbers, in the driver's own Python",
+    "mathematics.body_dynamics.inertias": "memory, when a block is set up",
+    "mathematics.body_tree.body_motion": "memory, when a block is set up",
     "mathematics.active_set.active_set_memory": "memory, when a block is set up",
     "mathematics.flight_prediction.flight_map": "memory, when a block is set up",
     "mathematics.whole_body_reduction.reduction_memory": "memory, when a block is set up",
@@ -77,6 +80,7 @@ LANDING = LandingCost(
     np.array([[-0.01, 0.02], [-0.03, 0.01]]),
     np.array([-0.02, 0.01]),
 )
+MOVING = BodyMotion(*(NORMAL(shape) for shape in ((2, 3, 3), (2, 3), (1, 6), (2, 6), (2, 6))))
 UNUSED = {
     "aloft.mathematics.flight_prediction.map_flight": (
         np.vstack([NORMAL((3, 16)), np.hstack([REGULAR, NORMAL((3, 13))])]), NORMAL((4, 3, 16)),
@@ -137,9 +141,8 @@ UNUSED = {
     "aloft.blocks.control.dynamics.lowest_point": (
         np.array([0.01, 0.0, -0.2]), 0.022, np.eye(3), np.zeros(3),
     ),
-    "aloft.blocks.control.dynamics.rolling_drift": (
-        *(np.linspace(-1.0, 2.0, 3) * k for k in range(1, 7)), np.zeros((2, 3)),
-    ),
+    "aloft.blocks.control.dynamics.rolling_drift": (MOVING, 1, POSE[0], POSE[1], np.zeros(3)),
+    "aloft.robots.contact_kinematics.see_pattern": (POSE[1:3], REGULAR, *np.ones((3, 3))),
     "aloft.mathematics.joint_feedback.integrate_accelerations": (
         0.002, 0.02, np.ones(10), Motion(np.ones(10), np.ones(10)), Motion(np.ones(10), np.ones(10)),
     ),
@@ -174,7 +177,6 @@ UNUSED = {
     ),
     "aloft.blocks.control.balance_target.add_quadratic_growth": (np.ones(3), 0.6, 0.25, np.zeros(3), np.zeros(3)),
     "aloft.blocks.general.periods.first_tick": (0.5, 0.002),
-    "aloft.mathematics.linear.multiply_vector": (POSE, POSE[0], np.zeros(4)),
     "aloft.mathematics.linear.add_product": (POSE, POSE[0], np.ones(4)),
     "aloft.mathematics.linear.multiply_matrices": (POSE, TARGET[1:], np.zeros((4, 3))),
     "aloft.mathematics.discretisation.matrix_exponential": (
@@ -270,6 +272,8 @@ def calls():
         other = {"estimator.use": "blocks.InvariantKalmanFilter", "legs.beyond": "slide"}
         other["wbc.solver"] = "daqp"
         aloft.load(ROOT / "graphs/jump.yaml", other).run(duration=0.1)
+        other = {"estimator.use": "blocks.ComplementaryFilter", "estimator.flight": "ballistic"}
+        aloft.load(ROOT / "graphs/jump.yaml", other).run(duration=0.02)
         weak = {"wbc.torque_margin": 0.15, "wbc.friction": 0.05}  # constraints come and go
         aloft.load(ROOT / "graphs/jump.yaml", weak).run(duration=0.1)
     for name, arguments in UNUSED.items():
@@ -310,7 +314,8 @@ def replaced(arguments, random):
     new = copy(arguments)
     for a in leaves(new):
         if isinstance(a, np.ndarray) and a.dtype == np.float64:
-            a += (0.1 * np.abs(a) + 1e-3) * random.standard_normal(a.shape)
+            by = (0.1 * np.abs(a) + 1e-3) * random.standard_normal(a.shape)
+            np.add(a, by, out=a, where=np.isfinite(a))
         elif isinstance(a, np.ndarray) and a.dtype == np.bool_:
             a[...] = random.random(a.shape) < 0.5
     return new

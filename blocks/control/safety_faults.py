@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from enum import IntEnum
 
+from ..signals import SwitchFault
+
 
 class Fault(IntEnum):
     """The reason why the robot was put into damping."""
@@ -44,6 +46,8 @@ class Fault(IntEnum):
     """The foot switches' readings were marked as not valid for too long."""
     STALE_HEALTH = 17
     """The robot's time stamp stopped changing."""
+    SWITCH = 18
+    """A foot switch is stuck or bounces."""
 
 
 TEXTS = {
@@ -56,6 +60,14 @@ TEXTS = {
     Fault.SOLVER: "the whole-body controller failed too often in a row",
 }
 """The faults of motion and computation in words; those of the hardware name a drive and a value."""
+
+
+SWITCH_TEXTS = {
+    SwitchFault.STUCK_CLOSED: "is stuck: it was closed in the air",
+    SwitchFault.STUCK_OPEN: "is stuck: it was open under a foot that stood",
+    SwitchFault.BOUNCING: "bounces: it opened and closed too often",
+}
+"""What is wrong with a foot switch, in words."""
 
 
 def is_of_hardware(fault: Fault) -> bool:

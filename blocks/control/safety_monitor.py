@@ -21,11 +21,13 @@ from ..signals import (
     JointCommand,
     JointState,
     RobotHealth,
+    SwitchFault,
+    SwitchHealth,
     WholeBodyCommand,
 )
 from ..signals.drive_conditions import HEALTHY
 from .health_limits import UNSTAMPED, HealthLimits, HealthParameters, health_text
-from .safety_faults import TEXTS, Fault, is_of_hardware
+from .safety_faults import SWITCH_TEXTS, TEXTS, Fault, is_of_hardware
 
 Array = NDArray[np.float64]
 
@@ -53,8 +55,10 @@ class SafetyState(Signal):
     strong = Field("n_joints", dtype="int64", text="ticks in a row each current was too large")
     invalid = Field(3, dtype="int64", text="ticks in a row joints, IMU, switches were not valid")
     stamps = Field(2, text="the last time stamp [s], and the ticks since it changed")
-    fault_place = Field(dtype="int64", text="the motor whose drive was at fault, by its index")
-    fault_value = Field(text="what it measured, in the unit of that signal")
+    fault_place = Field(
+        dtype="int64", text="index of the motor, or of the switch, that was at fault"
+    )
+    fault_value = Field(text="what it measured, in the unit of its signal")
 
 
 class SafetyMonitor(Block):
@@ -73,7 +77,8 @@ class SafetyMonitor(Block):
     * while the drives are on, the robot's own report (``health``) is bad: a drive reports an error,
       its last answer is older than ``answer_age`` or the sensor board's packet than ``imu_age``; a
       voltage, temperature or current is beyond its limit for ``health_hold``; joints, IMU or
-      switches are marked as not valid for ``invalid_hold``; the time stamp stays for ``stamp_age``.
+      switches are marked as not valid for ``invalid_hold``; the time stamp stays for ``stamp_age``;
+    * a foot switch is at fault, and ``SwitchMonitor`` asks to stop.
 
     In damping the command is zero torque and stiffness, the measured angle, zero velocity and the
     gain ``damping``; all values are finite whatever the inputs are. Every tick is judged, also
@@ -130,6 +135,7 @@ class SafetyMonitor(Block):
         },
         text="how drives and sensors are; not judged where it is not wired",
     )  # fmt: skip
+    switches = Input(SwitchHealth, default={}, text="which foot switches are at fault")
     command = Output(JointCommand, text="what the drives get")
     state = State(SafetyState, text="timers and the fault")
 
@@ -173,6 +179,9 @@ class SafetyMonitor(Block):
         if DrivePhase.OFF < self.health.state[()] < DrivePhase.DAMPED:
             of_health, place, value = self._health.judge()
             fault = fault or of_health
+        if fault == Fault.NONE and self.switches.stop[()]:
+            fault, place = Fault.SWITCH, int((self.switches.fault != SwitchFault.NONE).argmax())
+            value = float(self.switches.fault[place])
         if fault != Fault.NONE and state.fault[()] == Fault.NONE:
             state.fault[()] = fault
             state.fault_tick[()] = self.tick
@@ -213,6 +222,9 @@ class SafetyMonitor(Block):
         """A fault in words."""
         if not is_of_hardware(fault):
             return TEXTS[fault]
+        if fault == Fault.SWITCH:
+            point = self.robot.contacts[int(self.state.fault_place)].name
+            return f"foot switch {point} {SWITCH_TEXTS[SwitchFault(int(self.state.fault_value))]}"
         motor = self.robot.transmission.motors[int(self.state.fault_place)]
         return health_text(fault, motor, float(self.state.fault_value), self.params)
 

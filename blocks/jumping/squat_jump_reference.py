@@ -102,10 +102,10 @@ class SquatJumpReference(Block):
         robot, p = self.robot, self.params
         names = set(SquatJumpTask.__dataclass_fields__)
         task = SquatJumpTask(**{k: v for k, v in p.model_dump().items() if k in names})
-        self._reader = JumpTableReader(_plan(robot.model_dump_json(), task))
+        self._reader = JumpTableReader(_plan(robot.model_dump_json(), task), self.reference)
 
     def step(self) -> None:
-        self._reader.read(self.time, self.reference, self.params.lead)
+        self._reader.read(self.time, self.params.lead)
 
 
 @lru_cache(maxsize=8)

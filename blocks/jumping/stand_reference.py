@@ -70,11 +70,11 @@ class StandReference(Block):
         p = self.params
         times = (p.stand_time, p.squat_time, p.pause_time, p.rise_time)
         self._reader = JumpTableReader(
-            _plan(self.robot.model_dump_json(), float(p.squat_depth), times)
+            _plan(self.robot.model_dump_json(), float(p.squat_depth), times), self.reference
         )
 
     def step(self) -> None:
-        self._reader.read(self.time, self.reference, self.params.lead)
+        self._reader.read(self.time, self.params.lead)
 
 
 @lru_cache(maxsize=8)

@@ -184,6 +184,8 @@ class MujocoRobot(Robot):
         """Draw the world from the seed and build it."""
         robot, params = self.robot, self.params
         plant = self.plant = Plant(robot, params, self.period, self.physics, self.record)
+        plant.attach(self.imu, self.joints)
+        plant.truth.attach(self.truth)
         self._steps = round(self.period / params.timestep)
         self._jitter = plant.streams[Purpose.JITTER]
         damping = RELEASED * plant.damping
@@ -194,7 +196,6 @@ class MujocoRobot(Robot):
             steps = round(params.bus_period / params.timestep)
             feedback = MotorFeedback(robot, params, params.bus_period, steps, self.feedback)
         self._drives = Drives(robot, damping, self.drives, self.record, feedback)
-        self._torque = np.zeros(len(robot.joints))
 
     def open(self) -> None:
         """Stand on the ground, settle, and wait for the first command."""
@@ -205,12 +206,10 @@ class MujocoRobot(Robot):
 
     def read(self) -> None:
         """Publish the sensors and the truth at the present instant."""
-        plant, record, sensors = self.plant, self.record, self.plant.sensors
-        plant.read_imu(self.imu)
-        np.divide(record.joint_torque, int(record.steps), out=self._torque)
-        sensors.read_joints(plant.position, plant.velocity, self._torque, self.joints)
-        sensors.read_switches(int(self.physics.step), record, self.contacts)
-        plant.truth.publish(record, self.truth)
+        plant = self.plant
+        plant.read()
+        plant.sensors.read_switches(int(self.physics.step), self.record, self.contacts)
+        plant.truth.publish()
 
     def write(self) -> None:
         """Send the command on its way to the drives."""

@@ -57,7 +57,8 @@ class TwinRobot(DrivenRobot):
 
     A gantry holds the robot in its standing pose until the drives are on and get a first current.
 
-    ``drive_damping`` is not used: drives in damping brake as shorted windings do.
+    ``drive_damping`` is not used: drives in damping brake as shorted windings do. Nor is
+    ``bus_period``: the file of the hardware has it.
     """
 
     outside = "simulated"
@@ -159,6 +160,7 @@ class TwinRobot(DrivenRobot):
             tuple(params.faults),
         )  # fmt: skip
         self.twin.push = self.push
+        self.twin.plant.truth.attach(self.truth)
         self._hardware = hardware
         self.driver = _driver(robot, params, hardware, self.twin)
         self._queue = CommandQueue(self.driver.loop, robot, params.latency, self.period)
@@ -181,7 +183,7 @@ class TwinRobot(DrivenRobot):
     def read(self) -> None:
         """Publish the newest measurements, and the truth."""
         super().read()
-        self.twin.plant.truth.publish(self.record, self.truth)
+        self.twin.plant.truth.publish()
 
     def write(self) -> None:
         """Send the command on its way to the drives."""

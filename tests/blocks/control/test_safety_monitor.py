@@ -7,7 +7,7 @@ import pytest
 
 from aloft.blocks.control.safety_faults import Fault
 from aloft.blocks.control.safety_monitor import SafetyMonitor
-from aloft.blocks.signals import CommandMode, DrivePhase
+from aloft.blocks.signals import CommandMode, DrivePhase, SwitchFault
 from aloft.robots.description import find_robot
 from aloft.runtime.language.errors import BlockError
 from aloft.runtime.testing import BlockBench
@@ -310,6 +310,17 @@ def test_a_fall_does_not_end_the_run_but_says_why(bench):
     metrics = bench.block.metrics()
     assert metrics["safety_reason"] == "the base leant more than `tilt_limit`"
     assert "success" not in metrics and bench.clock.stop_reason is None
+
+
+def test_a_foot_switch_at_fault_ends_the_run_when_the_robot_may_stop(bench):
+    bench.set("switches", fault=[0, 0, 0, int(SwitchFault.STUCK_CLOSED)], stop=False)
+    bench.step(100)
+    assert fault(bench) == Fault.NONE
+    bench.set("switches", stop=True)
+    bench.step()
+    assert_damps(bench, Fault.SWITCH)
+    text = f"foot switch {ROBOT.contacts[3].name} is stuck: it was closed in the air"
+    assert bench.block.metrics()["safety_reason"] == text == bench.clock.stop_reason
 
 
 def test_needs_a_robot():
