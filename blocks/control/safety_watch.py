@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ...mathematics.kernel import kernel
 from ...mathematics.rotations import tilt
 from ..signals import CommandMode, DrivePhase, SwitchFault
-from .health_limits import Health, judge_health
+from .health_limits import Health, judge_health, measured
 from .safety_faults import Fault
 
 Array = NDArray[np.float64]
@@ -202,7 +202,9 @@ def watch(
     """
     fault, place, value = judge(desired, robot, bounds, timers), 0, 0.0
     if _OFF < health.state[()] < _DAMPED:
-        found, place, value = judge_health(health)
+        judge_health(health.drives, health.sensors, health.limits, health.verdict)
+        found, place = int(health.verdict[0]), int(health.verdict[1])
+        value = measured(health, found, place)
         if fault == 0:
             fault = found
     if fault == 0 and switches.stop[()]:
