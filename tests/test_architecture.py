@@ -347,3 +347,11 @@ def test_hidden_configuration_is_refused() -> None:
         if name not in only_places
     ]
     assert not wrong
+
+
+def test_documents_that_the_code_names_are_there() -> None:
+    for path in project_files():
+        if path.relative_to(ROOT).parts[0] in ("tests", "docs", "cli"):
+            continue  # command lines write pages whose names they say
+        for name in re.findall(r"\b[\w/]+\.md\b", path.read_text(encoding="utf-8")):
+            assert (ROOT / name).is_file(), f"{path.relative_to(ROOT)} names {name}"

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from enum import IntEnum
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,36 +11,28 @@ from numpy.typing import NDArray
 from ...mathematics.kernel import kernel
 from ...mathematics.rotations import tilt
 from ...runtime.language.block import Block, Input, Metric, Output, State
-from ...runtime.language.parameters import Parameters, live_parameter, parameter
+from ...runtime.language.parameters import live_parameter, parameter
 from ...runtime.language.per_joint import PerJoint
 from ...runtime.language.signals import Field, Signal
-from ..signals import BaseState, CommandMode, JointCommand, JointState, WholeBodyCommand
+from ..signals import (
+    BaseState,
+    CommandMode,
+    DrivePhase,
+    JointCommand,
+    JointState,
+    RobotHealth,
+    SwitchFault,
+    SwitchHealth,
+    WholeBodyCommand,
+)
+from ..signals.drive_conditions import HEALTHY
+from .health_limits import UNSTAMPED, HealthLimits, HealthParameters, health_text
+from .safety_faults import SWITCH_TEXTS, TEXTS, Fault, is_of_hardware
 
 Array = NDArray[np.float64]
 
 _DAMPED_SPEED = 20.0
 """Joint speed [rad/s] at which the default damping asks for the motors' peak torque."""
-
-
-class Fault(IntEnum):
-    """The reason why the robot was put into damping."""
-
-    NONE = 0
-    """There is no fault."""
-    TILT = 1
-    """The base leant too far for too long."""
-    JOINT_LIMIT = 2
-    """A joint went beyond its limits."""
-    JOINT_SPEED = 3
-    """A joint turned too fast for too long."""
-    STALE_SENSORS = 4
-    """Joint readings stopped changing."""
-    ABSURD_STATE = 5
-    """A state is not finite or beyond anything the robot can do."""
-    ABSURD_COMMAND = 6
-    """A command is not finite or beyond anything the drives can do."""
-    SOLVER = 7
-    """The whole-body controller failed too often in a row."""
 
 
 class SafetyState(Signal):
@@ -59,6 +50,15 @@ class SafetyState(Signal):
     last_position = Field("n_joints", unit="rad", text="joint angles of the last tick")
     last_velocity = Field("n_joints", unit="rad/s", text="joint velocities of the last tick")
     started = Field(dtype="bool", text="whether there was a last tick")
+    low = Field("n_joints", dtype="int64", text="ticks in a row each voltage was too low")
+    hot = Field("n_joints", dtype="int64", text="ticks in a row each winding was too hot")
+    strong = Field("n_joints", dtype="int64", text="ticks in a row each current was too large")
+    invalid = Field(3, dtype="int64", text="ticks in a row joints, IMU, switches were not valid")
+    stamps = Field(2, text="the last time stamp [s], and the ticks since it changed")
+    fault_place = Field(
+        dtype="int64", text="index of the motor, or of the switch, that was at fault"
+    )
+    fault_value = Field(text="what it measured, in the unit of its signal")
 
 
 class SafetyMonitor(Block):
@@ -73,16 +73,22 @@ class SafetyMonitor(Block):
     * joint readings have not changed by a single bit for ``stale_ticks`` ticks (zero: never;
       a simulator without noise may stand that still);
     * a state or a command is not finite, or beyond 10 m/s, 100 rad/s or its ``torque_limit``;
-    * the whole-body controller has not solved for ``unsolved_ticks`` ticks in a row.
+    * the whole-body controller has not solved for ``unsolved_ticks`` ticks in a row;
+    * while the drives are on, the robot's own report (``health``) is bad: a drive reports an error,
+      its last answer is older than ``answer_age`` or the sensor board's packet than ``imu_age``; a
+      voltage, temperature or current is beyond its limit for ``health_hold``; joints, IMU or
+      switches are marked as not valid for ``invalid_hold``; the time stamp stays for ``stamp_age``;
+    * a foot switch is at fault, and ``SwitchMonitor`` asks to stop.
 
     In damping the command is zero torque and stiffness, the measured angle, zero velocity and the
     gain ``damping``; all values are finite whatever the inputs are. Every tick is judged, also
     after a fault. Limits and damping are given by joint name or pattern; by default they follow
-    from the robot's motors. The block does not watch temperature, voltage or deadlines, and it does
-    not stop the run: the score does.
+    from the robot's motors. A fault of the hardware ends the run, with the drive and the value that
+    was measured as its reason. After any other fault the run goes on, damped: the score ends it. The
+    block does not watch deadlines.
     """
 
-    class Params(Parameters):
+    class Params(HealthParameters):
         tilt_limit: float = parameter(1.2, unit="rad", gt=0.0, le=math.pi, text="largest lean")
         tilt_hold: float = parameter(
             0.02, unit="s", ge=0.0, text="how long the base may lean further"
@@ -121,6 +127,15 @@ class SafetyMonitor(Block):
     base = Input(BaseState, text="the estimated base")
     joints = Input(JointState, text="the measured joints")
     wbc = Input(WholeBodyCommand, text="whether the controller has solved")
+    health = Input(
+        RobotHealth,
+        default={
+            "state": int(DrivePhase.DRIVING), "condition": HEALTHY, "stamp": UNSTAMPED,
+            "joints_valid": True, "imu_valid": True, "contacts_valid": True,
+        },
+        text="how drives and sensors are; not judged where it is not wired",
+    )  # fmt: skip
+    switches = Input(SwitchHealth, default={}, text="which foot switches are at fault")
     command = Output(JointCommand, text="what the drives get")
     state = State(SafetyState, text="timers and the fault")
 
@@ -139,6 +154,10 @@ class SafetyMonitor(Block):
         self.on_parameters()
         self._tilt_ticks = round(self.params.tilt_hold / self.period)
         self._joint_ticks = round(self.params.joint_hold / self.period)
+        state = self.state
+        self._health = HealthLimits(
+            p, self.period, self.health, state.low, state.hot, state.strong, state.invalid, state.stamps
+        )  # fmt: skip
         self._commands = (
             (self.desired.torque, torque_limit),
             (self.desired.position, np.full(n, 100.0)),
@@ -156,9 +175,20 @@ class SafetyMonitor(Block):
     def step(self) -> None:
         fault = self._judge()
         state, desired, command = self.state, self.desired, self.command
+        place, value = 0, 0.0
+        if DrivePhase.OFF < self.health.state[()] < DrivePhase.DAMPED:
+            of_health, place, value = self._health.judge()
+            fault = fault or of_health
+        if fault == Fault.NONE and self.switches.stop[()]:
+            fault, place = Fault.SWITCH, int((self.switches.fault != SwitchFault.NONE).argmax())
+            value = float(self.switches.fault[place])
         if fault != Fault.NONE and state.fault[()] == Fault.NONE:
             state.fault[()] = fault
             state.fault_tick[()] = self.tick
+            state.fault_place[()] = place
+            state.fault_value[()] = value
+            if is_of_hardware(fault):
+                self.request_stop(self._reason(fault))
         if state.fault[()] == Fault.NONE:
             command.mode[()] = desired.mode
             command.torque[...] = desired.torque
@@ -182,7 +212,21 @@ class SafetyMonitor(Block):
         if fault != Fault.NONE:
             period = self.context.clock.base_period
             result["safety_fault_time_s"] = int(self.state.fault_tick[()]) * period
+            result["safety_reason"] = self._reason(fault)
+            if is_of_hardware(fault):
+                result["success"] = False
+                result["reason"] = f"{self.context.path}: {self._reason(fault)}"
         return result
+
+    def _reason(self, fault: Fault) -> str:
+        """A fault in words."""
+        if not is_of_hardware(fault):
+            return TEXTS[fault]
+        if fault == Fault.SWITCH:
+            point = self.robot.contacts[int(self.state.fault_place)].name
+            return f"foot switch {point} {SWITCH_TEXTS[SwitchFault(int(self.state.fault_value))]}"
+        motor = self.robot.transmission.motors[int(self.state.fault_place)]
+        return health_text(fault, motor, float(self.state.fault_value), self.params)
 
     def _judge(self) -> Fault:
         """The gravest fault of this tick; all timers are updated."""

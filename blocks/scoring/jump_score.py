@@ -22,6 +22,7 @@ from .jump_series import (
 )
 from .stand_criteria import NEVER
 from .stand_following import begin, note_fall, note_feet, note_machine, note_rest
+from .stand_metrics import judgement_metrics, rest_metrics
 
 
 class JumpScore(Block):
@@ -116,17 +117,7 @@ class JumpScore(Block):
         flown = record.lift_off_time != NEVER
         landed = record.touchdown_time != NEVER
         judged = record.judged_time != NEVER
-        values: dict[str, Metric] = {
-            "success": failure is None,
-            "reason": failure or "all criteria hold",
-            "qp_failures": int(record.failures),
-            "saturated_share": float(record.saturated / record.ticks),
-            "peak_motor_torque_nm": float(record.peak_torque),
-            "peak_motor_speed_rad_s": float(record.peak_speed),
-            "forbidden_contacts": int(record.forbidden),
-            "joint_limit_violation_rad": float(record.violation),
-            "motor_overload_nm": float(record.overload),
-        }
+        values = judgement_metrics(record, failure)
         if self.params.jumps > 1:
             values |= {"jumps": made, "worst_landing_error_m": float(self.series.place_error)}
         if flown:
@@ -149,13 +140,7 @@ class JumpScore(Block):
                 "jump_yaw_deg": degrees(feet_turned(record)),
             }
         if judged:
-            values |= {
-                "final_tilt_deg": degrees(record.tilt),
-                "final_com_speed_m_s": float(record.com_speed),
-                "final_angular_speed_rad_s": float(record.angular_speed),
-                "final_support_margin_m": float(record.margin),
-                "final_load_share": float(record.load_share),
-            }
+            values |= rest_metrics(record)
         if self._planned:
             values |= {
                 "planned_flight_time_s": float(record.planned_flight),

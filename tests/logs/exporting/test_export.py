@@ -13,10 +13,9 @@ from pyarrow import parquet
 from aloft import load
 from aloft.logs.exporting.difference import ComparisonError, compare_runs, lift_off_tick
 from aloft.logs.exporting.export import export_mcap, export_parquet
-from aloft.logs.exporting.known_channels import quaternions_of_matrices
 from aloft.logs.file.reader import RecordedRun, read
 from aloft.logs.recording.recorder import Recorder
-from aloft.robots.kinematics import link_poses, matrices_of_quaternions
+from aloft.robots.kinematics import link_poses, matrices_of_quaternions, quaternions_of_matrices
 from aloft.robots.robot_description import RobotDescription
 
 ROOT = Path(__file__).parents[3]

@@ -22,14 +22,30 @@ in ``kappa`` and runs at the rate of the bus instead.
 
 from __future__ import annotations
 
+from typing import Protocol
+
 import numpy as np
 from numpy.typing import NDArray
 
-from ...blocks.signals import JointCommand
-from ...robots.robot_description import RobotDescription
-from ...robots.transmission import Transmission
+from ..robots.robot_description import RobotDescription
+from ..robots.transmission import Transmission
 
 Array = NDArray[np.float64]
+
+
+class JointTargets(Protocol):
+    """What a command says of the joints: ``JointCommand`` without its mode, each (n_joints,)."""
+
+    @property
+    def torque(self) -> Array: ...
+    @property
+    def position(self) -> Array: ...
+    @property
+    def velocity(self) -> Array: ...
+    @property
+    def stiffness(self) -> Array: ...
+    @property
+    def damping(self) -> Array: ...
 
 
 class DriveGoals:
@@ -60,7 +76,7 @@ class DriveGoals:
         self._share, self._own = np.zeros(n), np.zeros(n)
 
     def follow(
-        self, command: JointCommand, position: Array, velocity: Array, joint_position: Array,
+        self, command: JointTargets, position: Array, velocity: Array, joint_position: Array,
         joint_velocity: Array,
     ) -> None:  # fmt: skip
         """Set the goals for an active command and the measured motion of motors and joints."""

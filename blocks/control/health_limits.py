@@ -1,0 +1,248 @@
+"""Judges what the drives and sensors report of themselves against limits."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...mathematics.kernel import kernel
+from ...runtime.language.parameters import Parameters, parameter
+from ..signals import RobotHealth
+from ..signals.drive_conditions import describe
+from .safety_faults import Fault
+
+Array = NDArray[np.float64]
+Counts = NDArray[np.int64]
+
+_CRITICAL = 0x7C
+"""The bits of a drive's condition with which it has switched its torque off."""
+_ANSWERED = 0x80
+"""The bit that every condition has."""
+# What a compiled kernel can return.
+_DRIVE, _SILENT_DRIVE = int(Fault.DRIVE), int(Fault.SILENT_DRIVE)
+_VOLTAGE, _TEMPERATURE, _CURRENT = int(Fault.VOLTAGE), int(Fault.TEMPERATURE), int(Fault.CURRENT)
+_INVALID_JOINTS, _INVALID_IMU = int(Fault.INVALID_JOINTS), int(Fault.INVALID_IMU)
+_INVALID_CONTACTS, _STALE_HEALTH = int(Fault.INVALID_CONTACTS), int(Fault.STALE_HEALTH)
+UNSTAMPED = -1.0
+"""The stamp of a robot that does not say when it measured."""
+
+
+class HealthParameters(Parameters):
+    """How a robot's hardware may be before it is put into damping."""
+
+    lowest_voltage: float | None = parameter(
+        None, unit="V", gt=0.0, text="lowest supply voltage of a drive; none: not judged"
+    )
+    highest_temperature: float = parameter(
+        80.0, gt=0.0, le=200.0, text="highest temperature of a winding [deg C]"
+    )
+    largest_current: float | None = parameter(
+        None, unit="A", gt=0.0, text="largest measured current of a drive; none: not judged"
+    )
+    health_hold: float = parameter(
+        0.02, unit="s", ge=0.0, text="how long voltage, temperature or current may be beyond"
+    )
+    answer_age: float = parameter(
+        0.02, unit="s", gt=0.0, text="oldest answer of a drive that may be used"
+    )
+    imu_age: float = parameter(
+        0.02, unit="s", gt=0.0, text="oldest packet of the sensor board that may be used"
+    )
+    invalid_hold: float = parameter(
+        0.1, unit="s", ge=0.0,
+        text="how long joints, IMU or switches may be marked as not valid",
+    )  # fmt: skip
+    stamp_age: float = parameter(
+        0.05, unit="s", gt=0.0, text="how long the robot's time stamp may stay the same"
+    )
+
+
+class Limits(NamedTuple):
+    """The limits as numbers; infinite where there is none."""
+
+    lowest_voltage: float
+    highest_temperature: float
+    largest_current: float
+    answer_age: float
+
+
+class Drives(NamedTuple):
+    """What the drives report, and for how many ticks in a row it was beyond a limit."""
+
+    condition: Counts
+    age: Array
+    voltage: Array
+    temperature: Array
+    current: Array
+    low: Counts
+    hot: Counts
+    strong: Counts
+
+
+class HealthLimits:
+    """Judges a robot's health once a tick.
+
+    Args:
+        params: the limits.
+        period: the time from tick to tick [s].
+        health: what the robot reports.
+        low, hot, strong: ticks in a row each drive was beyond a limit, (n_joints,).
+        invalid: ticks in a row joints, IMU and switches were not valid, (3,).
+        stamps: the last stamp [s], and the number of ticks since it changed, (2,).
+    """
+
+    def __init__(
+        self, params: HealthParameters, period: float, health: RobotHealth, low: Counts, hot: Counts,
+        strong: Counts, invalid: Counts, stamps: Array,
+    ) -> None:  # fmt: skip
+        self._params, self._health = params, health
+        self._limits = Limits(
+            params.lowest_voltage or 0.0,
+            params.highest_temperature,
+            params.largest_current or np.inf,
+            params.answer_age,
+        )
+        self._drives = Drives(
+            health.condition, health.age, health.voltage, health.temperature, health.current,
+            low, hot, strong,
+        )  # fmt: skip
+        self._invalid, self._stamps = invalid, stamps
+        self._hold = round(params.health_hold / period)
+        self._invalid_hold = round(params.invalid_hold / period)
+        self._stamp_hold = max(1, round(params.stamp_age / period))
+
+    def judge(self) -> tuple[Fault, int, float]:
+        """The gravest fault of this tick, the drive it befell, and the value that was measured."""
+        health, params = self._health, self._params
+        fault, place = judge_drives(self._drives, self._limits, self._hold)
+        if fault == Fault.NONE and float(health.imu_age) > params.imu_age:
+            fault = int(Fault.SILENT_IMU)
+        sensors = judge_sensors(
+            bool(health.joints_valid), bool(health.imu_valid), bool(health.contacts_valid),
+            float(health.stamp), self._invalid, self._stamps, self._invalid_hold, self._stamp_hold,
+        )  # fmt: skip
+        found = Fault(fault or sensors)
+        return found, place, self._measured(found, place)
+
+    def _measured(self, fault: Fault, place: int) -> float:
+        drives = self._drives
+        match fault:
+            case Fault.DRIVE:
+                return float(drives.condition[place])
+            case Fault.SILENT_DRIVE:
+                return float(drives.age[place])
+            case Fault.VOLTAGE:
+                return float(drives.voltage[place])
+            case Fault.TEMPERATURE:
+                return float(drives.temperature[place])
+            case Fault.CURRENT:
+                return float(drives.current[place])
+            case Fault.SILENT_IMU:
+                return float(self._health.imu_age)
+        return 0.0
+
+
+def health_text(fault: Fault, who: str, value: float, params: HealthParameters) -> str:
+    """A fault of the hardware in words, with the limit and the value that was measured.
+
+    Args:
+        fault: the reason.
+        who: the motor of the drive it befell.
+        value: what was measured, in the unit of its signal.
+        params: the limits.
+    """
+    match fault:
+        case Fault.DRIVE:
+            return f"drive {who}: {describe(int(value))}"
+        case Fault.SILENT_DRIVE:
+            return (
+                f"drive {who} has not answered for {1e3 * value:.0f} ms; answer_age is "
+                f"{1e3 * params.answer_age:g} ms"
+            )
+        case Fault.VOLTAGE:
+            return (
+                f"drive {who}: {value:.1f} V is below lowest_voltage, {params.lowest_voltage:g} V"
+            )
+        case Fault.TEMPERATURE:
+            return (
+                f"drive {who}: its winding has {value:.0f} deg C; highest_temperature is "
+                f"{params.highest_temperature:g}"
+            )
+        case Fault.CURRENT:
+            return f"drive {who}: {value:.1f} A; largest_current is {params.largest_current:g} A"
+        case Fault.SILENT_IMU:
+            return (
+                f"the sensor board has sent nothing for {1e3 * value:.0f} ms; imu_age is "
+                f"{1e3 * params.imu_age:g} ms"
+            )
+        case Fault.STALE_HEALTH:
+            return f"the robot has measured nothing new for {1e3 * params.stamp_age:g} ms"
+    what = {
+        Fault.INVALID_JOINTS: "joint readings were",
+        Fault.INVALID_IMU: "IMU's readings were",
+        Fault.INVALID_CONTACTS: "foot switches' readings were",
+    }[fault]
+    return f"the {what} marked as not valid for more than {1e3 * params.invalid_hold:g} ms"
+
+
+@kernel
+def judge_drives(drives: Drives, limits: Limits, hold: int) -> tuple[int, int]:
+    """The gravest fault of any drive and its index; all counts are updated.
+
+    A voltage of zero is one that is not measured.
+    """
+    fault, place = 0, 0
+    for k in range(drives.condition.shape[0]):
+        condition = int(drives.condition[k])
+        voltage = float(drives.voltage[k])
+        low = 0.0 < voltage < limits.lowest_voltage
+        hot = not float(drives.temperature[k]) <= limits.highest_temperature
+        strong = not abs(float(drives.current[k])) <= limits.largest_current
+        drives.low[k] = int(drives.low[k]) + 1 if low else 0
+        drives.hot[k] = int(drives.hot[k]) + 1 if hot else 0
+        drives.strong[k] = int(drives.strong[k]) + 1 if strong else 0
+        found = 0
+        if condition & _CRITICAL != 0 or condition & _ANSWERED == 0:
+            found = _DRIVE
+        elif not float(drives.age[k]) <= limits.answer_age:
+            found = _SILENT_DRIVE
+        elif drives.low[k] > hold:
+            found = _VOLTAGE
+        elif drives.hot[k] > hold:
+            found = _TEMPERATURE
+        elif drives.strong[k] > hold:
+            found = _CURRENT
+        if found != 0 and (fault == 0 or found < fault):
+            fault, place = found, k
+    return fault, place
+
+
+@kernel
+def judge_sensors(
+    joints: bool,
+    imu: bool,
+    contacts: bool,
+    stamp: float,
+    invalid: Counts,
+    stamps: Array,
+    invalid_hold: int,
+    stamp_hold: int,
+) -> int:
+    """The gravest fault of what is measured; all counts are updated."""
+    invalid[0] = 0 if joints else int(invalid[0]) + 1
+    invalid[1] = 0 if imu else int(invalid[1]) + 1
+    invalid[2] = 0 if contacts else int(invalid[2]) + 1
+    same = stamp >= 0.0 and stamp == float(stamps[0])
+    stamps[1] = float(stamps[1]) + 1.0 if same else 0.0
+    stamps[0] = stamp
+    if invalid[0] > invalid_hold:
+        return _INVALID_JOINTS
+    if invalid[1] > invalid_hold:
+        return _INVALID_IMU
+    if invalid[2] > invalid_hold:
+        return _INVALID_CONTACTS
+    if float(stamps[1]) > stamp_hold:
+        return _STALE_HEALTH
+    return 0
