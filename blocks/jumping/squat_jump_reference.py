@@ -105,11 +105,7 @@ class SquatJumpReference(Block):
         self._reader = JumpTableReader(_plan(robot.model_dump_json(), task), self.reference)
 
     def step(self) -> None:
-<<<<<<< HEAD
-        self._reader.read(self.time, self.reference, self.params.lead, self.period)
-=======
-        self._reader.read(self.time, self.params.lead)
->>>>>>> main
+        self._reader.read(self.time, self.params.lead, self.period)
 
 
 @lru_cache(maxsize=8)
