@@ -15,11 +15,11 @@ from ...mathematics.capture_step import (
     spread_to_feet,
     swing_points,
 )
+from ...mathematics.rotations import mean_heading
 from ...mathematics.support_margin import support_margin
 from ...runtime.language.block import Block, Input, Output, State
 from ...runtime.language.parameters import Parameters, live_parameter
 from ...runtime.language.signals import Field, Signal
-from ..control.balance_target import mean_heading
 from ..signals import DynamicsTerms, JumpReference, Phase, PhaseState
 from .landing_heuristic import foot_sides, standing_feet
 
