@@ -18,6 +18,7 @@ import numpy as np
 import pytest
 
 import aloft
+from aloft.mathematics.body_tree import BodyMotion
 from aloft.mathematics.flight_prediction import LandingCost, flight_map
 from aloft.mathematics.joint_feedback import Feedback, Motion, SoftStops
 from aloft.mathematics.kernel import kernel, kernels
@@ -32,14 +33,16 @@ ROOMS = ("mathematics", "blocks", "hal")
 HOT = [path for room in ROOMS for path in sorted((ROOT / room).rglob("*.py"))]
 PLAIN = {"Array", "Flags", "Indices", "float", "int", "bool"}
 NOT_HOT = {
-    "hal.bear.conditions.conditions": "of an error byte, for people",
-    "hal.bear.conditions.describe": "of an error byte, for people",
-    "hal.bear.conditions.is_critical": "of an error byte, by integer arithmetic",
+    "blocks.signals.drive_conditions.conditions": "of an error byte, for people",
+    "blocks.signals.drive_conditions.describe": "of an error byte, for people",
+    "blocks.signals.drive_conditions.is_critical": "of an error byte, by integer arithmetic",
     "hal.simulated.start_check._millimetres": "for the text of an error, before a run",
     "hal.simulated.mujoco_robot._nearest_step": "for the text of an error, when a graph is loaded",
     "blocks.jumping.landing_heuristic.foot_sides": "of the description, when a graph is loaded",
     "hal.simulated.random_streams._signed": "of exact integers, when a run is restored",
     "hal.bear.supervision._first_lasting": "of plain numbers, in the driver's own Python",
+    "mathematics.body_dynamics.inertias": "memory, when a block is set up",
+    "mathematics.body_tree.body_motion": "memory, when a block is set up",
     "mathematics.active_set.active_set_memory": "memory, when a block is set up",
     "mathematics.flight_prediction.flight_map": "memory, when a block is set up",
     "mathematics.whole_body_reduction.reduction_memory": "memory, when a block is set up",
@@ -77,7 +80,28 @@ LANDING = LandingCost(
     np.array([[-0.01, 0.02], [-0.03, 0.01]]),
     np.array([-0.02, 0.01]),
 )
+SOLES = np.array([[0.05, -0.08, 0.0], [-0.04, -0.08, 0.0], [0.05, 0.08, 0.0], [-0.04, 0.08, 0.0]])
+MOVING = BodyMotion(*(NORMAL(shape) for shape in ((2, 3, 3), (2, 3), (1, 6), (2, 6), (2, 6))))
 UNUSED = {
+    "aloft.mathematics.capture_step.nearest_in_foot": (
+        SOLES, np.array([0, 0, 1, 1]), 1, np.array([0.1, 0.02]), np.zeros(2),
+    ),
+    "aloft.mathematics.capture_step.farthest_foot": (
+        SOLES, np.array([0, 0, 1, 1]), 2, np.array([0.1, 0.02]), np.zeros(2),
+    ),
+    "aloft.mathematics.capture_step.choose_foothold": (
+        np.array([-0.1, 0.02]), 6.0, 0.1, 0.1, SOLES, np.array([0, 0, 1, 1]), 1, 2, np.zeros(2),
+        np.zeros(2), np.zeros(3),
+    ),
+    "aloft.mathematics.capture_step.limit_foothold": (
+        np.array([0.1, -0.08, 0.0]), 0.3, 1.0, 0.2, 0.09, 0.27, np.array([-0.3, 0.02, 0.0]),
+    ),
+    "aloft.mathematics.capture_step.approach": (0.1, -0.3, 0.2, 0.05),
+    "aloft.mathematics.capture_step.swing_points": (
+        1, np.array([0, 0, 1, 1]), np.array([[0.045, 0.0, 0.0], [-0.045, 0.0, 0.0]] * 2),
+        np.array([-0.1, 0.1, 0.0]), 0.1, 0.03, 0.13, 0.015, SOLES, NORMAL((4, 3)),
+        np.ones(4, bool), np.zeros(4, bool), np.zeros((4, 3)),
+    ),
     "aloft.mathematics.flight_prediction.map_flight": (
         np.vstack([NORMAL((3, 16)), np.hstack([REGULAR, NORMAL((3, 13))])]), NORMAL((4, 3, 16)),
         np.eye(3), 4.8, 0.5, flight_map(10, 4),
@@ -137,9 +161,8 @@ UNUSED = {
     "aloft.blocks.control.dynamics.lowest_point": (
         np.array([0.01, 0.0, -0.2]), 0.022, np.eye(3), np.zeros(3),
     ),
-    "aloft.blocks.control.dynamics.rolling_drift": (
-        *(np.linspace(-1.0, 2.0, 3) * k for k in range(1, 7)), np.zeros((2, 3)),
-    ),
+    "aloft.blocks.control.dynamics.rolling_drift": (MOVING, 1, POSE[0], POSE[1], np.zeros(3)),
+    "aloft.robots.contact_kinematics.see_pattern": (POSE[1:3], REGULAR, *np.ones((3, 3))),
     "aloft.mathematics.joint_feedback.integrate_accelerations": (
         0.002, 0.02, np.ones(10), Motion(np.ones(10), np.ones(10)), Motion(np.ones(10), np.ones(10)),
     ),
@@ -174,7 +197,6 @@ UNUSED = {
     ),
     "aloft.blocks.control.balance_target.add_quadratic_growth": (np.ones(3), 0.6, 0.25, np.zeros(3), np.zeros(3)),
     "aloft.blocks.general.periods.first_tick": (0.5, 0.002),
-    "aloft.mathematics.linear.multiply_vector": (POSE, POSE[0], np.zeros(4)),
     "aloft.mathematics.linear.add_product": (POSE, POSE[0], np.ones(4)),
     "aloft.mathematics.linear.multiply_matrices": (POSE, TARGET[1:], np.zeros((4, 3))),
     "aloft.mathematics.discretisation.matrix_exponential": (
@@ -270,6 +292,8 @@ def calls():
         other = {"estimator.use": "blocks.InvariantKalmanFilter", "legs.beyond": "slide"}
         other["wbc.solver"] = "daqp"
         aloft.load(ROOT / "graphs/jump.yaml", other).run(duration=0.1)
+        other = {"estimator.use": "blocks.ComplementaryFilter", "estimator.flight": "ballistic"}
+        aloft.load(ROOT / "graphs/jump.yaml", other).run(duration=0.02)
         weak = {"wbc.torque_margin": 0.15, "wbc.friction": 0.05}  # constraints come and go
         aloft.load(ROOT / "graphs/jump.yaml", weak).run(duration=0.1)
     for name, arguments in UNUSED.items():
@@ -310,7 +334,8 @@ def replaced(arguments, random):
     new = copy(arguments)
     for a in leaves(new):
         if isinstance(a, np.ndarray) and a.dtype == np.float64:
-            a += (0.1 * np.abs(a) + 1e-3) * random.standard_normal(a.shape)
+            by = (0.1 * np.abs(a) + 1e-3) * random.standard_normal(a.shape)
+            np.add(a, by, out=a, where=np.isfinite(a))
         elif isinstance(a, np.ndarray) and a.dtype == np.bool_:
             a[...] = random.random(a.shape) < 0.5
     return new

@@ -1,6 +1,6 @@
 """What an error byte says."""
 
-from aloft.hal.bear.conditions import describe, is_critical
+from aloft.blocks.signals.drive_conditions import describe, is_critical
 
 
 def test_healthy() -> None:

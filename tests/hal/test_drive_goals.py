@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from aloft.blocks.signals import JointCommand
-from aloft.hal.bear.drive_goals import DriveGoals
+from aloft.hal.drive_goals import DriveGoals
 from aloft.robots.description import find_robot
 from aloft.robots.transmission import Transmission, motor_gains
 
