@@ -80,8 +80,28 @@ LANDING = LandingCost(
     np.array([[-0.01, 0.02], [-0.03, 0.01]]),
     np.array([-0.02, 0.01]),
 )
+SOLES = np.array([[0.05, -0.08, 0.0], [-0.04, -0.08, 0.0], [0.05, 0.08, 0.0], [-0.04, 0.08, 0.0]])
 MOVING = BodyMotion(*(NORMAL(shape) for shape in ((2, 3, 3), (2, 3), (1, 6), (2, 6), (2, 6))))
 UNUSED = {
+    "aloft.mathematics.capture_step.nearest_in_foot": (
+        SOLES, np.array([0, 0, 1, 1]), 1, np.array([0.1, 0.02]), np.zeros(2),
+    ),
+    "aloft.mathematics.capture_step.farthest_foot": (
+        SOLES, np.array([0, 0, 1, 1]), 2, np.array([0.1, 0.02]), np.zeros(2),
+    ),
+    "aloft.mathematics.capture_step.choose_foothold": (
+        np.array([-0.1, 0.02]), 6.0, 0.1, 0.1, SOLES, np.array([0, 0, 1, 1]), 1, 2, np.zeros(2),
+        np.zeros(2), np.zeros(3),
+    ),
+    "aloft.mathematics.capture_step.limit_foothold": (
+        np.array([0.1, -0.08, 0.0]), 0.3, 1.0, 0.2, 0.09, 0.27, np.array([-0.3, 0.02, 0.0]),
+    ),
+    "aloft.mathematics.capture_step.approach": (0.1, -0.3, 0.2, 0.05),
+    "aloft.mathematics.capture_step.swing_points": (
+        1, np.array([0, 0, 1, 1]), np.array([[0.045, 0.0, 0.0], [-0.045, 0.0, 0.0]] * 2),
+        np.array([-0.1, 0.1, 0.0]), 0.1, 0.03, 0.13, 0.015, SOLES, NORMAL((4, 3)),
+        np.ones(4, bool), np.zeros(4, bool), np.zeros((4, 3)),
+    ),
     "aloft.mathematics.flight_prediction.map_flight": (
         np.vstack([NORMAL((3, 16)), np.hstack([REGULAR, NORMAL((3, 13))])]), NORMAL((4, 3, 16)),
         np.eye(3), 4.8, 0.5, flight_map(10, 4),
@@ -314,7 +334,8 @@ def replaced(arguments, random):
     new = copy(arguments)
     for a in leaves(new):
         if isinstance(a, np.ndarray) and a.dtype == np.float64:
-            a += (0.1 * np.abs(a) + 1e-3) * random.standard_normal(a.shape)
+            by = (0.1 * np.abs(a) + 1e-3) * random.standard_normal(a.shape)
+            np.add(a, by, out=a, where=np.isfinite(a))
         elif isinstance(a, np.ndarray) and a.dtype == np.bool_:
             a[...] = random.random(a.shape) < 0.5
     return new

@@ -232,14 +232,14 @@ class JumpPlan(Block):
         return list(found.velocity_correction), list(found.momentum_correction)
 
     def setup(self) -> None:
-        from ...planner.library.reference_table import reference_table
+        from ...planner.library.once import reference_table_once
 
         robot, task = self.robot, planned_task(self.params, self.context)
         plan = self._plan(task, robot)
         self._report = self._report_validity(plan)
         self._by_progress = self.params.by == "progress" and "terms" in self.context.wired
         self._reader = JumpTableReader(
-            reference_table(plan, robot, self.params.stand_time), self.reference
+            reference_table_once(plan, robot, self.params.stand_time), self.reference
         )
 
     def step(self) -> None:

@@ -26,7 +26,17 @@ from ...runtime.language.parameter_change import ParameterChange
 from ...runtime.running.memory import Snapshot
 from ...runtime.running.notes import Note
 from .contents import NoRunError, RecordingError, expect_intact, scanned, tables, tables_at
-from .format import BUS, KEYFRAMES, NOTE, NOTES, READABLE, STATE, Header, RecordedField
+from .format import (
+    BUS,
+    KEYFRAMES,
+    NOTE,
+    NOTES,
+    READABLE,
+    STATE,
+    Header,
+    RecordedField,
+    RecordedRows,
+)
 from .messages import Content, Damage, Scan
 from .row_sources import PackedRows, Piece, RowSource, SeriesRows
 
@@ -137,13 +147,7 @@ class RecordedRun:
 
         All of them are in memory then; ``pieces`` and ``window`` need less.
         """
-        ticks = self.ticks
-        rows = np.empty((len(ticks), self.header.bus.size), np.uint8)
-        place = 0
-        for _, piece in self.pieces():
-            rows[place : place + len(piece)] = piece
-            place += len(piece)
-        return rows
+        return self._source.rows()
 
     def pieces(self, first: int | None = None, last: int | None = None) -> Iterator[Piece]:
         """Ticks (n,) and rows (n, bytes) from tick ``first`` up to, without, ``last``, some hundred at
@@ -153,6 +157,26 @@ class RecordedRun:
             return iter(())
         low = int(ticks[0]) if first is None else first
         return self._source.pieces(low, int(ticks[-1]) + 1 if last is None else last)
+
+    def batches(self, least: int = 1) -> Iterator[RecordedRows]:
+        """All ticks in order, at least ``least`` at a time but for the last batch; none is kept."""
+        waiting: list[Piece] = []
+        for piece in self.pieces():
+            waiting.append(piece)
+            if sum(len(ticks) for ticks, _ in waiting) >= least:
+                yield self._batch(waiting)
+                waiting = []
+        if waiting:
+            yield self._batch(waiting)
+
+    def no_rows(self) -> RecordedRows:
+        """A batch without ticks."""
+        return self._batch([(np.zeros(0, np.int64), np.zeros((0, self.header.bus.size), np.uint8))])
+
+    def _batch(self, pieces: list[Piece]) -> RecordedRows:
+        ticks, rows = zip(*pieces, strict=True)
+        layout = self.header.bus.layout()
+        return RecordedRows(self.header, np.concatenate(ticks), np.concatenate(rows), layout)
 
     def window(self, first: int, last: int) -> Piece:
         """The ticks from ``first`` up to, without, ``last``, (n,), and their rows, (n, bytes)."""

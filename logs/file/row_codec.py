@@ -163,14 +163,18 @@ def _columns(planes: NDArray[np.uint8], how: Prediction, wanted: NDArray[np.bool
         sources[how.source[more]] = True
         more = sources & ~needed
         needed |= more
-    place = np.empty(count, np.int64)
-    place[np.argsort(how.bits, kind="stable")] = np.arange(count)
-    those = np.flatnonzero(needed)
+    as_packed = np.argsort(how.bits, kind="stable")
+    kept = needed[as_packed]
+    those = as_packed[kept]
     left = np.empty((len(those), planes.shape[2], 8), np.uint8)
     for k in range(8):
-        left[:, :, k] = planes[k, place[those]]
+        left[:, :, k] = planes[k] if kept.all() else planes[k, kept]
     zigzag = left.view(np.uint64)[:, :, 0]
-    columns = (zigzag >> np.uint64(1)).view(np.int64) ^ -(zigzag & np.uint64(1)).view(np.int64)
+    signs = (zigzag & np.uint64(1)).view(np.int64)
+    np.negative(signs, out=signs)
+    zigzag >>= np.uint64(1)
+    columns = zigzag.view(np.int64)
+    columns ^= signs
     for order in range(MOST_ORDER, 0, -1):
         some = np.flatnonzero(how.order[those] >= order)
         columns[some] = np.cumsum(columns[some], axis=1)

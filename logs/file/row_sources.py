@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+import os
 from bisect import bisect_left
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from functools import cached_property
 from typing import Any, Protocol
 
@@ -18,6 +20,8 @@ from .messages import Content, Message, Scan
 from .row_codec import unpack, unpack_bytes
 from .tail import read_tail
 
+MOST_THREADS = 4
+"""Threads that unpack rows: most of the work is done outside of Python."""
 Piece = tuple[NDArray[np.int64], NDArray[np.uint8]]
 """Ticks (n,) and rows (n, bytes)."""
 
@@ -31,6 +35,9 @@ class RowSource(Protocol):
 
     def pieces(self, first: int, last: int) -> Iterator[Piece]:
         """The ticks from ``first`` up to, without, ``last``, and their rows, some at a time."""
+
+    def rows(self) -> NDArray[np.uint8]:
+        """The rows of all ticks, (ticks, bytes)."""
 
     def signal(self, field: RecordedField) -> NDArray[Any]:
         """One field at every tick, (ticks, ...)."""
@@ -85,6 +92,21 @@ class PackedRows:
             ticks = np.arange(start, start + len(rows), dtype=np.int64)
             low, high = bisect_left(ticks, first), bisect_left(ticks, last)
             yield ticks[low:high], rows[low:high]
+
+    def rows(self) -> NDArray[np.uint8]:
+        """The rows of all ticks, (ticks, bytes), unpacked by several threads."""
+        ticks = self.ticks
+        rows = np.empty((len(ticks), self._header.bus.size), np.uint8)
+
+        def unpack_one(message: Message) -> None:
+            first, some = self._unpacked(message, tables_at(self._found, message)[1])
+            place = bisect_left(ticks, first)
+            rows[place : place + len(some)] = some
+
+        with ThreadPoolExecutor(min(MOST_THREADS, os.cpu_count() or 1)) as pool:
+            for _ in pool.map(unpack_one, self._messages):
+                pass
+        return rows
 
     def signal(self, field: RecordedField) -> NDArray[Any]:
         """One field at every tick, (ticks, ...)."""
@@ -141,6 +163,10 @@ class SeriesRows:
             flat = self._filled(field, batches).reshape(len(rows), math.prod(field.shape))
             rows[:, first:last] = np.ascontiguousarray(flat).view(np.uint8)
         return rows
+
+    def rows(self) -> NDArray[np.uint8]:
+        """The rows of all ticks, (ticks, bytes)."""
+        return self._rows
 
     def pieces(self, first: int, last: int) -> Iterator[Piece]:
         """The ticks from ``first`` up to, without, ``last``, and their rows, at once."""

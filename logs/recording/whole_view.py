@@ -11,8 +11,6 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from ..file.reader import RecordedRun
 from ..viewing.blueprint import recording_blueprint
 from .run_stream import RunStream
@@ -61,20 +59,9 @@ def opened_stream(path: Path, name: str, layout: Any) -> Iterator[Any]:
 def draw(out: RunStream, run: RecordedRun) -> None:
     """Draw a whole run into a stream."""
     out.write_start()
-    waiting: list[tuple[Any, Any]] = []
-    for piece in run.pieces():
-        waiting.append(piece)
-        if sum(len(ticks) for ticks, _ in waiting) >= DRAWN_TICKS:
-            _draw_pieces(out, waiting)
-            waiting = []
-    _draw_pieces(out, waiting)
+    for batch in run.batches(DRAWN_TICKS):
+        out.write_rows(batch.ticks, batch.rows)
     out.write_rest()
     out.write_notes(run.notes)
     if run.outcome is not None:
         out.write_times(dict(run.outcome))
-
-
-def _draw_pieces(out: RunStream, pieces: list[tuple[Any, Any]]) -> None:
-    if pieces:
-        ticks, rows = (np.concatenate(parts) for parts in zip(*pieces, strict=True))
-        out.write_rows(ticks, rows)

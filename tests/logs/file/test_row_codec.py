@@ -16,7 +16,8 @@ def rows_of(*columns: NDArray[np.float64]) -> NDArray[np.uint8]:
 
 
 def smooth(ticks: int = 256, shift: float = 0.0) -> NDArray[np.float64]:
-    return np.sin(np.arange(ticks) * 0.01 + shift)
+    wave: NDArray[np.float64] = np.sin(np.arange(ticks) * 0.01 + shift)
+    return wave
 
 
 @pytest.mark.parametrize("shape", [(1, 8), (1, 3), (2, 17), (5, 0), (3, 1), (513, 70), (8, 24)])
