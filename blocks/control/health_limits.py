@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.kernel import kernel
 from ...runtime.language.parameters import Parameters, parameter
 from ..signals import RobotHealth
@@ -100,24 +99,41 @@ class Sensors(NamedTuple):
     stamps: Array
 
 
-class HealthLimits:
-    """Judges a robot's health once a tick.
+class Health(NamedTuple):
+    """A robot's health and its limits; ``state`` is a field of ``RobotHealth``, and ``verdict`` (2,) what
+    ``judge_health`` writes."""
 
-    Args:
-        params: the limits.
-        period: the time from tick to tick [s].
-        health: what the robot reports.
-        low, hot, strong: ticks in a row each drive was beyond a limit, (n_joints,).
-        invalid: ticks in a row joints, IMU and switches were not valid, (3,).
-        stamps: the last stamp [s], and the number of ticks since it changed, (2,).
-    """
+    drives: Drives
+    sensors: Sensors
+    limits: Limits
+    state: Counts
+    verdict: Counts
 
-    def __init__(
-        self, params: HealthParameters, period: float, health: RobotHealth, low: Counts, hot: Counts,
-        strong: Counts, invalid: Counts, stamps: Array,
-    ) -> None:  # fmt: skip
-        self._health = health
-        limits = Limits(
+
+class HealthTimers(Protocol):
+    """The memory of what is beyond its limit: see ``SafetyState``."""
+
+    low: Any
+    hot: Any
+    strong: Any
+    invalid: Any
+    stamps: Any
+
+
+def health_of(
+    params: HealthParameters, period: float, health: RobotHealth, timers: HealthTimers
+) -> Health:
+    """What is judged of a robot once a tick, every ``period`` [s]."""
+    return Health(
+        Drives(
+            health.condition, health.age, health.voltage, health.temperature, health.current,
+            timers.low, timers.hot, timers.strong,
+        ),
+        Sensors(
+            health.imu_age, health.stamp, health.joints_valid, health.imu_valid,
+            health.contacts_valid, timers.invalid, timers.stamps,
+        ),
+        Limits(
             params.lowest_voltage or 0.0,
             params.highest_temperature,
             params.largest_current or np.inf,
@@ -126,42 +142,28 @@ class HealthLimits:
             round(params.health_hold / period),
             round(params.invalid_hold / period),
             max(1, round(params.stamp_age / period)),
-        )
-        drives = self._drives = Drives(
-            health.condition, health.age, health.voltage, health.temperature, health.current,
-            low, hot, strong,
-        )  # fmt: skip
-        sensors = Sensors(
-            health.imu_age, health.stamp, health.joints_valid, health.imu_valid,
-            health.contacts_valid, invalid, stamps,
-        )  # fmt: skip
-        self._verdict = np.zeros(2, dtype=np.int64)
-        self._judge = KernelCall(judge_health, drives, sensors, limits, self._verdict)
+        ),
+        health.state,
+        np.zeros(2, dtype=np.int64),
+    )  # fmt: skip
 
-    def judge(self) -> tuple[Fault, int, float]:
-        """The gravest fault of this tick, the drive it befell, and the value that was measured."""
-        self._judge.run()
-        fault, place = self._verdict.item(0), self._verdict.item(1)
-        if fault == 0:
-            return Fault.NONE, 0, 0.0
-        return Fault(fault), place, self._measured(Fault(fault), place)
 
-    def _measured(self, fault: Fault, place: int) -> float:
-        drives = self._drives
-        match fault:
-            case Fault.DRIVE:
-                return float(drives.condition[place])
-            case Fault.SILENT_DRIVE:
-                return float(drives.age[place])
-            case Fault.VOLTAGE:
-                return float(drives.voltage[place])
-            case Fault.TEMPERATURE:
-                return float(drives.temperature[place])
-            case Fault.CURRENT:
-                return float(drives.current[place])
-            case Fault.SILENT_IMU:
-                return float(self._health.imu_age)
-        return 0.0
+@kernel
+def measured(health: Health, fault: int, place: int) -> float:
+    """What was measured of a fault, in the unit of its signal."""
+    if fault == _DRIVE:
+        return float(health.drives.condition[place])
+    if fault == _SILENT_DRIVE:
+        return float(health.drives.age[place])
+    if fault == _VOLTAGE:
+        return float(health.drives.voltage[place])
+    if fault == _TEMPERATURE:
+        return float(health.drives.temperature[place])
+    if fault == _CURRENT:
+        return float(health.drives.current[place])
+    if fault == _SILENT_IMU:
+        return float(health.sensors.imu_age[()])
+    return 0.0
 
 
 def health_text(fault: Fault, who: str, value: float, params: HealthParameters) -> str:
