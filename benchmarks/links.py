@@ -3,7 +3,8 @@
 A second process answers over the loopback. A round trip through links (header, checksum, mailbox,
 copies into and out of the bus, both ways) takes turns with one of the same bytes through bare
 publishers and subscribers of the same settings. Then ten free-running links carry a message each
-1000 times a second, first to a machine that takes them and then to one that is frozen.
+1000 times a second, first to a machine that takes them and then to one that is frozen. Last, the
+drives' watchdog damps after commands have ended.
 """
 
 from __future__ import annotations
@@ -33,6 +34,7 @@ from ..runtime.loading import load_text
 from ..runtime.placement.place import place
 from ..runtime.placement.placed import Link, PlacedGraph
 from ..runtime.running.memory import Memory
+from .damping import damping
 from .rows import Row, compare, take_turns
 
 LATENCY_GOAL = 1.3
@@ -111,7 +113,8 @@ def _links(placed: PlacedGraph) -> tuple[list[Link], Link]:
 
 
 def links(rounds: int = 40, repetitions: int = 25, ticks: int = 3000) -> list[Row]:
-    """Round trips beside bare Zenoh, the cost of sending, and the loss of ten links at 1 kHz."""
+    """Round trips beside bare Zenoh, the cost of sending, the loss of ten links at 1 kHz, and how
+    soon the drives are damped when commands end."""
     with socket.socket() as one, socket.socket() as two:
         one.bind(("127.0.0.1", 0))
         two.bind(("127.0.0.1", 0))
@@ -144,7 +147,7 @@ def links(rounds: int = 40, repetitions: int = 25, ticks: int = 3000) -> list[Ro
     note = f"{told['received']} of {sent} messages of {NUMBERS * 8} B came, {told['lost']} gaps"
     rows.append(Row("lost by ten links at 1 kHz", float(sent - told["received"]), "messages",
                     goal=0.0, note=note))  # fmt: skip
-    return rows
+    return [*rows, damping(rounds)]
 
 
 def _round_trips(placed: PlacedGraph, rounds: int, repetitions: int) -> list[Row]:

@@ -21,12 +21,13 @@ Exit codes:
   2    the graph, an override or the command line is wrong; nothing moved
   3    a block failed, a signal was not finite, or a policy ended the run
   130  stopped cleanly by SIGINT
+  137  a block hung in compiled code; the process was killed
   143  stopped cleanly by SIGTERM
 """
 
 VERBS = (
     "new", "run", "jump", "view", "plot", "replay", "check", "graph", "graphs", "blocks", "plan", "bench", "study", "test", "params",
-    "log", "robot", "twin",
+    "keys", "top", "watch", "log", "robot", "twin",
 )  # fmt: skip
 """All verbs, in the order of the help. The file of each has its name, and so has what it offers:
 a command, or a group of commands."""

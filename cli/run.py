@@ -95,6 +95,10 @@ def run(
     local: Annotated[
         bool, typer.Option("--local", help="Run the parts of all machines as processes here.")
     ] = False,
+    keys: Annotated[
+        Path | None,
+        typer.Option(help="The folder of `aloft keys`, or this machine's own: links over TLS."),
+    ] = None,
     plain: Annotated[
         bool,
         typer.Option("--plain", help="Compile nothing: slower, with the same bytes."),
@@ -113,11 +117,13 @@ def run(
             raise AloftError("--rerun is for one run; with --seeds nothing is shown")
         if (machine or local) and (seeds or (machine and local)):
             raise AloftError("choose one of --machine, --local and --seeds")
+        if keys is not None and not (machine or local):
+            raise AloftError("--keys is for links between machines: --machine NAME, or --local")
         if local:
             from .run_local import Wishes, run_local
 
             place = None if no_record else record
-            wishes = Wishes(settings, place, not no_record, params, as_json, traceback, plain)
+            wishes = Wishes(settings, place, not no_record, params, as_json, traceback, plain, keys)
             code = run_local(graph, wishes, out)
         elif seeds:
             code = run_many(graph, settings, parse_seeds(seeds), out, as_json, plain=plain)
@@ -127,7 +133,7 @@ def run(
             if machine:
                 from .run_part import Part
 
-                loaded, name = Part(loaded.checked, machine), f"{name}-{machine}"
+                loaded, name = Part(loaded.checked, machine, keys), f"{name}-{machine}"
             default = Path("recordings") / f"{name}.rrd"
             endpoint = open_endpoint(loaded, params, name)
             sinks = [endpoint] if endpoint is not None else []
@@ -240,6 +246,8 @@ def run_once(
     ``also`` is what else the JSON object has, and ``times`` says whether those of blocks are
     printed."""
     from ..logs.recording.recorder import Recorder
+    from ..runtime.running.freeze_guard import FreezeGuard
+    from .last_words import LastWords
     from .progress import TickCounter, compiling_shown, progress_bar
     from .view import how_to_view
 
@@ -254,7 +262,11 @@ def run_once(
     ):
         counter = TickCounter(progress, task)
         recorders = [recorder] if recorder is not None else []
-        result = graph.run(sinks=[*recorders, counter, *sinks], log=False, plain=plain)
+        last_words = LastWords(name, as_json)
+        with FreezeGuard(graph.checked, as_json=as_json) as guard:
+            result = graph.run(
+                sinks=[*recorders, counter, last_words, *sinks, guard], log=False, plain=plain
+            )
     recording = recorder.recording if recorder is not None else None
     print_result(out, name, result, times=times)
     if recorder is not None and recording is not None:

@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..runtime.language.errors import AloftError, ExitCode, RunError
 from ..runtime.language.stages import CheckedGraph
+from ..runtime.links.path_ages import NAME
 from ..runtime.loading import load
 from ..runtime.placement.place import place
 from ..runtime.placement.placed import PlacedGraph
@@ -40,8 +41,8 @@ GRACE = 15.0
 @dataclass(frozen=True)
 class Wishes:
     """What the command line asks for: settings, where the recording goes (by default where one of
-    the graph goes) and whether it is kept, the name for ``aloft params``, how to print, and
-    whether nothing is compiled."""
+    the graph goes) and whether it is kept, the name for ``aloft params``, how to print,
+    whether nothing is compiled, and the folder of keys, for links over TLS."""
 
     settings: Sequence[str]
     record: Path | None
@@ -50,6 +51,7 @@ class Wishes:
     as_json: bool
     traceback: bool
     plain: bool
+    keys: Path | None = None
 
 
 def run_local(path: Path, wishes: Wishes, out: Console) -> ExitCode:
@@ -60,7 +62,7 @@ def run_local(path: Path, wishes: Wishes, out: Console) -> ExitCode:
         PlacementError: it names no machines.
         AloftError: a part said nothing when it ended.
     """
-    from ..logs.recording.merged_run import merge_recordings, read_parts, run_hash_of
+    from ..logs.recording.merged_run import merge_recordings, path_metrics, read_parts, run_hash_of
     from .view import how_to_view
 
     placed = place(load(path, wishes.settings))
@@ -70,7 +72,8 @@ def run_local(path: Path, wishes: Wishes, out: Console) -> ExitCode:
         said = _run_processes(path, wishes, placed, files)
         parts = read_parts(placed, files) if all(f.exists() for f in files.values()) else {}
         run_hash, ticks = run_hash_of(placed, parts) if parts else ("", 0)
-        result = _whole_result(placed, said, run_hash, ticks)
+        ages = path_metrics(placed, parts) if parts else {}
+        result = _whole_result(placed, said, ages, run_hash, ticks)
         recording = None
         if parts and wishes.keep:
             target = wishes.record or Path("recordings") / f"{graph.name}.rrd"
@@ -100,7 +103,7 @@ def _run_processes(
     Raises:
         AloftError: a part has said nothing.
     """
-    endpoints = _free_endpoints(len(files))
+    endpoints = _free_endpoints(len(files), "tcp" if wishes.keys is None else "tls")
     settings = [
         f"machines.{name}={endpoint}" for name, endpoint in zip(files, endpoints, strict=True)
     ]
@@ -113,6 +116,7 @@ def _run_processes(
                 sys.executable, "-m", "aloft", "run", str(path), *sets, "--machine", machine,
                 "--record", str(file), "--params", params, "--json", "--quiet",
                 *(["--plain"] if wishes.plain else []),
+                *(["--keys", str(wishes.keys)] if wishes.keys is not None else []),
             ]  # fmt: skip
             # in a group of its own, so that Ctrl-C reaches it once, from here
             process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, process_group=0)
@@ -175,19 +179,23 @@ def _wait_for_all(running: Mapping[str, subprocess.Popen[str]]) -> list[signal.S
     return received
 
 
-def _free_endpoints(count: int) -> list[str]:
+def _free_endpoints(count: int, protocol: str) -> list[str]:
     """Endpoints on the loopback that nobody uses at present."""
     with ExitStack() as stack:
         sockets = [stack.enter_context(socket.socket()) for _ in range(count)]
         for made in sockets:
             made.bind(("127.0.0.1", 0))
-        return [f"tcp/127.0.0.1:{made.getsockname()[1]}" for made in sockets]
+        return [f"{protocol}/127.0.0.1:{made.getsockname()[1]}" for made in sockets]
 
 
 def _whole_result(
-    placed: PlacedGraph, said: Mapping[str, Mapping[str, Any]], run_hash: str, ticks: int
+    placed: PlacedGraph,
+    said: Mapping[str, Mapping[str, Any]],
+    ages: Mapping[str, Any],
+    run_hash: str,
+    ticks: int,
 ) -> RunResult:
-    """The result of the whole run, from what each part said of its own."""
+    """The result of the whole run, from what each part said of its own, and from measured ages."""
     graph = placed.graph
     by_block = {
         path: found
@@ -195,6 +203,8 @@ def _whole_result(
         for path, found in said[spec.machine].get("metrics_by_block", {}).items()
         if path == spec.path
     }
+    measured = (part.get("metrics_by_block", {}).get(NAME) for part in said.values())
+    by_block[NAME] = next((found for found in measured if found), ages)
     metrics, unmet, praise = merge_metrics(by_block)
     code, reason = _verdict(said, unmet, praise)
     failed = next(_in_order_of_guilt(said), None)

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
 from ..runtime.language.errors import AloftError, ExitCode
 from .output import print_json, print_warning, say
 from .study_runs import check_cells
-from .view import how_to_view, show
+from .view import draw, how_to_view, show
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -72,4 +73,7 @@ def open_run(
 
 def show_recording(path: Path) -> None:
     """Show the recording in a window until that is closed."""
-    show(path, web=False)
+    with TemporaryDirectory() as folder:
+        drawn = Path(folder) / path.name
+        draw(path, None, drawn)
+        show(drawn, web=False)

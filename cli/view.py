@@ -15,6 +15,9 @@ from .output import errors_reported
 if TYPE_CHECKING:
     from ..logs.viewing.viewer import Viewer
 
+MANY_TICKS = 20_000
+"""Ticks that take some seconds to draw."""
+
 
 def view(
     recording: Annotated[Path, typer.Argument(help="The recording, a .rrd file.")],
@@ -25,7 +28,7 @@ def view(
     web: Annotated[bool, typer.Option("--web", help="In a browser instead of a window.")] = False,
     save: Annotated[
         Path | None,
-        typer.Option(help="With --with: also keep what is shown, as one .rrd file."),
+        typer.Option(help="Also keep what is shown, as one .rrd file for any Rerun viewer."),
     ] = None,
     layout: Annotated[
         Path | None,
@@ -37,8 +40,6 @@ def view(
 ) -> None:
     """Look at a recording: the robot in 3D, its states and every signal."""
     with errors_reported(False):
-        if other is None and (save is not None or no_show):
-            raise AloftError("--save and --no-show belong to a comparison; add --with OTHER.rrd")
         if layout is not None and other is not None:
             raise AloftError("--layout is for one recording; leave out --with")
         if no_show and save is None:
@@ -46,47 +47,66 @@ def view(
         for path in (recording, *((other,) if other else ())):
             if not path.is_file():
                 raise AloftError(f"there is no recording {path}; `aloft run` writes one")
+            if save is not None and save.exists() and save.samefile(path):
+                raise AloftError(f"--save {save} would overwrite the recording; name another file")
         with tempfile.TemporaryDirectory() as folder:
-            shown = recording
+            path = save or Path(folder) / f"{recording.stem}.rrd"
             if other is not None:
-                shown = compare(recording, other, save or Path(folder) / "comparison.rrd")
+                compare(recording, other, path)
+            else:
+                path = draw(recording, layout, path)
+                if save is not None and path == recording:
+                    raise AloftError(f"{recording} is no recording of a run; it is all there is")
             if not no_show:
-                own = None if other else own_layout(recording, layout, Path(folder))
-                show(shown, web=web, layout=own)
+                show(path, web=web)
     raise typer.Exit(ExitCode.SUCCESS)
 
 
-def compare(first: Path, second: Path, path: Path) -> Path:
-    """Write both runs into one file."""
+def compare(first: Path, second: Path, path: Path) -> None:
+    """Write both runs into one file for the viewer."""
     from ..logs.file.reader import read
     from ..logs.recording.comparison import write_comparison
 
     try:
-        return write_comparison(path, read(first), read(second))
+        write_comparison(path, read(first), read(second))
     except OSError as error:
         raise AloftError(f"{path} cannot be written ({error.strerror or error})") from error
 
 
-def own_layout(recording: Path, layout: Path | None, folder: Path) -> Path | None:
-    """The user's layout for a recording, as a file in ``folder`` for the viewer, if there is one."""
+def draw(recording: Path, layout: Path | None, path: Path) -> Path:
+    """Write a file for the viewer: all of a run, with the user's layout if there is one.
+
+    What is no recording of a run, such as the motion of a plan or a comparison that was kept, is
+    shown as it is.
+    """
+    from ..logs.file.contents import NoRunError
     from ..logs.file.reader import read
+    from ..logs.recording.whole_view import write_view
     from ..logs.viewing.layout_file import blueprint_with, layout_beside, read_layout
 
-    header = read(recording).header
-    chosen = layout or layout_beside(header)
-    if chosen is None:
-        return None
-    path = folder / "layout.rbl"
-    blueprint_with(read_layout(chosen, header), header).save("aloft", path)
-    return path
+    try:
+        run = read(recording)
+    except NoRunError as error:
+        if layout is not None:
+            raise AloftError(f"{error}; it has no signals for the layout {layout}") from error
+        return recording
+    if len(run.ticks) >= MANY_TICKS:
+        typer.echo(f"drawing {len(run.ticks)} ticks ...", err=True)
+    chosen = layout or layout_beside(run.header)
+    own = None
+    if chosen is not None:
+        own = blueprint_with(read_layout(chosen, run.header), run.header)
+    try:
+        return write_view(path, run, own)
+    except OSError as error:
+        raise AloftError(f"{path} cannot be written ({error.strerror or error})") from error
 
 
-def show(recording: Path, *, web: bool, layout: Path | None = None) -> None:
+def show(file: Path, *, web: bool) -> None:
     """Show a file until the window is closed or Ctrl-C is pressed."""
     from ..logs.viewing.viewer import start_viewer
 
-    viewer = start_viewer("web" if web else "window", [recording, *((layout,) if layout else ())])
-    keep_open(viewer)
+    keep_open(start_viewer("web" if web else "window", [file]))
 
 
 def keep_open(viewer: Viewer) -> None:

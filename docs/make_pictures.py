@@ -15,7 +15,9 @@ from rich.console import Console
 from aloft import LoadError, load
 from aloft.cli.output import say
 from aloft.cli.run_output import print_result
+from aloft.logs.file.reader import read
 from aloft.logs.recording.recorder import Recorder
+from aloft.logs.recording.whole_view import write_view
 from aloft.logs.viewing.viewer import ViewerError, start_viewer
 from aloft.runtime.drawing.diagram import diagram
 from aloft.runtime.drawing.placing import draw
@@ -50,7 +52,8 @@ def save_view(recording: Path, instant: float, path: Path) -> None:
     """What `aloft view` shows of a recording at an instant [s]."""
     from rerun.experimental import ViewerClient
 
-    viewer = start_viewer("headless", [recording], size="1600x900")
+    drawn = write_view(recording.with_name("view.rrd"), read(recording))
+    viewer = start_viewer("headless", [drawn], size="1600x900")
     try:
         client = ViewerClient.connect(viewer.source)
         end = time.monotonic() + PATIENCE

@@ -6,7 +6,15 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from typing import Any, ClassVar, Literal
 
-from ..blocks.signals import ContactSwitches, ImuReading, JointCommand, JointState
+from ..blocks.signals import (
+    ContactSwitches,
+    DrivePhase,
+    ImuReading,
+    JointCommand,
+    JointState,
+    RobotHealth,
+)
+from ..blocks.signals.drive_conditions import HEALTHY
 from ..robots.description import RobotDescription
 from ..runtime.language.block import Block, Context, Input, Output
 from ..runtime.language.parameters import Parameters
@@ -20,11 +28,14 @@ class Robot(Block, ABC):
     instant ``t_n`` (``emit``). The controller runs. Then the robot takes the command and its time
     goes on to ``t_{n+1}`` (``update``).
 
-    A driver implements five methods, and ``wait`` if it has a clock. ``open`` is called once. The others are called by the
+    A driver implements five methods, ``report`` if its drives say how they are, and ``wait`` if it
+    has a clock. ``open`` is called once. The others are called by the
     control thread once in every tick, so they must not allocate arrays, must not wait without a
     time-out, and must not raise because a single packet is bad:
 
     * ``read`` writes the latest sensor sample into ``imu``, ``joints`` and ``contacts``.
+    * ``report`` writes into ``health`` how the drives and the sensors are. What ``Robot`` has says
+      that all is well, at the tick's own time.
     * ``write`` sends ``command`` to the drives.
     * ``advance`` lets the time to the next tick pass. A simulator computes it. A real robot returns
       at once: its time passes by itself.
@@ -54,6 +65,7 @@ class Robot(Block, ABC):
     imu = Output(ImuReading, text="inertial measurement unit, at the start of the tick")
     joints = Output(JointState, text="joint encoders and motor currents, at the same instant")
     contacts = Output(ContactSwitches, text="tactile switches, at the same instant")
+    health = Output(RobotHealth, text="voltages, temperatures, currents, conditions and ages")
     command = Input(JointCommand, text="what the drives are to do")
 
     @classmethod
@@ -82,8 +94,9 @@ class Robot(Block, ABC):
         return 0.002
 
     def emit(self) -> None:
-        """Publish the sensors' readings."""
+        """Publish the sensors' readings, and how drives and sensors are."""
         self.read()
+        self.report()
 
     def update(self) -> None:
         """Take the command and let the time to the next tick pass."""
@@ -109,6 +122,14 @@ class Robot(Block, ABC):
     @abstractmethod
     def read(self) -> None:
         """Write the sensor sample of this tick's start to the outputs."""
+
+    def report(self) -> None:
+        """Write how the drives and the sensors are; here that all is well."""
+        health = self.health
+        health.state[()] = DrivePhase.DRIVING
+        health.condition.fill(HEALTHY)
+        health.stamp[()] = self.tick * self.context.clock.base_period
+        health.joints_valid[()] = health.imu_valid[()] = health.contacts_valid[()] = True
 
     @abstractmethod
     def write(self) -> None:

@@ -2,24 +2,172 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..mathematics.rotations import cross, rotate_back, skew
+from ..mathematics.body_tree import (
+    BodyMotion,
+    BodyTree,
+    body_motion,
+    move_bodies,
+    place_bodies,
+    place_of,
+    velocity_at,
+)
+from ..mathematics.compiling.kernel_call import KernelCall
+from ..mathematics.kernel import kernel
+from ..mathematics.rotations import rotate_back
 from .ball_feet import ball_feet
-from .link_poses import contact_centres, joints_above, link_poses
-from .pinocchio_model import build_pinocchio_model
+from .body_tree import body_tree
+from .link_poses import contact_centres, link_poses
 from .robot_description import RobotDescription
 
 Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
 
-_DOWN = np.array([0.0, 0.0, -1.0])
+
+class Contacts(NamedTuple):
+    """The feet and the round rubber of their contact points.
+
+    ``body`` and ``sole`` (n_feet, 3) are a foot's body and the centre of its sole [m, body]; ``ball``
+    (n_feet,) is the contact point of a foot that is a ball, and -1 of others. ``foot``, ``centre``
+    (n_contacts, 3) [m, body] and ``radius`` (n_contacts,) [m] are a contact's. ``pattern``
+    (2, n_contacts) gives the direction ahead of a robot all of whose feet are balls, ``patterned``.
+    """
+
+    body: Indices
+    sole: Array
+    ball: Indices
+    foot: Indices
+    centre: Array
+    radius: Array
+    pattern: Array
+    patterned: bool
+
+
+class Seen(NamedTuple):
+    """What ``see_contacts`` writes: see the attributes of ``ContactKinematics``."""
+
+    points: Array
+    rates: Array
+    soles: Array
+    forward: Array
+    com_velocity: Array
+
+
+class Rigid(NamedTuple):
+    """The robot's bodies, their motion while the base only turns, and scratch: three places (3, 3)."""
+
+    tree: BodyTree
+    motion: BodyMotion
+    scratch: Array
+
+
+class Measured(NamedTuple):
+    """The base's ``orientation``, which gives the vertical, and ``angular_velocity`` [rad/s, body], and
+    the joints' ``position`` and ``velocity`` [rad, rad/s]."""
+
+    orientation: Array
+    angular_velocity: Array
+    position: Array
+    velocity: Array
+
+
+@kernel
+def see_contacts(rigid: Rigid, contacts: Contacts, measured: Measured, seen: Seen) -> None:
+    """The contact points as seen from the base, which is held in place but turns."""
+    tree, motion, down, arm = rigid.tree, rigid.motion, rigid.scratch[0], rigid.scratch[1]
+    for k in range(3):
+        motion.velocity[0, 3 + k] = measured.angular_velocity[k]
+        down[k] = 0.0
+    place_bodies(tree, measured.position, motion)
+    move_bodies(tree, measured.velocity, motion)
+    down[2] = -1.0
+    rotate_back(measured.orientation, down, down)
+    for i in range(contacts.foot.shape[0]):
+        body = int(contacts.body[contacts.foot[i]])
+        point = seen.points[i]
+        place_of(motion, body, contacts.centre[i], point)
+        for k in range(3):
+            point[k] = float(point[k]) + float(contacts.radius[i]) * float(down[k])
+        velocity_at(motion, body, point, seen.rates[i])
+    for k in range(3):
+        seen.forward[k] = 0.0
+    for foot in range(contacts.body.shape[0]):
+        body, ball = int(contacts.body[foot]), int(contacts.ball[foot])
+        place_of(motion, body, contacts.sole[foot], seen.soles[foot])
+        for k in range(3):
+            seen.forward[k] = float(seen.forward[k]) + float(motion.rotation[body, k, 0])
+            if ball >= 0:
+                seen.soles[foot, k] = seen.points[ball, k]
+    if contacts.patterned:
+        see_pattern(contacts.pattern, seen.points, down, arm, seen.forward)
+    see_com_velocity(rigid, seen.com_velocity)
+
+
+@kernel
+def see_pattern(pattern: Array, points: Array, down: Array, aside: Array, forward: Array) -> None:
+    """The direction ahead (3,), from where the points are: see ``_pattern``.
+
+    Args:
+        down: the direction of gravity [body], (3,).
+        aside: scratch (3,).
+    """
+    for k in range(3):
+        forward[k] = aside[k] = 0.0
+        for i in range(points.shape[0]):
+            forward[k] = float(forward[k]) + float(pattern[0, i]) * float(points[i, k])
+            aside[k] = float(aside[k]) + float(pattern[1, i]) * float(points[i, k])
+    x, y, z = float(aside[0]), float(aside[1]), float(aside[2])
+    u, v, w = float(down[0]), float(down[1]), float(down[2])
+    forward[0] = float(forward[0]) + (v * z - w * y)
+    forward[1] = float(forward[1]) + (w * x - u * z)
+    forward[2] = float(forward[2]) + (u * y - v * x)
+
+
+@kernel
+def see_com_velocity(rigid: Rigid, out: Array) -> None:
+    """The velocity (3,) of the centre of mass relative to the base's origin [m/s, body]."""
+    tree, motion, place, velocity = rigid.tree, rigid.motion, rigid.scratch[1], rigid.scratch[2]
+    total = 0.0
+    out[0] = out[1] = out[2] = 0.0
+    for body in range(tree.mass.shape[0]):
+        mass = float(tree.mass[body])
+        place_of(motion, body, tree.com[body], place)
+        velocity_at(motion, body, place, velocity)
+        total += mass
+        for k in range(3):
+            out[k] = float(out[k]) + mass * float(velocity[k])
+    for k in range(3):
+        out[k] = float(out[k]) / total
+
+
+@kernel
+def differentiate_contacts(
+    rigid: Rigid, contacts: Contacts, centres: Array, jacobians: Array
+) -> None:
+    """The centres of the contacts' rubber (n_contacts, 3) [m, body], and their Jacobians by the joints
+    (n_contacts, 3, n_joints), with the bodies where ``see_contacts`` has left them."""
+    for i in range(contacts.foot.shape[0]):
+        body = int(contacts.body[contacts.foot[i]])
+        centre, jacobian = centres[i], jacobians[i]
+        place_of(rigid.motion, body, contacts.centre[i], centre)
+        for k in range(jacobian.shape[1]):
+            jacobian[0, k] = jacobian[1, k] = jacobian[2, k] = 0.0
+        x, y, z = float(centre[0]), float(centre[1]), float(centre[2])
+        while body > 0:
+            joint = rigid.motion.joint[body - 1]
+            u, v, w = float(joint[3]), float(joint[4]), float(joint[5])
+            jacobian[0, body - 1] = float(joint[0]) + (v * z - w * y)
+            jacobian[1, body - 1] = float(joint[1]) + (w * x - u * z)
+            jacobian[2, body - 1] = float(joint[2]) + (u * y - v * x)
+            body = int(rigid.tree.parent[body - 1])
 
 
 class ContactKinematics:
-    """The robot with its base held in place but turning, evaluated by Pinocchio.
+    """The robot with its base held in place but turning.
 
     The rubber of a contact point is round: what touches the ground is its lowest point, however
     the foot is turned, and that part of the foot is what stands still while the foot rolls.
@@ -38,50 +186,43 @@ class ContactKinematics:
             pattern that feet of one point make. They are constant, and zero where the points have
             no heading.
 
-    ``centres`` and ``jacobians`` are updated by ``differentiate`` only.
+    ``centres`` and ``jacobians`` are updated by ``differentiate`` only. A kernel that calls
+    ``see_contacts`` itself takes ``rigid``, ``contacts`` and ``seen``.
     """
 
     def __init__(self, robot: RobotDescription) -> None:
-        import pinocchio
-
-        built = build_pinocchio_model(robot)
-        data: Any = built.model.createData()
-        self._evaluate: Any = pinocchio.computeCentroidalMomentum
-        self._model: Any = built.model
-        self._data: Any = data
-        self._position = np.array(pinocchio.neutral(built.model))
-        self._velocity = np.zeros(built.model.nv)
-        frames = built.model.frames
-        # Views of Pinocchio's own memory; the base's frame is its world here.
-        self._feet = [
-            (data.oMi[joint].rotation, data.oMi[joint].translation,
-             data.v[joint].linear, data.v[joint].angular)
-            for joint in (frames[sole].parentJoint for sole in built.sole_frames)
-        ]  # fmt: skip
-        self._momentum = data.hg.linear
-        self._mass = robot.total_mass
-        self._foot_of_point = robot.foot_of_contact()
-        self._radii = [contact.radius for contact in robot.contacts]
-        self._centres = list(contact_centres(robot))
-        self._balls = ball_feet(robot)
-        self._pattern = _pattern(robot) if len(self._balls) == len(robot.feet) > 1 else None
-        self._sole_offsets = [np.array(foot.sole) for foot in robot.feet]
-        self._down, self._arm, self._spare = np.zeros(3), np.zeros(3), np.zeros(3)
-        self.points, self.rates = np.zeros((len(self._radii), 3)), np.zeros((len(self._radii), 3))
-        self.soles = np.zeros((len(self._feet), 3))
+        n_joints, n_contacts = len(robot.joints), len(robot.contacts)
+        owners, balls = robot.foot_of_contact(), ball_feet(robot)
+        bodies = {robot.base: 0} | {joint.child: k + 1 for k, joint in enumerate(robot.joints)}
+        ball_of_foot = {ball.foot: ball.point for ball in balls}
+        self._foot_of_point, self._centres = owners, list(contact_centres(robot))
+        self._pattern = _pattern(robot) if len(balls) == len(robot.feet) > 1 else None
+        self.rigid = Rigid(body_tree(robot), body_motion(n_joints), np.zeros((3, 3)))
+        self.contacts = Contacts(
+            np.array([bodies[foot.link] for foot in robot.feet], dtype=np.int64),
+            np.array([foot.sole for foot in robot.feet], dtype=np.float64).reshape(-1, 3),
+            np.array([ball_of_foot.get(k, -1) for k in range(len(robot.feet))], dtype=np.int64),
+            np.array(owners, dtype=np.int64),
+            contact_centres(robot),
+            np.array([contact.radius for contact in robot.contacts], dtype=np.float64),
+            np.zeros((2, n_contacts)) if self._pattern is None else self._pattern,
+            self._pattern is not None,
+        )
+        self.points, self.rates = np.zeros((n_contacts, 3)), np.zeros((n_contacts, 3))
+        self.soles = np.zeros((len(robot.feet), 3))
         self.forward, self.com_velocity = np.zeros(3), np.zeros(3)
-        n_joints = len(robot.joints)
-        self._differentiate: Any = pinocchio.computeAllTerms
-        self._joint_jacobians = data.J[:, 6:]
-        self._linear, self._angular = np.zeros((3, n_joints)), np.zeros((3, n_joints))
-        self._lever = np.zeros((3, 3))
-        self._of_leg = np.array([joints_above(robot, foot.link) for foot in robot.feet], float)
-        self.centres = np.zeros((len(self._radii), 3))
-        self.jacobians = np.zeros((len(self._radii), 3, n_joints))
+        self.seen = Seen(self.points, self.rates, self.soles, self.forward, self.com_velocity)
+        self._measured = Measured(np.zeros(4), np.zeros(3), np.zeros(n_joints), np.zeros(n_joints))
+        self._see = KernelCall(see_contacts, self.rigid, self.contacts, self._measured, self.seen)
+        self.centres = np.zeros((n_contacts, 3))
+        self.jacobians = np.zeros((n_contacts, 3, n_joints))
+        self._differentiate = KernelCall(
+            differentiate_contacts, self.rigid, self.contacts, self.centres, self.jacobians
+        )
         self.heading_levers = self._find_heading_levers()
 
     def _find_heading_levers(self) -> Array:
-        levers = np.zeros((len(self._radii), 2))
+        levers = np.zeros((len(self._centres), 2))
         if self._pattern is not None:
             levers[...] = self._pattern.T
             return levers
@@ -104,54 +245,17 @@ class ContactKinematics:
             angular_velocity: of the base [rad/s, body], (3,).
             position, velocity: of the joints [rad, rad/s], (n_joints,).
         """
-        self._position[7:] = position
-        self._velocity[3:6] = angular_velocity
-        self._velocity[6:] = velocity
-        self._evaluate(self._model, self._data, self._position, self._velocity)
-        rotate_back(orientation, _DOWN, self._down)
-        for i, foot in enumerate(self._foot_of_point):
-            turn, place, linear, angular = self._feet[foot]
-            point, arm = self.points[i], self._arm
-            np.dot(self._down, turn, arm)
-            arm *= self._radii[i]
-            arm += self._centres[i]
-            cross(angular, arm, self._spare)
-            self._spare += linear
-            np.dot(turn, self._spare, self.rates[i])
-            np.dot(turn, arm, point)
-            point += place
-        self.forward.fill(0.0)
-        for foot, (turn, place, _, _) in enumerate(self._feet):
-            self.forward += turn[:, 0]
-            np.dot(turn, self._sole_offsets[foot], self.soles[foot])
-            self.soles[foot] += place
-        for ball in self._balls:
-            self.soles[ball.foot] = self.points[ball.point]
-        if self._pattern is not None:
-            np.dot(self._pattern[0], self.points, out=self.forward)
-            np.dot(self._pattern[1], self.points, out=self._spare)
-            cross(self._down, self._spare, self._arm)
-            self.forward += self._arm
-        np.divide(self._momentum, self._mass, out=self.com_velocity)
+        measured = self._measured
+        measured.orientation[...], measured.position[...] = orientation, position
+        measured.angular_velocity[...], measured.velocity[...] = angular_velocity, velocity
+        self._see.run()
 
     def differentiate(self) -> None:
         """Update ``centres`` and ``jacobians`` for the joints of the last ``evaluate``.
 
         The centre of the rubber is its radius above the ground, whatever the base's orientation.
         """
-        # The function for Jacobians alone returns them, as a new array.
-        self._differentiate(self._model, self._data, self._position, self._velocity)
-        self._linear[...] = self._joint_jacobians[:3]
-        self._angular[...] = self._joint_jacobians[3:]
-        for i, foot in enumerate(self._foot_of_point):
-            centre = self.centres[i]
-            np.dot(self._feet[foot][0], self._centres[i], centre)
-            centre += self._feet[foot][1]
-            skew(centre, self._lever)
-            jacobian = self.jacobians[i]
-            np.dot(self._lever, self._angular, jacobian)
-            np.subtract(self._linear, jacobian, out=jacobian)
-            jacobian *= self._of_leg[foot]
+        self._differentiate.run()
 
 
 def _pattern(robot: RobotDescription) -> Array:

@@ -45,6 +45,33 @@ def matrices_of_quaternions(quaternions: Array) -> Array:
     return np.ascontiguousarray(np.moveaxis(np.array(rows), -1, 0))
 
 
+def quaternions_of_matrices(matrices: Array) -> Array:
+    """Unit quaternions x, y, z, w (..., 4) of rotation matrices (..., 3, 3)."""
+    m = matrices
+    diagonal = np.einsum("...ii->...i", m)
+    trace = diagonal.sum(axis=-1)
+    # four times the square of each component; the largest gives the most exact result
+    squares = np.stack(
+        [1.0 - trace + 2.0 * diagonal[..., k] for k in range(3)] + [1.0 + trace], axis=-1
+    )
+    off = {(i, j): m[..., i, j] for i in range(3) for j in range(3)}
+    x, y, z = (off[2, 1] - off[1, 2], off[0, 2] - off[2, 0], off[1, 0] - off[0, 1])
+    xy, xz, yz = (off[0, 1] + off[1, 0], off[0, 2] + off[2, 0], off[1, 2] + off[2, 1])
+    rows = np.stack(
+        [
+            np.stack([squares[..., 0], xy, xz, x], axis=-1),
+            np.stack([xy, squares[..., 1], yz, y], axis=-1),
+            np.stack([xz, yz, squares[..., 2], z], axis=-1),
+            np.stack([x, y, z, squares[..., 3]], axis=-1),
+        ],
+        axis=-2,
+    )
+    best = squares.argmax(axis=-1)
+    picked = np.take_along_axis(rows, best[..., None, None], axis=-2)[..., 0, :]
+    unit: Array = picked / np.linalg.norm(picked, axis=-1, keepdims=True)
+    return unit
+
+
 def rotations_about(axis: tuple[float, float, float], angles: Array) -> Array:
     """Rotation matrices (n, 3, 3) by ``angles`` [rad] (n,) about a unit axis (Rodrigues)."""
     x, y, z = axis

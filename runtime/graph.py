@@ -17,6 +17,7 @@ from typing import Any
 
 from .language.errors import AloftError
 from .language.stages import CheckedGraph, ClockSpec
+from .links.path_ages import path_sinks
 from .loading import load as load_checked
 from .loading import load_text
 from .loading.nodes import text_of
@@ -79,6 +80,7 @@ class Graph:
             ticks = round(duration * self.checked.base_rate)
             if ticks < 1:
                 raise AloftError(f"a run of {duration} s is shorter than one tick")
+        sinks = [*path_sinks(self.checked, clock.kind if clock is not None else ""), *sinks]
         return Executor(self.checked, clock=clock, sinks=sinks, log=log, plain=plain).run(ticks)
 
     def open(self, *, seed: int | None = None, plain: bool = False) -> SteppedRun:

@@ -35,6 +35,7 @@ def test_the_wheel_holds_all_code_and_data(wheel: Path) -> None:
     for package in LISTED:
         folder = ROOT.joinpath(*package.split(".")[1:])
         expected |= {f"{package.replace('.', '/')}/{path.name}" for path in folder.glob("*.py")}
+    expected.add("aloft/blocks/general/example_policy.onnx")
     for path in (ROOT / "graphs").rglob("*.yaml"):
         expected.add(f"aloft/{path.relative_to(ROOT).as_posix()}")
     assert expected - inside == set()

@@ -2,26 +2,44 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ...mathematics.body_dynamics import (
+    Inertias,
+    MotionTerms,
+    equations_of_motion,
+    inertias,
+)
+from ...mathematics.body_tree import (
+    BodyMotion,
+    BodyTree,
+    acceleration_at,
+    body_motion,
+    move_bodies,
+    place_bodies,
+    place_of,
+    velocity_at,
+)
+from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.kernel import kernel
 from ...mathematics.rotations import normalise, rotate_back, to_matrix
 from ...robots.ball_feet import ball_feet
-from ...robots.pinocchio_model import build_pinocchio_model
+from ...robots.body_tree import body_tree
 from ...runtime.language.block import Block, Input, Output
 from ..signals import BaseState, DynamicsTerms, JointState, MassEstimate
 
 Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
 
 LEAST_SCALE, LEAST_OFFSET = 1e-4, 2e-5
 """The steps in which the model's mass (as a share) and its torso's CoM [m] change."""
 
 
 class Dynamics(Block):
-    """Inertia, contact Jacobians, momentum and their drifts, by Pinocchio (paper, II-B and V).
+    """Inertia, contact Jacobians, momentum and their drifts (paper, II-B and V).
 
     With generalised velocity v (base linear and angular in the body frame, then joints), contact
     points p_c and momentum h = (l, k) about the centre of mass::
@@ -56,185 +74,166 @@ class Dynamics(Block):
     terms = Output(DynamicsTerms, text="the model's terms")
 
     def setup(self) -> None:
-        import pinocchio
-
-        robot = self.robot
-        built = build_pinocchio_model(robot)
-        self._pinocchio: Any = pinocchio
-        self._model: Any = built.model
-        self._data: Any = built.model.createData()
-        self._rotor_coupling = built.rotor_coupling
-        n_velocities: int = built.model.nv
-        # What the model has now: the factor on all masses, and the offset of the torso's CoM.
-        self._nominal_mass = robot.total_mass
-        self._scale, self._offset, self._rest = 1.0, np.zeros(3), np.zeros(3)
-        base = self._model.inertias[self._model.getJointId("base")]
-        self._lever, self._described_lever = base.lever, np.array(base.lever)
-        torso = next(link for link in robot.links if link.name == robot.base)
-        self._torso_share = torso.mass / base.mass
-        self._armature = np.diag(built.model.armature)
-        self._rotors = np.array(self._rotor_coupling)
-        self._weighs = "mass" in self.context.wired
-
-        self._position = np.array(pinocchio.neutral(self._model))
-        self._velocity = np.zeros(n_velocities)
-        self._still = np.zeros(n_velocities)
-        joints = [built.model.frames[sole].parentJoint for sole in built.sole_frames]
-        # Views of Pinocchio's own memory, which it overwrites in every tick.
-        data = self._data
-        self._mass_matrix: Array = data.M
-        self._jacobian: Array = data.J
-        self._momentum: Array = data.hg.vector
-        self._momentum_rate: Array = data.dhg.vector
-        self._foot_place = [data.oMi[joint].translation for joint in joints]
-        self._foot_turn = [data.oMi[joint].rotation for joint in joints]
-        self._foot_motion = [
-            (
-                data.v[joint].linear,
-                data.v[joint].angular,
-                data.a[joint].linear,
-                data.a[joint].angular,
-            )
-            for joint in joints
-        ]
-        # Which columns move each foot: Pinocchio's Jacobian holds those of all joints at once.
-        self._moves = np.zeros((len(joints), 1, n_velocities))
-        for foot, joint in enumerate(joints):
-            for support in self._model.supports[joint]:
-                if support > 0:
-                    start = self._model.joints[support].idx_v
-                    self._moves[foot, 0, start : start + self._model.joints[support].nv] = 1.0
-        self._soles = [np.array(foot.sole) for foot in robot.feet]
-        self._points = [np.array(contact.position) for contact in robot.contacts]
-        self._foot_of_point = robot.foot_of_contact()
-        self._balls = ball_feet(robot)
-        n_feet = len(joints)
-        self._foot_jacobian = np.zeros((n_feet, 6, n_velocities))
-        self._local = np.zeros((2, 3))
-        self._shift = np.zeros((3, 6))
-        self._shift[:, :3] = np.eye(3)
+        robot, base, joints, mass, terms = (
+            self.robot, self.base, self.joints, self.mass, self.terms,
+        )  # fmt: skip
+        n_joints = len(robot.joints)
+        tree = body_tree(robot)
+        bodies = {joint.child: k + 1 for k, joint in enumerate(robot.joints)} | {robot.base: 0}
+        balls = {ball.point: ball for ball in ball_feet(robot)}
+        owners = robot.foot_of_contact()
+        feet = Feet(
+            np.array([bodies[foot.link] for foot in robot.feet], dtype=np.int64),
+            np.array([foot.sole for foot in robot.feet], dtype=np.float64).reshape(-1, 3),
+            np.array(owners, dtype=np.int64),
+            np.array([contact.position for contact in robot.contacts]).reshape(-1, 3),
+            np.array([balls[k].radius if k in balls else -1.0 for k in range(len(owners))]),
+            np.array(
+                [balls[k].centre if k in balls else np.zeros(3) for k in range(len(owners))]
+            ).reshape(-1, 3),
+        )
+        self._evaluate = KernelCall(
+            evaluate,
+            BaseAndJoints(
+                base.position, base.orientation, base.linear_velocity, base.angular_velocity,
+                joints.position, joints.velocity,
+            ),
+            Weighing(
+                mass.mass, mass.com_offset, robot.total_mass, tree.com[0].copy(), np.zeros(3)
+            ),
+            tree,
+            Scratch(body_motion(n_joints), inertias(n_joints), np.zeros(4), np.zeros((3, 3))),
+            np.ascontiguousarray(robot.rotor_matrix),
+            feet,
+            MotionTerms(*(getattr(terms, name) for name in MotionTerms._fields)),
+            FootTerms(*(getattr(terms, name) for name in FootTerms._fields)),
+        )  # fmt: skip
 
     def step(self) -> None:
-        base, joints, terms = self.base, self.joints, self.terms
-        q, v = self._position, self._velocity
-        q[0:3] = base.position
-        normalise(base.orientation, q[3:7])
-        q[7:] = joints.position
-        rotate_back(q[3:7], base.linear_velocity, v[0:3])
-        v[3:6] = base.angular_velocity
-        v[6:] = joints.velocity
+        self._evaluate.run()
 
-        if self._weighs:
-            self._weigh()
-        pinocchio, model, data = self._pinocchio, self._model, self._data
-        pinocchio.computeAllTerms(model, data, q, v)
-        # Also leaves every joint's spatial acceleration at v' = 0 in the model's data.
-        pinocchio.computeCentroidalMomentumTimeVariation(model, data, q, v, self._still)
 
-        terms.velocity[...] = v
-        np.multiply(self._mass_matrix, self._scale, out=terms.mass_matrix)
-        np.add(terms.mass_matrix, self._rotors, out=terms.mass_matrix)
-        np.multiply(data.nle, self._scale, out=terms.nonlinear_effects)
-        terms.com[...] = data.com[0]
-        terms.com_velocity[...] = data.vcom[0]
-        np.multiply(data.Ag, self._scale, out=terms.centroidal_matrix)
-        np.multiply(self._momentum[0:3], self._scale, out=terms.linear_momentum)
-        np.multiply(self._momentum[3:6], self._scale, out=terms.angular_momentum)
-        np.multiply(self._momentum_rate, self._scale, out=terms.centroidal_drift)
-        terms.base_position[...] = base.position
-        to_matrix(q[3:7], terms.base_rotation)
+class BaseAndJoints(NamedTuple):
+    """The pose and velocity of the base, as in ``BaseState``, and the joints' motion."""
 
-        for ball in self._balls:
-            lowest = self._points[ball.point]
-            lowest_point(ball.centre, ball.radius, self._foot_turn[ball.foot], lowest)
-            self._soles[ball.foot][...] = lowest
-        for foot, sole in enumerate(self._soles):
-            turn = self._foot_turn[foot]
-            terms.foot_rotation[foot] = turn
-            np.dot(turn, sole, terms.foot_position[foot])
-            terms.foot_position[foot] += self._foot_place[foot]
-            np.multiply(self._jacobian, self._moves[foot], out=self._foot_jacobian[foot])
-        for point, foot in enumerate(self._foot_of_point):
-            position, turn = terms.contact_position[point], self._foot_turn[foot]
-            np.dot(turn, self._points[point], position)
-            position += self._foot_place[foot]
-            move_jacobian(
-                self._foot_jacobian[foot], position, self._shift, terms.contact_jacobian[point]
-            )
-            point_motion(*self._foot_motion[foot], self._points[point], self._local)
-            np.dot(turn, self._local[0], terms.contact_velocity[point])
-            np.dot(turn, self._local[1], terms.contact_drift[point])
-        for ball in self._balls:
-            motion, turn = self._foot_motion[ball.foot], self._foot_turn[ball.foot]
-            rolling_drift(*motion, ball.centre, self._points[ball.point], self._local)
-            np.dot(turn, self._local[1], terms.contact_drift[ball.point])
+    position: Array
+    orientation: Array
+    linear_velocity: Array
+    angular_velocity: Array
+    joint_position: Array
+    joint_velocity: Array
 
-    def _weigh(self) -> None:
-        """Give the model the mass and the torso's centre of mass at the input, if they changed."""
-        mass, offset = float(self.mass.mass), self.mass.com_offset
-        scale = mass / self._nominal_mass if mass > 0.0 else 1.0
-        # In small steps, so that the model is a function of the input and rarely changes.
-        scale = round(scale / LEAST_SCALE) * LEAST_SCALE
-        np.divide(offset, LEAST_OFFSET, out=self._rest)
-        np.rint(self._rest, out=self._rest)
-        self._rest *= LEAST_OFFSET
-        if scale == self._scale and np.array_equal(self._rest, self._offset):
-            return
-        self._scale, self._offset[...] = scale, self._rest
-        # All masses scale alike, so the terms do; rotors do not. The body that carries the torso may
-        # carry links that are welded to it as well.
-        np.multiply(self._armature, 1.0 - scale, out=self._rotors)
-        np.add(self._rotors, self._rotor_coupling, out=self._rotors)
-        np.multiply(self._offset, self._torso_share, out=self._rest)
-        np.add(self._described_lever, self._rest, out=self._lever)
+
+class Weighing(NamedTuple):
+    """The mass to use [kg], without a dimension (zero: the ``nominal`` one), and the offset of the
+    torso's centre of mass from the ``described`` one [m], (3,); ``offset`` (3,) is scratch."""
+
+    mass: Array
+    com_offset: Array
+    nominal: float
+    described: Array
+    offset: Array
+
+
+class Feet(NamedTuple):
+    """The feet and their contact points.
+
+    ``body`` and ``sole`` (n_feet, 3) are a foot's body and the centre of its sole [m, body]; ``foot`` and
+    ``point`` (n_contacts, 3) are a contact's foot and its place [m, body]. Where the foot is a ball,
+    ``radius`` [m] is not negative, and ``centre`` (n_contacts, 3) [m, body] is the ball's.
+    """
+
+    body: Indices
+    sole: Array
+    foot: Indices
+    point: Array
+    radius: Array
+    centre: Array
+
+
+class Scratch(NamedTuple):
+    """Memory: the bodies' motion and inertias, a unit quaternion, and three places (3, 3)."""
+
+    motion: BodyMotion
+    inertias: Inertias
+    orientation: Array
+    places: Array
+
+
+class FootTerms(NamedTuple):
+    """The fields of ``DynamicsTerms`` that the kernel of the feet writes."""
+
+    velocity: Array
+    base_position: Array
+    base_rotation: Array
+    foot_position: Array
+    foot_rotation: Array
+    contact_position: Array
+    contact_velocity: Array
+    contact_jacobian: Array
+    contact_drift: Array
 
 
 @kernel
-def move_jacobian(origin_jacobian: Array, point: Array, shift: Array, out: Array) -> None:
-    """The Jacobian (3, n) of a body's point, from the body's spatial Jacobian at the origin.
+def weigh_torso(weighing: Weighing, tree: BodyTree) -> float:
+    """Put the centre of mass of the torso where it is now; returns the factor on all masses.
 
-    A body that moves with (v_0, w) at the origin moves with v_0 + w x p at p, so
-    J_p = [1 | -[p]x] J_0.
-
-    Args:
-        origin_jacobian: spatial velocity at the world's origin per v, linear first, (6, n).
-        point: in the world [m].
-        shift: scratch (3, 6) whose left half is the identity.
+    In small steps, so that the model is a function of the input and rarely changes. All masses scale
+    alike, so the terms do; rotors do not.
     """
-    x, y, z = float(point[0]), float(point[1]), float(point[2])
-    shift[0, 4], shift[0, 5], shift[1, 5] = z, -y, x
-    shift[1, 3], shift[2, 3], shift[2, 4] = -z, y, -x
-    np.dot(shift, origin_jacobian, out)
+    offset, mass = weighing.offset, float(weighing.mass[()])
+    np.divide(weighing.com_offset, LEAST_OFFSET, offset)
+    np.rint(offset, offset)
+    for k in range(3):
+        tree.com[0, k] = float(weighing.described[k]) + float(offset[k]) * LEAST_OFFSET
+    if mass > 0.0:
+        return round(mass / weighing.nominal / LEAST_SCALE) * LEAST_SCALE
+    return 1.0
 
 
 @kernel
-def point_motion(
-    linear: Array,
-    angular: Array,
-    linear_rate: Array,
-    angular_rate: Array,
-    offset: Array,
-    out: Array,
-) -> None:
-    """Velocity (row 0) and classical acceleration (row 1) of a body's point, in the body's frame.
+def set_state(state: BaseAndJoints, scratch: Scratch, terms: FootTerms) -> None:
+    """Give the base its rotation and velocity, and write the generalised velocity."""
+    motion, v, orientation = scratch.motion, terms.velocity, scratch.orientation
+    normalise(state.orientation, orientation)
+    to_matrix(orientation, terms.base_rotation)
+    rotate_back(orientation, state.linear_velocity, v[0:3])
+    for row in range(3):
+        v[3 + row] = state.angular_velocity[row]
+        motion.velocity[0, row] = state.linear_velocity[row]
+        spin = 0.0
+        for column in range(3):
+            turn = float(terms.base_rotation[row, column])
+            motion.rotation[0, row, column] = turn
+            spin += turn * float(state.angular_velocity[column])
+        motion.velocity[0, 3 + row] = spin
+        terms.base_position[row] = state.position[row]
+    for k in range(state.joint_velocity.shape[0]):
+        v[6 + k] = state.joint_velocity[k]
 
-    From the body's spatial velocity (v, w) and spatial acceleration (a, w') in its own frame:
-    v_p = v + w x r, a_p = a + w' x r + w x v_p.
 
-    Args:
-        linear, angular, linear_rate, angular_rate: v, w, a, w', (3,).
-        offset: r, the point in the body's frame [m].
-    """
-    x, y, z = float(offset[0]), float(offset[1]), float(offset[2])
-    wx, wy, wz = float(angular[0]), float(angular[1]), float(angular[2])
-    ax, ay, az = float(angular_rate[0]), float(angular_rate[1]), float(angular_rate[2])
-    vx = float(linear[0]) + wy * z - wz * y
-    vy = float(linear[1]) + wz * x - wx * z
-    vz = float(linear[2]) + wx * y - wy * x
-    out[0, 0], out[0, 1], out[0, 2] = vx, vy, vz
-    out[1, 0] = float(linear_rate[0]) + ay * z - az * y + wy * vz - wz * vy
-    out[1, 1] = float(linear_rate[1]) + az * x - ax * z + wz * vx - wx * vz
-    out[1, 2] = float(linear_rate[2]) + ax * y - ay * x + wx * vy - wy * vx
+@kernel
+def write_jacobian(tree: BodyTree, motion: BodyMotion, body: int, place: Array, out: Array) -> None:
+    """The Jacobian (3, n_velocities) of a body's point: v + w x r of every generalised velocity."""
+    for row in range(3):
+        for column in range(out.shape[1]):
+            out[row, column] = 0.0
+    x, y, z = float(place[0]), float(place[1]), float(place[2])
+    for k in range(3):
+        a, b, c = (
+            float(motion.rotation[0, 0, k]),
+            float(motion.rotation[0, 1, k]),
+            float(motion.rotation[0, 2, k]),
+        )
+        out[0, k], out[1, k], out[2, k] = a, b, c
+        out[0, 3 + k], out[1, 3 + k], out[2, 3 + k] = b * z - c * y, c * x - a * z, a * y - b * x
+    while body > 0:
+        joint = motion.joint[body - 1]
+        a, b, c = float(joint[3]), float(joint[4]), float(joint[5])
+        out[0, 5 + body] = float(joint[0]) + (b * z - c * y)
+        out[1, 5 + body] = float(joint[1]) + (c * x - a * z)
+        out[2, 5 + body] = float(joint[2]) + (a * y - b * x)
+        body = int(tree.parent[body - 1])
 
 
 @kernel
@@ -251,31 +250,78 @@ def lowest_point(centre: Array, radius: float, rotation: Array, out: Array) -> N
 
 
 @kernel
-def rolling_drift(
-    linear: Array,
-    angular: Array,
-    linear_rate: Array,
-    angular_rate: Array,
-    centre: Array,
-    lowest: Array,
-    out: Array,
-) -> None:
-    """The rate of change of the velocity of a ball's lowest point (row 1), in the body's frame.
+def rolling_drift(motion: BodyMotion, body: int, centre: Array, lowest: Array, out: Array) -> None:
+    """The rate of change (3,) of the velocity of a ball's lowest point, while v' = 0.
 
     The lowest point consists of other material at every instant. So its velocity
     v_c + w x (lowest - centre) has the derivative a_c + w' x (lowest - centre), without the
     centripetal acceleration that a fixed point of the material has.
 
     Args:
-        linear, angular, linear_rate, angular_rate: as for ``point_motion``.
-        centre, lowest: the ball's centre and its lowest point in the body's frame [m].
-        out: (2, 3); row 0 is the centre's velocity.
+        centre, lowest: the places of the ball's centre and of its lowest point [m], (3,).
     """
-    point_motion(linear, angular, linear_rate, angular_rate, centre, out)
+    acceleration_at(motion, body, centre, out)
     x = float(lowest[0]) - float(centre[0])
     y = float(lowest[1]) - float(centre[1])
     z = float(lowest[2]) - float(centre[2])
-    ax, ay, az = float(angular_rate[0]), float(angular_rate[1]), float(angular_rate[2])
-    out[1, 0] += ay * z - az * y
-    out[1, 1] += az * x - ax * z
-    out[1, 2] += ax * y - ay * x
+    spatial = motion.acceleration[body]
+    a, b, c = float(spatial[3]), float(spatial[4]), float(spatial[5])
+    out[0] = float(out[0]) + (b * z - c * y)
+    out[1] = float(out[1]) + (c * x - a * z)
+    out[2] = float(out[2]) + (a * y - b * x)
+
+
+@kernel
+def write_contacts(tree: BodyTree, scratch: Scratch, feet: Feet, terms: FootTerms) -> None:
+    """Where the contact points are, how they move, and their Jacobians and drifts."""
+    motion, place, centre = scratch.motion, scratch.places[0], scratch.places[1]
+    for point in range(feet.foot.shape[0]):
+        foot = int(feet.foot[point])
+        body = int(feet.body[foot])
+        if feet.radius[point] >= 0.0:
+            lowest_point(
+                feet.centre[point], float(feet.radius[point]), motion.rotation[body],
+                feet.point[point],
+            )  # fmt: skip
+            for k in range(3):
+                feet.sole[foot, k] = feet.point[point, k]
+        place_of(motion, body, feet.point[point], place)
+        velocity_at(motion, body, place, terms.contact_velocity[point])
+        acceleration_at(motion, body, place, terms.contact_drift[point])
+        if feet.radius[point] >= 0.0:
+            place_of(motion, body, feet.centre[point], centre)
+            rolling_drift(motion, body, centre, place, terms.contact_drift[point])
+        write_jacobian(tree, motion, body, place, terms.contact_jacobian[point])
+        for k in range(3):
+            terms.contact_position[point, k] = float(terms.base_position[k]) + float(place[k])
+
+
+@kernel
+def evaluate(
+    state: BaseAndJoints,
+    weighing: Weighing,
+    tree: BodyTree,
+    scratch: Scratch,
+    rotors: Array,
+    feet: Feet,
+    terms: MotionTerms,
+    foot_terms: FootTerms,
+) -> None:
+    """All terms of the model at a state. ``rotors`` are the rotors' part of the mass matrix."""
+    motion, place = scratch.motion, scratch.places[0]
+    scale = weigh_torso(weighing, tree)
+    set_state(state, scratch, foot_terms)
+    place_bodies(tree, state.joint_position, motion)
+    move_bodies(tree, state.joint_velocity, motion)
+    equations_of_motion(tree, motion, scratch.inertias, rotors, scale, foot_terms.velocity, terms)
+    write_contacts(tree, scratch, feet, foot_terms)
+    for foot in range(feet.body.shape[0]):
+        body = int(feet.body[foot])
+        place_of(motion, body, feet.sole[foot], place)
+        for row in range(3):
+            foot_terms.foot_position[foot, row] = float(state.position[row]) + float(place[row])
+            for column in range(3):
+                turn = float(motion.rotation[body, row, column])
+                foot_terms.foot_rotation[foot, row, column] = turn
+    for k in range(3):
+        terms.com[k] = float(terms.com[k]) + float(state.position[k])

@@ -2,8 +2,43 @@
 
 from __future__ import annotations
 
+from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.inertial_filter import right_up
+from ...mathematics.kernel import kernel
+from .base_filter import (
+    Estimator,
+    count_standing,
+    forget_samples,
+    is_unaccelerated,
+    learn_bias,
+    place_points,
+    predict,
+    use_contacts,
+)
 from .inertial_estimator import InertialEstimator
+
+
+@kernel
+def filter_tick(estimator: Estimator) -> None:
+    """A tick of the paper's filter; every point in contact has the weight one."""
+    estimate, sample, learning = estimator.filter, estimator.sample, estimator.learning
+    points = estimator.legs.points
+    fastest = predict(estimator)
+    if fastest < estimator.settings.still_rate[0]:
+        for axis in range(3):
+            learning.filling_sum[axis] += float(sample.gyro[axis])
+        learn_bias(learning, estimator.fixed.block, estimate.gyro_bias, 10.0)
+    else:
+        forget_samples(learning)
+    if is_unaccelerated(sample.force) and count_standing(points.active) > 0:
+        right_up(
+            estimate.orientation, sample.force, float(estimator.settings.tilt_gain[0]),
+            estimator.scratch.spare,
+        )  # fmt: skip
+    place_points(estimator)
+    for point in range(points.weights.shape[0]):
+        points.weights[point] = 1.0 if points.active[point] else 0.0
+    use_contacts(estimator, 1.0, 1.0)
 
 
 class ComplementaryFilter(InertialEstimator):
@@ -26,15 +61,5 @@ class ComplementaryFilter(InertialEstimator):
 
     starts_level = False
 
-    def correct_orientation(self, fastest: float) -> None:
-        if fastest < self.params.still_rate:
-            self.learning.filling_sum += self._gyro
-            self.learn_bias(self.estimate.gyro_bias, 10.0)
-        else:
-            self.forget_samples()
-        if self.is_unaccelerated() and self.contacts.active.any():
-            right_up(self.estimate.orientation, self._force, self.params.tilt_gain, self._spare)
-
-    def trust_points(self) -> tuple[float, float]:
-        self._weights[...] = self.contacts.active
-        return 1.0, 1.0
+    def make_call(self, estimator: Estimator) -> KernelCall:
+        return KernelCall(filter_tick, estimator)

@@ -9,7 +9,7 @@ from ...mathematics.kernel import kernel
 from ...runtime.language.block import Block, Input, Output, State
 from ...runtime.language.parameters import Parameters, live_parameter
 from ...runtime.language.signals import Field, Signal
-from ..signals import ContactState, ContactSwitches
+from ..signals import ContactState, ContactSwitches, SwitchHealth
 
 
 class ContactTimers(Signal):
@@ -28,6 +28,8 @@ class ContactDetector(Block):
     not interrupt a contact, and a foot that lands toe first is in contact at its toe only: the
     points of a foot do not influence one another.
 
+    A switch that is said to be at ``fault`` counts as open (``SwitchMonitor``).
+
     The hold delays the report of a lift-off by the same time; a block that needs lift-off sooner
     reads the switches or the plan's time. The block does not estimate forces.
     """
@@ -43,6 +45,7 @@ class ContactDetector(Block):
     params: Params
 
     switches = Input(ContactSwitches, text="the raw switches")
+    faults = Input(SwitchHealth, default={}, text="which switches are not to be believed")
     state = Output(ContactState, text="which points carry load")
     timers = State(ContactTimers, text="one timer a point")
 
@@ -50,6 +53,7 @@ class ContactDetector(Block):
         timers = self.timers
         latch(
             self.switches.closed,
+            self.faults.fault,
             self.params.close_samples,
             round(self.params.hold / self.period),
             timers.closed,
@@ -62,15 +66,19 @@ class ContactDetector(Block):
 @kernel
 def latch(
     switches: NDArray[np.bool_],
+    faults: NDArray[np.int64],
     close_samples: int,
     hold_samples: int,
     closed: NDArray[np.int64],
     opened: NDArray[np.int64],
     active: NDArray[np.bool_],
 ) -> None:
-    """Update ``closed``, ``opened`` and ``active`` (n_contacts,) by the switches of one tick."""
+    """Update ``closed``, ``opened`` and ``active`` (n_contacts,) by the switches of one tick.
+
+    A switch with a fault counts as open.
+    """
     for point in range(switches.shape[0]):
-        if switches[point]:
+        if switches[point] and faults[point] == 0:
             closed[point] += 1
             opened[point] = 0
             if closed[point] >= close_samples:

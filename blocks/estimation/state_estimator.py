@@ -2,17 +2,35 @@
 
 from __future__ import annotations
 
-import numpy as np
+from typing import NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
+from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.constants import GRAVITY
 from ...mathematics.inertial_filter import misalignment, right_up, turn, weigh
+from ...mathematics.kernel import kernel
 from ...mathematics.rotations import rotate, rotate_back, wrap
 from ...runtime.language.block import State
 from ...runtime.language.parameters import live_parameter, parameter
 from ...runtime.language.signals import Field, Signal
+from .base_filter import (
+    Estimator,
+    count_standing,
+    forget_samples,
+    is_unaccelerated,
+    learn_bias,
+    limit,
+    place_points,
+    predict,
+    use_contacts,
+)
 from .inertial_estimator import InertialEstimator, InertialParameters
 
-_GRAVITY_UP = np.array([0.0, 0.0, GRAVITY])
+Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+Counts = NDArray[np.int64]
 
 
 class GroundTrust(Signal):
@@ -23,6 +41,132 @@ class GroundTrust(Signal):
     facing = Field(dtype="bool", text="whether the feet's heading has been noted")
     heading = Field(unit="rad", frame="world", text="where the feet point while they stand")
     aligned = Field(dtype="int64", text="ticks of alignment with the level ground")
+
+
+class Trust(NamedTuple):
+    """The fields of ``GroundTrust``."""
+
+    gate: Array
+    flown: Flags
+    facing: Flags
+    heading: Array
+    aligned: Counts
+
+
+class GroundSettings(NamedTuple):
+    """Parameters that may change during a run, each (1,)."""
+
+    gate: Array
+    gate_growth: Array
+    support: Array
+    slow_rate: Array
+
+
+@kernel
+def align_with_ground(estimator: Estimator, trust: Trust) -> None:
+    """Correct tilt and heading by the points, and the gyroscope's bias by the drift of both."""
+    estimate, seen, scratch = estimator.filter, estimator.legs.seen, estimator.scratch
+    error, spare = scratch.error, scratch.spare
+    # Least squares over all ticks so far, then over the last 250: angle and its drift.
+    ticks = min(int(trust.aligned[()]) + 1, 250)
+    trust.aligned[()] = ticks
+    n = max(ticks, 30)
+    angle_gain, drift_gain = 2 * (2 * n - 1) / (n * (n + 1)), 6 / (n * (n + 1))
+    misalignment(estimate.orientation, seen.points, seen.forward, error, spare)
+    if not trust.facing[()]:
+        trust.heading[()] = -float(error[2])
+        trust.facing[()] = True
+    error[2] = wrap(float(error[2]) + float(trust.heading[()]))
+    limit(error, 0.05, error)
+    rotate_back(estimate.orientation, error, spare)
+    for axis in range(3):
+        drift = float(spare[axis]) * (drift_gain / estimator.fixed.period)
+        estimate.gyro_bias[axis] -= drift
+        error[axis] *= angle_gain
+    turn(estimate.orientation, float(error[0]), float(error[1]), float(error[2]))
+
+
+@kernel
+def learn_accelerometer_bias(estimator: Estimator, still: bool) -> None:
+    """While the robot stands still, learn the mean of the accelerometer minus gravity."""
+    estimate, learning, scratch = estimator.filter, estimator.learning, estimator.scratch
+    if not still:
+        forget_samples(learning)
+        return
+    bias, up, weight = estimate.accelerometer_bias, scratch.error, scratch.spare
+    up[0] = up[1] = 0.0
+    up[2] = GRAVITY
+    rotate_back(estimate.orientation, up, weight)
+    for axis in range(3):
+        total = float(learning.filling_sum[axis]) + float(estimator.sample.force[axis])
+        learning.filling_sum[axis] = total + float(bias[axis]) - float(weight[axis])
+    learn_bias(learning, estimator.fixed.block, bias, 3.0)
+
+
+@kernel
+def correct_orientation(
+    estimator: Estimator, trust: Trust, settings: GroundSettings, level_ground: bool, fastest: float
+) -> None:
+    """Correct the orientation and learn biases.
+
+    Args:
+        fastest: the largest low-passed rate of base and joints [rad/s]; infinite unless all
+            points stand.
+    """
+    if trust.gate[()] == 0.0:  # the first tick: the feet point along x
+        trust.gate[()] = settings.gate[0]
+        trust.facing[()] = True
+    flown, still = bool(trust.flown[()]), fastest < estimator.settings.still_rate[0]
+    if not flown:
+        learn_accelerometer_bias(estimator, still)
+    if not is_unaccelerated(estimator.sample.force):
+        return
+    if fastest < settings.slow_rate[0] and (level_ground or not flown):
+        align_with_ground(estimator, trust)
+    elif still:
+        right_up(
+            estimator.filter.orientation, estimator.sample.force,
+            float(estimator.settings.tilt_gain[0]), estimator.scratch.spare,
+        )  # fmt: skip
+
+
+@kernel
+def trust_points(
+    estimator: Estimator, trust: Trust, settings: GroundSettings
+) -> tuple[float, float]:
+    """Write the weight of every point.
+
+    Returns the largest weight, and a factor from 0 to 1 on all corrections by contacts.
+    """
+    estimate, points, up = estimator.filter, estimator.legs.points, estimator.scratch.spare
+    gate, growth = float(trust.gate[()]), float(settings.gate_growth[0])
+    trusted = weigh(points.rates, points.active, estimate.velocity, gate, points.weights)
+    rotate(estimate.orientation, estimator.sample.force, up)
+    support = min(max(float(up[2]) / float(settings.support[0]), 0.0), 1.0)
+    if count_standing(points.active) == 0:
+        gate += 0.05 * growth * estimator.fixed.period
+    elif trusted < 0.25:
+        gate += growth * estimator.fixed.period
+    else:
+        gate += 0.1 * (float(settings.gate[0]) - gate)
+    trust.gate[()] = min(gate, 10.0)
+    return trusted, support
+
+
+@kernel
+def estimate_tick(
+    estimator: Estimator, trust: Trust, settings: GroundSettings, level_ground: bool
+) -> None:
+    """A tick of the filter: predict, correct the orientation, weigh the points, use them."""
+    watching = bool(estimator.filter.started[()])
+    fastest = predict(estimator)
+    if watching and count_standing(estimator.legs.points.active) == 0 and trust.aligned[()] > 0:
+        trust.flown[()] = True
+        trust.facing[()] = False
+    correct_orientation(estimator, trust, settings, level_ground, fastest)
+    place_points(estimator)
+    trusted, support = trust_points(estimator, trust, settings)
+    use_contacts(estimator, trusted, support)
 
 
 class StateEstimator(InertialEstimator):
@@ -89,69 +233,17 @@ class StateEstimator(InertialEstimator):
     params: Params
     trust = State(GroundTrust, text="how far points and ground are trusted")
 
-    def watch_motion(self) -> float:
-        fastest = super().watch_motion()
-        if self._standing == 0 and self.trust.aligned[()]:
-            self.trust.flown[()] = True
-            self.trust.facing[()] = False
-        return fastest
+    def setup(self) -> None:
+        self.ground_settings = GroundSettings(*(np.zeros(1) for _ in GroundSettings._fields))
+        super().setup()
 
-    def correct_orientation(self, fastest: float) -> None:
-        estimate, trust, params = self.estimate, self.trust, self.params
-        if not trust.gate[()]:  # the first tick: the feet point along x
-            trust.gate[()], trust.facing[()] = params.gate, True
-        flown, still = bool(trust.flown[()]), fastest < params.still_rate
-        if not flown:
-            self._learn_accelerometer_bias(still)
-        if not self.is_unaccelerated():
-            return
-        if fastest < params.slow_rate and (params.level_ground or not flown):
-            self._align_with_ground()
-        elif still:
-            right_up(estimate.orientation, self._force, params.tilt_gain, self._spare)
+    def on_parameters(self) -> None:
+        super().on_parameters()
+        for name, value in zip(GroundSettings._fields, self.ground_settings, strict=True):
+            value[0] = getattr(self.params, name)
 
-    def _align_with_ground(self) -> None:
-        """Correct tilt and heading by the points, and the gyroscope's bias by the drift of both."""
-        estimate, trust, seen = self.estimate, self.trust, self._kinematics
-        # Least squares over all ticks so far, then over the last 250: angle and its drift.
-        trust.aligned[()] = ticks = min(int(trust.aligned[()]) + 1, 250)
-        n = max(ticks, 30)
-        angle_gain, drift_gain = 2 * (2 * n - 1) / (n * (n + 1)), 6 / (n * (n + 1))
-        misalignment(estimate.orientation, seen.points, seen.forward, self._error, self._spare)
-        if not trust.facing[()]:
-            trust.heading[()] = -float(self._error[2])
-            trust.facing[()] = True
-        self._error[2] = wrap(float(self._error[2]) + float(trust.heading))
-        np.clip(self._error, -0.05, 0.05, out=self._error)
-        rotate_back(estimate.orientation, self._error, self._spare)
-        self._spare *= drift_gain / self.period
-        estimate.gyro_bias -= self._spare
-        self._error *= angle_gain
-        turn(estimate.orientation, *self._error.tolist())
-
-    def _learn_accelerometer_bias(self, still: bool) -> None:
-        """While the robot stands still, learn the mean of the accelerometer minus gravity."""
-        if not still:
-            self.forget_samples()
-            return
-        bias = self.estimate.accelerometer_bias
-        rotate_back(self.estimate.orientation, _GRAVITY_UP, self._spare)
-        self.learning.filling_sum += self._force
-        self.learning.filling_sum += bias
-        self.learning.filling_sum -= self._spare
-        self.learn_bias(bias, 3.0)
-
-    def trust_points(self) -> tuple[float, float]:
-        estimate, params, active = self.estimate, self.params, self.contacts.active
-        gate = float(self.trust.gate[()])
-        trusted = weigh(self._world_rates, active, estimate.velocity, gate, self._weights)
-        rotate(estimate.orientation, self._force, self._spare)
-        support = min(max(float(self._spare[2]) / params.support, 0.0), 1.0)
-        if not active.any():
-            gate += 0.05 * params.gate_growth * self.period
-        elif trusted < 0.25:
-            gate += params.gate_growth * self.period
-        else:
-            gate += 0.1 * (params.gate - gate)
-        self.trust.gate[()] = min(gate, 10.0)
-        return trusted, support
+    def make_call(self, estimator: Estimator) -> KernelCall:
+        trust = Trust(*(getattr(self.trust, name) for name in Trust._fields))
+        return KernelCall(
+            estimate_tick, estimator, trust, self.ground_settings, self.params.level_ground
+        )

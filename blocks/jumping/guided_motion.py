@@ -18,7 +18,7 @@ choice; it takes the velocities nearest to those that lead back to its standing 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -29,6 +29,7 @@ from ...robots.ball_feet import ball_feet
 from ...robots.description import RobotDescription
 from ...robots.limb import FootKind, foot_shape
 from ...robots.pinocchio_model import PinocchioModel
+from ...runtime.language.block import Misfit
 from ...runtime.language.errors import BlockError
 
 Array = NDArray[np.float64]
@@ -65,6 +66,19 @@ def missing_joints(robot: RobotDescription) -> int:
     """The number of joints that a robot lacks to control its centre of mass and its base."""
     rows = sum(ROWS_OF_FOOT[foot_shape(robot, foot)[0]] for foot in range(len(robot.feet)))
     return max(0, rows - (len(robot.joints) - len(robot.held)))
+
+
+def too_few_joints(robot: RobotDescription | None) -> Iterator[Misfit]:
+    """The misfit of a robot that lacks joints to move its centre of mass and base while it stands."""
+    assert robot is not None
+    missing = missing_joints(robot)
+    if missing:
+        yield Misfit(
+            f"{robot.name} lacks {missing} joints to move its centre of mass and its base with "
+            "all feet on the ground",
+            expected=f"{len(robot.joints) + missing} joints that are not held",
+            found=f"{len(robot.joints) - len(robot.held)}",
+        )
 
 
 class GuidedBody:

@@ -232,19 +232,21 @@ class JumpPlan(Block):
         return list(found.velocity_correction), list(found.momentum_correction)
 
     def setup(self) -> None:
-        from ...planner.library.reference_table import reference_table
+        from ...planner.library.once import reference_table_once
 
         robot, task = self.robot, planned_task(self.params, self.context)
         plan = self._plan(task, robot)
         self._report = self._report_validity(plan)
         self._by_progress = self.params.by == "progress" and "terms" in self.context.wired
-        self._reader = JumpTableReader(reference_table(plan, robot, self.params.stand_time))
+        self._reader = JumpTableReader(
+            reference_table_once(plan, robot, self.params.stand_time), self.reference
+        )
 
     def step(self) -> None:
         lead = self.params.lead
         lead = float(self.delay.delay) if lead is None else lead
         time = self.time - float(self.progress.late)
-        self._reader.read(time, self.reference, lead, self.period)
+        self._reader.read(time, lead, self.period)
         if self._by_progress:
             self._follow_motion(time)
 

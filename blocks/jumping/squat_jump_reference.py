@@ -11,7 +11,7 @@ from ...robots.pinocchio_model import build_pinocchio_model
 from ...runtime.language.block import Block, Misfit, Output
 from ...runtime.language.parameters import Parameters, parameter
 from ..signals import JumpReference
-from .guided_motion import missing_joints
+from .guided_motion import too_few_joints
 from .squat_jump import SquatJumpTask, plan_squat_jump
 
 
@@ -96,24 +96,16 @@ class SquatJumpReference(Block):
     @classmethod
     def requires(cls, params: Parameters, robot: RobotDescription | None) -> Iterable[Misfit]:
         """Report too few joints to move the centre of mass and the base with all feet standing."""
-        assert robot is not None
-        missing = missing_joints(robot)
-        if missing:
-            yield Misfit(
-                f"a squat jump needs {missing} more joints than {robot.name} has to move its "
-                "centre of mass and base with all feet on the ground",
-                expected=f"{len(robot.joints) + missing} joints that are not held",
-                found=f"{len(robot.joints) - len(robot.held)}",
-            )
+        return too_few_joints(robot)
 
     def setup(self) -> None:
         robot, p = self.robot, self.params
         names = set(SquatJumpTask.__dataclass_fields__)
         task = SquatJumpTask(**{k: v for k, v in p.model_dump().items() if k in names})
-        self._reader = JumpTableReader(_plan(robot.model_dump_json(), task))
+        self._reader = JumpTableReader(_plan(robot.model_dump_json(), task), self.reference)
 
     def step(self) -> None:
-        self._reader.read(self.time, self.reference, self.params.lead)
+        self._reader.read(self.time, self.params.lead, self.period)
 
 
 @lru_cache(maxsize=8)

@@ -15,7 +15,7 @@ from ...robots.pinocchio_model import build_pinocchio_model
 from ...runtime.language.block import Block, Misfit, Output
 from ...runtime.language.parameters import Parameters, parameter
 from ..signals import JumpReference
-from .guided_motion import GuidedBody, Motion, MotionRecorder, check_limits, missing_joints
+from .guided_motion import GuidedBody, Motion, MotionRecorder, check_limits, too_few_joints
 
 Array = NDArray[np.float64]
 
@@ -64,25 +64,17 @@ class StandReference(Block):
     @classmethod
     def requires(cls, params: Parameters, robot: RobotDescription | None) -> Iterable[Misfit]:
         """Report too few joints to move the centre of mass and the base with all feet standing."""
-        assert robot is not None
-        missing = missing_joints(robot)
-        if missing:
-            yield Misfit(
-                f"{robot.name} lacks {missing} joints to move its centre of mass and its base with "
-                "all feet on the ground",
-                expected=f"{len(robot.joints) + missing} joints that are not held",
-                found=f"{len(robot.joints) - len(robot.held)}",
-            )
+        return too_few_joints(robot)
 
     def setup(self) -> None:
         p = self.params
         times = (p.stand_time, p.squat_time, p.pause_time, p.rise_time)
         self._reader = JumpTableReader(
-            _plan(self.robot.model_dump_json(), float(p.squat_depth), times)
+            _plan(self.robot.model_dump_json(), float(p.squat_depth), times), self.reference
         )
 
     def step(self) -> None:
-        self._reader.read(self.time, self.reference, self.params.lead)
+        self._reader.read(self.time, self.params.lead)
 
 
 @lru_cache(maxsize=8)

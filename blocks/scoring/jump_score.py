@@ -22,6 +22,7 @@ from .jump_series import (
 )
 from .stand_criteria import NEVER
 from .stand_following import begin, note_fall, note_feet, note_machine, note_rest
+from .stand_metrics import judgement_metrics, rest_metrics
 
 
 class JumpScore(Block):
@@ -41,7 +42,9 @@ class JumpScore(Block):
        0.2 rad/s, every sole flat (all its points loaded, or three of more), each foot with over
        0.4 of an equal share of the weight, com at least 10 mm inside the support polygon.
     7. From 0.15 s after touchdown to the end: no foot unloaded for more than 20 ms, and the
-       middle of each foot stays within 5 mm horizontally (set 20 mm for pushes).
+       middle of each foot stays within 5 mm horizontally (set 20 mm for pushes). With ``steps`` the
+       feet may take so many steps in all: each is measured from its new place, 0.15 s after its
+       last step, and the rest is judged 1.5 s after the last step.
     8. Task: apex above standing within 10 % of its target, feet within 2 cm and 5 deg of theirs;
        every contact point above ground of the ``landing_height``. Targets are the parameters
        ``rise``, ``distance`` and ``yaw``, else the reference's, and without either not judged.
@@ -114,17 +117,7 @@ class JumpScore(Block):
         flown = record.lift_off_time != NEVER
         landed = record.touchdown_time != NEVER
         judged = record.judged_time != NEVER
-        values: dict[str, Metric] = {
-            "success": failure is None,
-            "reason": failure or "all criteria hold",
-            "qp_failures": int(record.failures),
-            "saturated_share": float(record.saturated / record.ticks),
-            "peak_motor_torque_nm": float(record.peak_torque),
-            "peak_motor_speed_rad_s": float(record.peak_speed),
-            "forbidden_contacts": int(record.forbidden),
-            "joint_limit_violation_rad": float(record.violation),
-            "motor_overload_nm": float(record.overload),
-        }
+        values = judgement_metrics(record, failure)
         if self.params.jumps > 1:
             values |= {"jumps": made, "worst_landing_error_m": float(self.series.place_error)}
         if flown:
@@ -141,18 +134,13 @@ class JumpScore(Block):
                 "flight_time_s": float(record.touchdown_time - record.lift_off_time),
                 "peak_tilt_deg": degrees(record.peak_tilt),
                 "foot_slip_m": float(record.foot_slip),
+                "steps": int(record.steps),
                 "jump_distance_x_m": x,
                 "jump_distance_y_m": y,
                 "jump_yaw_deg": degrees(feet_turned(record)),
             }
         if judged:
-            values |= {
-                "final_tilt_deg": degrees(record.tilt),
-                "final_com_speed_m_s": float(record.com_speed),
-                "final_angular_speed_rad_s": float(record.angular_speed),
-                "final_support_margin_m": float(record.margin),
-                "final_load_share": float(record.load_share),
-            }
+            values |= rest_metrics(record)
         if self._planned:
             values |= {
                 "planned_flight_time_s": float(record.planned_flight),
@@ -252,7 +240,12 @@ class JumpScore(Block):
         """Peaks since touchdown, feet that slide or step, and the rest when its time comes."""
         record, truth, params = self.record, self.truth, self.params
         record.peak_tilt[()] = max(record.peak_tilt.item(), tilt(truth.base_orientation))
-        note_feet(record, truth, self._footing, self.period, landed >= params.slip_delay - 1e-9)
+        note_feet(
+            record, truth, self._footing, self.period, landed >= params.slip_delay - 1e-9,
+            params, params.slip_delay,
+        )  # fmt: skip
+        if record.steps:
+            landed = min(landed, float(record.now) - max(record.step_end.tolist()))
         if record.judged_time == NEVER and landed >= params.rest_time - 1e-9:
             note_rest(record, truth, self._footing)
             record.ground_low[()] = min(truth.ground_height.tolist())

@@ -22,6 +22,10 @@ from .stand_criteria import (
     judge_safety,
 )
 from .stand_following import begin, note_fall, note_feet, note_machine, note_rest
+from .stand_metrics import judgement_metrics, rest_metrics
+
+SETTLING = 0.15
+"""A foot that has taken a step may settle for so long [s]."""
 
 
 class SquatRecord(StandRecord):
@@ -105,7 +109,7 @@ class StandScore(Block):
         settled = self.time >= self.params.settle_time - 1e-9
         if settled:
             record.peak_tilt[()] = max(record.peak_tilt.item(), tilt(truth.base_orientation))
-        note_feet(record, truth, self._footing, self.period, settled)
+        note_feet(record, truth, self._footing, self.period, settled, self.params, SETTLING)
         if record.judged_time == NEVER and self.time >= self.params.judge_time - 1e-9:
             note_rest(record, truth, self._footing)
             self.request_stop(f"judged at {self.time:.2f} s")
@@ -116,28 +120,13 @@ class StandScore(Block):
         if record.ticks == 0:
             return {"success": False, "reason": "the run had no ticks"}
         failure = next((text for holds, text in self._judge() if not holds), None)
-        values: dict[str, Metric] = {
-            "success": failure is None,
-            "reason": failure or "all criteria hold",
-            "qp_failures": int(record.failures),
-            "saturated_share": float(record.saturated / record.ticks),
-            "peak_motor_torque_nm": float(record.peak_torque),
-            "peak_motor_speed_rad_s": float(record.peak_speed),
-            "forbidden_contacts": int(record.forbidden),
-            "joint_limit_violation_rad": float(record.violation),
-            "motor_overload_nm": float(record.overload),
+        values = judgement_metrics(record, failure) | {
             "squat_depth_m": float(record.standing_height - record.lowest_height),
             "peak_tilt_deg": degrees(record.peak_tilt),
             "foot_slip_m": float(record.foot_slip),
         }
         if record.judged_time != NEVER:
-            values |= {
-                "final_tilt_deg": degrees(record.tilt),
-                "final_com_speed_m_s": float(record.com_speed),
-                "final_angular_speed_rad_s": float(record.angular_speed),
-                "final_support_margin_m": float(record.margin),
-                "final_load_share": float(record.load_share),
-            }
+            values |= rest_metrics(record)
         return values
 
     def _judge(self) -> Iterator[Verdict]:

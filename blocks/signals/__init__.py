@@ -24,6 +24,8 @@ from .control import (
     JointTarget,
     JointTorque,
     MassEstimate,
+    SwitchFault,
+    SwitchHealth,
     WholeBodyCommand,
     WholeBodyTarget,
 )
@@ -62,6 +64,8 @@ __all__ = [
     "PhaseState",
     "RobotHealth",
     "RobotTruth",
+    "SwitchFault",
+    "SwitchHealth",
     "WholeBodyCommand",
     "WholeBodyTarget",
 ]

@@ -5,6 +5,8 @@ Units, frames and orders are those of the package ``signals``.
 
 from __future__ import annotations
 
+from enum import IntEnum
+
 from ...runtime.language.signals import Field, Signal
 
 
@@ -12,6 +14,26 @@ class ContactState(Signal):
     """Which contact points carry load, after debouncing."""
 
     active = Field("n_contacts", dtype="bool", text="whether each point is in contact")
+
+
+class SwitchFault(IntEnum):
+    """What is wrong with a foot switch."""
+
+    NONE = 0
+    """Nothing was noticed."""
+    STUCK_CLOSED = 1
+    """It stayed closed in the air."""
+    STUCK_OPEN = 2
+    """It stayed open under a foot that stands."""
+    BOUNCING = 3
+    """It opened and closed too often."""
+
+
+class SwitchHealth(Signal):
+    """Which foot switches are not to be believed, and whether the robot should stop for that."""
+
+    fault = Field("n_contacts", dtype="int64", values=SwitchFault, text="see SwitchFault")
+    stop = Field(dtype="bool", text="one of them is at fault, and the robot is not in the air")
 
 
 class BaseState(Signal):

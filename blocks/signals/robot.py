@@ -58,7 +58,10 @@ class DrivePhase(IntEnum):
 
 
 class RobotHealth(Signal):
-    """How the drives and the sensor board of a real robot are. Drives are in the motors' order."""
+    """How a robot's drives and sensors are. Drives are in the motors' order.
+
+    What a robot does not measure is zero, as in a simulator voltages, temperatures and currents.
+    """
 
     state = Field(dtype="int64", values=DrivePhase, text="what the drives do; see DrivePhase")
     voltage = Field("n_joints", unit="V", text="supply voltage at every drive")
@@ -69,7 +72,7 @@ class RobotHealth(Signal):
     )
     age = Field("n_joints", unit="s", text="time since every drive answered last")
     imu_age = Field(unit="s", text="time since the last packet of the sensor board")
-    stamp = Field(unit="s", text="time of the newest measurement, since the driver was opened")
+    stamp = Field(unit="s", text="time of the newest measurement; a negative one says nothing")
     joints_valid = Field(dtype="bool", text="every drive has answered in the last exchange")
     imu_valid = Field(
         dtype="bool", text="the board streams, and its IMU is not frozen or saturated"

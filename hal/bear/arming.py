@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...blocks.signals import DrivePhase
+from ...blocks.signals.drive_conditions import describe, is_critical
 from .bus import BearBus, BusError, Reply
-from .conditions import describe, is_critical
 from .configuration import Hardware
 from .motor_loop import MotorLoop
 from .registers import Mode, Torque

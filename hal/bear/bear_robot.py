@@ -10,11 +10,12 @@ from typing import Literal
 from ...blocks.signals import DrivePhase
 from ...runtime.language.block import Context, Misfit
 from ...runtime.language.parameters import Parameters, parameter
+from ..drive_gains import joint_gains
 from .bus import BusError, open_port
 from .command_queue import CommandQueue
 from .configuration import Hardware, HardwareError
 from .dead_man import AlwaysHeld, DeadMansSwitch, open_switch, wait_until_held
-from .driven_robot import DrivenRobot, DriveParameters, joint_gains, read_hardware
+from .driven_robot import DrivenRobot, DriveParameters, read_hardware
 from .driver import Driver
 from .motor_thread import MotorThread
 from .watchdog import Watchdog
@@ -61,7 +62,8 @@ class BearRobot(DrivenRobot):
     * in the motor thread: a drive or the board is silent, reports an error, is too hot, has too low
       a voltage; a stuck encoder, a frozen IMU, a saturated gyroscope; a second writer on the bus; a
       command older than ``command_age``; the dead man's switch let go;
-    * in a process of its own: the graph hangs for ``graph_timeout`` or has died;
+    * in a process of its own: the graph hangs for ``graph_timeout`` or has died, or a link that
+      brings commands from another machine was silent for ``links.watchdog``, by default 15 ms;
     * in the drives: nothing written for the hardware's ``drives.watchdog``.
 
     It was never run on a real robot; against the twin every shipped jump was (``aloft twin``).
@@ -118,6 +120,7 @@ class BearRobot(DrivenRobot):
         driver = Driver(self.robot, hardware, bus_port, board_port, stiffness, damping)
         self.driver = driver
         self._opened_at = time.monotonic()
+        driver.loop.clock = self.now
         driver.connect()
         if params.armed:
             self._switch = open_switch(hardware.dead_man)
@@ -125,11 +128,13 @@ class BearRobot(DrivenRobot):
             if params.time == "real":
                 devices = [motor.id for motor in hardware.motors.values()]
                 descriptor = bus_port.fileno()  # type: ignore[attr-defined]
-                self._watchdog = Watchdog(descriptor, devices, params.graph_timeout)
+                silence = self.context.clock.command_limit
+                self._watchdog = Watchdog(descriptor, devices, params.graph_timeout, silence)
             self._cycle = time.monotonic()
             driver.arm(self._next_cycle)
         if params.time == "real":
-            self._thread = MotorThread(driver.loop, params.command_age, self._objection)
+            age = min(params.command_age, self.context.clock.command_limit or params.command_age)
+            self._thread = MotorThread(driver.loop, age, self._objection)
             self._thread.start()
         else:
             self._queue = CommandQueue(driver.loop, self.robot, params.latency, self.period)
@@ -142,10 +147,11 @@ class BearRobot(DrivenRobot):
 
     def write(self) -> None:
         """Give the command to the motor thread, or to the next exchanges."""
+        heard = self.context.clock.commands_heard()
         if self._watchdog is not None:
-            self._watchdog.beat()
+            self._watchdog.beat(heard)
         if self._thread is not None:
-            self._thread.follow(self.command)
+            self._thread.follow(self.command, heard)
         elif self._queue is not None:
             self._queue.give(self.command)
         self.stop_after_fault()
@@ -194,8 +200,9 @@ class BearRobot(DrivenRobot):
     def _objection(self) -> str:
         """Why the motor thread must not go on; empty if it may."""
         if self._watchdog is not None and self._watchdog.tripped:
-            limit = 1e3 * self.params.graph_timeout
-            return f"the watchdog has damped the drives: the graph hung for {limit:g} ms"
+            limit, silence = 1e3 * self.params.graph_timeout, 1e3 * self.context.clock.command_limit
+            links = f", or no commands came over the links for {silence:g} ms" if silence else ""
+            return f"the watchdog has damped the drives: the graph hung for {limit:g} ms{links}"
         return "" if self._switch.held() else "the dead man's switch was let go"
 
     def _next_cycle(self) -> bool:

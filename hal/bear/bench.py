@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...blocks.signals.drive_conditions import describe, is_critical
 from ...robots.robot_description import RobotDescription
 from ...robots.transmission import Transmission
 from .arming import LISTENING
 from .bulk import BulkExchange
 from .bus import BearBus, BusError
-from .conditions import describe, is_critical
 from .configuration import Hardware, MotorSettings
 from .motor_loop import WRITE
 from .registers import Mode, Torque

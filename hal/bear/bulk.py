@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ...blocks.signals.drive_conditions import HEALTHY
 from .bus import BearBus, BusError, register_of
-from .conditions import HEALTHY
 from .frames import BROADCAST, HEADER, LONGEST, Instruction, checksum
 from .registers import Register
 

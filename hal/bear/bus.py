@@ -7,8 +7,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
+from ...blocks.signals.drive_conditions import describe, is_critical
 from ...runtime.language.errors import AloftError
-from .conditions import describe, is_critical
 from .frames import BROADCAST, Frame, FrameReader, Instruction, frame_bytes
 from .registers import CONFIG, STATUS, Register
 

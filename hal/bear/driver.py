@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 from ...blocks.signals import DrivePhase
 from ...robots.robot_description import RobotDescription
 from ...robots.transmission import Transmission, motor_gains
+from ..drive_goals import DriveGoals
 from . import arming
 from .bus import BearBus, SerialPort
 from .configuration import Hardware
-from .drive_goals import DriveGoals
 from .motor_loop import MotorLoop
 from .sense_board import BoardMode, SenseBoard
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from threading import Lock
 
 import numpy as np
@@ -9,10 +10,10 @@ from numpy.typing import NDArray
 
 from ...blocks.signals import CommandMode, DrivePhase, JointCommand, RobotHealth
 from ...robots.robot_description import RobotDescription
+from ..drive_goals import DriveGoals
 from .bulk import BulkExchange
 from .bus import BearBus, BusError
 from .configuration import Hardware
-from .drive_goals import DriveGoals
 from .measurement import FASTEST, LARGEST_STEP, PLAUSIBLE, READ, Measurement
 from .registers import Torque
 from .sense_board import SenseBoard
@@ -51,6 +52,8 @@ class MotorLoop:
         late_cycles: how many of them began too late.
         lost_answers: how many answers were lost or damaged.
         link_lost: whether the port has failed, so that nothing can be sent any more.
+        clock: the time since the driver was opened [s]; by default that of the exchanges.
+        stamp: when something was measured last, by this clock.
     """
 
     def __init__(
@@ -73,6 +76,8 @@ class MotorLoop:
         self.fault = ""
         self.cycles = self.late_cycles = 0
         self.link_lost = False
+        self.clock: Callable[[], float] = lambda: self.cycles * hardware.bus.period
+        self.stamp = 0.0
         self.lock = Lock()
         """Held while measurements or the command are written: who reads them from another thread
         takes it."""
@@ -123,6 +128,8 @@ class MotorLoop:
         with self.lock:
             self.lost_answers += len(bulk.ages) - answered
             self.measured.take_drives(bulk)
+            if answered:
+                self.stamp = self.clock()
             if fresh:
                 self.measured.take_board(self.board)
         driving = self.phase in (DrivePhase.STARTING, DrivePhase.HOLDING, DrivePhase.DRIVING)
@@ -155,7 +162,7 @@ class MotorLoop:
         self._drive.exchange()
         self.measured.take_drives(self._drive)
 
-    def report(self, health: RobotHealth, now: float) -> None:
+    def report(self, health: RobotHealth) -> None:
         """Write how everything is."""
         measured, bulk, period = self.measured, self._last, self.hardware.bus.period
         health.state[()] = self.phase
@@ -167,7 +174,7 @@ class MotorLoop:
             health.age[k] = age * period
         silent = self.supervision.imu_silent
         health.imu_age[()] = silent * period
-        health.stamp[()] = now
+        health.stamp[()] = self.stamp
         health.joints_valid[()] = not self.link_lost and not any(bulk.ages.tolist())
         health.imu_valid[()] = not self.link_lost and self.supervision.imu_valid
         health.contacts_valid[()] = not self.link_lost and silent == 0
@@ -178,7 +185,7 @@ class MotorLoop:
         """What changes in a run: objects, and the names of their attributes."""
         found: list[tuple[object, tuple[str, ...]]] = [
             (self, ("phase", "cycles", "late_cycles", "lost_answers", "target", "current_limit",
-                    "link_lost", "exchange_in_use")),
+                    "link_lost", "stamp", "exchange_in_use")),
             (self.supervision, ("low", "hot", "still", "last", "moved", "numbers", "frozen",
                                 "saturated", "imu_silent", "imu_valid")),
             (self.measured, ("sum", "count", "specific_force", "angular_velocity", "closed")),

@@ -46,9 +46,13 @@ class MotorThread:
         self._commanded = time.monotonic()
         self._thread.start()
 
-    def follow(self, command: JointCommand) -> None:
-        """Follow this command from the next cycle on."""
-        self._commanded = time.monotonic()
+    def follow(self, command: JointCommand, heard: int = 0) -> None:
+        """Follow this command from the next cycle on.
+
+        ``heard`` says when what it was made from last came from another machine, by the monotonic
+        clock [ns]; zero where it was made here.
+        """
+        self._commanded = heard * 1e-9 if heard else time.monotonic()
         self._loop.follow(command)
 
     def wait_for(self, cycle: int, seconds: float) -> bool:
@@ -87,4 +91,4 @@ class MotorThread:
         if reason:
             self._loop.fail(reason)
         elif age > self._command_age and self._loop.phase is DrivePhase.DRIVING:
-            self._loop.fail(f"the graph has given no command for {1e3 * age:.0f} ms")
+            self._loop.fail(f"no new command has come for {1e3 * age:.0f} ms")

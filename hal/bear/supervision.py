@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ...blocks.signals.drive_conditions import describe, is_critical
 from .bulk import BulkExchange
-from .conditions import describe, is_critical
 from .configuration import Hardware
 from .measurement import Measurement
 from .sense_board import SenseBoard

@@ -14,7 +14,7 @@ from pathlib import Path
 from .bus import BusError
 from .frames import BROADCAST, Instruction, frame_bytes
 from .registers import STATUS, Torque
-from .watchdog_process import BEATS, CLOSING, READY, SIZE, TRIPPED
+from .watchdog_process import CLOSING, READY, SIZE, TRIPPED, UNTIL
 
 _STARTING = 10.0
 """How long the process may take to start [s]."""
@@ -29,8 +29,9 @@ def damping_frame(devices: list[int]) -> bytes:
 
 
 class Watchdog:
-    """A process that commands damping when ``beat`` was not called for ``limit`` seconds, or when
-    this process has died. It shares the open port, so no opening can fail then.
+    """A process that commands damping when ``beat`` was not called for ``limit`` seconds, when
+    links have brought no commands for ``silence`` seconds, or when this process has died. It shares
+    the open port, so no opening can fail then.
 
     It begins to count at the first beat.
 
@@ -38,20 +39,23 @@ class Watchdog:
         port_fd: the file descriptor of the drives' port.
         devices: the drives' addresses.
         limit: the time without a beat [s].
+        silence: the time without commands from other machines [s].
 
     Raises:
         BusError: the process does not start.
     """
 
-    def __init__(self, port_fd: int, devices: list[int], limit: float) -> None:
+    def __init__(
+        self, port_fd: int, devices: list[int], limit: float, silence: float = 0.0
+    ) -> None:
         memory_fd = os.memfd_create("aloft-watchdog")
         os.truncate(memory_fd, SIZE)
         self._memory = mmap.mmap(memory_fd, SIZE)
-        self._beats = 0
+        self._limit, self._silence = int(limit * 1e9), int(silence * 1e9)
         program = Path(__file__).with_name("watchdog_process.py")
         frame = damping_frame(devices).hex()
         self._process = subprocess.Popen(
-            [sys.executable, "-I", str(program), str(port_fd), str(memory_fd), str(limit), frame],
+            [sys.executable, "-I", str(program), str(port_fd), str(memory_fd), frame],
             pass_fds=(port_fd, memory_fd),
             stdin=subprocess.DEVNULL,
             start_new_session=True,  # Ctrl-C in the terminal is for the graph only
@@ -69,10 +73,16 @@ class Watchdog:
         """The process."""
         return self._process.pid
 
-    def beat(self) -> None:
-        """The graph is alive."""
-        self._beats += 1
-        struct.pack_into("Q", self._memory, BEATS, self._beats)
+    def beat(self, heard: int = 0) -> None:
+        """The graph is alive.
+
+        ``heard`` says when commands last came from another machine, by the monotonic clock [ns];
+        zero where they are made here. So the process notices silent links although this one hangs.
+        """
+        until = time.monotonic_ns() + self._limit
+        if heard:
+            until = min(until, heard + self._silence)
+        struct.pack_into("Q", self._memory, UNTIL, until)
 
     @property
     def tripped(self) -> bool:

@@ -1,9 +1,8 @@
 """The program of the watchdog's process: it damps the drives when the graph hangs or dies.
 
-It knows nothing of aloft: it gets the open port, some shared memory, a time limit and the bytes
-that damp. So it starts fast, and nothing that the graph imports can fail in it.
+It knows nothing of aloft: it gets the open port, some shared memory and the bytes that damp. So it starts fast, and nothing that the graph imports can fail in it.
 
-    python watchdog_process.py PORT_FD MEMORY_FD SECONDS FRAME_IN_HEX
+    python watchdog_process.py PORT_FD MEMORY_FD FRAME_IN_HEX
 """
 
 from __future__ import annotations
@@ -15,8 +14,9 @@ import sys
 import time
 from contextlib import suppress
 
-BEATS, TRIPPED, CLOSING, READY = 0, 8, 16, 24
-"""Where each unsigned number of 8 bytes lies in the shared memory."""
+UNTIL, TRIPPED, CLOSING, READY = 0, 8, 16, 24
+"""Where each unsigned number of 8 bytes lies in the shared memory. The first is the time until which
+the graph may be left alone, by the monotonic clock [ns]; zero before there is one."""
 SIZE = 32
 LASTING = 2.0
 """For how long damping is commanded again and again [s]."""
@@ -24,8 +24,8 @@ LASTING = 2.0
 
 def main() -> int:
     """Watch until the graph says that it closes, or until it hangs or has died."""
-    port, memory, limit = int(sys.argv[1]), int(sys.argv[2]), float(sys.argv[3])
-    frame = bytes.fromhex(sys.argv[4])
+    port, memory = int(sys.argv[1]), int(sys.argv[2])
+    frame = bytes.fromhex(sys.argv[3])
     parent = os.getppid()
     with mmap.mmap(memory, SIZE) as shared:
 
@@ -33,13 +33,10 @@ def main() -> int:
             return int(struct.unpack_from("Q", shared, place)[0])
 
         struct.pack_into("Q", shared, READY, 1)
-        beats, since = read(BEATS), time.monotonic()
         while not read(CLOSING):
-            now = read(BEATS)
-            if now != beats:
-                beats, since = now, time.monotonic()
+            until = read(UNTIL)
             died = os.getppid() != parent
-            if died or (beats and time.monotonic() - since > limit):
+            if died or (until and time.monotonic_ns() > until):
                 struct.pack_into("Q", shared, TRIPPED, 1)
                 end = time.monotonic() + LASTING
                 while time.monotonic() < end and (died or not read(CLOSING)):

@@ -2,15 +2,119 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
 from ...blocks.signals import CommandMode, JointCommand
+from ...mathematics.compiling.kernel_call import KernelCall
+from ...mathematics.kernel import kernel
 from ...robots.description import RobotDescription
-from .actuator import clip_joint_torque, joint_feedback_torque, motor_torque_limits
+from ..drive_goals import Targets
+from .actuator import (
+    MotorRecord,
+    Motors,
+    MotorScratch,
+    drive_motors,
+    joint_feedback_torque,
+)
+from .motor_feedback import Loops, MotorFeedback, close_loops
 from .state import DriveState, TickRecord
 
 Array = NDArray[np.float64]
+Counts = NDArray[np.int64]
+Flags = NDArray[np.bool_]
+
+_ACTIVE, _DAMPING = int(CommandMode.ACTIVE), int(CommandMode.DAMPING)
+
+
+class Commands(NamedTuple):
+    """A ring of commands, of which one is active and some are on their way: see ``DriveState``."""
+
+    active: Counts
+    pending: Counts
+    due: Counts
+    mode: Counts
+    targets: Targets
+
+
+class Joints(NamedTuple):
+    """What the drives of all joints read and give in a physics step: the count of the step, (1,),
+    whether a command has ``arrived`` in it, (1,), the ``position`` that their encoders read [rad], the ``velocity`` [rad/s] and the ``torque`` [N m],
+    each (n_joints,)."""
+
+    step: Counts
+    arrived: Flags
+    position: Array
+    velocity: Array
+    torque: Array
+
+
+@kernel
+def follow_commands(commands: Commands, released: Array, joints: Joints) -> None:
+    """Let the commands act that are due, and write the joint torques that the active one asks for.
+
+    Args:
+        released: the damping in the damping mode [N m s/rad], (n_joints,).
+    """
+    active, pending = int(commands.active[()]), int(commands.pending[()])
+    joints.arrived[0] = False
+    while pending > 0:
+        following = (active + 1) % commands.due.shape[0]
+        if commands.due[following] > joints.step[0]:
+            break
+        active, pending = following, pending - 1
+        joints.arrived[0] = True
+    commands.active[()] = active
+    commands.pending[()] = pending
+    mode = int(commands.mode[active])
+    if mode == _ACTIVE:
+        joint_feedback_torque(
+            commands.targets.torque[active], commands.targets.stiffness[active],
+            commands.targets.damping[active], commands.targets.position[active],
+            commands.targets.velocity[active], joints.position, joints.velocity, joints.torque,
+        )  # fmt: skip
+        return
+    for k in range(joints.torque.shape[0]):
+        joints.torque[k] = float(joints.velocity[k]) * -float(released[k])
+        if mode != _DAMPING:
+            joints.torque[k] = 0.0
+
+
+@kernel
+def drive_joints(
+    commands: Commands,
+    released: Array,
+    joints: Joints,
+    motors: Motors,
+    scratch: MotorScratch,
+    record: MotorRecord,
+) -> None:
+    """The joint torques of a physics step: what the commands ask for, as far as the motors can."""
+    follow_commands(commands, released, joints)
+    drive_motors(joints.velocity, joints.torque, motors, scratch, record)
+
+
+@kernel
+def drive_loops(
+    commands: Commands,
+    released: Array,
+    loops: Loops,
+    joints: Joints,
+    motors: Motors,
+    scratch: MotorScratch,
+    record: MotorRecord,
+) -> None:
+    """The same where the drives close the loops per motor, once a command has arrived."""
+    follow_commands(commands, released, joints)
+    active = int(commands.active[()])
+    if int(commands.mode[active]) == _ACTIVE:
+        close_loops(
+            loops, commands.targets, active, bool(joints.arrived[0]), joints.position,
+            joints.velocity, joints.torque,
+        )  # fmt: skip
+    drive_motors(joints.velocity, joints.torque, motors, scratch, record)
 
 
 class MotorLimits:
@@ -18,42 +122,34 @@ class MotorLimits:
     come to it."""
 
     def __init__(self, robot: RobotDescription, record: TickRecord) -> None:
-        self._record = record
-        self._joint_to_motor = np.ascontiguousarray(robot.joint_to_motor)
-        self._motor_to_torque = np.ascontiguousarray(robot.joint_to_motor.T)
-        self._torque_to_motor = robot.torque_to_motor
         motors = robot.motors
-        self._peak, self._no_load = motors.peak_torque, motors.no_load_speed
-        self._slope = motors.peak_torque / (motors.no_load_speed - motors.corner_speed)
+        self.motors = Motors(
+            np.ascontiguousarray(robot.joint_to_motor),
+            np.ascontiguousarray(robot.torque_to_motor),
+            np.ascontiguousarray(robot.joint_to_motor.T),
+            motors.peak_torque,
+            motors.peak_torque / (motors.no_load_speed - motors.corner_speed),
+            motors.no_load_speed,
+        )
         n = len(robot.joints)
-        self._speed, self._wanted = np.zeros(n), np.zeros(n)
-        self.motor_torque = np.zeros(n)
+        self.scratch = MotorScratch(*(np.zeros(n) for _ in MotorScratch._fields))
+        self.record = MotorRecord(*(getattr(record, name) for name in MotorRecord._fields))
+        self.motor_torque = self.scratch.torque
         """The motors' torques of the last call [N m], (n_joints,)."""
-        self._lower, self._upper, self._excess = (np.zeros(n) for _ in range(3))
-        self._clipped, self._one = np.zeros(n, dtype=np.bool_), np.ones(n, dtype=np.int64)
 
     def apply(self, velocity: Array, torque: Array) -> None:
         """Limit the joint ``torque`` [N m] at the joint ``velocity`` [rad/s] in place."""
-        record = self._record
-        np.dot(self._joint_to_motor, velocity, out=self._speed)
-        motor_torque_limits(
-            self._speed, self._peak, self._slope, self._no_load, self._lower, self._upper
-        )  # fmt: skip
-        clip_joint_torque(
-            torque, self._torque_to_motor, self._motor_to_torque, self._lower, self._upper,
-            self._wanted, self.motor_torque,
-        )  # fmt: skip
-        np.not_equal(self._wanted, self.motor_torque, out=self._clipped)
-        np.add(record.saturated, self._one, out=record.saturated, where=self._clipped)
-        np.maximum(record.torque_high, self.motor_torque, out=record.torque_high)
-        np.minimum(record.torque_low, self.motor_torque, out=record.torque_low)
-        np.maximum(record.speed_high, self._speed, out=record.speed_high)
-        np.minimum(record.speed_low, self._speed, out=record.speed_low)
-        np.subtract(self.motor_torque, self._upper, out=self._excess)
-        np.maximum(record.overload, self._excess, out=record.overload)
-        np.subtract(self._lower, self.motor_torque, out=self._excess)
-        np.maximum(record.overload, self._excess, out=record.overload)
-        np.add(record.joint_torque, torque, out=record.joint_torque)
+        drive_motors(velocity, torque, self.motors, self.scratch, self.record)
+
+
+class Row(NamedTuple):
+    """One command of the ring, each field (n_joints,)."""
+
+    torque: Array
+    stiffness: Array
+    damping: Array
+    position: Array
+    velocity: Array
 
 
 class Drives:
@@ -67,6 +163,8 @@ class Drives:
         damping: the damping of every joint in the damping mode [N m s/rad], (n_joints,).
         state: the active command and the commands that have not arrived yet.
         record: where saturation, peak torques and excesses over limits are noted.
+        feedback: closes the loops of commands per motor; without it every joint gets its command's
+            own feedback.
     """
 
     def __init__(
@@ -75,17 +173,31 @@ class Drives:
         damping: Array,
         state: DriveState,
         record: TickRecord,
+        feedback: MotorFeedback | None = None,
     ) -> None:
-        self._negative_damping = -damping
+        self._feedback = feedback
         self._state = state
-        self._limits = MotorLimits(robot, record)
-        self._scratch = np.zeros(len(robot.joints))
         self._slots = len(state.due)
         self._rows = [
-            (state.torque[k], state.stiffness[k], state.damping[k], state.position[k],
-             state.velocity[k])
+            Row(state.torque[k], state.stiffness[k], state.damping[k], state.position[k],
+                state.velocity[k])
             for k in range(self._slots)
         ]  # fmt: skip
+        limits = MotorLimits(robot, record)
+        n = len(robot.joints)
+        joints = self._joints = Joints(
+            np.zeros(1, np.int64), np.zeros(1, np.bool_), *(np.zeros(n) for _ in range(3))
+        )
+        commands = Commands(
+            state.active, state.pending, state.due, state.mode,
+            Targets(*(getattr(state, name) for name in Targets._fields)),
+        )  # fmt: skip
+        motors = limits.motors, limits.scratch, limits.record
+        if feedback is None:
+            self._drive = KernelCall(drive_joints, commands, damping, joints, *motors)
+        else:
+            loops = feedback.loops
+            self._drive = KernelCall(drive_loops, commands, damping, loops, joints, *motors)
 
     def hold(self, position: Array, torque: Array, stiffness: Array, damping: Array) -> None:
         """Drop all commands and from now on hold the joints at a position with these gains.
@@ -95,6 +207,8 @@ class Drives:
             torque: the feedforward torques [N m], (n_joints,).
             stiffness, damping: the gains [N m/rad, N m s/rad], (n_joints,).
         """
+        if self._feedback is not None:
+            self._feedback.reset()
         self._state.active[()] = 0
         self._state.pending[()] = 0
         self._state.last_due[()] = 0
@@ -133,25 +247,9 @@ class Drives:
         ``position`` is the reading of the drives' own encoders [rad], ``velocity`` the joint
         velocity [rad/s].
         """
-        state = self._state
-        pending = int(state.pending)
-        active = int(state.active)
-        while pending:
-            following = (active + 1) % self._slots
-            if state.due[following] > step:
-                break
-            active, pending = following, pending - 1
-            state.active[()] = active
-            state.pending[()] = pending
-        mode = int(state.mode[active])
-        if mode == CommandMode.ACTIVE:
-            torque, stiffness, damping, target, target_velocity = self._rows[active]
-            joint_feedback_torque(
-                torque, stiffness, damping, target, target_velocity, position, velocity,
-                out, self._scratch,
-            )  # fmt: skip
-        elif mode == CommandMode.DAMPING:
-            np.multiply(velocity, self._negative_damping, out=out)
-        else:
-            out.fill(0.0)
-        self._limits.apply(velocity, out)
+        joints = self._joints
+        joints.step[0] = step
+        joints.position[...] = position
+        joints.velocity[...] = velocity
+        self._drive.run()
+        out[...] = joints.torque

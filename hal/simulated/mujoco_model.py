@@ -9,9 +9,7 @@ Contact: spheres at the contact points and capsules for the rest of the robot. T
 with the ground and with other limbs, but not with their own limb or the base; a limb consists of
 all links that one joint of the base carries. Capsules of two limbs that overlap in the standing
 pose do not collide with each other, as they only approximate the links' shapes. Every contact of a
-capsule is a forbidden contact, except that of a foot with the ground that all its contact points have
-sunk into: after a drop of 20 cm soft ground gives way by the few millimetres between points and foot.
-Friction cones are elliptic.
+capsule is a forbidden contact. Friction cones are elliptic.
 
 MuJoCo scales the stiffness of a contact with the mass that it carries: a time constant and a
 damping ratio are given, so robots of any mass sink in by the same fraction of a millimetre.
@@ -53,12 +51,14 @@ CONTACT_IMPEDANCE = (0.95, 0.99, 0.001, 0.5, 2.0)
 @dataclass(frozen=True)
 class Variation:
     """The differences from the nominal world: friction coefficient, factor on the stiffness of the
-    contacts, factor on every mass and inertia, offset of the base link's CoM [m, base frame]."""
+    contacts, factor on every mass and inertia, offset of the base link's CoM [m, base frame], factor on
+    the friction and damping of the motors."""
 
     friction: float = 0.7
     contact_stiffness: float = 1.0
     mass: float = 1.0
     base_com_offset: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    joint_friction: float = 1.0
 
 
 def build_mujoco_model(
@@ -120,16 +120,6 @@ def mujoco_spec(
 def body_name(link: str) -> str:
     """The name of a link's body in the model; the name ``world`` is reserved by MuJoCo."""
     return "link/world" if link == "world" else link
-
-
-def soles(model: MjModel, robot: RobotDescription) -> dict[int, tuple[int, ...]]:
-    """By geom, the shapes of the links that are feet: the numbers of the foot's contact points."""
-    found = {}
-    for foot in robot.feet:
-        points = tuple(k for k, each in enumerate(robot.contacts) if each.foot == foot.name)
-        for k in range(len(robot.link(foot.link).shapes)):
-            found[model.geom(f"{foot.link}/{k}").id] = points
-    return found
 
 
 def _overlaps(model: MjModel, robot: RobotDescription) -> list[tuple[str, str]]:
@@ -251,7 +241,8 @@ def _add_robot(spec: MjSpec, robot: RobotDescription, variation: Variation) -> N
             name=joint.name, type=slide if joint.kind == "slide" else hinge, axis=joint.axis,
             limited=no if joint.limits is None else yes, range=joint.limits or (0.0, 0.0),
             solref_limit=[CONTACT_TIME_CONSTANT, 1.0], armature=armature[k],
-            frictionloss=motors.friction[k], damping=[motors.damping[k], 0.0, 0.0],
+            frictionloss=motors.friction[k] * variation.joint_friction,
+            damping=[motors.damping[k] * variation.joint_friction, 0.0, 0.0],
         )  # fmt: skip
         motor = spec.add_actuator(
             name=f"motor/{joint.name}", target=joint.name, trntype=mujoco.mjtTrn.mjTRN_JOINT

@@ -13,9 +13,11 @@ from ...robots.description import RobotDescription
 from ...runtime.language.block import Context, Input, Metric, Misfit, Output, State
 from ...runtime.language.parameters import Parameters
 from ...runtime.language.terrain import Ground, Terrain
+from ..drive_gains import gain_misfits, lost_gains
 from ..robot import Robot
 from .drives import Drives
 from .holding import RELEASED
+from .motor_feedback import FeedbackState, MotorFeedback
 from .parameters import SimulatorParameters
 from .plant import Plant
 from .random_streams import Purpose
@@ -33,8 +35,15 @@ class MujocoRobot(Robot):
     and the torques as their means over the tick before (their filters pass no more), the switches
     by the force in the physics step before. The command computed from them takes effect at the
     first physics step at or after ``t_n + latency + jitter``, and stays in effect until the next
-    one does. Meanwhile the drives close the joint loop at the physics rate with the command's
-    gains, by their own encoders, and limit the torques in motor space by the torque-speed curves.
+    one does. Meanwhile the drives close their loops at the physics rate by their own encoders, and
+    limit the torques in motor space by the torque-speed curves.
+
+    With a ``bus_period`` they are the drives of a real robot: each closes a loop on its own motor, with
+    gains that are fixed for the run (``stiffness`` and ``damping`` of the joints, through the
+    transmission), around goals that a driver renews when a command arrives and once a period, from the
+    measurement of the exchange before. The command's gains are met at the instant of each measurement
+    (``hal/drive_goals.py``). Without it the driver is taken as infinitely fast: every joint gets its
+    command's own gains in every physics step, as no real drives could give them.
 
     Command modes: ``OFF`` gives no torque, ``ACTIVE`` feedforward plus joint feedback, ``DAMPING``
     the damping ``drive_damping`` on every joint, whatever the command's gains are.
@@ -69,6 +78,7 @@ class MujocoRobot(Robot):
     truth = Output(RobotTruth, truth=True, text="what only a simulator knows")
     physics = State(PhysicsState, text="the simulator's state, written for a snapshot")
     drives = State(DriveState, text="commands in the drives and on their way")
+    feedback = State(FeedbackState, text="the goals of the drives' own loops")
     record = State(TickRecord, text="what happened in the physics steps of the last tick")
 
     @classmethod
@@ -80,15 +90,19 @@ class MujocoRobot(Robot):
             "encoder_offset": 0.003, "encoder_resolution": 1e-4, "joint_velocity_noise": 0.05,
             "switch_threshold": [0.5, 3.0], "switch_bounce": 0.002, "latency": 0.002,
             "jitter": 0.0005, "initial_attitude_error": 0.01, "random_start_phase": True,
+            "bus_period": 0.001,
         }  # fmt: skip
 
     @classmethod
     def requires(cls, params: Parameters, robot: RobotDescription | None) -> Iterable[Misfit]:
-        """Report a transmission that the simulator cannot express, and feet that cannot stand."""
-        assert robot is not None
+        """Report a transmission that the simulator cannot express, gains that no drives can give, and
+        feet that cannot stand."""
+        assert isinstance(params, SimulatorParameters) and robot is not None
         complaint = unfit_motor(robot)
         if complaint:
             yield Misfit(complaint, fix="correct `transmission` in the robot's description")
+        elif params.bus_period is not None:
+            yield from gain_misfits(params, robot)
         uneven = uneven_contacts(robot) if robot.base_joint != "fixed" else ""
         if uneven:
             yield Misfit(
@@ -98,17 +112,27 @@ class MujocoRobot(Robot):
 
     @classmethod
     def requires_of_graph(cls, params: Parameters, context: Context) -> Iterable[Misfit]:
-        """Report a physics step that does not divide the block's period."""
+        """Report periods that do not divide each other."""
         assert isinstance(params, SimulatorParameters)
-        steps = context.period / params.timestep
-        if abs(steps - round(steps)) > 1e-6 or round(steps) < 1:
+        bus = params.bus_period
+        whole = context.period if bus is None else bus
+        what = "the control period" if bus is None else "bus_period"
+        steps = whole / params.timestep
+        if not _is_whole(steps):
             yield Misfit(
-                f"timestep {params.timestep} s does not divide the control period "
-                f"{context.period} s",
+                f"timestep {params.timestep} s does not divide {what} {whole} s",
                 parameter="timestep",
-                expected=f"a whole fraction of {context.period} s",
+                expected=f"a whole fraction of {whole} s",
                 found=f"{params.timestep} s",
-                fix=f"timestep: {_nearest_step(context.period, params.timestep):.10g} s",
+                fix=f"timestep: {_nearest_step(whole, params.timestep):.10g} s",
+            )
+        if bus is not None and not _is_whole(context.period / bus):
+            yield Misfit(
+                f"bus_period {bus} s does not divide the control period {context.period} s",
+                parameter="bus_period",
+                expected=f"a whole fraction of {context.period} s",
+                found=f"{bus} s",
+                fix=f"bus_period: {_nearest_step(context.period, bus):.10g} s",
             )
 
     @classmethod
@@ -160,13 +184,18 @@ class MujocoRobot(Robot):
         """Draw the world from the seed and build it."""
         robot, params = self.robot, self.params
         plant = self.plant = Plant(robot, params, self.period, self.physics, self.record)
+        plant.attach(self.imu, self.joints)
+        plant.truth.attach(self.truth)
         self._steps = round(self.period / params.timestep)
         self._jitter = plant.streams[Purpose.JITTER]
         damping = RELEASED * plant.damping
         if params.drive_damping is not None:
             damping = np.full(len(robot.joints), params.drive_damping)
-        self._drives = Drives(robot, damping, self.drives, self.record)
-        self._torque = np.zeros(len(robot.joints))
+        feedback = None
+        if params.bus_period is not None:
+            steps = round(params.bus_period / params.timestep)
+            feedback = MotorFeedback(robot, params, params.bus_period, steps, self.feedback)
+        self._drives = Drives(robot, damping, self.drives, self.record, feedback)
 
     def open(self) -> None:
         """Stand on the ground, settle, and wait for the first command."""
@@ -177,12 +206,10 @@ class MujocoRobot(Robot):
 
     def read(self) -> None:
         """Publish the sensors and the truth at the present instant."""
-        plant, record, sensors = self.plant, self.record, self.plant.sensors
-        plant.read_imu(self.imu)
-        np.divide(record.joint_torque, int(record.steps), out=self._torque)
-        sensors.read_joints(plant.position, plant.velocity, self._torque, self.joints)
-        sensors.read_switches(int(self.physics.step), record, self.contacts)
-        plant.truth.publish(record, self.truth)
+        plant = self.plant
+        plant.read()
+        plant.sensors.read_switches(int(self.physics.step), self.record, self.contacts)
+        plant.truth.publish()
 
     def write(self) -> None:
         """Send the command on its way to the drives."""
@@ -213,8 +240,13 @@ class MujocoRobot(Robot):
         self.plant.load()
 
     def metrics(self) -> Mapping[str, Metric]:
-        """The values that were drawn from the seed."""
-        return self.plant.metrics()
+        """The values that were drawn from the seed, and what the drives do not give of the gains."""
+        lost = lost_gains(self.params, self.robot) if self.params.bus_period is not None else {}
+        return {**self.plant.metrics(), **lost}
+
+
+def _is_whole(ratio: float) -> bool:
+    return abs(ratio - round(ratio)) <= 1e-6 and round(ratio) >= 1
 
 
 def _nearest_step(period: float, timestep: float) -> float:

@@ -6,11 +6,12 @@ from typing import Literal, Self
 
 from pydantic import model_validator
 
-from ...runtime.language.parameters import Parameters, parameter
+from ...runtime.language.parameters import parameter
+from ..drive_gains import DriveGains
 from . import scenes
 
 
-class SimulatorParameters(Parameters):
+class SimulatorParameters(DriveGains):
     """The parameters of ``MujocoRobot``; by default there are no disturbances.
 
     A *spread* is half the width of a uniform distribution around the nominal value, from which one
@@ -56,6 +57,7 @@ class SimulatorParameters(Parameters):
     )
     mass_scale: float = parameter(1.0, gt=0, text="factor on all masses and inertias")
     mass_spread: float = parameter(0.0, ge=0, lt=1, text="spread of the factor mass_scale")
+    joint_friction: float = parameter(1.0, ge=0, text="factor on the motors' friction and damping")
     base_com_offset: list[float] = parameter(
         [0.0, 0.0, 0.0], unit="m", min_length=3, max_length=3, text="offset of the torso's CoM"
     )
@@ -68,6 +70,12 @@ class SimulatorParameters(Parameters):
     random_start_phase: bool = parameter(
         False, text="start physics at a drawn phase of the control clock"
     )
+    bus_period: float | None = parameter(
+        None, unit="s", gt=0, le=0.02,
+        text="how often the driver renews the goals of the drives, which close their loops per motor with "
+        "`stiffness` and `damping`; none: in every physics step, so that the joints get exactly the "
+        "commanded feedback",
+    )  # fmt: skip
     latency: float = parameter(0.0, unit="s", ge=0, le=0.1, text="delay from sensing to torque")
     jitter: float = parameter(
         0.0,

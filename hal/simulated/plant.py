@@ -13,18 +13,20 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from ...blocks.signals import ExternalForce, ImuReading
+from ...blocks.signals import ExternalForce, ImuReading, JointState
+from ...mathematics.compiling.kernel_call import KernelCall
 from ...robots.description import RobotDescription
 from ...runtime.language.block import Metric
 from .base import BASES
 from .holding import holding_gains, passive_joints
-from .mujoco_model import Variation, body_name, soles
+from .mujoco_model import Variation, body_name
 from .parameters import SimulatorParameters
 from .random_streams import WORDS, Purpose, RandomStreams, stream
 from .sensors import Sensors
 from .stance import centre_on_origin, holding_torque, place_standing
 from .start_check import StartCheck
 from .state import PhysicsState, TickRecord
+from .step_record import Cleared, StepRecord, StepSensors, clear, note_step
 from .truth import TruthReport
 from .world import build_world, draw_variation
 
@@ -91,9 +93,12 @@ class Plant:
         self._passive = passive_joints(robot)
         self._limits = (robot.joint_limits[:, 0].copy(), robot.joint_limits[:, 1].copy())
         n = len(robot.joints)
-        self._encoder, self._excess = np.zeros(n), np.zeros(n)
-        self._mean_force = np.zeros(3)
-        self._soles = soles(self.model, robot)
+        self._encoder = np.zeros(n)
+        self._mean_force, self._mean_torque = np.zeros(3), np.zeros(n)
+        self._clear = KernelCall(
+            clear, *(getattr(record, name) for name in ("steps", "forbidden", "saturated")),
+            Cleared(*(getattr(record, name) for name in Cleared._fields)),
+        )  # fmt: skip
         self.late = 0.0
         self._attach(mujoco.MjData(self.model))
 
@@ -113,13 +118,17 @@ class Plant:
         base = self._base = BASES[self._robot.base_joint](data)
         self.position, self.velocity = data.qpos[base.positions :], data.qvel[base.velocities :]
         self._ctrl, self._external = data.ctrl, data.xfrc_applied
-        self._accelerometer = data.sensor("accelerometer").data
-        self._contacts = data.sensor("contacts").data
+        self._sampled = (data.sensor("accelerometer").data, data.sensor("contacts").data)
         # The sensors of the contact points are the model's last.
         first = model.nsensordata - 4 * len(self._robot.contacts)
-        self._load = data.sensordata[first:].reshape(-1, 4)
-        self._vertical = self._load[:, 3]
-        self.truth = TruthReport(data, base, self._robot, self._params.build_scene())
+        load = data.sensordata[first:].reshape(-1, 4)
+        self.truth = TruthReport(data, base, self._robot, self._params.build_scene(), self.record)
+        record, sensors = self.record, self.sensors
+        self._note = KernelCall(
+            note_step, self.physics.step, StepSensors(load, *self._sampled, self.position),
+            *self._limits, sensors.ground_force, sensors.bounce_steps,
+            StepRecord(*(getattr(record, name) for name in StepRecord._fields)),
+        )  # fmt: skip
         self._points = []
         for point, (link, _) in self._robot.points.items():
             body = model.body(body_name(link)).id
@@ -198,34 +207,10 @@ class Plant:
             if push is not None:
                 self._apply_push(push)
             self._step2(model, data)
-            self.sensors.watch_switches(step, self._vertical, record)
-            np.add(record.load, self._load, out=record.load)
-            np.add(record.accelerometer, self._accelerometer, out=record.accelerometer)
-            allowed = 0.0
-            for point in self._load:
-                allowed += point.item(0)
-            if self._contacts.item(0) > allowed and self._contacts.item(0) > allowed + self._sunk():
-                record.forbidden += 1
+            self._note.run()
             self._step1(model, data)
-            lower, upper = self._limits
-            np.subtract(lower, self.position, out=self._excess)
-            np.maximum(record.violation, self._excess, out=record.violation)
-            np.subtract(self.position, upper, out=self._excess)
-            np.maximum(record.violation, self._excess, out=record.violation)
             step += 1
         record.steps += steps
-        self.physics.step[()] = step
-
-    def _sunk(self) -> int:
-        """How many contacts are those of a foot's own shape with the ground that all its contact
-        points have sunk into: a hard landing on soft ground."""
-        found, bodies = 0, self.model.geom_bodyid
-        for first, second in self.data.contact.geom:
-            ground, geom = (first, second) if bodies[first] == 0 else (second, first)
-            points = self._soles.get(int(geom), ())
-            if bodies[ground] == 0 and points:
-                found += all(self._load[point, 0] > 0.0 for point in points)
-        return found
 
     def _apply_push(self, push: ExternalForce) -> None:
         """Apply the external force at its point of its body, which moves with the body."""
@@ -244,11 +229,26 @@ class Plant:
         wrench[0], wrench[1], wrench[2] = fx, fy, fz
         wrench[3], wrench[4], wrench[5] = y * fz - z * fy, z * fx - x * fz, x * fy - y * fx
 
-    def read_imu(self, out: ImuReading) -> None:
-        """Write a sample of the IMU: the gyroscope of this instant, and the mean of the
-        accelerometer since ``clear_record``."""
-        np.divide(self.record.accelerometer, int(self.record.steps), out=self._mean_force)
-        self.sensors.read_imu(self.angular_velocity(), self._mean_force, out)
+    def attach(self, imu: ImuReading, joints: JointState) -> None:
+        """From now on ``read`` writes to these signals."""
+        sensors = self.sensors
+        self._read_imu = sensors.imu_call(self._base.angular_velocity, self._mean_force, imu)
+        self._read_joints = sensors.joint_call(
+            self.position, self.velocity, self._mean_torque, joints
+        )
+
+    def read(self) -> None:
+        """Write a sample of the IMU, the gyroscope of this instant and the mean of the accelerometer
+        since ``clear_record``, and one of the joints with their mean torques."""
+        record = self.record
+        steps = int(record.steps)
+        np.divide(record.accelerometer, steps, out=self._mean_force)
+        np.divide(record.joint_torque, steps, out=self._mean_torque)
+        self._base.refresh()
+        self.sensors.draw_imu()
+        self._read_imu.run()
+        self.sensors.draw_joints()
+        self._read_joints.run()
 
     def angular_velocity(self) -> Array:
         """The base's true angular velocity now [rad/s, body]."""
@@ -257,19 +257,7 @@ class Plant:
 
     def clear_record(self) -> None:
         """Begin a new record, except for the memory of the switches."""
-        record = self.record
-        record.steps[()] = 0
-        record.forbidden[()] = 0
-        for total in (
-            record.load, record.accelerometer, record.joint_torque, record.violation,
-            record.overload,
-        ):  # fmt: skip
-            total.fill(0.0)
-        record.saturated.fill(0)
-        for high in (record.torque_high, record.speed_high):
-            high.fill(-np.inf)
-        for low in (record.torque_low, record.speed_low):
-            low.fill(np.inf)
+        self._clear.run()
 
     def save(self) -> None:
         """Copy the state of the simulator and of the random streams to ``physics``."""

@@ -3,17 +3,127 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...blocks.signals import ContactSwitches, ImuReading, JointState
+from ...mathematics.compiling.kernel_call import KernelCall
+from ...mathematics.kernel import kernel
 from ...robots.description import RobotDescription
 from .parameters import SimulatorParameters
 from .random_streams import Purpose, RandomStreams, stream
 from .state import TickRecord
 
 Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+Counts = NDArray[np.int64]
+
+
+@kernel
+def watch_switches(
+    step: int,
+    load: Array,
+    ground_force: Array,
+    bounce_steps: int,
+    closed: Flags,
+    bounce_end: Counts,
+) -> None:
+    """Update the switches in one physics step.
+
+    Args:
+        load: the contact points' contact counts and forces on the ground [N], (n_contacts, 4); the
+            vertical force is negative where the robot presses.
+        ground_force: up to which force every switch is closed [N], (n_contacts,).
+        bounce_steps: how long a switch that has changed chatters.
+        closed, bounce_end: as in ``TickRecord``.
+    """
+    for point in range(closed.shape[0]):
+        now = float(load[point, 3]) <= float(ground_force[point])
+        if bounce_steps > 0 and now != closed[point]:
+            bounce_end[point] = step + 1 + bounce_steps
+        closed[point] = now
+
+
+class ImuErrors(NamedTuple):
+    """The errors of an IMU, which the robot may not have (``present``).
+
+    ``gyro_bias`` [rad/s] and ``accelerometer_bias`` [m/s^2], (3,); ``gyro_noise`` and
+    ``accelerometer_noise`` (3,), drawn for this sample, of variance one; ``scale`` (2,) of both noises;
+    ``limit`` (2,), the ranges of gyroscope and accelerometer.
+    """
+
+    present: bool
+    gyro_bias: Array
+    accelerometer_bias: Array
+    gyro_noise: Array
+    accelerometer_noise: Array
+    scale: Array
+    limit: Array
+
+
+class JointErrors(NamedTuple):
+    """The errors of the joints' sensors: ``offset`` (n_joints,) [rad] of the encoders; ``size`` (2,), the
+    encoders' resolution [rad] and the scale of the velocities' noise [rad/s]; ``noise`` (n_joints,),
+    drawn for this sample, of variance one."""
+
+    offset: Array
+    size: Array
+    noise: Array
+
+
+@kernel
+def sample(true: Array, bias: Array, noise: Array, scale: float, limit: float, out: Array) -> None:
+    """A reading (3,) with bias, noise and saturation; what is not a number stays so."""
+    for axis in range(3):
+        reading = float(true[axis]) + float(bias[axis])
+        if scale != 0.0:
+            reading += float(noise[axis]) * scale
+        reading = min(reading, limit)
+        reading = max(reading, -limit)
+        out[axis] = reading
+
+
+@kernel
+def sample_imu(
+    rate: Array, force: Array, errors: ImuErrors, read_rate: Array, read_force: Array
+) -> None:
+    """A sample of the IMU from the true values [rad/s, m/s^2, body]; zero where there is none."""
+    if not errors.present:
+        for axis in range(3):
+            read_rate[axis] = read_force[axis] = 0.0
+        return
+    scale, limit = errors.scale, errors.limit
+    sample(rate, errors.gyro_bias, errors.gyro_noise, float(scale[0]), float(limit[0]), read_rate)
+    sample(
+        force, errors.accelerometer_bias, errors.accelerometer_noise, float(scale[1]),
+        float(limit[1]), read_force,
+    )  # fmt: skip
+
+
+@kernel
+def sample_joints(
+    position: Array,
+    velocity: Array,
+    torque: Array,
+    errors: JointErrors,
+    read_position: Array,
+    read_velocity: Array,
+    read_torque: Array,
+) -> None:
+    """A sample of encoders and currents from the joints' true motion and torques."""
+    resolution, scale = float(errors.size[0]), float(errors.size[1])
+    np.add(position, errors.offset, read_position)
+    if resolution != 0.0:
+        np.divide(read_position, resolution, read_position)
+        np.rint(read_position, read_position)
+        np.multiply(read_position, resolution, read_position)
+    for joint in range(velocity.shape[0]):
+        read_velocity[joint] = velocity[joint]
+        if scale != 0.0:
+            read_velocity[joint] += float(errors.noise[joint]) * scale
+        read_torque[joint] = torque[joint]
 
 
 class Sensors:
@@ -25,13 +135,12 @@ class Sensors:
     ) -> None:
         n, n_contacts = len(robot.joints), len(robot.contacts)
         self._params = params
-        self._has_imu, self._has_switches = robot.sensors.imu, robot.sensors.switches
+        self._has_switches = robot.sensors.switches
         self._gyro = streams[Purpose.GYRO]
         self._accelerometer = streams[Purpose.ACCELEROMETER]
         self._velocity = streams[Purpose.JOINT_VELOCITY]
         self._bounce = streams[Purpose.BOUNCE]
-        self._bounce_steps = math.ceil(params.switch_bounce / params.timestep - 1e-9)
-        self._noise, self._joint_noise = np.zeros(3), np.zeros(n)
+        self.bounce_steps = math.ceil(params.switch_bounce / params.timestep - 1e-9)
 
         def spread(purpose: Purpose, half_width: float, size: int) -> Array:
             return stream(params.seed, purpose).uniform(-1.0, 1.0, size) * half_width
@@ -42,75 +151,81 @@ class Sensors:
         """The accelerometer's bias [m/s^2]."""
         self.encoder_offset = spread(Purpose.ENCODER_OFFSET, params.encoder_offset, n)
         """The offset of every joint encoder: its reading minus the true angle [rad]."""
+        self._imu_errors = ImuErrors(
+            robot.sensors.imu, self.gyro_bias, self.accelerometer_bias, np.zeros(3), np.zeros(3),
+            np.array([params.gyro_noise, params.accelerometer_noise]),
+            np.array([_limit(params.gyro_range), _limit(params.accelerometer_range)]),
+        )  # fmt: skip
+        self._joint_errors = JointErrors(
+            self.encoder_offset, np.array([params.encoder_resolution, params.joint_velocity_noise]),
+            np.zeros(n),
+        )  # fmt: skip
         low, high = params.switch_threshold
         draws = stream(params.seed, Purpose.SWITCH_THRESHOLD).random(n_contacts)
         self.switch_threshold = low + (high - low) * draws
         """The force that closes every switch [N]."""
-        self._ground_force = -self.switch_threshold
-        self._closed = np.zeros(n_contacts, dtype=np.bool_)
-        self._changed = np.zeros(n_contacts, dtype=np.bool_)
+        self.ground_force = -self.switch_threshold
+        """The vertical force on the ground up to which every switch is closed [N]."""
+
+    def draw_imu(self) -> None:
+        """Draw the noise of the next sample of the IMU."""
+        if self._params.gyro_noise:
+            self._gyro.standard_normal(out=self._imu_errors.gyro_noise)
+        if self._params.accelerometer_noise:
+            self._accelerometer.standard_normal(out=self._imu_errors.accelerometer_noise)
+
+    def draw_joints(self) -> None:
+        """Draw the noise of the next sample of the joints."""
+        if self._params.joint_velocity_noise:
+            self._velocity.standard_normal(out=self._joint_errors.noise)
+
+    def imu_call(self, rate: Array, force: Array, out: ImuReading) -> KernelCall:
+        """Writes a sample of the IMU, after ``draw_imu``: arguments as for ``read_imu``."""
+        return KernelCall(
+            sample_imu, rate, force, self._imu_errors, out.angular_velocity, out.specific_force
+        )
+
+    def joint_call(
+        self, position: Array, velocity: Array, torque: Array, out: JointState
+    ) -> KernelCall:
+        """Writes a sample of the joints, after ``draw_joints``: arguments as for ``read_joints``."""
+        return KernelCall(
+            sample_joints, position, velocity, torque, self._joint_errors, out.position,
+            out.velocity, out.torque,
+        )  # fmt: skip
 
     def read_imu(self, angular_velocity: Array, specific_force: Array, out: ImuReading) -> None:
         """Write a sample of the IMU from the true values [rad/s, m/s^2, body]; zero without IMU."""
-        params = self._params
-        if not self._has_imu:
-            out.angular_velocity.fill(0.0)
-            out.specific_force.fill(0.0)
-            return
-        for true, bias, noise, limit, generator, reading in (
-            (angular_velocity, self.gyro_bias, params.gyro_noise, params.gyro_range,
-             self._gyro, out.angular_velocity),
-            (specific_force, self.accelerometer_bias, params.accelerometer_noise,
-             params.accelerometer_range, self._accelerometer, out.specific_force),
-        ):  # fmt: skip
-            np.add(true, bias, out=reading)
-            if noise:
-                generator.standard_normal(out=self._noise)
-                np.multiply(self._noise, noise, out=self._noise)
-                np.add(reading, self._noise, out=reading)
-            if limit is not None:
-                np.minimum(reading, limit, out=reading)
-                np.maximum(reading, -limit, out=reading)
+        self.draw_imu()
+        sample_imu(
+            angular_velocity, specific_force, self._imu_errors, out.angular_velocity,
+            out.specific_force,
+        )  # fmt: skip
 
     def read_joints(self, position: Array, velocity: Array, torque: Array, out: JointState) -> None:
         """Write a sample of encoders and currents from the joints' true motion and torques."""
-        params = self._params
-        np.add(position, self.encoder_offset, out=out.position)
-        if params.encoder_resolution:
-            np.divide(out.position, params.encoder_resolution, out=out.position)
-            np.rint(out.position, out=out.position)
-            np.multiply(out.position, params.encoder_resolution, out=out.position)
-        out.velocity[:] = velocity
-        if params.joint_velocity_noise:
-            self._velocity.standard_normal(out=self._joint_noise)
-            np.multiply(self._joint_noise, params.joint_velocity_noise, out=self._joint_noise)
-            np.add(out.velocity, self._joint_noise, out=out.velocity)
-        out.torque[:] = torque
-
-    def watch_switches(self, step: int, ground_force: Array, record: TickRecord) -> None:
-        """Update the switches in one physics step.
-
-        ``ground_force`` is the vertical force of every contact point on the ground [N], which is
-        negative where the robot presses.
-        """
-        np.less_equal(ground_force, self._ground_force, out=self._closed)
-        if self._bounce_steps:
-            np.not_equal(self._closed, record.closed, out=self._changed)
-            np.copyto(record.bounce_end, step + 1 + self._bounce_steps, where=self._changed)
-        record.closed[:] = self._closed
+        self.draw_joints()
+        sample_joints(
+            position, velocity, torque, self._joint_errors, out.position, out.velocity, out.torque
+        )
 
     def read_switches(self, step: int, record: TickRecord, out: ContactSwitches) -> None:
         """Write a sample of the switches; a switch that has just changed reads either way at
         random. Without switches none is closed."""
         self.read_closed(step, record, out.closed)
 
-    def read_closed(self, step: int, record: TickRecord, closed: NDArray[np.bool_]) -> None:
+    def read_closed(self, step: int, record: TickRecord, closed: Flags) -> None:
         """The same as an array, (n_contacts,)."""
         if not self._has_switches:
             closed.fill(False)
             return
         closed[:] = record.closed
-        if self._bounce_steps:
+        if self.bounce_steps:
             for k, end in enumerate(record.bounce_end.tolist()):
                 if step < end:
                     closed[k] = self._bounce.random() < 0.5
+
+
+def _limit(limit: float | None) -> float:
+    """The range of a sensor, infinite where it has none."""
+    return math.inf if limit is None else limit

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...blocks.signals import RobotTruth
+from ...mathematics.compiling.kernel_call import KernelCall
+from ...mathematics.kernel import kernel
 from ...robots.description import RobotDescription
 from .base import FixedBase
 from .scenes import Scene
@@ -15,6 +18,128 @@ from .state import TickRecord
 
 if TYPE_CHECKING:
     from mujoco import MjData
+
+Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+Counts = NDArray[np.int64]
+
+
+class Instant(NamedTuple):
+    """What the simulator knows of the present instant.
+
+    ``joint_position``, ``joint_velocity`` (n_joints,) [rad, rad/s]; ``com``, ``com_velocity`` and
+    ``angular_momentum`` (3,) [m, m/s, N m s, world]; ``places`` (n, 3) [m, world] of all named places,
+    of which ``contacts`` (n_contacts,) are those of the contact points, which lie ``below`` [m] under
+    them. ``floor`` (1,) is its height, and ``boxes`` (n_boxes, 5) stand on it: from and to in x, from
+    and to in y, top [m].
+    """
+
+    joint_position: Array
+    joint_velocity: Array
+    com: Array
+    com_velocity: Array
+    angular_momentum: Array
+    places: Array
+    contacts: Counts
+    below: Array
+    floor: Array
+    boxes: Array
+
+
+class Peaks(NamedTuple):
+    """Sums and extremes over the physics steps of a tick: see ``TickRecord``."""
+
+    steps: Counts
+    load: Array
+    forbidden: Counts
+    violation: Array
+    overload: Array
+    saturated: Counts
+    torque_high: Array
+    torque_low: Array
+    speed_high: Array
+    speed_low: Array
+
+
+class Report(NamedTuple):
+    """The fields of ``RobotTruth`` but those of the base."""
+
+    joint_position: Array
+    joint_velocity: Array
+    com: Array
+    com_velocity: Array
+    angular_momentum: Array
+    contact_position: Array
+    contact_force: Array
+    contact_touched: Flags
+    ground_height: Array
+    forbidden_contacts: Counts
+    joint_limit_violation: Array
+    motor_overload: Array
+    saturated_share: Array
+    motor_torque: Array
+    motor_speed: Array
+
+
+@kernel
+def height_of_ground(floor: Array, boxes: Array, x: float, y: float) -> float:
+    """The height [m, world] of the highest surface at a place: as ``Scene.ground_height``."""
+    height = float(floor[0])
+    for box in range(boxes.shape[0]):
+        inside = boxes[box, 0] <= x <= boxes[box, 1] and boxes[box, 2] <= y <= boxes[box, 3]
+        if boxes[box, 4] > height and inside:
+            height = float(boxes[box, 4])
+    return height
+
+
+@kernel
+def largest(values: Array) -> float:
+    """The largest value, and zero of none."""
+    found = float(values[0]) if values.shape[0] > 0 else 0.0
+    for k in range(1, values.shape[0]):
+        found = max(found, float(values[k]))
+    return found
+
+
+@kernel
+def report_contacts(instant: Instant, peaks: Peaks, report: Report) -> None:
+    """The contact points: where they are, the ground under them, and the mean force on each."""
+    steps = int(peaks.steps[()])
+    for point in range(instant.below.shape[0]):
+        place = int(instant.contacts[point])
+        x, y = float(instant.places[place, 0]), float(instant.places[place, 1])
+        report.contact_position[point, 0], report.contact_position[point, 1] = x, y
+        report.contact_position[point, 2] = instant.places[place, 2] - instant.below[point]
+        report.ground_height[point] = height_of_ground(instant.floor, instant.boxes, x, y)
+        touched = False
+        for axis in range(3):
+            force = float(peaks.load[point, 1 + axis]) / -steps
+            report.contact_force[point, axis] = force
+            touched = touched or force != 0.0
+        report.contact_touched[point] = touched
+
+
+@kernel
+def report_truth(instant: Instant, peaks: Peaks, report: Report) -> None:
+    """Write the truth about a tick that has been simulated."""
+    for axis in range(3):
+        report.com[axis] = instant.com[axis]
+        report.com_velocity[axis] = instant.com_velocity[axis]
+        report.angular_momentum[axis] = instant.angular_momentum[axis]
+    report_contacts(instant, peaks, report)
+    count, at_limit = report.joint_position.shape[0], 0
+    for k in range(count):
+        report.joint_position[k] = instant.joint_position[k]
+        report.joint_velocity[k] = instant.joint_velocity[k]
+        at_limit += int(peaks.saturated[k])
+        high, low = float(peaks.torque_high[k]), float(peaks.torque_low[k])
+        report.motor_torque[k] = low if -low > high else high
+        high, low = float(peaks.speed_high[k]), float(peaks.speed_low[k])
+        report.motor_speed[k] = low if -low > high else high
+    report.forbidden_contacts[()] = int(peaks.forbidden[()])
+    report.joint_limit_violation[()] = largest(peaks.violation)
+    report.motor_overload[()] = largest(peaks.overload)
+    report.saturated_share[()] = at_limit / (int(peaks.steps[()]) * max(1, count))
 
 
 class TruthReport:
@@ -25,49 +150,36 @@ class TruthReport:
     """
 
     def __init__(
-        self, data: MjData, base: FixedBase, robot: RobotDescription, scene: Scene
+        self,
+        data: MjData,
+        base: FixedBase,
+        robot: RobotDescription,
+        scene: Scene,
+        record: TickRecord,
     ) -> None:
         self._base = base
-        self._scene = scene
-        self._position, self._velocity = (
+        boxes = [(*box.x, *box.y, box.top) for box in scene.boxes]
+        self._instant = Instant(
             data.qpos[base.positions :],
             data.qvel[base.velocities :],
+            data.sensor("com").data,
+            data.sensor("com_velocity").data,
+            data.sensor("angular_momentum").data,
+            data.site_xpos,
+            np.array([data.site(contact.name).id for contact in robot.contacts], dtype=np.int64),
+            depth_of_contacts(robot),
+            np.array([scene.floor]),
+            np.array(boxes, dtype=np.float64).reshape(-1, 5),
         )
-        self._com, self._com_velocity, self._angular_momentum = (
-            data.sensor(name).data for name in ("com", "com_velocity", "angular_momentum")
-        )
-        self._below = depth_of_contacts(robot)
-        self._places = [data.site(contact.name).xpos for contact in robot.contacts]
-        n = len(robot.joints)
-        self._negative, self._is_low = np.zeros(n), np.zeros(n, dtype=np.bool_)
+        self._peaks = Peaks(*(getattr(record, name) for name in Peaks._fields))
 
-    def publish(self, record: TickRecord, truth: RobotTruth) -> None:
-        """Write all fields of ``truth``."""
-        steps = int(record.steps)
-        self._base.publish(truth)
-        truth.joint_position[:] = self._position
-        truth.joint_velocity[:] = self._velocity
-        truth.com[:] = self._com
-        truth.com_velocity[:] = self._com_velocity
-        truth.angular_momentum[:] = self._angular_momentum
-        np.divide(record.load[:, 1:], -steps, out=truth.contact_force)
-        for k, place in enumerate(self._places):
-            truth.contact_position[k] = place
-            truth.contact_position[k, 2] -= self._below.item(k)
-            truth.ground_height[k] = self._scene.ground_height(place.item(0), place.item(1))
-            force = truth.contact_force[k]
-            truth.contact_touched[k] = any(force.item(axis) != 0.0 for axis in range(3))
-        truth.forbidden_contacts[()] = record.forbidden
-        truth.joint_limit_violation[()] = max(record.violation.tolist(), default=0.0)
-        truth.motor_overload[()] = max(record.overload.tolist(), default=0.0)
-        truth.saturated_share[()] = sum(record.saturated.tolist()) / (
-            steps * max(1, len(self._is_low))
-        )
-        for high, low, out in (
-            (record.torque_high, record.torque_low, truth.motor_torque),
-            (record.speed_high, record.speed_low, truth.motor_speed),
-        ):
-            np.negative(low, out=self._negative)
-            np.greater(self._negative, high, out=self._is_low)
-            out[:] = high
-            np.copyto(out, low, where=self._is_low)
+    def attach(self, truth: RobotTruth) -> None:
+        """From now on ``publish`` writes to ``truth``."""
+        self._truth = truth
+        report = Report(*(getattr(truth, name) for name in Report._fields))
+        self._report = KernelCall(report_truth, self._instant, self._peaks, report)
+
+    def publish(self) -> None:
+        """Write all fields of the truth."""
+        self._base.publish(self._truth)
+        self._report.run()

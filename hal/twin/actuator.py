@@ -6,7 +6,7 @@ import struct
 from dataclasses import dataclass, field
 from functools import lru_cache
 
-from ..bear.conditions import HEALTHY
+from ...blocks.signals.drive_conditions import HEALTHY
 from ..bear.frames import Frame, Instruction
 from ..bear.registers import CONFIG, STATUS, Mode, Register, Torque
 

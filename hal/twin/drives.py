@@ -12,6 +12,7 @@ from ...robots.transmission import Transmission
 from ..bear.configuration import Hardware
 from ..bear.registers import Mode
 from ..simulated.drives import MotorLimits
+from ..simulated.motor_feedback import motor_feedback
 from ..simulated.state import TickRecord
 from .actuator import EmulatedActuator
 from .frozen import Part
@@ -139,12 +140,10 @@ class EmulatedDrives:
         self.sense(position, velocity)
         self._arrive(step)
         goals, current, wanted = self.goals, self.current, self._wanted
-        np.subtract(goals[:, 1], self.position, out=current)
-        np.multiply(current, goals[:, 3], out=current)
-        np.add(current, goals[:, 0], out=current)
-        np.subtract(goals[:, 2], self.velocity, out=wanted)
-        np.multiply(wanted, goals[:, 4], out=wanted)
-        np.add(current, wanted, out=current)
+        motor_feedback(
+            goals[:, 0], goals[:, 1], goals[:, 2], goals[:, 3], goals[:, 4],
+            self.position, self.velocity, current,
+        )  # fmt: skip
         np.minimum(current, goals[:, 5], out=current)
         np.negative(goals[:, 5], out=wanted)
         np.maximum(current, wanted, out=current)

@@ -247,6 +247,8 @@ class Twin:
             for k, name in enumerate(self._points):
                 if self.faults.of(name, "stuck_switch"):
                     closed[k] = True
+                if self.faults.of(name, "open_switch"):
+                    closed[k] = False
                 if self.faults.of(name, "bouncing_switch"):
                     closed[k] = bool(self.faults.draw(name, 2).random() < 0.5)
         for bit, point in enumerate(self._order):

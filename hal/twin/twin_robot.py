@@ -13,8 +13,9 @@ from ...runtime.language.signals import Field, Signal
 from ...runtime.language.terrain import Ground, Terrain
 from ..bear.command_queue import CommandQueue
 from ..bear.configuration import Hardware
-from ..bear.driven_robot import DrivenRobot, DriveParameters, joint_gains, read_hardware
+from ..bear.driven_robot import DrivenRobot, DriveParameters, read_hardware
 from ..bear.driver import Driver
+from ..drive_gains import joint_gains
 from ..simulated.parameters import SimulatorParameters
 from ..simulated.plant import Plant
 from ..simulated.rotors import unfit_motor
@@ -56,7 +57,8 @@ class TwinRobot(DrivenRobot):
 
     A gantry holds the robot in its standing pose until the drives are on and get a first current.
 
-    ``drive_damping`` is not used: drives in damping brake as shorted windings do.
+    ``drive_damping`` is not used: drives in damping brake as shorted windings do. Nor is
+    ``bus_period``: the file of the hardware has it.
     """
 
     outside = "simulated"
@@ -158,6 +160,7 @@ class TwinRobot(DrivenRobot):
             tuple(params.faults),
         )  # fmt: skip
         self.twin.push = self.push
+        self.twin.plant.truth.attach(self.truth)
         self._hardware = hardware
         self.driver = _driver(robot, params, hardware, self.twin)
         self._queue = CommandQueue(self.driver.loop, robot, params.latency, self.period)
@@ -180,7 +183,7 @@ class TwinRobot(DrivenRobot):
     def read(self) -> None:
         """Publish the newest measurements, and the truth."""
         super().read()
-        self.twin.plant.truth.publish(self.record, self.truth)
+        self.twin.plant.truth.publish()
 
     def write(self) -> None:
         """Send the command on its way to the drives."""

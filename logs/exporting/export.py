@@ -1,21 +1,28 @@
-"""Recordings for other programs: CSV, Parquet and MCAP, with every number exact."""
+"""Recordings for other programs: CSV, Parquet and MCAP, with every number exact.
+
+A stretch of the recording is in memory at a time.
+"""
 
 from __future__ import annotations
 
 import csv
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ...runtime.language.errors import AloftError
-from ..file.format import RecordedField, nanoseconds
+from ..file.format import RecordedField, RecordedRows, nanoseconds
 from ..file.reader import RecordedRun
 from ..file.table import chosen
-from .known_channels import known_channels
-from .named_columns import NamedColumn, named_columns
+from .known_channels import Timed, known_channels
+from .named_columns import NamedColumn, NamedColumns
+
+ROW_GROUP = 8192
+"""Ticks in a row group of a Parquet file, which is in memory as a whole."""
 
 
 class ExportError(AloftError):
@@ -32,12 +39,13 @@ def export_csv(run: RecordedRun, path: Path, names: Sequence[str] = ()) -> None:
         KeyError: no signal has such a name.
         OSError: the file cannot be written.
     """
-    columns = named_columns(run, names)
+    table = NamedColumns(run, names)
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
-        writer.writerow([column.name for column in columns])
-        lists = [column.values.tolist() for column in columns]
-        writer.writerows(zip(*lists, strict=True))
+        writer.writerow([column.name for column in table.columns])
+        for batch in run.batches():
+            lists = [values.tolist() for values in table.values(batch)]
+            writer.writerows(zip(*lists, strict=True))
 
 
 def export_parquet(run: RecordedRun, path: Path, names: Sequence[str] = ()) -> None:
@@ -54,8 +62,8 @@ def export_parquet(run: RecordedRun, path: Path, names: Sequence[str] = ()) -> N
     import pyarrow as pa  # comes with Rerun
     from pyarrow import parquet
 
-    columns = named_columns(run, names)
-    arrays = [pa.array(np.ascontiguousarray(column.values)) for column in columns]
+    table = NamedColumns(run, names)
+    types = [pa.from_numpy_dtype(values.dtype) for values in table.values(run.no_rows())]
     robot = run.header.robot
     about = {
         "aloft.graph": run.header.graph,
@@ -66,12 +74,15 @@ def export_parquet(run: RecordedRun, path: Path, names: Sequence[str] = ()) -> N
     }
     schema = pa.schema(
         [
-            pa.field(column.name, array.type, metadata=_metadata(column))
-            for column, array in zip(columns, arrays, strict=True)
+            pa.field(column.name, kind, metadata=_metadata(column))
+            for column, kind in zip(table.columns, types, strict=True)
         ],
         metadata=about,
     )
-    parquet.write_table(pa.Table.from_arrays(arrays, schema=schema), path)
+    with parquet.ParquetWriter(path, schema) as writer:
+        for batch in run.batches(ROW_GROUP):
+            arrays = [pa.array(np.ascontiguousarray(values)) for values in table.values(batch)]
+            writer.write_table(pa.Table.from_arrays(arrays, schema=schema))
 
 
 def _metadata(column: NamedColumn) -> dict[str, str] | None:
@@ -96,27 +107,37 @@ def export_mcap(run: RecordedRun, path: Path, names: Sequence[str] = ()) -> None
     ports: dict[str, list[RecordedField]] = {}
     for field in chosen(run, names):
         ports.setdefault(field.name.rpartition(".")[0], []).append(field)
-    instants = nanoseconds(run.header.base_rate, run.ticks).tolist()
     with path.open("wb") as file:
         writer = Writer(file)
         writer.start(library="aloft")
         writer.add_metadata("aloft", {"graph": run.header.graph, "name": run.header.name})
+        channels: list[tuple[int, Callable[[RecordedRows], Iterator[Timed]]]] = []
         for known in () if names else known_channels(run):
             schema_id = writer.register_schema(
                 known.type, known.schema_encoding, known.schema.encode()
             )
             channel = writer.register_channel(known.topic, known.encoding, schema_id)
-            for instant, data in known.messages:
+            for instant, data in known.once:
                 writer.add_message(channel, instant, data, instant)
+            channels.append((channel, known.messages))
         for port, fields in ports.items():
             schema = json.dumps(_json_schema(port, fields)).encode()
             schema_id = writer.register_schema(port, "jsonschema", schema)
             channel = writer.register_channel(port.replace(".", "/"), "json", schema_id)
-            lists = {field.field_name: run[field.name].tolist() for field in fields}
-            for k, instant in enumerate(instants):
-                message = json.dumps({name: values[k] for name, values in lists.items()})
-                writer.add_message(channel, instant, message.encode(), instant)
+            channels.append((channel, partial(_json_messages, fields)))
+        for batch in run.batches():
+            for channel, messages in channels:
+                for instant, data in messages(batch):
+                    writer.add_message(channel, instant, data, instant)
         writer.finish()
+
+
+def _json_messages(fields: Sequence[RecordedField], batch: RecordedRows) -> Iterator[Timed]:
+    """One message a tick with all fields of a port."""
+    instants = nanoseconds(batch.header.base_rate, batch.ticks).tolist()
+    lists = {field.field_name: batch.signal(field.name).tolist() for field in fields}
+    for k, instant in enumerate(instants):
+        yield instant, json.dumps({name: values[k] for name, values in lists.items()}).encode()
 
 
 def _json_schema(port: str, fields: Sequence[RecordedField]) -> dict[str, Any]:

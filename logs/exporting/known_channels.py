@@ -7,18 +7,20 @@ They show the robot in 3D (``/tf``, ``/scene``), its joints by name (``/joint_st
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...robots.description import RobotDescription
-from ...robots.kinematics import link_poses
-from ..file.format import nanoseconds
+from ...robots.kinematics import quaternions_of_matrices
+from ..file.format import RecordedRows, nanoseconds
 from ..file.reader import RecordedRun
 from ..viewing.robot_shapes import quaternion_from_z, shapes_of
+from ..viewing.scene_part import Moments
 from ..viewing.scene_ports import IMU, JOINTS, ScenePorts, port_of, ports_of, scene_ports
 from .cdr import DEFINITIONS, imu, joint_state, transforms, wrench
 
@@ -31,133 +33,108 @@ LEVELS = {"INFO": 2, "WARN": 3, "ERROR": 4}
 """The levels of ``foxglove.Log``."""
 
 
+Timed = tuple[int, bytes]
+Messages = Callable[[RecordedRows], Iterator[Timed]]
+
+
 @dataclass(frozen=True)
 class Channel:
-    """A channel: its messages are (time [ns], bytes), in order of time."""
+    """A channel; a message is its time [ns] and its bytes.
+
+    Attributes:
+        once: messages of the whole run.
+        messages: gives those of a batch of ticks, in order of time.
+    """
 
     topic: str
     type: str
     encoding: str
     schema_encoding: str
     schema: str
-    messages: Iterator[tuple[int, bytes]]
+    once: tuple[Timed, ...]
+    messages: Messages
 
 
 def known_channels(run: RecordedRun) -> list[Channel]:
     """The channels for which the recording has signals. Without a robot there is only ``/log``."""
-    channels = [_json("/log", "foxglove.Log", _notes(run))]
+    channels = [_json("/log", "foxglove.Log", tuple(_notes(run)))]
     robot = run.header.robot
     if robot is None:
         return channels
-    instants = nanoseconds(run.header.base_rate, run.ticks)
     ports = ports_of(run.header)
     joints, sensor = port_of(ports, JOINTS), port_of(ports, IMU)
     if joints is not None:
         channels.append(
-            _ros("/joint_states", "sensor_msgs/msg/JointState", _joints(run, joints, robot))
+            _ros("/joint_states", "sensor_msgs/msg/JointState", partial(_joints, joints, robot))
         )
     if sensor is not None:
-        channels.append(_ros("/imu", "sensor_msgs/msg/Imu", _imu(run, sensor, robot.base)))
+        channels.append(_ros("/imu", "sensor_msgs/msg/Imu", partial(_imu, sensor, robot.base)))
     drawn = scene_ports(run.header)
     if drawn is not None:
-        channels.append(_ros("/tf", "tf2_msgs/msg/TFMessage", _poses(run, drawn, robot)))
-        start = int(instants[0]) if len(instants) else 0
-        update = [(start, json.dumps(scene_update(run, robot, start)).encode())]
-        channels.append(_json("/scene", "foxglove.SceneUpdate", iter(update)))
+        channels.append(_ros("/tf", "tf2_msgs/msg/TFMessage", partial(_poses, drawn, robot)))
+        start = int(nanoseconds(run.header.base_rate, run.ticks[:1]).sum())
+        update = (start, json.dumps(scene_update(run, robot, start)).encode())
+        channels.append(_json("/scene", "foxglove.SceneUpdate", (update,)))
         if drawn.contact_force is not None and drawn.contact_position is not None:
             for k, foot in enumerate(robot.feet):
-                messages = _wrench(run, drawn, [i == k for i in robot.foot_of_contact()])
+                messages = partial(_wrench, drawn, [i == k for i in robot.foot_of_contact()])
                 name = "geometry_msgs/msg/WrenchStamped"
                 channels.append(_ros(f"/wrench/{foot.name}", name, messages))
     return channels
 
 
-def _ros(topic: str, name: str, messages: Iterator[tuple[int, bytes]]) -> Channel:
-    return Channel(topic, name, "cdr", "ros2msg", DEFINITIONS[name], messages)
+def _ros(topic: str, name: str, messages: Messages) -> Channel:
+    return Channel(topic, name, "cdr", "ros2msg", DEFINITIONS[name], (), messages)
 
 
-def _json(topic: str, name: str, messages: Iterator[tuple[int, bytes]]) -> Channel:
+def _json(topic: str, name: str, once: tuple[Timed, ...]) -> Channel:
     # these readers know the content by the schema's name
     schema = json.dumps({"title": name, "type": "object"})
-    return Channel(topic, name, "json", "jsonschema", schema, messages)
+    return Channel(topic, name, "json", "jsonschema", schema, once, lambda batch: iter(()))
 
 
-def _instants(run: RecordedRun) -> list[int]:
-    found: list[int] = nanoseconds(run.header.base_rate, run.ticks).tolist()
+def _instants(batch: RecordedRows) -> list[int]:
+    found: list[int] = nanoseconds(batch.header.base_rate, batch.ticks).tolist()
     return found
 
 
-def _joints(run: RecordedRun, port: str, robot: RobotDescription) -> Iterator[tuple[int, bytes]]:
+def _joints(port: str, robot: RobotDescription, batch: RecordedRows) -> Iterator[Timed]:
     names = [joint.name for joint in robot.joints]
-    lists = [run[f"{port}.{field}"].tolist() for field in ("position", "velocity", "torque")]
-    for instant, *values in zip(_instants(run), *lists, strict=True):
+    fields = ("position", "velocity", "torque")
+    lists = [batch.signal(f"{port}.{field}").tolist() for field in fields]
+    for instant, *values in zip(_instants(batch), *lists, strict=True):
         yield instant, joint_state(instant, names, *values)
 
 
-def _imu(run: RecordedRun, port: str, frame: str) -> Iterator[tuple[int, bytes]]:
-    turn = run[f"{port}.angular_velocity"].tolist()
-    force = run[f"{port}.specific_force"].tolist()
-    for instant, *values in zip(_instants(run), turn, force, strict=True):
+def _imu(port: str, frame: str, batch: RecordedRows) -> Iterator[Timed]:
+    turn = batch.signal(f"{port}.angular_velocity").tolist()
+    force = batch.signal(f"{port}.specific_force").tolist()
+    for instant, *values in zip(_instants(batch), turn, force, strict=True):
         yield instant, imu(instant, frame, *values)
 
 
-def _wrench(
-    run: RecordedRun, ports: ScenePorts, on_foot: list[bool]
-) -> Iterator[tuple[int, bytes]]:
+def _wrench(ports: ScenePorts, on_foot: list[bool], batch: RecordedRows) -> Iterator[Timed]:
     """The force on a foot and its torque about the middle of the foot's contact points."""
     assert ports.contact_force is not None and ports.contact_position is not None
-    force = run[ports.contact_force][:, on_foot]
-    place = run[ports.contact_position][:, on_foot]
+    force = batch.signal(ports.contact_force)[:, on_foot]
+    place = batch.signal(ports.contact_position)[:, on_foot]
     arm = place - place.mean(axis=1, keepdims=True)
     torques = np.cross(arm, force).sum(axis=1).tolist()
-    lists = zip(_instants(run), force.sum(axis=1).tolist(), torques, strict=True)
+    lists = zip(_instants(batch), force.sum(axis=1).tolist(), torques, strict=True)
     for instant, total, torque in lists:
         yield instant, wrench(instant, WORLD, total, torque)
 
 
-def _poses(
-    run: RecordedRun, ports: ScenePorts, robot: RobotDescription
-) -> Iterator[tuple[int, bytes]]:
-    every = max(1, round(run.header.base_rate / PICTURE_RATE))
-    due = np.flatnonzero(run.ticks % every == 0)
-    source = ports.pose
-    base, turn = np.zeros((len(due), 3)), np.tile([0.0, 0.0, 0.0, 1.0], (len(due), 1))
-    if source.base_position is not None and source.base_orientation is not None:
-        base, turn = run[source.base_position][due], run[source.base_orientation][due]
-    poses = link_poses(robot, base, turn, run[source.joint_position][due])
-    instants = nanoseconds(run.header.base_rate, run.ticks[due]).tolist()
+def _poses(ports: ScenePorts, robot: RobotDescription, batch: RecordedRows) -> Iterator[Timed]:
+    every = max(1, round(batch.header.base_rate / PICTURE_RATE))
+    due = np.flatnonzero(batch.ticks % every == 0)
+    poses = Moments(batch, due, []).poses(robot, ports.pose)
+    instants = nanoseconds(batch.header.base_rate, batch.ticks[due]).tolist()
     places = poses.position.tolist()
     turns = quaternions_of_matrices(poses.rotation).tolist()
     for k, instant in enumerate(instants):
         listed = zip(poses.names, places[k], turns[k], strict=True)
         yield instant, transforms(instant, WORLD, listed)
-
-
-def quaternions_of_matrices(matrices: Array) -> Array:
-    """Unit quaternions x, y, z, w (..., 4) of rotation matrices (..., 3, 3)."""
-    m = matrices
-    diagonal = np.einsum("...ii->...i", m)
-    trace = diagonal.sum(axis=-1)
-    # four times the square of each component; the largest gives the most exact result
-    squares = np.stack(
-        [1.0 - trace + 2.0 * diagonal[..., k] for k in range(3)] + [1.0 + trace], axis=-1
-    )
-    off = {(i, j): m[..., i, j] for i in range(3) for j in range(3)}
-    x, y, z = (off[2, 1] - off[1, 2], off[0, 2] - off[2, 0], off[1, 0] - off[0, 1])
-    xy, xz, yz = (off[0, 1] + off[1, 0], off[0, 2] + off[2, 0], off[1, 2] + off[2, 1])
-    rows = np.stack(
-        [
-            np.stack([squares[..., 0], xy, xz, x], axis=-1),
-            np.stack([xy, squares[..., 1], yz, y], axis=-1),
-            np.stack([xz, yz, squares[..., 2], z], axis=-1),
-            np.stack([x, y, z, squares[..., 3]], axis=-1),
-        ],
-        axis=-2,
-    )
-    best = squares.argmax(axis=-1)
-    picked = np.take_along_axis(rows, best[..., None, None], axis=-2)[..., 0, :]
-    unit: Array = picked / np.linalg.norm(picked, axis=-1, keepdims=True)
-    return unit
 
 
 def scene_update(run: RecordedRun, robot: RobotDescription, instant: int) -> dict[str, Any]:
@@ -218,7 +195,7 @@ def _solid(place: Any, turn: Any, size: Any, color: Any) -> dict[str, Any]:
     }
 
 
-def _notes(run: RecordedRun) -> Iterator[tuple[int, bytes]]:
+def _notes(run: RecordedRun) -> Iterator[Timed]:
     for note in sorted(run.notes, key=lambda note: note.tick):
         instant = int(nanoseconds(run.header.base_rate, np.array([note.tick]))[0])
         seconds, rest = divmod(instant, 1_000_000_000)

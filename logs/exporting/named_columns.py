@@ -15,7 +15,7 @@ from typing import Any
 from numpy.typing import NDArray
 
 from ...robots.description import RobotDescription
-from ..file.format import RecordedField
+from ..file.format import RecordedField, RecordedRows
 from ..file.reader import RecordedRun
 from ..file.table import TICK, TIME, chosen
 from ..viewing.signal_names import names_along, unit_of_element
@@ -23,42 +23,44 @@ from ..viewing.signal_names import names_along, unit_of_element
 
 @dataclass(frozen=True)
 class NamedColumn:
-    """One number at every tick, ``values`` (ticks,), and what is known about it, as texts."""
+    """One number in every tick, by name, and what is known about it, as texts."""
 
     name: str
-    values: NDArray[Any]
     about: Mapping[str, str]
 
 
-def named_columns(run: RecordedRun, names: Sequence[str] = ()) -> list[NamedColumn]:
+class NamedColumns:
     """``tick``, ``t`` and every number of some signals, by default of all.
 
     Args:
         run: the recording.
         names: of signals, or the beginnings of such, ``dynamics`` or ``dynamics.terms``.
 
+    Attributes:
+        columns: all columns, in order.
+
     Raises:
         KeyError: no signal has such a name or beginning.
     """
-    columns = [NamedColumn(TICK, run.ticks, {}), NamedColumn(TIME, run.time, {"unit": "s"})]
-    fields = chosen(run, names)
-    if len(fields) > 1:
-        _ = run.rows  # read all at once, not the file anew for each
-    for field in fields:
-        values = run[field.name]
-        about = {
-            "signal": field.name,
-            "frame": field.frame or "",
-            "text": field.text,
-        }
-        flat = values.reshape(len(values), math.prod(values.shape[1:]))
-        for k, element in enumerate(element_labels(field, run.header.robot)):
-            name = f"{field.name}[{element}]" if element else field.name
-            unit = unit_of_element(field, run.header.robot, k)
-            columns.append(
-                NamedColumn(name, flat[:, k], {**about, "unit": unit, "element": element})
-            )
-    return columns
+
+    def __init__(self, run: RecordedRun, names: Sequence[str] = ()) -> None:
+        robot, self._rate = run.header.robot, run.header.base_rate
+        self._fields = chosen(run, names)
+        self.columns = [NamedColumn(TICK, {}), NamedColumn(TIME, {"unit": "s"})]
+        for field in self._fields:
+            about = {"signal": field.name, "frame": field.frame or "", "text": field.text}
+            for k, element in enumerate(element_labels(field, robot)):
+                name = f"{field.name}[{element}]" if element else field.name
+                unit = unit_of_element(field, robot, k)
+                self.columns.append(NamedColumn(name, {**about, "unit": unit, "element": element}))
+
+    def values(self, batch: RecordedRows) -> list[NDArray[Any]]:
+        """The values of each column in the ticks of a batch, (ticks,) each."""
+        found: list[NDArray[Any]] = [batch.ticks, batch.ticks / self._rate]
+        for field in self._fields:
+            values = batch.signal(field.name)
+            found += list(values.reshape(len(values), math.prod(field.shape)).T)
+        return found
 
 
 def element_labels(field: RecordedField, robot: RobotDescription | None) -> list[str]:

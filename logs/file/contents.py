@@ -14,6 +14,10 @@ class RecordingError(AloftError):
     """Raised for a file that is no recording or that is damaged. The message says what to do."""
 
 
+class NoRunError(RecordingError):
+    """Raised for a file of Rerun's that is no recording of a run, such as the motion of a plan."""
+
+
 class DamagedError(RecordingError):
     """Raised for a recording with bytes that are not what was written; names the lost ticks."""
 

@@ -12,8 +12,8 @@ output and a field. All but the static ones are on the timelines ``t`` (exact na
 ``graph``            the graph as it ran, after includes, sub-graphs and overrides, as text
 ``rows``             ``aloft:packed``: the bytes of the bus after each of some ticks without a
                      gap, at most half a second of them; see ``row_codec``
-``signals/B/P/F``    the field after every tick as ``Scalars``, for the viewer; of fields with at
-                     most 64 elements, and where it changes only: see ``changed_rows``
+``signals/B/P/F``    the curve of a field as ``Scalars``, for the viewer: of those in the plots that
+                     it shows first, and of as many ticks as the curve needs; see ``thinned_rows``
 ``keyframes``        ``aloft:bus`` and ``aloft:state`` at tick k: the bytes of both buffers before
                      tick k ran, from which a run can go on
 ``notes``            ``aloft:note``: JSON of a ``Note``: life cycle, overruns, faults, parameter
@@ -28,7 +28,10 @@ output and a field. All but the static ones are on the timelines ``t`` (exact na
 ===================  ===============================================================================
 
 Row k is the bus after all outputs of tick k were written. Every message of the file has a checksum:
-see ``messages``.
+see ``messages``. ``viewing.detail`` says how much is drawn into a recording. The other curves, and
+the rest of the scene, are drawn from the rows when ``aloft view`` shows it.
+
+Format 3 had the curves of all fields, and packed its rows in another way.
 
 Recordings of versions before 0.2 have format 2. They have no ``rows`` and no checksums. Their
 ``signals`` hold every field exactly (int64 fields as component ``aloft:exact``), and ``recorded``
@@ -53,9 +56,9 @@ from ...runtime.language.layout import Layout
 from ...runtime.language.signals import Slot
 from ...runtime.language.terrain import Ground, Terrain
 
-FORMAT = 3
+FORMAT = 4
 """The number of this format."""
-READABLE = (2, 3)
+READABLE = (2, 3, 4)
 """The formats that can be read."""
 SIGNALS, STATES, KEYFRAMES, NOTES, EVENTS = "signals", "states", "keyframes", "notes", "events"
 LIMITS, TIMES, WORLD, GRAPH = "limits", "times", "world", "graph"

@@ -25,12 +25,28 @@ from numpy.typing import NDArray
 from ...runtime.language.parameter_change import ParameterChange
 from ...runtime.running.memory import Snapshot
 from ...runtime.running.notes import Note
-from .contents import RecordingError, expect_intact, scanned, tables, tables_at
-from .format import BUS, KEYFRAMES, NOTE, NOTES, READABLE, STATE, Header, RecordedField
+from .contents import NoRunError, RecordingError, expect_intact, scanned, tables, tables_at
+from .format import (
+    BUS,
+    KEYFRAMES,
+    NOTE,
+    NOTES,
+    READABLE,
+    STATE,
+    Header,
+    RecordedField,
+    RecordedRows,
+)
 from .messages import Content, Damage, Scan
 from .row_sources import PackedRows, Piece, RowSource, SeriesRows
 
 __all__ = ["RecordedRun", "RecordingError", "read"]
+
+READ_ALONE = 3
+"""Signals that are each taken from the file for themselves. Who asks for more wants many, and one
+reading of everything is faster then."""
+MOST_KEPT = 2 << 30
+"""The bytes of all rows, at most, that are then kept in memory."""
 
 
 @dataclass(frozen=True)
@@ -82,9 +98,16 @@ class RecordedRun:
         known = self.signals()
         if name not in known:
             self.nearest(name)
-        if "rows" in self.__dict__:
+        self._asked.add(name)
+        whole = len(self.ticks) * self.header.bus.size
+        if "rows" in self.__dict__ or (len(self._asked) > READ_ALONE and whole <= MOST_KEPT):
             return self.header.bus.layout().view(self.rows, name)
         return self._source.signal(known[name])
+
+    @cached_property
+    def _asked(self) -> set[str]:
+        """The signals that were asked for; nothing depends on their order."""
+        return set()
 
     def nearest(self, name: str) -> NoReturn:
         """Raise the ``KeyError`` for an unknown signal; its message has the nearest names."""
@@ -124,13 +147,7 @@ class RecordedRun:
 
         All of them are in memory then; ``pieces`` and ``window`` need less.
         """
-        ticks = self.ticks
-        rows = np.empty((len(ticks), self.header.bus.size), np.uint8)
-        place = 0
-        for _, piece in self.pieces():
-            rows[place : place + len(piece)] = piece
-            place += len(piece)
-        return rows
+        return self._source.rows()
 
     def pieces(self, first: int | None = None, last: int | None = None) -> Iterator[Piece]:
         """Ticks (n,) and rows (n, bytes) from tick ``first`` up to, without, ``last``, some hundred at
@@ -140,6 +157,26 @@ class RecordedRun:
             return iter(())
         low = int(ticks[0]) if first is None else first
         return self._source.pieces(low, int(ticks[-1]) + 1 if last is None else last)
+
+    def batches(self, least: int = 1) -> Iterator[RecordedRows]:
+        """All ticks in order, at least ``least`` at a time but for the last batch; none is kept."""
+        waiting: list[Piece] = []
+        for piece in self.pieces():
+            waiting.append(piece)
+            if sum(len(ticks) for ticks, _ in waiting) >= least:
+                yield self._batch(waiting)
+                waiting = []
+        if waiting:
+            yield self._batch(waiting)
+
+    def no_rows(self) -> RecordedRows:
+        """A batch without ticks."""
+        return self._batch([(np.zeros(0, np.int64), np.zeros((0, self.header.bus.size), np.uint8))])
+
+    def _batch(self, pieces: list[Piece]) -> RecordedRows:
+        ticks, rows = zip(*pieces, strict=True)
+        layout = self.header.bus.layout()
+        return RecordedRows(self.header, np.concatenate(ticks), np.concatenate(rows), layout)
 
     def window(self, first: int, last: int) -> Piece:
         """The ticks from ``first`` up to, without, ``last``, (n,), and their rows, (n, bytes)."""
@@ -206,7 +243,8 @@ def read(path: str | PathLike[str], *, damaged: bool = False) -> RecordedRun:
     Raises:
         FileNotFoundError: there is no such file.
         DamagedError: bytes have changed since they were written; the message names the lost ticks.
-        RecordingError: it is not a recording of aloft's, or was written by a later version.
+        NoRunError: it is a file of Rerun's, but no run was recorded into it.
+        RecordingError: it is no such file, or was written by a later version.
     """
     path = Path(path)
     found = scanned(path)
@@ -217,13 +255,13 @@ def read(path: str | PathLike[str], *, damaged: bool = False) -> RecordedRun:
         expect_intact(found)
         if found.sealed or not found.messages:
             raise RecordingError(f"{path} was cut off before its beginning was written")
-        raise RecordingError(f"{path} is a Rerun file, but not a recording of a run by aloft")
+        raise NoRunError(f"{path} is a Rerun file, but not a recording of a run by aloft")
     number = json.loads(texts["header"]).get("format", 0)
     if number not in READABLE:
         newer = "update aloft" if number > max(READABLE) else "read it with an older one"
         raise RecordingError(
             f"{path} has format {number}, this version of aloft reads "
-            f"{' and '.join(map(str, READABLE))}; {newer}"
+            f"{', '.join(map(str, READABLE))}; {newer}"
         )
     notes = [
         (row, Note(**json.loads(text)))

@@ -1,8 +1,10 @@
 """Packs the rows of some ticks, every bit of them, into few bytes.
 
-Rows of neighbouring ticks are alike. So each word of eight bytes is combined by exclusive or with
-the same word of the tick before, the bytes are ordered by word, then by their place in the word,
-then by tick, and the result is compressed with Zstandard.
+Rows of neighbouring ticks are alike, and so are many words of one row. So the words of eight bytes
+that change are predicted (``row_prediction``), and what is left is kept: as whole numbers, zigzag
+coded so that small ones have many leading zeros, ordered by byte, then by column, then by tick, with
+columns side by side that have as many bits left. Then it is compressed with Zstandard. Words that
+do not change are kept once.
 """
 
 from __future__ import annotations
@@ -13,9 +15,15 @@ from zlib import crc32
 import numpy as np
 from numpy.typing import NDArray
 
+from .row_prediction import MOST_ORDER, Prediction, Words, ordered, predict
+
 _HEAD = Struct("<4sIIqI")
 """A mark, the number of ticks, the bytes of a row, the first tick, and the CRC-32 of the rows."""
-_MARK = b"rows"
+_MARK, _EARLIER = b"rowp", b"rows"
+_SIZES = Struct("<II")
+"""Behind the head: the number of columns that change, and the bytes before compression."""
+_NEGATIVE = 16
+"""Added to the order of a column that is predicted from the negative of another."""
 LEVEL = 3
 """Of Zstandard; higher levels save 1 % at three times the work."""
 
@@ -27,13 +35,37 @@ def pack(first: int, rows: NDArray[np.uint8]) -> bytes:
     count, size = rows.shape
     words = np.zeros((count, -(-size // 8) * 8), np.uint8)
     words[:, :size] = rows
-    whole = words.view(np.uint64)
-    changes = whole.copy()
-    changes[1:] ^= whole[:-1]
-    planes = changes.view(np.uint8).reshape(count, -1, 8).transpose(1, 2, 0)
-    codec = pa.Codec("zstd", compression_level=LEVEL)
-    packed: bytes = codec.compress(planes.tobytes(), asbytes=True)
-    return _HEAD.pack(_MARK, count, size, first, crc32(rows.tobytes())) + packed
+    whole = words.view(np.int64)
+    changing = (whole != whole[:1]).any(axis=0)
+    columns = ordered(np.ascontiguousarray(whole[:, changing].T))
+    how = predict(columns)
+    left = _left(columns, how)
+    planes = left[np.argsort(how.bits, kind="stable")].view(np.uint8)
+    parts = (
+        np.packbits(changing).tobytes(),
+        whole[0, ~changing].tobytes(),
+        (how.order + _NEGATIVE * how.negative.astype(np.uint8)).tobytes(),
+        how.bits.tobytes(),
+        how.source.tobytes(),
+        planes.reshape(len(columns), count, 8).transpose(2, 0, 1).tobytes(),
+    )
+    flat = b"".join(parts)
+    packed: bytes = pa.Codec("zstd", compression_level=LEVEL).compress(flat, asbytes=True)
+    head = _HEAD.pack(_MARK, count, size, first, crc32(rows.tobytes()))
+    return head + _SIZES.pack(len(columns), len(flat)) + packed
+
+
+def _left(columns: Words, how: Prediction) -> Words:
+    """What of ``columns`` (n, ticks) is left by their prediction, zigzag coded."""
+    left = columns.copy()
+    others = np.flatnonzero(how.source != np.arange(len(columns)))
+    near = columns[how.source[others]]
+    left[others] -= np.where(how.negative[others, None], ~near, near)
+    for order in range(1, MOST_ORDER + 1):
+        those = np.flatnonzero(how.order >= order)
+        left[those, 1:] = np.diff(left[those], axis=1)
+    zigzag: Words = (left << 1) ^ (left >> 63)
+    return zigzag
 
 
 def unpack(data: bytes) -> tuple[int, NDArray[np.uint8]]:
@@ -42,21 +74,133 @@ def unpack(data: bytes) -> tuple[int, NDArray[np.uint8]]:
     Raises:
         ValueError: the bytes are not packed rows, or give other rows than were packed.
     """
-    import pyarrow as pa
-
-    if len(data) < _HEAD.size or data[:4] != _MARK:
-        raise ValueError("these bytes are no packed rows")
-    _, count, size, first, crc = _HEAD.unpack_from(data)
-    width = -(-size // 8)
-    try:
-        flat = pa.Codec("zstd").decompress(data[_HEAD.size :], count * width * 8, asbytes=True)
-    except (OSError, pa.ArrowException, MemoryError) as error:
-        raise ValueError(f"packed rows cannot be unpacked ({error})") from error
-    planes = np.frombuffer(flat, np.uint8).reshape(width, 8, count)
-    words = planes.transpose(2, 0, 1).copy().reshape(count, width * 8)
-    whole = words.view(np.uint64)
-    np.bitwise_xor.accumulate(whole, axis=0, out=whole)
-    rows = np.ascontiguousarray(words[:, :size])
-    if crc32(rows.tobytes()) != crc:
+    mark, _, size, first, crc = _head(data)
+    rows = _earlier(data) if mark == _EARLIER else _words(data, 0, size)
+    rows = np.ascontiguousarray(rows[:, :size])
+    if crc32(rows.data) != crc:
         raise ValueError("unpacked rows are not those that were packed")
     return first, rows
+
+
+def unpack_bytes(data: bytes, begin: int, end: int) -> tuple[int, NDArray[np.uint8]]:
+    """The first tick and the bytes from ``begin`` up to, without, ``end`` of each row, (n, bytes).
+
+    Raises:
+        ValueError: the bytes are not packed rows.
+    """
+    if _head(data)[0] == _EARLIER:
+        first, rows = unpack(data)
+        return first, np.ascontiguousarray(rows[:, begin:end])
+    low = begin // 8
+    words = _words(data, begin, end)
+    return _head(data)[3], np.ascontiguousarray(words[:, begin - 8 * low : end - 8 * low])
+
+
+def _head(data: bytes) -> tuple[bytes, int, int, int, int]:
+    """Mark, number of ticks, bytes of a row, first tick, CRC-32. Raises ``ValueError``."""
+    if len(data) < _HEAD.size + _SIZES.size or data[:4] not in (_MARK, _EARLIER):
+        raise ValueError("these bytes are no packed rows")
+    mark, count, size, first, crc = _HEAD.unpack_from(data)
+    return mark, count, size, first, crc
+
+
+def _decompressed(packed: bytes, size: int) -> bytes:
+    import pyarrow as pa
+
+    try:
+        flat: bytes = pa.Codec("zstd").decompress(packed, size, asbytes=True)
+    except (OSError, pa.ArrowException, MemoryError) as error:
+        raise ValueError(f"packed rows cannot be unpacked ({error})") from error
+    return flat
+
+
+def _words(data: bytes, begin: int, end: int) -> NDArray[np.uint8]:
+    """The words of each row that have the bytes from ``begin`` to ``end``, as bytes, (n, bytes)."""
+    _, count, size, _, _ = _head(data)
+    changes, length = _SIZES.unpack_from(data, _HEAD.size)
+    flat = _decompressed(data[_HEAD.size + _SIZES.size :], length)
+    width = -(-size // 8)
+    sizes = (
+        -(-width // 8),
+        8 * (width - changes),
+        changes,
+        changes,
+        4 * changes,
+        8 * changes * count,
+    )
+    if changes > width or sum(sizes) != length:
+        raise ValueError("packed rows have not the size that they say")
+    places = np.cumsum((0, *sizes)).tolist()
+    mask, constant, kind, bits, source, planes = (
+        np.frombuffer(flat, np.uint8, size, place)
+        for size, place in zip(sizes, places, strict=False)
+    )
+    changing = np.unpackbits(mask, count=width).astype(np.bool_)
+    if int(changing.sum()) != changes:
+        raise ValueError("packed rows have not as many columns as they say")
+    how = Prediction(kind % _NEGATIVE, source.view(np.int32), kind >= _NEGATIVE, bits)
+    low, high = begin // 8, -(-end // 8)
+    number = np.cumsum(changing) - 1  # of a column that changes, among those that do
+    wanted = np.zeros(changes, np.bool_)
+    wanted[number[low:high][changing[low:high]]] = True
+    found = np.empty((high - low, count), np.int64)
+    here = changing[low:high]
+    steady = (np.cumsum(~changing) - 1)[low:high][~here]
+    found[~here] = constant.view(np.int64)[steady, None]
+    found[here] = ordered(_columns(planes.reshape(8, changes, count), how, wanted))
+    return np.ascontiguousarray(found.T).view(np.uint8)
+
+
+def _columns(planes: NDArray[np.uint8], how: Prediction, wanted: NDArray[np.bool_]) -> Words:
+    """Those columns that are ``wanted`` (n,), (some, ticks), from the bytes of all (8, n, ticks)."""
+    count = len(how.order)
+    if (how.source >= count).any() or (how.source < 0).any() or (how.order > MOST_ORDER).any():
+        raise ValueError("packed rows have a prediction that there is not")
+    alone = how.source == np.arange(count)
+    needed, more = wanted.copy(), wanted
+    while more.any():  # what these columns are predicted from
+        sources = np.zeros(count, np.bool_)
+        sources[how.source[more]] = True
+        more = sources & ~needed
+        needed |= more
+    as_packed = np.argsort(how.bits, kind="stable")
+    kept = needed[as_packed]
+    those = as_packed[kept]
+    left = np.empty((len(those), planes.shape[2], 8), np.uint8)
+    for k in range(8):
+        left[:, :, k] = planes[k] if kept.all() else planes[k, kept]
+    zigzag = left.view(np.uint64)[:, :, 0]
+    signs = (zigzag & np.uint64(1)).view(np.int64)
+    np.negative(signs, out=signs)
+    zigzag >>= np.uint64(1)
+    columns = zigzag.view(np.int64)
+    columns ^= signs
+    for order in range(MOST_ORDER, 0, -1):
+        some = np.flatnonzero(how.order[those] >= order)
+        columns[some] = np.cumsum(columns[some], axis=1)
+    here = np.zeros(count, np.int64)
+    here[those] = np.arange(len(those))
+    done, waiting = alone.copy(), those[~alone[those]]
+    while len(waiting):
+        ready = done[how.source[waiting]]
+        if not ready.any():
+            raise ValueError("packed rows have columns that are predicted from one another")
+        now = waiting[ready]
+        near = columns[here[how.source[now]]]
+        columns[here[now]] += np.where(how.negative[now, None], ~near, near)
+        done[now] = True
+        waiting = waiting[~ready]
+    result: Words = columns[here[np.flatnonzero(wanted)]]
+    return result
+
+
+def _earlier(data: bytes) -> NDArray[np.uint8]:
+    """The rows of recordings of format 3: each word combined with that of the tick before by
+    exclusive or, ordered by word, by byte, then by tick."""
+    _, count, size, _, _ = _head(data)
+    width = -(-size // 8)
+    flat = _decompressed(data[_HEAD.size :], count * width * 8)
+    words = np.frombuffer(flat, np.uint8).reshape(width, 8, count).transpose(2, 0, 1).copy()
+    whole = words.reshape(count, width * 8).view(np.uint64)
+    np.bitwise_xor.accumulate(whole, axis=0, out=whole)
+    return whole.view(np.uint8)

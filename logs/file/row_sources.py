@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+import os
 from bisect import bisect_left
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from functools import cached_property
 from typing import Any, Protocol
 
@@ -15,9 +17,11 @@ from .changed_rows import filled
 from .contents import located, tables, tables_at, unreadable
 from .format import EXACT, PACKED, RECORDED, ROWS, SIGNALS, SPAN, Header, RecordedField, entity_of
 from .messages import Content, Message, Scan
-from .row_codec import unpack
+from .row_codec import unpack, unpack_bytes
 from .tail import read_tail
 
+MOST_THREADS = 4
+"""Threads that unpack rows: most of the work is done outside of Python."""
 Piece = tuple[NDArray[np.int64], NDArray[np.uint8]]
 """Ticks (n,) and rows (n, bytes)."""
 
@@ -32,12 +36,15 @@ class RowSource(Protocol):
     def pieces(self, first: int, last: int) -> Iterator[Piece]:
         """The ticks from ``first`` up to, without, ``last``, and their rows, some at a time."""
 
+    def rows(self) -> NDArray[np.uint8]:
+        """The rows of all ticks, (ticks, bytes)."""
+
     def signal(self, field: RecordedField) -> NDArray[Any]:
         """One field at every tick, (ticks, ...)."""
 
 
 class PackedRows:
-    """The rows of a recording of format 3; in memory there is a batch at a time."""
+    """The rows of a recording of format 3 or 4; in memory there is a batch at a time."""
 
     def __init__(self, found: Scan, header: Header) -> None:
         self._found, self._header = found, header
@@ -55,11 +62,14 @@ class PackedRows:
                     first=first, last=first + len(rows) - 1,
                 )  # fmt: skip
 
-    def _unpacked(self, message: Message, batch: Any) -> tuple[int, NDArray[np.uint8]]:
+    def _unpacked(
+        self, message: Message, batch: Any, part: tuple[int, int] | None = None
+    ) -> tuple[int, NDArray[np.uint8]]:
+        """First tick and rows (n, bytes) of a message, or of each row the bytes ``part`` only."""
         try:
             packed = batch[f"aloft:{PACKED}"][0].values.to_numpy().tobytes()
-            first, rows = unpack(packed)
-            if rows.shape[1] != self._header.bus.size:
+            first, rows = unpack(packed) if part is None else unpack_bytes(packed, *part)
+            if part is None and rows.shape[1] != self._header.bus.size:
                 raise ValueError("these rows belong to another layout")
         except (ValueError, KeyError) as error:
             raise unreadable(self._found, message, error) from error
@@ -83,14 +93,32 @@ class PackedRows:
             low, high = bisect_left(ticks, first), bisect_left(ticks, last)
             yield ticks[low:high], rows[low:high]
 
+    def rows(self) -> NDArray[np.uint8]:
+        """The rows of all ticks, (ticks, bytes), unpacked by several threads."""
+        ticks = self.ticks
+        rows = np.empty((len(ticks), self._header.bus.size), np.uint8)
+
+        def unpack_one(message: Message) -> None:
+            first, some = self._unpacked(message, tables_at(self._found, message)[1])
+            place = bisect_left(ticks, first)
+            rows[place : place + len(some)] = some
+
+        with ThreadPoolExecutor(min(MOST_THREADS, os.cpu_count() or 1)) as pool:
+            for _ in pool.map(unpack_one, self._messages):
+                pass
+        return rows
+
     def signal(self, field: RecordedField) -> NDArray[Any]:
         """One field at every tick, (ticks, ...)."""
-        layout = self._header.bus.layout()
-        found = np.empty((len(self.ticks), *field.shape), field.dtype)
-        for ticks, rows in self.pieces(*_all(self.ticks)):
-            place = bisect_left(self.ticks, ticks[0])
-            found[place : place + len(ticks)] = layout.view(rows, field.name)
-        return found
+        part = self._header.bus.layout().byte_range(field.name)
+        ticks = self.ticks
+        found = np.empty((len(ticks), part[1] - part[0]), np.uint8)
+        for message in self._messages:
+            _, batch = tables_at(self._found, message)
+            first, some = self._unpacked(message, batch, part)
+            place = bisect_left(ticks, first)
+            found[place : place + len(some)] = some
+        return found.view(field.dtype).reshape(len(ticks), *field.shape)
 
 
 class SeriesRows:
@@ -136,6 +164,10 @@ class SeriesRows:
             rows[:, first:last] = np.ascontiguousarray(flat).view(np.uint8)
         return rows
 
+    def rows(self) -> NDArray[np.uint8]:
+        """The rows of all ticks, (ticks, bytes)."""
+        return self._rows
+
     def pieces(self, first: int, last: int) -> Iterator[Piece]:
         """The ticks from ``first`` up to, without, ``last``, and their rows, at once."""
         low, high = bisect_left(self.ticks, first), bisect_left(self.ticks, last)
@@ -162,7 +194,3 @@ class SeriesRows:
             values = batch[name].flatten().to_numpy().astype(field.dtype, copy=False)
             parts.append(values.reshape(len(ticks[-1]), *field.shape))
         return filled(self.ticks, np.concatenate(ticks), np.concatenate(parts))
-
-
-def _all(ticks: NDArray[np.int64]) -> tuple[int, int]:
-    return (int(ticks[0]), int(ticks[-1]) + 1) if len(ticks) else (0, 0)

@@ -1,7 +1,7 @@
 """Writes two runs into one Rerun file, which shows them together in every view.
 
-The file has everything that ``format`` describes, except keyframes and properties: the first run
-below ``first`` and the second one below ``second``. Both runs begin at the same time.
+The file has everything that ``format`` describes, except rows, keyframes and properties: the first
+run below ``first`` and the second one below ``second``. Both runs begin at the same time.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from ..viewing.blueprint import recording_blueprint
 from ..viewing.plot_views import Shown
 from ..viewing.scene_part import OTHER_RUN, Colors
 from .run_stream import RunStream
+from .whole_view import draw, opened_stream
 
 
 def write_comparison(path: str | PathLike[str], first: RecordedRun, second: RecordedRun) -> Path:
@@ -24,28 +25,14 @@ def write_comparison(path: str | PathLike[str], first: RecordedRun, second: Reco
         ImportError: Rerun is not installed.
         OSError: the file cannot be written.
     """
-    import rerun as rr
-
     path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.open("wb").close()  # Rerun would only warn, so find out here whether it can be written
     name, other = _labels(first, second)
     shown = (Shown("first/", name), Shown("second/", other))
-    stream = rr.RecordingStream("aloft", recording_id=f"{name} and {other}", send_properties=False)
-    rr.set_log_time_enabled(False, recording=stream)
-    stream.save(path, default_blueprint=recording_blueprint(first.header, shown))
-    try:
+    layout = recording_blueprint(first.header, shown)
+    with opened_stream(path, f"{name} and {other}", layout) as stream:
         for run, place, colors in zip((first, second), shown, (Colors(), OTHER_RUN), strict=True):
             out = RunStream(stream, run.header, root=place.root, colors=colors, label=place.label)
-            out.write_start()
-            out.write_rows(run.ticks, run.rows)
-            for note in run.notes:
-                out.write_note(note)
-            if run.outcome is not None:
-                out.write_times(dict(run.outcome))
-    finally:
-        stream.flush(timeout_sec=30)
-        stream.disconnect()
+            draw(out, run)
     return path
 
 

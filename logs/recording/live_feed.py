@@ -19,12 +19,9 @@ from ...runtime.running.failures import describe
 from ...runtime.running.notes import Note
 from ..file.format import Header
 from ..viewing.blueprint import recording_blueprint
+from ..viewing.detail import LIVE
 from .run_stream import RunStream
 
-LIVE_RATE = 100.0
-"""Rows a second that are shown [Hz]; the recording has all."""
-MOST_ELEMENTS = 64
-"""Fields with more elements, such as mass matrices, are not shown live."""
 WAITING = 64
 """Pieces of work that may wait for the viewer."""
 PATIENCE = 10.0
@@ -86,7 +83,7 @@ class LiveFeed:
             rr.set_log_time_enabled(False, recording=stream)
             layout = recording_blueprint(header, live=True)
             stream.connect_grpc(self._source, default_blueprint=layout)
-            run = RunStream(stream, header, rate=LIVE_RATE, most=MOST_ELEMENTS)
+            run = RunStream(stream, header, detail=LIVE)
             run.write_start()
             while not self.problem:
                 self._stirred = time.monotonic()

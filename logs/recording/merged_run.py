@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from hashlib import blake2b
 from os import PathLike
 from pathlib import Path
@@ -15,7 +16,8 @@ from typing import Any
 
 import numpy as np
 
-from ...runtime.language.errors import AloftError
+from ...runtime.language.errors import AloftError, ExitCode
+from ...runtime.links.path_ages import LATEST, judged, timeline_of
 from ...runtime.links.whole import Whole
 from ...runtime.placement.placed import PlacedGraph
 from ...runtime.running.memory import BoundGraph, Memory, Snapshot
@@ -70,7 +72,35 @@ def merged_outcome(
         if path in found:
             blocks[path] = found[path]
     changed = {"run_hash": run_hash, "ticks": ticks, "metrics": metrics, "blocks": blocks}
+    ages = path_metrics(placed, parts)
+    if ages.pop("success", True) is False and worst["success"]:
+        code = int(ExitCode.NOT_SUCCESSFUL)
+        changed |= {"success": False, "reason": ages["reason"], "exit_code": code}
+    ages.pop("reason", None)
+    metrics |= ages
     return {**worst, **changed}
+
+
+def path_metrics(placed: PlacedGraph, parts: Mapping[str, RecordedRun]) -> dict[str, Any]:
+    """The measured ages of the paths for which the graph allows one, where parts ran free; in
+    lockstep the part that sets the pace has measured them."""
+    graph = placed.graph
+    if graph.links.mode != "free" or not graph.links.paths:
+        return {}
+    timelines = {}
+    for machine, part in parts.items():
+        ticks, rows = part.window(*_latest(part))
+        layout = part.header.bus.layout()
+        timelines[machine] = timeline_of(placed, machine, ticks, partial(layout.view, rows))
+    return judged(graph, timelines)
+
+
+def _latest(part: RecordedRun) -> tuple[int, int]:
+    """The ticks of a part that are looked at: the first, and the one after the last."""
+    if not len(part.ticks):
+        return 0, 0
+    end = int(part.ticks[-1]) + 1
+    return max(int(part.ticks[0]), end - LATEST), end
 
 
 def read_parts(

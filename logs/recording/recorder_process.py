@@ -43,6 +43,8 @@ LAST_SYNC = 2.0
 """Seconds that the end waits for the disk."""
 BATCH, BATCH_BYTES = 1024, 1 << 24
 """Ticks written at once, and their bytes, at most."""
+SLOW_FLUSH = 4.0
+"""How many flush periods ticks may wait that are fewer than those of one period of the graph."""
 DRAW_PERIOD = 10.0
 """Seconds between two pieces of what the viewer shows: each costs the viewer time and memory."""
 
@@ -56,7 +58,8 @@ class Task:
         path: the name that the recording gets; empty if no file is written.
         file: the descriptor of the file, which is locked; see ``place``.
         keep: the number of earlier recordings of that name that are kept.
-        flush_period: seconds after which what has come is handed to the operating system.
+        flush_period: seconds after which what has come is handed to the operating system; four times
+            as many where it is less than a period of the graph's time.
         sync_period: seconds after which that is told to put it on the disk.
         live: where a viewer listens that shows the run while it goes on, if one does.
         split: ticks after which the recording goes on in a new file, at the next keyframe; zero for
@@ -171,12 +174,19 @@ class RecorderProcess:
         if now - self._fed >= LIVE_PERIOD:
             self._feed_rows()
             self._fed = now
-        if now - self._flushed >= self._task.flush_period:
+        if self._flush_is_due(now - self._flushed):
             self.flush()
             self._flushed = now
         if now - self._synced >= self._task.sync_period:
             self.sync()
             self._synced = now
+
+    def _flush_is_due(self, waited: float) -> bool:
+        """Whether it is time: a simulation that is slower than real time may wait longer, as small
+        batches are larger in the file."""
+        period = self._task.flush_period
+        full = self._filled >= period * self._header.base_rate
+        return waited >= (period if full else SLOW_FLUSH * period)
 
     def _take_one(self, record: Record) -> None:
         if record.kind == ROW:

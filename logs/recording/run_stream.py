@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...runtime.running.notes import Note
-from ..file.changed_rows import ChangedRows
 from ..file.format import (
     EVENTS,
     GRAPH,
@@ -27,8 +26,10 @@ from ..file.format import (
 )
 from ..file.time_columns import time_columns, timed
 from ..viewing.block_times import times_table
+from ..viewing.blueprint import is_main
+from ..viewing.detail import WHOLE, Detail
 from ..viewing.limits import limits_of
-from ..viewing.plot_views import EVERY_VALUE
+from ..viewing.plot_views import EVERY_VALUE, main_fields
 from ..viewing.scene import Scene
 from ..viewing.scene_part import Colors
 from ..viewing.scene_ports import scene_ports
@@ -45,11 +46,8 @@ class RunStream:
         stream: the Rerun stream. The caller opens and closes it.
         header: what is known before the first tick.
         root: a prefix of all entities, such as ``first/``, where a stream holds several runs.
-        rate: how often signals are written [1/s]; by default in every tick.
-        most: fields with more elements than this are left out; by default none is.
+        detail: how much of the run is drawn. ``write_rest`` comes last, unless it has a row rate.
         colors: the colours in which this run is drawn.
-        changes_only: leave signals out where they do not change; see ``changed_rows``. Then
-            ``write_rest`` comes last.
         label: what the run is called in events, where a stream holds several.
     """
 
@@ -59,32 +57,34 @@ class RunStream:
         header: Header,
         *,
         root: str = "",
-        rate: float | None = None,
-        most: int | None = None,
+        detail: Detail = WHOLE,
         colors: Colors | None = None,
-        changes_only: bool = False,
         label: str = "",
     ) -> None:
         self._label = f"{label}: " if label else ""
         self.stream, self.header, self._root = stream, header, root
         self._layout = header.bus.layout()
+        rate, ports = detail.row_rate, scene_ports(header)
         self._every = 1 if rate is None else max(1, round(header.base_rate / rate))
+        main = {field.name for field in main_fields(header, ports)}
         self._fields = [
             field
             for field in header.bus.fields
-            if not field.constant and (most is None or np.prod(field.shape) <= most)
+            if not field.constant
+            and np.prod(field.shape) <= detail.most
+            and (not detail.main_only or ports is None or field.name in main)
         ]
-        self._changed = {field.name: ChangedRows() for field in self._fields if changes_only}
-        names = {field.name for field in self._fields}
-        lanes = [lane for lane in all_lanes(header) if lane.field.name in names]
-        self._lanes, self._reader = lanes, LaneReader(lanes)
+        pickers = {field.name: detail.picker() for field in self._fields}
+        self._pickers = {name: picker for name, picker in pickers.items() if picker is not None}
+        self._lanes = [lane for lane in all_lanes(header) if not detail.main_only or is_main(lane)]
+        told = [lane for lane in all_lanes(header) if lane.told and lane not in self._lanes]
+        self._reader = LaneReader([*self._lanes, *told])
         self._limits = [
             (field, limits) for field in self._fields if (limits := limits_of(field, header))
         ]
-        ports = scene_ports(header)
         self._scene = None
         if ports is not None:
-            self._scene = Scene(stream, header, ports, root, colors or Colors())
+            self._scene = Scene(stream, header, ports, root, colors or Colors(), detail)
 
     def write_start(self) -> None:
         """Write what does not change: the graph, legends, colours and shapes."""
@@ -148,10 +148,11 @@ class RunStream:
     def write_rest(self) -> None:
         """Write the last value of the signals that were constant in the end, for the viewer."""
         for field in self._fields:
-            if field.name in self._changed:
-                rest = self._changed[field.name].rest()
-                if rest is not None:
-                    self._write_signal(field, *rest)
+            rest = self._pickers[field.name].rest() if field.name in self._pickers else None
+            if rest is not None:
+                self._write_signal(field, *rest)
+        if self._scene is not None:
+            self._scene.write_rest()
 
     def write_times(self, outcome: dict[str, Any]) -> None:
         """Write the time that each block took."""
@@ -174,8 +175,8 @@ class RunStream:
         for field in self._fields:
             values = batch.signal(field.name)[due]
             flat = np.ascontiguousarray(values.reshape(len(values), -1))
-            if field.name in self._changed:
-                some, flat = self._changed[field.name].pick(ticks, flat)
+            if field.name in self._pickers:
+                some, flat = self._pickers[field.name].pick(ticks, flat)
             else:
                 some = ticks
             if len(some):
@@ -206,8 +207,9 @@ class RunStream:
 
         for change in self._reader.changes(batch):
             lane, times = change.lane, self._times(change.ticks)
-            states = rr.StateChange.columns(state=change.labels)
-            self.stream.send_columns(f"{self._root}{lane.entity}", times, states)
+            if lane in self._lanes:
+                states = rr.StateChange.columns(state=change.labels)
+                self.stream.send_columns(f"{self._root}{lane.entity}", times, states)
             if lane.told:
                 texts = [f"{lane.field.name}: {label}" for label in change.labels]
                 self._write_events(change.ticks, texts, ["INFO"] * len(texts))

@@ -27,11 +27,10 @@ from ..file.messages import ARROW, CLOSING, FILE_HEAD, HEAD, Content, Message, s
 from ..file.row_codec import pack
 from ..file.time_columns import time_columns
 from ..viewing.blueprint import recording_blueprint
+from ..viewing.detail import RECORDED
 from .place import Place, take_place
 from .run_stream import RunStream
 
-MOST_DRAWN = 64
-"""Fields with more elements, such as mass matrices, have no curves; their numbers are in the rows."""
 DRAWN_TICKS, DRAWN_BYTES = 4096, 1 << 25
 """Ticks that are drawn at once and their bytes, at most: the viewer likes few large pieces."""
 ROWS_AT_ONCE = 512
@@ -76,7 +75,7 @@ class RecordingWriter:
         )
         rr.set_log_time_enabled(False, recording=self._stream)
         self._made = self._stream.binary_stream()
-        self._run = RunStream(self._stream, header, changes_only=True, most=MOST_DRAWN)
+        self._run = RunStream(self._stream, header, detail=RECORDED)
         self._write_start()
 
     def _write_start(self) -> None:
@@ -98,7 +97,7 @@ class RecordingWriter:
         files = json.dumps(dict(header.contents))
         self._stream.send_property("files", rr.AnyValues(contents=files))
         self._put(Content.START)
-        layout = recording_blueprint(header)
+        layout = recording_blueprint(header, main_only=RECORDED.main_only)
         rr.send_blueprint(layout, make_active=False, make_default=True, recording=self._stream)
         self._run.write_start()
         self._put(Content.PICTURE)

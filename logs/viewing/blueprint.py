@@ -28,12 +28,13 @@ def recording_blueprint(
     live: bool = False,
     first_tabs: Sequence[Any] = (),
     follow: bool = True,
+    main_only: bool = False,
 ) -> Any:
     """The layout, saved in the file so that it needs no set-up to look at.
 
     ``shown`` are the runs in the stream, by default one; of several, each entity has its root.
     ``first_tabs`` come before those made from the graph; with ``follow`` the camera goes along with
-    the robot.
+    the robot. With ``main_only`` blocks have no tabs, because their signals are not drawn.
     """
     import rerun.blueprint as rrb
 
@@ -43,7 +44,7 @@ def recording_blueprint(
     right = rrb.Tabs(
         *first_tabs,
         rrb.Grid(*main, grid_columns=columns, name="Main signals"),
-        *block_tabs(header, shown),
+        *(() if main_only and ports else block_tabs(header, shown)),
         rrb.TextDocumentView(origin=f"{shown[0].root}{TIMES}", name="Block times"),
         rrb.TextDocumentView(origin=f"{shown[0].root}{GRAPH}", name="Graph"),
         active_tab=0,
@@ -106,12 +107,13 @@ def scene_view(header: Header, shown: Sequence[Shown], *, follow: bool = True) -
 
 def main_lanes(header: Header) -> list[Lane]:
     """The lanes that are shown at first."""
-    return [
-        lane
-        for lane in all_lanes(header)
-        if (lane.field.values and lane.field.field_name not in HIDDEN_LANES)
-        or lane.field.field_name in LANES
-    ]
+    return [lane for lane in all_lanes(header) if is_main(lane)]
+
+
+def is_main(lane: Lane) -> bool:
+    """Whether a lane is shown at first."""
+    name = lane.field.field_name
+    return name in LANES or (bool(lane.field.values) and name not in HIDDEN_LANES)
 
 
 def states_view(header: Header, shown: Sequence[Shown]) -> Any:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from ...robots.description import RobotDescription
 from ..file.changed_rows import ChangedRows
 from ..file.format import PLOTS, Header, RecordedRows
+from ..file.thinned_rows import ThinnedRows
 from ..file.time_columns import time_columns
 from .scene_contacts import GRAVITY
 
@@ -47,11 +48,18 @@ def loads_on_feet(robot: RobotDescription, force: Array) -> Array:
 class FootForces:
     """Writes ``plots/foot_force`` and ``plots/weight`` below ``root``, batch by batch."""
 
-    def __init__(self, stream: Any, header: Header, force: str, root: str) -> None:
+    def __init__(
+        self,
+        stream: Any,
+        header: Header,
+        force: str,
+        root: str,
+        picker: ChangedRows | ThinnedRows | None = None,
+    ) -> None:
         assert header.robot is not None
         self._stream, self._header, self._robot = stream, header, header.robot
         self._force, self._root = force, root
-        self._changed = ChangedRows()
+        self._picker = picker
 
     def write_static(self) -> None:
         """Write names and colours."""
@@ -71,10 +79,18 @@ class FootForces:
     def write(self, batch: RecordedRows) -> None:
         """Write the loads at every tick of a batch at which they change."""
         loads = loads_on_feet(self._robot, batch.signal(self._force))
-        ticks, loads = self._changed.pick(batch.ticks, loads)
+        ticks = batch.ticks
+        if self._picker is not None:
+            ticks, loads = self._picker.pick(ticks, loads)
         self._send(FOOT_FORCE, ticks, loads)
         ends = batch.ticks[[0, -1]] if len(batch.ticks) > 1 else batch.ticks
         self._send(WEIGHT, ends, np.full((len(ends), 1), weight_of(self._robot)))
+
+    def write_rest(self) -> None:
+        """Write the last loads, if they were constant in the end."""
+        rest = self._picker.rest() if self._picker is not None else None
+        if rest is not None:
+            self._send(FOOT_FORCE, *rest)
 
     def _send(self, entity: str, ticks: NDArray[np.int64], values: Array) -> None:
         import rerun as rr

@@ -28,6 +28,7 @@ MOST_IN_TAB = 6
 """More plots than this in one tab would be too low to read."""
 MOST_PLOTS = 5
 """Shown first of a graph without a robot."""
+FEET = "vertical force on each foot"
 OTHER = np.array([0xFFA726FF, 0xC0CA33FF, 0x26C6DAFF], np.uint32)
 """x, y and z of what lies over the true values: an estimate, the other run."""
 DARK = np.array([0x8E3B38FF, 0x3E6B40FF, 0x2B628EFF], np.uint32)
@@ -53,11 +54,6 @@ class Line:
     field: RecordedField
     label: str = ""
     colors: NDArray[np.uint32] | None = None
-
-
-def field_plot(header: Header, field: RecordedField, shown: Sequence[Shown]) -> Any:
-    """The plot of a single field."""
-    return plot(header, field.name, [Line(field)], shown)
 
 
 def plot(header: Header, name: str, lines: Sequence[Line], shown: Sequence[Shown]) -> Any:
@@ -123,7 +119,7 @@ def feet_plot(header: Header, shown: Sequence[Shown]) -> Any:
     return rrb.TimeSeriesView(
         origin="/",
         contents=[f"{run.root}{FOOT_FORCE}" for run in shown] + [f"{shown[0].root}{WEIGHT}"],
-        name=f"vertical force on each foot [N]{looks((), shown)}",
+        name=f"{FEET} [N]{looks((), shown)}",
         axis_y=rrb.ScalarAxis(range=(RANGE[0] * weight, RANGE[1] * weight)),
         overrides=overrides or None,
         plot_legend=legend(len(names) * len(shown)),
@@ -148,9 +144,22 @@ def main_plots(header: Header, ports: ScenePorts | None, shown: Sequence[Shown])
     They show the robot's true, estimated and planned motion, forces and motors. For a graph without
     a
     robot they show its first fields."""
+    return [
+        feet_plot(header, shown) if name == FEET else plot(header, name, lines, shown)
+        for name, lines in main_lines(header, ports)
+    ]
+
+
+def main_fields(header: Header, ports: ScenePorts | None) -> list[RecordedField]:
+    """The fields in the plots that are shown first."""
+    return [line.field for _, lines in main_lines(header, ports) for line in lines]
+
+
+def main_lines(header: Header, ports: ScenePorts | None) -> list[tuple[str, list[Line]]]:
+    """Name and lines of each plot that is shown first; ``FEET`` has none of a field."""
     fields = {field.name: field for field in header.bus.fields if not field.constant}
     if ports is None:
-        return [field_plot(header, field, shown) for field in list(fields.values())[:MOST_PLOTS]]
+        return [(field.name, [Line(field)]) for field in list(fields.values())[:MOST_PLOTS]]
     pose = ports.pose.block
     velocity = next(
         (n for end in ("base_linear_velocity", "linear_velocity")
@@ -164,17 +173,17 @@ def main_plots(header: Header, ports: ScenePorts | None, shown: Sequence[Shown])
         ("base", base, estimate, ""),
         ("velocity of the base", velocity, f"{block_of(estimate)}.linear_velocity", ""),
     )
-    plots = []
+    plots: list[tuple[str, list[Line]]] = []
     for name, actual, guess, plan in overlays:
         known = (("planned", plan, DARK), ("", actual, AXES), ("estimated", guess, OTHER))
         lines = [Line(fields[n], label, c) for label, n, c in known if n in fields]
         if lines:
             lines.sort(key=lambda line: line.label != "")  # the true one first: it names the unit
-            plots.append(plot(header, name, [_named(line) for line in lines], shown))
+            plots.append((name, [_named(line) for line in lines]))
     if ports.contact_force is not None and header.robot is not None and header.robot.feet:
-        plots.append(feet_plot(header, shown))
+        plots.append((FEET, []))
     names = [f"{pose}.{field}" for field in MAIN_FIELDS]
-    plots += [field_plot(header, fields[name], shown) for name in names if name in fields]
+    plots += [(name, [Line(fields[name])]) for name in names if name in fields]
     return plots
 
 

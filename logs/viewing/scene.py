@@ -8,6 +8,7 @@ import numpy as np
 
 from ..file.format import EVENTS, Header, RecordedRows
 from ..file.time_columns import time_columns, timed
+from .detail import Detail
 from .flights import SHORTEST_FLIGHT, TOUCHDOWN, Flights
 from .foot_forces import AFTER_TOUCHDOWN, FootForces, LandingPeaks
 from .scene_contacts import ContactPart
@@ -18,8 +19,6 @@ from .scene_push import PushPart
 from .scene_robot import RobotPart
 from .scene_terrain import TerrainPart
 
-PICTURE_RATE = 100.0
-"""Pictures a second [Hz]: more than an eye sees, a fifth of the bytes."""
 PARTS = (TerrainPart, RobotPart, ContactPart, MassCentrePart, PlanPart, FootTargetPart, PushPart)
 
 
@@ -27,16 +26,24 @@ class Scene:
     """Writes the scene to a Rerun ``stream``, batch by batch, below ``root``."""
 
     def __init__(
-        self, stream: Any, header: Header, ports: ScenePorts, root: str, colors: Colors
+        self,
+        stream: Any,
+        header: Header,
+        ports: ScenePorts,
+        root: str,
+        colors: Colors,
+        detail: Detail,
     ) -> None:
         self._stream, self._header, self._ports = stream, header, ports
         self._root = root
-        self._every = max(1, round(header.base_rate / PICTURE_RATE))
-        self._parts = [part(stream, header, ports, f"{root}world", colors) for part in PARTS]
+        self._every = max(1, round(header.base_rate / detail.picture_rate))
+        self._parts = [
+            part(stream, header, ports, f"{root}world", colors, detail) for part in PARTS
+        ]
         self._flights = Flights(max(1, round(SHORTEST_FLIGHT * header.base_rate)))
         self._loads = self._peaks = None
         if ports.contact_force is not None and header.robot is not None and header.robot.feet:
-            self._loads = FootForces(stream, header, ports.contact_force, root)
+            self._loads = FootForces(stream, header, ports.contact_force, root, detail.picker())
             after = max(1, round(AFTER_TOUCHDOWN * header.base_rate))
             self._peaks = LandingPeaks(header.robot, after)
 
@@ -60,6 +67,11 @@ class Scene:
         if self._loads is not None:
             self._loads.write(batch)
         self._write_flights(batch)
+
+    def write_rest(self) -> None:
+        """Write the last forces on the feet, if they were constant in the end."""
+        if self._loads is not None:
+            self._loads.write_rest()
 
     def _write_flights(self, batch: RecordedRows) -> None:
         import rerun as rr

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...robots.kinematics import quaternions_of_matrices
 from .scene_contacts import ABOVE_GROUND
 from .scene_part import Array, Moments, ScenePart
 
@@ -115,7 +116,8 @@ class FootTargetPart(ScenePart):
         rotation = moments[f"{self.ports.feet}.rotation"]
         for k, foot in enumerate(self.robot.feet):
             there = base + np.einsum("nij,nj->ni", turn, position[:, k])
-            columns = rr.Transform3D.columns(translation=there, mat3x3=turn @ rotation[:, k])
+            way = quaternions_of_matrices(turn @ rotation[:, k])
+            columns = rr.Transform3D.columns(translation=there, quaternion=way)
             self.send(f"foot_targets/{foot.name}", moments, columns)
 
 

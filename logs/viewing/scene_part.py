@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ...robots.description import RobotDescription
 from ...robots.kinematics import LinkPoses, link_poses
 from ..file.format import Header, RecordedRows
+from .detail import Detail
 from .robot_shapes import scale_of
 from .scene_ports import PoseSource, ScenePorts
 
@@ -72,12 +73,18 @@ class ScenePart:
     """
 
     def __init__(
-        self, stream: Any, header: Header, ports: ScenePorts, world: str, colors: Colors
+        self,
+        stream: Any,
+        header: Header,
+        ports: ScenePorts,
+        world: str,
+        colors: Colors,
+        detail: Detail,
     ) -> None:
         assert header.robot is not None
         self.stream, self.header, self.ports = stream, header, ports
         self.robot: RobotDescription = header.robot
-        self.world, self.colors = world, colors
+        self.world, self.colors, self.detail = world, colors, detail
         self.scale = scale_of(self.robot)
 
     def write_static(self) -> None:

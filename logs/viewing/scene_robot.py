@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from ...robots.kinematics import quaternions_of_matrices
 from .robot_shapes import capsules, eye_height, shapes_of
 from .scene_part import Moments, ScenePart
 from .scene_ports import PoseSource
@@ -28,7 +29,8 @@ class RobotPart(ScenePart):
             poses = moments.poses(self.robot, source)
             for link in self.robot.links:
                 position, rotation = poses.of(link.name)
-                transforms = rr.Transform3D.columns(translation=position, mat3x3=rotation)
+                turn = quaternions_of_matrices(rotation)
+                transforms = rr.Transform3D.columns(translation=position, quaternion=turn)
                 self.send(f"{name}/{link.name}", moments, transforms)
             if name == "robot":
                 beside = poses.of(self.robot.base)[0].copy()
@@ -51,6 +53,6 @@ class RobotPart(ScenePart):
 
     def _robots(self) -> list[tuple[str, PoseSource, int]]:
         robots = [("robot", self.ports.pose, self.colors.robot)]
-        if self.ports.estimate is not None:
+        if self.ports.estimate is not None and self.detail.estimate:
             robots.append(("estimate", self.ports.estimate, self.colors.estimate))
         return robots

@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...blocks.signals import JumpReference, Phase
+from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.kernel import kernel
 from ...mathematics.rotations import normalise
 
 Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+_THRUST, _FLIGHT, _LANDING = int(Phase.THRUST), int(Phase.FLIGHT), int(Phase.LANDING)
 
 _FED_FORWARD = (
     "com_acceleration", "angular_momentum_rate", "joint_acceleration", "joint_torque",
@@ -45,25 +50,83 @@ class JumpTable:
     contact: NDArray[np.bool_] | None = None
 
 
+class Rows(NamedTuple):
+    """The columns of a table side by side, in the order of ``Fields``.
+
+    ``time`` (n,) [s]; ``rows`` (n, width); ``sums`` (n, width), the integrals of what is ``fed`` (width,)
+    forward; ``marks`` (2,) [s], when the squat and when the recovery begins; ``jumps`` (n_jumps, 3) [s],
+    when thrust, flight and landing begin, and ``touchdowns`` (n_jumps,) the last of these again;
+    ``contact`` (n, n_contacts), or no row where all points carry load but in flight.
+    """
+
+    time: Array
+    rows: Array
+    sums: Array
+    fed: Flags
+    marks: Array
+    jumps: Array
+    touchdowns: Array
+    contact: Flags
+
+
+class Fields(NamedTuple):
+    """The fields of ``JumpReference`` that are columns of a table, each flat."""
+
+    com: Array
+    com_velocity: Array
+    com_acceleration: Array
+    orientation: Array
+    angular_velocity: Array
+    angular_momentum: Array
+    angular_momentum_rate: Array
+    foot_position: Array
+    foot_velocity: Array
+    foot_yaw: Array
+    foot_pitch: Array
+    joint_position: Array
+    joint_velocity: Array
+    joint_acceleration: Array
+    joint_torque: Array
+
+
+class Marks(NamedTuple):
+    """The other fields of ``JumpReference``."""
+
+    time: Array
+    phase: NDArray[np.int64]
+    lift_off_time: Array
+    touchdown_time: Array
+    contact: Flags
+
+
 class JumpTableReader:
-    """Writes the reference of any instant of a table without allocating."""
+    """Writes the reference of any instant of a table to ``reference``, without allocating."""
 
-    def __init__(self, table: JumpTable) -> None:
-        self._table = table
-        self._time = table.time
-        self._columns = list(table.columns.items())
-        self._scratch = {name: np.zeros(rows.shape[1:]) for name, rows in self._columns}
-        self._ahead = {name: np.zeros(rows.shape[1:]) for name, rows in self._columns}
-        self._sums = {
-            name: integral(self._time, rows) for name, rows in self._columns if name in _FED_FORWARD
-        }
+    def __init__(self, table: JumpTable, reference: JumpReference) -> None:
+        n = len(table.time)
+        columns = [table.columns[name].reshape(n, -1) for name in Fields._fields]
+        fed = np.concatenate([
+            np.full(rows.shape[1], name in _FED_FORWARD)
+            for name, rows in zip(Fields._fields, columns, strict=True)
+        ])  # fmt: skip
+        rows = np.ascontiguousarray(np.concatenate(columns, axis=1), dtype=np.float64)
         first = (table.thrust_time, table.lift_off_time, table.touchdown_time)
-        self._jumps = [first, *table.later_jumps]
-        self._touchdowns = np.array([jump[2] for jump in self._jumps])
+        jumps = np.array([first, *table.later_jumps], dtype=np.float64)
+        contact = np.zeros((0, 1), np.bool_) if table.contact is None else table.contact
+        self._instant = np.zeros(3)
+        self._read = KernelCall(
+            read_table,
+            Rows(
+                np.ascontiguousarray(table.time, dtype=np.float64), rows,
+                integral(table.time, rows), fed, np.array([table.squat_time, table.recover_time]),
+                jumps, jumps[:, 2].copy(), np.ascontiguousarray(contact),
+            ),
+            self._instant, np.zeros(rows.shape[1]),
+            Fields(*(getattr(reference, name).reshape(-1) for name in Fields._fields)),
+            Marks(*(getattr(reference, name) for name in Marks._fields)),
+        )  # fmt: skip
 
-    def read(
-        self, time: float, reference: JumpReference, lead: float = 0.0, hold: float = 0.0
-    ) -> None:
+    def read(self, time: float, lead: float = 0.0, hold: float = 0.0) -> None:
         """The reference at ``time``; before the table its first row, after it its last.
 
         Lift-off and touchdown times are those of the next flight, and from its middle on those of
@@ -74,57 +137,115 @@ class JumpTableReader:
         from then on, because a command holds until the next one. So a thrust that ends between two
         commands ends with the right momentum.
         """
-        table = self._table
-        here, there = locate(self._time, time), locate(self._time, time + lead)
-        for name, rows in self._columns:
-            out, scratch = getattr(reference, name), self._scratch[name]
-            if hold > 0.0 and name in _FED_FORWARD:
-                self._mean(name, rows, time + lead, hold, out)
-                continue
-            row, share = there if name in _FED_FORWARD else here
-            np.subtract(rows[row + 1], rows[row], out=scratch)
-            np.multiply(scratch, share, out=scratch)
-            np.add(rows[row], scratch, out=out)
-        normalise(reference.orientation, reference.orientation)
-        jump = present_jump(time, self._touchdowns)
-        thrust, lift_off, touchdown = self._jumps[jump]
-        phase = planned_phase(
-            time, table.squat_time, thrust, lift_off, touchdown, table.recover_time
-        )
-        if jump and phase < Phase.THRUST:  # between two jumps it has landed, and does not squat
-            phase = int(Phase.LANDING)
-        reference.time[()] = time
-        reference.phase[()] = phase
-        if jump + 1 < len(self._jumps) and time >= 0.5 * (lift_off + touchdown):
-            _, lift_off, touchdown = self._jumps[jump + 1]
-        reference.lift_off_time[()] = lift_off
-        reference.touchdown_time[()] = touchdown
-        reference.contact[...] = phase != Phase.FLIGHT
-        if table.contact is not None and phase != Phase.FLIGHT:
-            reference.contact[...] = table.contact[here[0]]
+        self._instant[0], self._instant[1], self._instant[2] = time, lead, hold
+        self._read.run()
 
-    def _mean(self, name: str, rows: Array, begin: float, hold: float, out: Array) -> None:
-        """The mean of a column from ``begin`` on over ``hold`` seconds."""
-        scratch, ahead = self._scratch[name], self._ahead[name]
-        self._sum_to(name, rows, begin + hold, ahead)
-        self._sum_to(name, rows, begin, out)
-        np.subtract(ahead, out, out=scratch)
-        np.divide(scratch, hold, out=out)
 
-    def _sum_to(self, name: str, rows: Array, time: float, out: Array) -> None:
-        """The integral of a column, linear between its rows, from its first row to ``time``."""
-        scratch, times = self._scratch[name], self._time
-        row, share = locate(times, time)
-        length = float(times[row + 1]) - float(times[row])
-        np.subtract(rows[row + 1], rows[row], out=scratch)
-        np.multiply(scratch, 0.5 * share, out=scratch)
-        np.add(scratch, rows[row], out=scratch)
-        np.multiply(scratch, share * length, out=scratch)
-        np.add(self._sums[name][row], scratch, out=out)
-        outside = time - min(max(time, float(times[0])), float(times[-1]))
-        if outside:
-            np.multiply(rows[0 if outside < 0.0 else -1], outside, out=scratch)
-            np.add(out, scratch, out=out)
+@kernel
+def sum_to(table: Rows, time: float, sign: float, out: Array) -> None:
+    """Add ``sign`` times the integral of what is fed forward, from the first row to ``time``.
+
+    Between its rows a column is linear.
+    """
+    rows, last = table.rows, table.rows.shape[0] - 1
+    row, share = locate(table.time, time)
+    length = float(table.time[row + 1]) - float(table.time[row])
+    outside = time - min(max(time, float(table.time[0])), float(table.time[last]))
+    beyond = 0 if outside < 0.0 else last
+    for k in range(out.shape[0]):
+        if not table.fed[k]:
+            continue
+        risen = (float(rows[row + 1, k]) - float(rows[row, k])) * (0.5 * share)
+        part = (risen + float(rows[row, k])) * (share * length)
+        total = float(table.sums[row, k]) + part
+        if outside != 0.0:
+            total += float(rows[beyond, k]) * outside
+        out[k] += sign * total
+
+
+@kernel
+def interpolate_rows(table: Rows, time: float, lead: float, hold: float, out: Array) -> None:
+    """All columns at ``time``, and what is fed forward as ``JumpTableReader.read`` says."""
+    rows = table.rows
+    here, part = locate(table.time, time)
+    there, later = locate(table.time, time + lead)
+    for k in range(out.shape[0]):
+        row, share = (there, later) if table.fed[k] else (here, part)
+        if table.fed[k] and hold > 0.0:
+            out[k] = 0.0
+            continue
+        out[k] = float(rows[row, k]) + (float(rows[row + 1, k]) - float(rows[row, k])) * share
+    if hold > 0.0:
+        sum_to(table, time + lead + hold, 1.0, out)
+        sum_to(table, time + lead, -1.0, out)
+        for k in range(out.shape[0]):
+            if table.fed[k]:
+                out[k] /= hold
+
+
+@kernel
+def take(values: Array, first: int, out: Array) -> int:
+    """Fill ``out`` with the values from ``first`` on; returns where the next ones begin."""
+    for k in range(out.shape[0]):
+        out[k] = values[first + k]
+    return first + len(out)
+
+
+@kernel
+def write_fields(values: Array, fields: Fields) -> None:
+    """Write the columns to the fields of the reference."""
+    first = take(values, 0, fields.com)
+    first = take(values, first, fields.com_velocity)
+    first = take(values, first, fields.com_acceleration)
+    first = take(values, first, fields.orientation)
+    first = take(values, first, fields.angular_velocity)
+    first = take(values, first, fields.angular_momentum)
+    first = take(values, first, fields.angular_momentum_rate)
+    first = take(values, first, fields.foot_position)
+    first = take(values, first, fields.foot_velocity)
+    first = take(values, first, fields.foot_yaw)
+    first = take(values, first, fields.foot_pitch)
+    first = take(values, first, fields.joint_position)
+    first = take(values, first, fields.joint_velocity)
+    first = take(values, first, fields.joint_acceleration)
+    take(values, first, fields.joint_torque)
+    normalise(fields.orientation, fields.orientation)
+
+
+@kernel
+def write_marks(table: Rows, time: float, marks: Marks) -> None:
+    """Write the phase, the times of the flight, and which points carry load."""
+    jump = present_jump(time, table.touchdowns)
+    thrust, lift_off = float(table.jumps[jump, 0]), float(table.jumps[jump, 1])
+    touchdown = float(table.jumps[jump, 2])
+    squat, recover = float(table.marks[0]), float(table.marks[1])
+    phase = planned_phase(time, squat, thrust, lift_off, touchdown, recover)
+    if jump > 0 and phase < _THRUST:  # between two jumps it has landed, and does not squat
+        phase = _LANDING
+    marks.time[()] = time
+    marks.phase[()] = phase
+    if jump + 1 < table.jumps.shape[0] and time >= 0.5 * (lift_off + touchdown):
+        lift_off, touchdown = float(table.jumps[jump + 1, 1]), float(table.jumps[jump + 1, 2])
+    marks.lift_off_time[()] = lift_off
+    marks.touchdown_time[()] = touchdown
+    row, _ = locate(table.time, time)
+    for point in range(marks.contact.shape[0]):
+        planned = table.contact.shape[0] == 0 or bool(table.contact[row, point])
+        marks.contact[point] = phase != _FLIGHT and planned
+
+
+@kernel
+def read_table(table: Rows, instant: Array, values: Array, fields: Fields, marks: Marks) -> None:
+    """The reference at an instant.
+
+    Args:
+        instant: the time, the lead and the hold of ``JumpTableReader.read`` [s], (3,).
+        values: scratch, (width,).
+    """
+    time = float(instant[0])
+    interpolate_rows(table, time, float(instant[1]), float(instant[2]), values)
+    write_fields(values, fields)
+    write_marks(table, time, marks)
 
 
 def integral(times: Array, rows: Array) -> Array:

@@ -17,6 +17,7 @@ from ..solving.refinement import ROUNDS, curable
 from ..task.errors import PlanError
 from ..task.plan import JumpPlan, PlanFileError, read_plan, task_of_header, write_plan
 from ..task.task import JumpTask, TaskError
+from .once import require_valid_once
 from .shipped import shipped_graphs
 
 SHIPPED = shipped_graphs() / "plans"
@@ -220,7 +221,7 @@ class PlanLibrary:
         """
         kept = None if anew else self.find(task)
         if kept is not None:
-            require_valid(kept, self.robot)
+            require_valid_once(kept, self.robot)
             return kept, True
         near = None if anew else self.nearest(task)
         plan = solve_and_check(task, self.robot, near[0] if near else None, solve)

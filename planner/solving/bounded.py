@@ -1,4 +1,7 @@
-"""Bounds the time of a call that may loop forever inside a library, by running it in a process of its own."""
+"""Bounds the time of a call that may loop forever inside a library, by running it in a copy of this process.
+
+It is meant for processes with one thread; see ``solver_process`` for others.
+"""
 
 from __future__ import annotations
 
@@ -10,13 +13,22 @@ from typing import Any
 
 
 def cpu_time() -> float:
-    """Processor time [s] of this process and of those it has waited for."""
+    """Processor time [s] of this process, of those it has waited for, and what others counted."""
     if not hasattr(os, "fork"):
         return time.process_time()
     import resource
 
     children = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return time.process_time() + children.ru_utime + children.ru_stime
+    return time.process_time() + children.ru_utime + children.ru_stime + _elsewhere
+
+
+_elsewhere = 0.0
+
+
+def count(seconds: float) -> None:
+    """Count processor time that another process has spent for this one."""
+    global _elsewhere
+    _elsewhere += seconds
 
 
 def bounded(function: Callable[[], Any], limit: int) -> tuple[bool, Any]:

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import contextlib
 import math
-import os
 from collections import OrderedDict
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -14,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..problem.assembly import Assembly
-from .bounded import bounded, cpu_time
+from .bounded import cpu_time
+from .solver_process import call_bounded, call_solver, quiet
 
 Array = NDArray[np.float64]
 
@@ -122,24 +121,19 @@ def _run(problem: Problem, guess: Array, name: str, warm: bool, limit: int) -> S
     started = cpu_time()
     function, evaluate, constraint = _solver(problem.assembly, name, warm, limit)
 
-    def attempt() -> tuple[Array, dict[str, Any]]:
-        with _quiet():
-            result = function(
-                x0=guess, p=problem.parameters, lbx=problem.lower, ubx=problem.upper,
-                lbg=problem.row_lower, ubg=problem.row_upper,
-            )  # fmt: skip
-        stats = function.stats()
-        wanted = ("success", "iter_count", "unified_return_status")
-        return np.array(result["x"]).ravel(), {key: stats.get(key) for key in wanted}
-
-    # In a copy of this process: a fatrop that has failed once would fail at easy problems later.
+    arguments = {
+        "x0": guess, "p": problem.parameters, "lbx": problem.lower, "ubx": problem.upper,
+        "lbg": problem.row_lower, "ubg": problem.row_upper,
+    }  # fmt: skip
+    # In a copy of a process: a fatrop that has failed once would fail at easy problems later.
     if name == "fatrop":
-        ended, answer = bounded(attempt, patience(problem, limit))
-        if not ended:
-            return Solution(guess, name, 0, np.inf, np.inf, "dynamics", False, cpu_time() - started)
+        ended, answer = call_bounded(function, arguments, patience(problem, limit))
+        if not ended or answer is None:
+            spent = cpu_time() - started
+            return Solution(guess, name, 0, np.inf, np.inf, "dynamics", False, spent)
         values, stats = answer
     else:
-        values, stats = attempt()
+        values, stats = call_solver(function, arguments)
     cost = float(evaluate(values, problem.parameters)) if np.isfinite(values).all() else np.inf
     violation, family = violation_of(problem, values, constraint)
     status = str(stats.get("unified_return_status", ""))
@@ -214,20 +208,6 @@ def _make_solver(assembly: Assembly, name: str, warm: bool, limit: int) -> tuple
             "hess_lag": functions["hess_lag"], "jac_g": functions["nlp_jac_g"],
             "grad_f": functions["grad_f"], "no_nlp_grad": True, "ipopt": own,
         }  # fmt: skip
-    with _quiet():
+    with quiet():
         made = ca.nlpsol("jump", name, nlp, options)
     return made, functions["nlp_f"], functions["nlp_g"]
-
-
-@contextlib.contextmanager
-def _quiet() -> Iterator[None]:
-    """The solvers write to the process's standard output, whatever they are told; not now."""
-    kept = os.dup(1)
-    nowhere = os.open(os.devnull, os.O_WRONLY)
-    try:
-        os.dup2(nowhere, 1)
-        yield
-    finally:
-        os.dup2(kept, 1)
-        os.close(kept)
-        os.close(nowhere)

@@ -40,6 +40,8 @@ WEIGHTS = {"force": 0.01, "orientation": 20.0, "impulse": 5.0}
 SCALED_WEIGHTS = ("force", "impulse")
 THRUST, TOES, TOE_KNOTS = 0.25, 0.04, 8
 """s; of the whole thrust and of its part on the toes, for a robot of BRUCE's size."""
+CONTACT = 0.6
+"""s on the ground between two jumps in a row, for a robot of BRUCE's size."""
 KNOTS = {"squat": 12, "thrust": 12, "flight": 16, "landing": 12}
 LANDING_LEAN, KNEE_BEND, JOINTS = 0.1, 0.4, 0.06
 """rad"""
@@ -58,6 +60,7 @@ class Asked(Protocol):
     recipe: Any
     formulation: Any
     thrust_time: float | None
+    contact_time: float | None
     margins: Margins | None
     weights: Any
     knots: Any
@@ -136,21 +139,42 @@ def _plain(task: Asked, robot: RobotDescription) -> Iterator[Choice]:
     if "knots" not in said:
         why = "the flight is exact on any grid; where feet stand knots are closer"
         yield Choice("knots", task.knots.model_copy(update=KNOTS), why)
-    toes = word_of_toes(robot)
-    if "phases" in said or len(task.hops()) > 1:
+    rows = len(task.hops()) > 1
+    if "phases" in said:
         return
-    if toes and task.thrust_time is not None:
+    contact = _contact_time(task, slow)
+    if rows and "contact_time" not in said:
+        yield Choice("contact_time", contact, "between two jumps the robot comes to balance")
+    toes = word_of_toes(robot)
+    if toes and task.thrust_time is not None and not (rows and contact is None):
         whole = task.thrust_time if "thrust_time" in said else rounded(THRUST * slow)
         late = min(rounded(TOES * slow), 0.5 * whole)
-        spans = (
+        half = 0.5 * (contact or 0.0)
+        spans = [
             Span(phase="squat", time=_time(task, "squat_time", slow)),
-            Span(phase="thrust", time=round(whole - late, 6)),
-            Span(phase="thrust", time=late, contacts=toes, knots=TOE_KNOTS),
-            Span(phase="flight"),
-            Span(phase="landing", time=_time(task, "landing_time", slow)),
-        )
-        yield Choice("phases", spans, f"the heels rise {1000 * late:.0f} ms before the {toes}s leave "
+            *_thrust(whole, late, toes),
+        ]
+        for _ in task.hops()[1:]:
+            between = _thrust(half, min(late, 0.5 * half), toes)
+            spans += [Span(phase="flight"), Span(phase="landing", time=half), *between]
+        last = Span(phase="landing", time=_time(task, "landing_time", slow))
+        yield Choice("phases", (*spans, Span(phase="flight"), last),
+                     f"the heels rise {1000 * late:.0f} ms before the {toes}s leave "
                      "the ground: the foot lengthens the leg")  # fmt: skip
+
+
+def _thrust(whole: float, late: float, toes: str) -> tuple[Span, Span]:
+    """A thrust [s], first on all contacts and at last on the toes."""
+    return (
+        Span(phase="thrust", time=round(whole - late, 6)),
+        Span(phase="thrust", time=late, contacts=toes, knots=TOE_KNOTS),
+    )
+
+
+def _contact_time(task: Asked, slow: float) -> float | None:
+    """The time on the ground between two jumps [s]: what the task says, or what gives room for balance."""
+    said = "contact_time" in task.model_fields_set
+    return task.contact_time if said else rounded(CONTACT * slow)
 
 
 def _time(task: Asked, name: str, slow: float) -> float | None:

@@ -155,6 +155,10 @@ class Block:
     is run again; the real world (a robot, another machine) does not, so a replay takes its outputs
     from the recording."""
 
+    waits_for_others: ClassVar[bool] = False
+    """Whether a call waits for another process, with a limit of its own. Then the watchdog, which
+    ends the run when a call takes longer than ``clock.hangs_after``, does not watch the block."""
+
     array_allocations: ClassVar[int] = 0
     """How many arrays a tick may allocate. It is zero unless a library leaves no choice; then the
     class says in ``allocation_reason`` which library that is."""
@@ -210,6 +214,15 @@ class Block:
         """
         values = {name: getattr(params, name) for name in type(params).model_fields}
         return {n: v for n, v in values.items() if isinstance(v, int) and not isinstance(v, bool)}
+
+    @classmethod
+    def fitted(cls, params: Parameters) -> type[Block]:
+        """The class whose ports are those that the parameters ask for; by default the class itself.
+
+        Another class is derived from this one and has its name. A ``BlockError`` that this raises
+        should be a misfit of ``requires`` as well.
+        """
+        return cls
 
     @classmethod
     def requires(cls, params: Parameters, robot: RobotDescription | None) -> Iterable[Misfit]:

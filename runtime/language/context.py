@@ -21,6 +21,15 @@ class Clock:
     kind: str = "free"
     stopped_by: str = ""
     """The path of the block that asked for the end of the run."""
+    began: int = 0
+    """When the present tick began, by the run's source of time [ns]; zero if ticks are not timed."""
+    command_limit: float = 0.0
+    """How long the links that bring commands may be silent [s]; zero where none is watched."""
+
+    def commands_heard(self) -> int:
+        """When the most silent link that brings commands last brought one, by the monotonic clock
+        [ns]; zero where no such link is watched."""
+        return 0
 
 
 @dataclass(frozen=True)

@@ -97,6 +97,11 @@ class MachineSpec:
     where: Position | None = None
 
 
+WATCHDOG = 0.015
+"""The default of ``LinkSettings.watchdog`` [s]. What damps the actuators looks every millisecond, so
+they are in damping within 20 ms."""
+
+
 @dataclass(frozen=True)
 class LinkPolicy:
     """What the reader of a free-running link does where no message has come for ``max_age`` [s].
@@ -106,6 +111,8 @@ class LinkPolicy:
 
     max_age: float | None = None
     late: Literal["hold", "safe", "stop"] = "stop"
+    watch: bool = True
+    """Whether the silence of the link counts where it brings commands to actuators."""
 
 
 @dataclass(frozen=True)
@@ -121,6 +128,9 @@ class LinkSettings:
     of: Mapping[str, LinkPolicy] = field(default_factory=dict)
     paths: Mapping[str, float] = field(default_factory=dict)
     """The largest age [s] that is allowed on paths, ``block.output -> block.input``."""
+    watchdog: float | None = None
+    """How long a link that brings commands to actuators may be silent [s]; by default
+    ``WATCHDOG`` for real actuators, and any time for simulated ones."""
 
     def policy_of(self, source: str) -> LinkPolicy:
         """The policy of the links that carry the outputs of the block ``source``."""
@@ -136,6 +146,8 @@ class ClockSpec:
     overrun: Literal["skip", "stop"] = "skip"
     stop_after: int = 1
     """The number of overruns in a row that end the run, if the overrun policy is ``stop``."""
+    hangs_after: float = 10.0
+    """The time [s] after which a call of a block is taken to hang, which ends the run."""
 
 
 @dataclass(frozen=True)

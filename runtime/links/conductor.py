@@ -14,6 +14,7 @@ from ..language.errors import RunError
 from ..language.parameter_change import Adjustment
 from ..running.memory import BoundGraph
 from ..running.notes import Note
+from .command_watch import CommandWatch
 from .inbox import Inbox
 from .latest import LatestInbox
 from .mailbox import Mailbox, MailTimeoutError
@@ -64,6 +65,8 @@ class Conductor(Block):
     tick.
     """
 
+    waits_for_others = True
+
     def connect(
         self,
         others: Others,
@@ -76,14 +79,16 @@ class Conductor(Block):
         on_open: Callable[[], None],
         patience: float,
         connect_time: float,
+        watch: CommandWatch,
         moves: bool = False,
         elsewhere: Mapping[str, str] | None = None,
     ) -> None:
         """Take what it needs: the other parts, the ends of all links (senders by the link's name),
         the clock, what declares the links once the transport is open, and how long to wait for a message and for the other parts to start [s].
-        ``moves`` says whether this part has actuators, and ``elsewhere`` which machine runs each
-        block that is not here."""
+        ``watch`` watches the links that bring commands, ``moves`` says whether this part has
+        actuators, and ``elsewhere`` which machine runs each block that is not here."""
         self.moves, self.elsewhere = moves, elsewhere or {}
+        self._watch = watch
         self.others = others
         self._transport = transport
         self._inboxes = inboxes
@@ -295,6 +300,8 @@ class FaultTeller:
 
 class Gate(Block):
     """A block of the runtime whose ``start`` waits until all parts have come as far as this one."""
+
+    waits_for_others = True
 
     def connect(self, conductor: Conductor, phase: Phase) -> None:
         """Take what it waits with, and how far all must be."""

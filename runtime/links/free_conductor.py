@@ -47,13 +47,14 @@ class FreeConductor(Conductor):
             self.others.say()
 
     def update(self) -> None:
-        """Look whether another part has ended or failed, and take over changed parameters.
+        """Look whether another part has ended or failed and whether commands still come, and take
+        over changed parameters.
 
         Raises:
             PeerError: another part failed.
         """
         clock = self._clock
-        ended = self.others.ended()
+        ended = self.others.ended() or self._watch.complaint()
         if ended:
             clock.stop_reason = ended
         if clock.wish is not None:

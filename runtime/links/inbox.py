@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from typing import Any, Protocol
 
 from ..language.block import Block
@@ -22,12 +23,15 @@ class Inbox:
         damaged: how many messages were thrown away because they were not whole, or of another
             schema or run.
         received: how many were whole.
+        heard_at: when the newest message came, by the monotonic clock [ns]; zero before the first.
     """
 
     def __init__(self, link: Link, reader: MessageReader, others: Others, patience: float) -> None:
         self.link = link
         self.damaged = 0
         self.received = 0
+        self.heard_at = 0
+        self._newest = -1
         self._reason = ""
         self._reader = reader
         self._others = others
@@ -67,6 +71,8 @@ class Inbox:
             self._others.note_checked(self.link.name)
             return
         self.received += 1
+        if message.tick > self._newest:  # one that comes again is no sign of life
+            self._newest, self.heard_at = message.tick, time.monotonic_ns()
         self._mailbox.put(message.tick, message.payload)
 
     def show(self, tick: int) -> None:
@@ -106,6 +112,8 @@ class Received(Block):
 
     Subclasses made by ``received_block_type`` declare the ports.
     """
+
+    waits_for_others = True
 
     inbox: Shows | None = None
 

@@ -17,6 +17,8 @@ from .inbox import PROBE
 from .message import DamagedMessageError, Message, MessageReader
 from .others import Others
 
+TICK_TIME = "~tick"
+"""The path of the block that keeps when ticks began."""
 KEPT = 4096
 """The number of last ages from which the percentiles are computed."""
 
@@ -26,10 +28,29 @@ class LinkHealth(Signal):
 
     age = Field(unit="s", text="since the source ran, by the estimated clock of its machine")
     late = Field(dtype="bool", text="whether the age exceeds what is allowed")
+    tick = Field(dtype="int64", text="the tick in which the source ran, on its machine; -1: none")
+    sent = Field(dtype="int64", text="when it was sent, by the clock of the sender [ns]")
+    read = Field(dtype="int64", text="when it was read, by the clock of the reader [ns]")
     received = Field(dtype="int64", text="messages so far")
     lost = Field(dtype="int64", text="messages that never came, by the gaps in their numbers")
     surplus = Field(dtype="int64", text="messages that came twice or after a later one")
     damaged = Field(dtype="int64", text="messages that were thrown away")
+
+
+class TickBegan(Signal):
+    """When a tick of a part that runs free began."""
+
+    time = Field(dtype="int64", text="by the monotonic clock of its machine [ns]")
+
+
+class TickTime(Block):
+    """Keeps when each tick began, so that ages on paths through several machines can be measured."""
+
+    began = Output(TickBegan)
+
+    def step(self) -> None:
+        """Take the time; it runs before all other blocks."""
+        self.began.time[()] = time.monotonic_ns()
 
 
 class Health(Block):
@@ -39,6 +60,11 @@ class Health(Block):
 
     def step(self) -> None:
         """Never called: the link writes when the stand-in of its source runs."""
+
+
+def health_path(link: Link) -> str:
+    """The path of the block that shows how a free-running link does."""
+    return f"{link.source}~from~{link.sender}"
 
 
 class LatestInbox:
@@ -54,6 +80,10 @@ class LatestInbox:
         health: where to write how the link does.
         stop: called with the reason where the policy is to stop.
         clock: the monotonic time [ns].
+
+    Attributes:
+        heard_at: when the newest message came, by ``clock``; zero before the first.
+        age: of the message at the last tick of the reader [ns].
     """
 
     def __init__(
@@ -69,6 +99,7 @@ class LatestInbox:
         self.link = link
         self.policy = policy
         self.received = self.lost = self.surplus = self.damaged = self.late_ticks = 0
+        self.heard_at = self.age = 0
         self._reader = reader
         self._others = others
         self._health = health
@@ -107,6 +138,7 @@ class LatestInbox:
             return
         self.lost += gap
         self.received += 1
+        self.heard_at = self._clock()
         self._latest = message
 
     def show(self, tick: int) -> None:
@@ -134,12 +166,15 @@ class LatestInbox:
         if message is not None and message is not self._shown and not safe:
             self._reader.show(message.payload)
             self._shown = message
-        self._ages[self._count % KEPT] = age
+        self.age = self._ages[self._count % KEPT] = age
         self._count += 1
-        self._write(age, late)
+        self._write(message, now, age, late)
 
-    def _write(self, age: int, late: bool) -> None:
+    def _write(self, message: Message | None, now: int, age: int, late: bool) -> None:
         health = self._health
+        health.tick[()] = -1 if message is None else message.tick
+        health.sent[()] = 0 if message is None else message.time
+        health.read[()] = now
         health.age[()] = age * 1e-9
         health.late[()] = late
         health.received[()] = self.received

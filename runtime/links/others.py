@@ -115,6 +115,16 @@ class Others:
         return link in self._checked
 
     @property
+    def graph_hash(self) -> str:
+        """The hash of the graph that this part runs."""
+        return self._hashes[0]
+
+    @property
+    def phase(self) -> Phase:
+        """How far this part is."""
+        return self._phase
+
+    @property
     def started(self) -> bool:
         """Whether all blocks of this part have started."""
         return self._phase >= Phase.STARTED
@@ -263,7 +273,7 @@ class Others:
 
     def _hear(self, data: bytes) -> None:
         """Keep a beacon; whatever is none is thrown away."""
-        with suppress(ValueError, KeyError, TypeError, AttributeError):
+        with suppress(Exception):  # whatever bytes do, a thread of the network goes on
             state = json.loads(data)
             name, phase, checked = state["machine"], int(state["phase"]), list(state["checked"])
             if name not in self.names or len(bytes.fromhex(state["run"])) != len(self.run):

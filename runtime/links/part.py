@@ -18,14 +18,16 @@ from ..running.executor import Executor
 from ..running.memory import BoundGraph
 from ..running.run_result import RunResult
 from ..running.sinks import Sink
+from .command_watch import CommandWatch
 from .conductor import Conductor, FaultTeller, Gate
 from .free_conductor import FreeConductor
 from .inbox import Inbox, Received, received_block_type
-from .latest import Health, LatestInbox
+from .latest import TICK_TIME, Health, LatestInbox, TickTime, health_path
 from .message import MessageReader, MessageWriter
 from .others import Others, Phase
 from .outbox import Send
 from .part_clock import PartClock
+from .path_ages import PathAges, path_sinks
 from .spread_parameters import SpreadParameters
 from .transport import Transport, data_key
 
@@ -39,11 +41,6 @@ CONDUCTOR, PREPARED, STARTED = "~conductor", "~prepared", "~started"
 def sender_path(link: Link) -> str:
     """The path of the block that sends on a link."""
     return f"{link.source}~to~{link.receiver}"
-
-
-def health_path(link: Link) -> str:
-    """The path of the block that shows how a free-running link does."""
-    return f"{link.source}~from~{link.sender}"
 
 
 def part_graph(placed: PlacedGraph, machine: str) -> CheckedGraph:
@@ -89,6 +86,8 @@ def part_graph(placed: PlacedGraph, machine: str) -> CheckedGraph:
     free = graph.links.mode == "free"
     if free:
         blocks += [_own(health_path(link), Health, machine) for link in placed.received_by(machine)]
+        blocks.append(_own(TICK_TIME, TickTime, machine))
+        order.insert(0, TICK_TIME)
     blocks.append(_own(CONDUCTOR, FreeConductor if free else Conductor, machine))
     return replace(graph, blocks=tuple(blocks), order=(*order, *received, CONDUCTOR))
 
@@ -134,16 +133,20 @@ class BoundPart(BoundGraph):
             placed, machine, transport, lambda: clock.wish and clock.wish[0], free=self.is_free
         )
         self.inboxes: list[Inbox | LatestInbox] = []
-        self._transport = transport
+        self.path_ages: list[PathAges] = []
+        self.transport = transport
         conductor = self._block(CONDUCTOR, Conductor)
         for path, phase in ((PREPARED, Phase.PREPARED), (STARTED, Phase.STARTED)):
             self._block(path, Gate).connect(conductor, phase)
         self._make_inboxes(patience)
+        self.watch = CommandWatch(placed, machine, self.inboxes)
+        if self.watch.links:
+            clock.heard, clock.command_limit = self.watch.heard, self.watch.limit
         conductor.connect(
             self.others, transport, self.inboxes,
             {link.name: self._block(sender_path(link), Send) for link in placed.sent_by(machine)},
             self.parameters, clock=clock, on_open=self._open_links, patience=patience,
-            connect_time=connect_time, moves=bool(self._moving()),
+            connect_time=connect_time, moves=bool(self._moving()), watch=self.watch,
             elsewhere={s.path: s.machine for s in placed.graph.blocks if s.machine != machine},
         )  # fmt: skip
         self.conductor = conductor
@@ -187,10 +190,10 @@ class BoundPart(BoundGraph):
         for inbox in self.inboxes:
             link = inbox.link
             key = data_key(link.sender, link.receiver, link.source)
-            self._transport.subscribe(key, inbox.hear)
+            self.transport.subscribe(key, inbox.hear)
         for link in self.placed.sent_by(self.machine):
             writer = MessageWriter(link, layout, bus, self.others.run)
-            put = self._transport.publisher(data_key(link.sender, link.receiver, link.source))
+            put = self.transport.publisher(data_key(link.sender, link.receiver, link.source))
             self._block(sender_path(link), Send).connect(writer, put)
 
     def _in_order_of_start(self) -> dict[str, Block]:
@@ -233,4 +236,7 @@ def run_part(
     """Run one part from start to close, together with the others; the options are the executor's."""
     teller = FaultTeller(bound.conductor)
     clock = options.pop("clock", None) or part_clock(bound)
-    return Executor(bound, clock=clock, sinks=[teller, *sinks], **options).run(ticks)
+    if not bound.is_free:
+        bound.path_ages = path_sinks(bound.placed.graph, clock.kind)
+    sinks = [teller, *bound.path_ages, *sinks]
+    return Executor(bound, clock=clock, sinks=sinks, **options).run(ticks)

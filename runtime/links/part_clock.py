@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from ..language.block import Clock
 
 
@@ -17,7 +19,13 @@ class PartClock(Clock):
         self.wish: tuple[str, str] | None = None
         self._agreed: tuple[str, str] | None = None
         self._heeded = False
+        self.heard: Callable[[], int] | None = None
+        """What says when commands were last heard; see ``CommandWatch.heard``."""
         super().__init__(base_period)
+
+    def commands_heard(self) -> int:
+        """When the most silent link that brings commands last brought one [ns]."""
+        return 0 if self.heard is None else self.heard()
 
     def agree(self, reason: str, block: str) -> None:
         """End the run after this tick."""

@@ -25,12 +25,10 @@ ROOT = "aloft"
 """The first part of every key expression."""
 
 
-def session_config(listen: Sequence[str], connect: Sequence[str]) -> Any:
-    """A Zenoh configuration of a peer that listens and connects only where it is told to."""
-    import zenoh
-
-    config = zenoh.Config()
-    settings: Mapping[str, Any] = {
+def session_settings(listen: Sequence[str], connect: Sequence[str]) -> dict[str, Any]:
+    """The settings of a peer that listens and connects only where it is told to, by their paths in
+    Zenoh's configuration."""
+    return {
         "mode": "peer",
         "scouting/multicast/enabled": False,
         "scouting/gossip/enabled": False,
@@ -47,7 +45,16 @@ def session_config(listen: Sequence[str], connect: Sequence[str]) -> Any:
         "transport/link/tx/lease": LEASE,
         "transport/shared_memory/enabled": False,
     }
-    for key, value in settings.items():
+
+
+def session_config(
+    listen: Sequence[str], connect: Sequence[str], secured: Mapping[str, Any] | None = None
+) -> Any:
+    """Those settings as a Zenoh configuration; ``secured`` are more of them, for TLS and access."""
+    import zenoh
+
+    config = zenoh.Config()
+    for key, value in {**session_settings(listen, connect), **(secured or {})}.items():
         config.insert_json5(key, json.dumps(value))
     return config
 
@@ -55,6 +62,11 @@ def session_config(listen: Sequence[str], connect: Sequence[str]) -> Any:
 def as_chunk(name: str) -> str:
     """A name as one or more chunks of a key expression, without what is special there."""
     return re.sub(r"[^A-Za-z0-9_./~-]", "_", name)
+
+
+def prefix_of(graph: str) -> str:
+    """What all key expressions of a graph begin with."""
+    return f"{ROOT}/{as_chunk(graph).replace('/', '_')}"
 
 
 class ZenohTransport:
@@ -65,10 +77,19 @@ class ZenohTransport:
         machines: all machines of the graph, in its order.
         wait: whether sending waits where the queue is full. Lockstep waits, since nothing may be
             lost; a free-running part drops, since nothing may wait.
+        secured: TLS and access control, as ``key_folder.secured`` gives them; none: neither.
     """
 
-    def __init__(self, graph: str, machines: Sequence[MachineSpec], *, wait: bool = True) -> None:
-        self._prefix = f"{ROOT}/{as_chunk(graph).replace('/', '_')}"
+    def __init__(
+        self,
+        graph: str,
+        machines: Sequence[MachineSpec],
+        *,
+        wait: bool = True,
+        secured: Mapping[str, Any] | None = None,
+    ) -> None:
+        self._prefix = prefix_of(graph)
+        self._secured = secured
         self._machines = tuple(machines)
         self._wait = wait
         self._session: Any = None
@@ -83,7 +104,9 @@ class ZenohTransport:
         own = self._machines[place].endpoint
         try:
             self._session = zenoh.open(
-                session_config([own], [spec.endpoint for spec in self._machines[:place]])
+                session_config(
+                    [own], [spec.endpoint for spec in self._machines[:place]], self._secured
+                )
             )
         except zenoh.ZError as error:
             raise AloftError(
@@ -109,6 +132,26 @@ class ZenohTransport:
 
     def _keep(self, declared: Any) -> None:
         self._kept.append(declared)
+
+    @property
+    def is_open(self) -> bool:
+        """Whether it is connected."""
+        return self._session is not None
+
+    def shower(self, key: str) -> Take:
+        """A publisher that never delays any other."""
+        import zenoh
+
+        publisher = self._session.declare_publisher(
+            f"{self._prefix}/{as_chunk(key)}",
+            congestion_control=zenoh.CongestionControl.DROP,
+            express=False,
+            priority=zenoh.Priority.BACKGROUND,
+            reliability=zenoh.Reliability.BEST_EFFORT,
+        )
+        self._keep(publisher)
+        put: Take = publisher.put
+        return put
 
     def publisher(self, key: str) -> Take:
         """A publisher whose messages go out at once."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -10,7 +10,7 @@ from typing import Any
 from ...robots.description import find_robot
 from ...robots.shipped import robot_names
 from ..language.block import Block
-from ..language.errors import UnknownBlockError
+from ..language.errors import BlockError, UnknownBlockError
 from ..language.fit import fix_without_robot
 from ..language.importing import BlockImportError, UnknownModuleError
 from ..language.registry import find_block, nearest_names
@@ -23,7 +23,7 @@ from .declaration_check import check_defaults, check_emit
 from .fit import check_fit, lacks_robot
 from .flat import FlatBlock, FlatGraph
 from .inserted import insert_constant, insert_delay, read_values
-from .link_settings import check_paths, read_link_settings
+from .link_settings import check_paths, check_watchdog, read_link_settings
 from .machines import on_machines, read_machines
 from .parameter_check import check_parameters
 from .problems import Code, Problems, nearest
@@ -32,6 +32,9 @@ from .settings import Settings, read_settings
 from .sizes import check_sizes
 from .told import resolve_told
 from .wire_check import Draft, WireCheck
+
+LONGEST_RING = 8
+"""Names at each end of a ring that are printed; what is between is counted."""
 
 
 def examine(graph: FlatGraph, problems: Problems) -> CheckedGraph | None:
@@ -63,6 +66,7 @@ def examine(graph: FlatGraph, problems: Problems) -> CheckedGraph | None:
     checked = _assemble(graph, settings, settings.base_rate, drafts, values)
     checked = replace(on_machines(checked, graph, machines), links=links)
     check_paths(checked, graph, problems)
+    check_watchdog(checked, graph, problems)
     return None if len(problems) else checked
 
 
@@ -78,6 +82,12 @@ def _draft(flat: FlatBlock, graph: FlatGraph, settings: Settings, problems: Prob
     draft.params = check_parameters(flat, draft.block_type, problems, settings.robot)
     draft.dimensions = settings.dimensions
     if draft.params is None:
+        return draft
+    try:
+        draft.block_type = draft.block_type.fitted(draft.params)
+    except BlockError as error:
+        problems.add(Code.MISFIT, f"{flat.path}: {error}", flat.where, at=flat.path)
+        draft.block_type = None
         return draft
     try:
         local = draft.block_type.local_dimensions(draft.params, settings.robot)
@@ -243,16 +253,24 @@ def _report_loops(drafts: Mapping[str, Draft], problems: Problems) -> None:
         in_order = [*blocks[start:], *blocks[:start], block]
         problems.add(
             Code.LOOP,
-            f"{' -> '.join(in_order)} is a loop without a delay: "
+            f"{_ring(in_order)} is a loop without a delay: "
             "each needs the next one's answer of the same tick",
             wire.where,
             at=target,
             other=source,
             other_where=drafts[source.rpartition(".")[0]].flat.where,
             expected="a delay, or a block that emits from its state, somewhere in the ring",
-            found=" -> ".join([*ports, ports[0]]),
+            found=_ring([*ports, ports[0]]),
             fix=f"{name}: {{from: {wire.shown or source}, delay: 1}}",
         )
+
+
+def _ring(names: Sequence[str]) -> str:
+    """The names in order; of a long ring the first and the last, and how many are between."""
+    most = LONGEST_RING
+    if len(names) > 2 * most:
+        names = [*names[:most], f"({len(names) - 2 * most} more)", *names[-most:]]
+    return " -> ".join(names)
 
 
 def _assemble(

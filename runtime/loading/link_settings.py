@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
-from ..language.stages import CheckedGraph, LinkPolicy, LinkSettings
+from ..language.stages import CheckedGraph, LinkPolicy, LinkSettings, Position
 from ..placement.age import worst_age
+from ..placement.commands import command_sources, silence_limit
 from ..placement.placed import PlacementError
 from .flat import FlatGraph
 from .nodes import Entry, MapNode, kind, plain
@@ -14,8 +15,8 @@ from .problems import Code, Problems, listing, nearest
 from .settings import read_quantity
 from .written import unknown_key, wrong_kind
 
-POLICY_KEYS = ("max_age", "late")
-LINK_KEYS = ("mode", *POLICY_KEYS, "of", "paths")
+POLICY_KEYS = ("max_age", "late", "watch")
+LINK_KEYS = ("mode", *POLICY_KEYS, "of", "paths", "watchdog")
 _WORDS = {"mode": ("lockstep", "free"), "late": ("hold", "safe", "stop")}
 
 
@@ -67,7 +68,35 @@ def read_link_settings(graph: FlatGraph, clock: str, problems: Problems) -> Link
                 expected="the age at which 'late' takes effect",
                 fix="max_age: 10 ms",
             )
-    return LinkSettings(mode, policy, of, _read_paths(graph.links, problems))
+    allowed = _read_paths(graph.links, problems)
+    return LinkSettings(mode, policy, of, allowed, found.get("watchdog"))
+
+
+def check_watchdog(checked: CheckedGraph, graph: FlatGraph, problems: Problems) -> None:
+    """Report links that bring commands so rarely that their silence could not be noticed in time."""
+    for machine in checked.machines:
+        limit = silence_limit(checked, machine.name)
+        if limit is None:
+            continue
+        for source in command_sources(checked, machine.name):
+            spec = checked.block(source)
+            period = spec.period_ticks * checked.base_period
+            if 2.0 * period <= limit * (1.0 + 1e-9):
+                continue
+            entry = graph.links.get("watchdog") if graph.links is not None else None
+            problems.add(
+                Code.AGE,
+                f"{source} brings commands to {machine.name} every {period * 1e3:.6g} ms, so one "
+                f"message that is lost would count as silence",
+                entry.value.where
+                if entry is not None
+                else spec.where or Position(graph.file, 1, 1),
+                at="links.watchdog",
+                expected=f"at least {2e3 * period:.6g} ms, or a link that is not watched",
+                found=f"{limit * 1e3:.6g} ms",
+                fix=f"links: {{watchdog: {2e3 * period:.6g} ms}}, or links: {{of: {{{source}: "
+                "{watch: false}}}",
+            )
 
 
 def check_paths(checked: CheckedGraph, graph: FlatGraph, problems: Problems) -> None:
@@ -132,6 +161,15 @@ def _read(node: MapNode, at: str, keys: tuple[str, ...], problems: Problems) -> 
             age = read_quantity(entry.value, f"{at}.max_age", "s", problems)
             if age is not None:
                 found["max_age"] = age
+        elif entry.key == "watchdog":
+            limit = read_quantity(entry.value, f"{at}.watchdog", "s", problems)
+            if limit is not None:
+                found["watchdog"] = limit
+        elif entry.key == "watch":
+            if isinstance(plain(entry.value), bool):
+                found["watch"] = plain(entry.value)
+            else:
+                wrong_kind(entry.value, f"{at}.watch", "true or false", problems)
         elif entry.key in _WORDS:
             value = plain(entry.value)
             if value in _WORDS[entry.key]:

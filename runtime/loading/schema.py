@@ -56,6 +56,7 @@ _FIELDS: Schema = {
 _LINK_POLICY: Schema = {
     "max_age": {"anyOf": [{"type": "number", "exclusiveMinimum": 0}, {"type": "string"}]},
     "late": {"enum": ["hold", "safe", "stop"]},
+    "watch": {"type": "boolean", "description": "whether its silence counts for 'watchdog'"},
 }
 _VALUES: Schema = {"type": "object", "description": "values by field; the others are zero"}
 _WIRE: Schema = {
@@ -148,6 +149,10 @@ def graph_schema(blocks: Mapping[str, type[Block]] | None = None) -> Schema:
                         "additionalProperties": _LINK_POLICY["max_age"],
                         "description": "block.output -> block.input: the largest age",
                     },
+                    "watchdog": {
+                        **_LINK_POLICY["max_age"],
+                        "description": "how long a link that brings commands may be silent: 15 ms",
+                    },
                 },
                 "description": "how the machines keep together",
             },
@@ -197,6 +202,7 @@ def _clock_schema() -> Schema:
         "kind": {"enum": ["free", "paced", "robot"]},
         "overrun": {"enum": ["skip", "stop"]},
         "stop_after": {"type": "integer", "minimum": 1},
+        "hangs_after": {"type": ["number", "string"], "exclusiveMinimum": 0},
     }
     return {
         "type": "object",

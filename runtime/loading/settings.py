@@ -135,6 +135,10 @@ def _read_clock(graph: FlatGraph, problems: Problems) -> ClockSpec:
         if entry.key not in CLOCK_KEYS:
             unknown_key(entry, CLOCK_KEYS, "of 'clock'", problems)
             continue
+        if entry.key == "hangs_after":
+            limit = read_quantity(entry.value, "clock.hangs_after", "s", problems)
+            values |= {} if limit is None else {entry.key: limit}
+            continue
         value = plain(entry.value)
         words = _CLOCK_WORDS.get(entry.key)
         if words is not None and value not in words:

@@ -28,7 +28,7 @@ SUBGRAPH_KEYS = ("inputs", "outputs", "parameters")
 """Keys that only a sub-graph's file may have."""
 COMMON_KEYS = ("include", "blocks", "wires", "set")
 BLOCK_KEYS = ("use", "with", "in", "rate", "offset", "on")
-CLOCK_KEYS = ("kind", "overrun", "stop_after")
+CLOCK_KEYS = ("kind", "overrun", "stop_after", "hangs_after")
 WIRE_KEYS = ("from", "delay", "initial", "allow", "value")
 
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*(?:/[A-Za-z][A-Za-z0-9_]*)*$")

@@ -32,7 +32,7 @@ class _Times:
         self.output: dict[str, Instant] = {}
         self.ran: dict[str, float] = {}
         self.kept: dict[str, deque[Instant]] = {
-            spec.path: deque([None] * _depth(spec), maxlen=_depth(spec))
+            spec.path: deque([None] * depth(spec), maxlen=depth(spec))
             for spec in graph.blocks
             if spec.block_type.is_moore()
         }
@@ -73,7 +73,7 @@ class _Times:
         return None if limit is None else now - limit - (self.ran[source] - time)
 
 
-def _depth(spec: BlockSpec) -> int:
+def depth(spec: BlockSpec) -> int:
     """After how many runs of a Moore block its output depends on an input."""
     if not issubclass(spec.block_type, Delay):
         return 1
@@ -110,7 +110,7 @@ def worst_age(graph: CheckedGraph, source: str, target: str) -> float | None:
             raise PlacementError(f"there is no wired {kind} {end!r}{there}")
     reader = specs[target.rpartition(".")[0]]
     pattern = lcm(*(spec.period_ticks for spec in graph.blocks))
-    settling = sum(spec.period_ticks * (1 + _depth(spec)) for spec in graph.blocks)
+    settling = sum(spec.period_ticks * (1 + depth(spec)) for spec in graph.blocks)
     if pattern + settling > LONGEST:
         raise PlacementError(
             f"the age of {source} at {target} would need {pattern + settling} ticks to compute; at "

@@ -6,13 +6,16 @@ During a run the garbage collector is off, so that it interrupts no tick.
 from __future__ import annotations
 
 import gc
+import os
+import sys
+import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from typing import Any
 
 from ...mathematics.compiling.compile_calls import compile_calls
-from ..language.block import Metric
+from ..language.block import Block, Metric
 from ..language.errors import AloftError, ExitCode, RunError
 from ..language.stages import CheckedGraph, ClockSpec
 from .failures import describe, locate
@@ -21,10 +24,11 @@ from .life_cycle import LifeCycle, LifeState
 from .memory import BoundGraph
 from .notes import Note, TakesNotes
 from .pacing import TimeSource, WallTime
-from .run_result import RunResult, TakesResult, merge_metrics
-from .sinks import MemoryLog, RunHash, Sink
-from .ticker import Ticker
+from .run_result import RunResult, TakesAbandoned, TakesResult, merge_metrics
+from .sinks import GivesMetrics, MemoryLog, RunHash, Sink
+from .ticker import Ticker, hang_text
 from .timing import block_times
+from .watchdog import Watchdog
 
 
 class Executor:
@@ -67,6 +71,7 @@ class Executor:
         self._time: TimeSource = time_source or WallTime()
         spec = clock or self.bound.graph.clock
         self.bound.clock.kind = spec.kind
+        self._spec = spec
         self.ticker = Ticker(
             self.bound,
             spec,
@@ -103,7 +108,14 @@ class Executor:
         problems: list[str] = []
         start_time = end_time = self._time.now()
         first_tick = clock.tick
-        with Interrupts(clock, self.life) as interrupts, _quiet_collector():
+        with (
+            Interrupts(clock, self.life) as interrupts,
+            Watchdog(
+                self.ticker, self.life, interrupts, self._spec.hangs_after,
+                lambda block, place, stack: self._abandon(block, place, stack, interrupts),
+            ) as watchdog,
+            _quiet_collector(collect=self.ticker.pacer is not None),
+        ):  # fmt: skip
             try:
                 try:
                     interrupts.armed = True
@@ -118,6 +130,8 @@ class Executor:
                     self._note("life", "running")
                     start_time = self._time.now()
                     self.ticker.advance(limit)
+                    if watchdog.hung is not None:
+                        raise watchdog.hung
                 finally:  # within the outer try, so that nothing interrupts what follows
                     interrupts.armed = False
             except RunError as failure:
@@ -140,6 +154,31 @@ class Executor:
             clock.tick - first_tick, (end_time - start_time) * 1e-9, error, problems, interrupts
         )
         return replace(result, warnings=tuple(self._finish_sinks(result)))
+
+    def _abandon(self, block: str, place: str, stack: str, interrupts: Interrupts) -> None:
+        """End a run whose thread cannot be interrupted: the stop cycles go out from this thread,
+        and unless somebody works at this interpreter, the process ends."""
+        interactive = hasattr(sys, "ps1")
+        if not interactive:  # what follows may hang as well
+            threading.Timer(self._spec.hangs_after, os._exit, (int(ExitCode.RUN_FAILED),)).start()
+        clock = self.bound.clock
+        who = f"block '{block}'" if block else "the runtime"
+        text = hang_text(who, self.ticker.instant(clock.tick), self._spec.hangs_after)
+        error = RunError(f"{text}; nothing interrupts it", block=block, tick=clock.tick)
+        error.where, error.traceback = place, stack
+        clock.stop_reason = clock.stop_reason or str(error)
+        self._note_error(error)
+        if self.life.state is LifeState.RUNNING:
+            self.life.stop()
+        problems = [*self.life.problems, *self._close_sinks()]
+        result = self._result(clock.tick, 0.0, error, problems, interrupts)
+        result = replace(result, warnings=tuple(self._finish_sinks(result)))
+        os.write(2, f"\n{error}\n  it is at {place}\n".encode())
+        for sink in self._opened:
+            if isinstance(sink, TakesAbandoned):
+                sink.abandoned(result)
+        if not interactive:
+            os._exit(int(ExitCode.RUN_FAILED))
 
     def _compile_kernels(self) -> None:
         """Compile the kernels that the blocks call, before any block is started."""
@@ -217,7 +256,9 @@ class Executor:
         if error is None:
             self._add_cautions()
         by_block: dict[str, dict[str, Metric]] = {}
-        for path, block in self.bound.blocks.items():
+        giving: dict[str, Block | GivesMetrics] = {**self.bound.blocks}
+        giving |= {sink.name: sink for sink in self._opened if isinstance(sink, GivesMetrics)}
+        for path, block in giving.items():
             try:
                 by_block[path] = dict(block.metrics())
             except Exception as failure:  # noqa: BLE001  # the other blocks' metrics still count
@@ -284,12 +325,17 @@ class Executor:
 
 
 @contextmanager
-def _quiet_collector() -> Iterator[None]:
+def _quiet_collector(*, collect: bool) -> Iterator[None]:
     """Switch the garbage collector off within, and exempt all existing objects from later
-    collections, so that no collection interrupts a tick."""
+    collections, so that no collection interrupts a tick.
+
+    With ``collect`` garbage is collected before. That takes tens of milliseconds, which count where
+    many short runs follow each other as fast as possible.
+    """
     enabled = gc.isenabled()
     with ExitStack() as after:
-        gc.collect()
+        if collect:
+            gc.collect()
         gc.freeze()
         after.callback(gc.unfreeze)
         gc.disable()

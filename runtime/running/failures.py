@@ -12,9 +12,16 @@ from ..language.errors import AloftError, RunError
 from ..language.stages import BlockSpec
 
 
+class Hang(BaseException):
+    """Raised by the watchdog inside a call that does not return; no ``except Exception`` stops it."""
+
+    def __str__(self) -> str:
+        return "it did not return in time"
+
+
 def describe(error: BaseException) -> str:
     """The text of an error, with its type unless it was raised for users to read."""
-    if isinstance(error, AloftError):
+    if isinstance(error, AloftError | Hang):
         return str(error)
     return f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
 
@@ -24,7 +31,11 @@ def place_of(error: BaseException) -> str:
 
     An error raised inside a library, such as NumPy, is placed where the block called it.
     """
-    frames = traceback.extract_tb(error.__traceback__)
+    return place_of_frames(traceback.extract_tb(error.__traceback__))
+
+
+def place_of_frames(frames: traceback.StackSummary) -> str:
+    """``file:line`` of the innermost statement that is the user's; empty if there is no frame."""
     own = [frame for frame in frames if not _is_installed(frame.filename)]
     best = (own or frames)[-1:]
     return f"{best[0].filename}:{best[0].lineno}" if best else ""
@@ -32,7 +43,7 @@ def place_of(error: BaseException) -> str:
 
 def _is_installed(file: str) -> bool:
     """Whether a file belongs to Python, to an installed package or to the runtime itself."""
-    return file.startswith(_INSTALLED) or "site-packages" in Path(file).parts
+    return file.startswith(INSTALLED) or "site-packages" in Path(file).parts
 
 
 def locate(error: RunError) -> RunError:
@@ -44,7 +55,7 @@ def locate(error: RunError) -> RunError:
     return error
 
 
-_INSTALLED = (
+INSTALLED = (
     "<",
     sysconfig.get_path("stdlib"),
     sysconfig.get_path("platstdlib"),

@@ -45,13 +45,14 @@ class LifeCycle:
 
     ``problems`` collects one text for everything that went wrong while stopping. ``guarding`` is
     true while a stop cycle or ``close`` of one block runs: an interrupt may raise an error there
-    without harm to the other blocks.
+    without harm to the other blocks. ``calls`` counts these calls.
     """
 
     def __init__(self, blocks: Mapping[str, Block]) -> None:
         self.state = LifeState.IDLE
         self.problems: list[str] = []
         self.guarding = False
+        self.calls = 0
         self._blocks = blocks
         self._started: list[str] = []
 
@@ -97,6 +98,7 @@ class LifeCycle:
     def _guard(self, path: str, call: Callable[[], None], what: str) -> None:
         try:
             try:
+                self.calls += 1
                 self.guarding = True
                 call()
             finally:

@@ -187,3 +187,11 @@ class TakesResult(Protocol):
 
     def finish(self, result: RunResult) -> list[str]:
         """Take the result, after everything else is closed. Returns warnings for the user."""
+
+
+@runtime_checkable
+class TakesAbandoned(Protocol):
+    """The method that a sink has, beside ``record``, if it is told of a run that is abandoned."""
+
+    def abandoned(self, result: RunResult) -> None:
+        """Take the result of a run that hangs; when all sinks have it, the process ends."""

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from hashlib import blake2b
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..language.block import Metric
 from ..language.layout import Layout
 from .memory import BoundGraph
 from .notes import Note
@@ -24,6 +26,16 @@ class Sink(Protocol):
 
     def close(self) -> None:
         """Finish, once, also after a failure."""
+
+
+@runtime_checkable
+class GivesMetrics(Protocol):
+    """A sink that has a word in the result, as a block has: ``Block.metrics`` by ``name``."""
+
+    name: str
+
+    def metrics(self) -> Mapping[str, Metric]:
+        """Measures of the run, with ``success`` and ``reason`` where it judges."""
 
 
 class RunHash:

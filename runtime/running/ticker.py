@@ -16,7 +16,7 @@ from ..language.block import Block
 from ..language.errors import RunError
 from ..language.schedule import phases
 from ..language.stages import ClockSpec
-from .failures import describe
+from .failures import Hang, describe
 from .finite import FiniteCheck, NotFiniteError
 from .memory import BoundGraph
 from .notes import Note
@@ -126,7 +126,8 @@ class Ticker:
                         break
                 program = table[tick % length]
                 if timing:
-                    row = [now()]
+                    clock.began = now()
+                    row = [clock.began]
                     for call in program.calls:
                         call()
                         row.append(now())
@@ -163,16 +164,20 @@ class Ticker:
         block = owner.context.path if isinstance(owner, Block) else ""
         if isinstance(owner, Block) or not isinstance(error, NotFiniteError):
             who = f"block '{block}'" if block else f"the runtime ({type(owner).__name__})"
-            text = f"{who} failed at {self._instant(tick)}: {describe(error)}"
+            if isinstance(error, Hang):
+                text = hang_text(who, self.instant(tick), self._policy.hangs_after)
+                return RunError(text, block=block, tick=tick)
+            text = f"{who} failed at {self.instant(tick)}: {describe(error)}"
             if isinstance(error, ValueError) and "read-only" in str(error):
                 text += "; an input cannot be written: copy it into an array made in setup()"
         else:
             block = error.place.rpartition(".")[0].rpartition(".")[0]
-            text = f"block '{block}' wrote a value that is not finite at {self._instant(tick)}: "
+            text = f"block '{block}' wrote a value that is not finite at {self.instant(tick)}: "
             text += str(error)
         return RunError(text, block=block, tick=tick)
 
-    def _instant(self, tick: int) -> str:
+    def instant(self, tick: int) -> str:
+        """How reports name a tick."""
         return f"tick {tick} ({tick * self.bound.clock.base_period:.3f} s)"
 
     def tell(self, note: Note) -> None:
@@ -201,8 +206,16 @@ class Ticker:
         if self._policy.overrun == "stop" and pacer.in_a_row >= self._policy.stop_after:
             who = f"block '{block}' was running" if block else "no block was running"
             raise RunError(
-                f"overrun at {self._instant(tick)}: {late * 1e-6:.3f} ms late, {pacer.in_a_row} in "
+                f"overrun at {self.instant(tick)}: {late * 1e-6:.3f} ms late, {pacer.in_a_row} in "
                 f"a row; {who} when the deadline passed, and the overrun policy is 'stop'",
                 block=block,
                 tick=tick,
             )
+
+
+def hang_text(who: str, instant: str, limit: float) -> str:
+    """What is said of a call that did not return."""
+    return (
+        f"{who} hung at {instant}: it did not return within {limit:g} s "
+        "(clock.hangs_after allows longer)"
+    )

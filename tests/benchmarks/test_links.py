@@ -8,7 +8,7 @@ def test_rows() -> None:
     assert list(rows) == [
         "round trip through links", "sending a message", "sending one of ten messages",
         "sending one of ten messages to a frozen machine",
-        "lost by ten links at 1 kHz",
+        "lost by ten links at 1 kHz", "from the last command to damping",
     ]  # fmt: skip
     trip = rows["round trip through links"]
     assert trip.peer == "bare Zenoh" and trip.ratio is not None and trip.ratio > 0.5
@@ -16,6 +16,7 @@ def test_rows() -> None:
         assert row.value is not None and row.goal is not None
     lost = rows["lost by ten links at 1 kHz"]
     assert f"of {COUNT * 100} messages of 512 B came" in lost.note
+    assert 15.0 <= (rows["from the last command to damping"].value or 0.0) < 10_000.0
     assert 0.0 <= (lost.value or 0.0) < COUNT * 100  # some came
 
 

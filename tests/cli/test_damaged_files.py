@@ -74,18 +74,22 @@ def recording(folder: Path) -> Path:
     ],
     ids="-".join,
 )
-def test_a_damaged_recording(command: list[str], recording: Path, folder: Path) -> None:
+def test_a_damaged_recording(
+    command: list[str], recording: Path, folder: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
     data, draw = recording.read_bytes(), random.Random(" ".join(command))
     (folder / "whole.rrd").write_bytes(data)
     good, said = outcome(*(part.format("whole.rrd") for part in command))
     assert good == 0, said
     refused = 0
+    capfd.readouterr()
     for number in range(TRIES):
         file = folder / f"damaged{number}.rrd"
         file.write_bytes(damaged(data, draw))
         code, printed = outcome(*(part.format(file.name) for part in command))
         assert code in (0, 1, 2), printed
         assert "Traceback" not in printed
+        assert capfd.readouterr() == ("", "")  # no library writes lines of its own
         if code == 2:
             refused += 1
             assert file.name in printed

@@ -22,10 +22,22 @@ def test_a_file_that_is_not_there(tmp_path: Path) -> None:
 
 
 def test_options_that_mean_nothing(tmp_path: Path) -> None:
-    code, text = view(tmp_path / "a.rrd", "--save", "b.rrd")
-    assert code == 2 and "add --with OTHER.rrd" in text
     code, text = view(tmp_path / "a.rrd", "--with", "b.rrd", "--no-show")
     assert code == 2 and "add --save FILE.rrd" in text
+
+
+def test_what_is_shown_can_be_kept(tmp_path: Path) -> None:
+    recording, kept = tmp_path / "count.rrd", tmp_path / "kept.rrd"
+    graph = str(ROOT / "tests/cli/count.yaml")
+    CliRunner().invoke(make_app(), ["run", graph, "--record", str(recording), "-q"])
+    code, _ = view(recording, "--save", kept, "--no-show")
+    assert code == 0 and kept.stat().st_size > 1000
+    before = recording.read_bytes()
+    code, text = view(recording, "--save", recording, "--no-show")
+    assert code == 2 and "would overwrite the recording; name another file" in text
+    code, text = view(kept, "--layout", tmp_path / "own.yaml")
+    assert code == 2 and "has no signals for the layout" in text
+    assert recording.read_bytes() == before
 
 
 def test_a_comparison_of_what_is_no_recording(tmp_path: Path) -> None:

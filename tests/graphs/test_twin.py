@@ -46,6 +46,40 @@ def test_it_lands_although_answers_are_lost() -> None:
     assert result.metrics["lost_answers"] > 100  # type: ignore[operator]
 
 
+def test_the_controllers_own_limits_act_before_the_drivers() -> None:
+    """13.1 V are within the driver's limit of 13 V and below the safety monitor's of 13.2 V."""
+    low = {"kind": "low_voltage", "start": 0.05, "value": 13.1, "target": "left_knee_motor"}
+    graph = aloft.load(GRAPHS / "jump_twin.yaml", {"robot.faults": [low]})
+    result = Executor(graph.checked, log=False).run()
+    text = "drive left_knee_motor: 13.1 V is below lowest_voltage, 13.2 V"
+    assert not result.success and result.reason == f"safety: {text}"
+    assert result.metrics["safety_fault"] == "voltage" and result.metrics["safety_reason"] == text
+    assert 0.05 < float(result.metrics["safety_fault_time_s"]) < 0.08  # type: ignore[arg-type]
+    assert result.metrics["drives_at_end"] == "damped"
+
+
+SWITCHES = [
+    ("open_switch", "is stuck: it was open under a foot that stood", 0.3),
+    ("bouncing_switch", "bounces: it opened and closed too often", 0.7),
+    pytest.param("stuck_switch", "is stuck: it was closed in the air", 2.0, marks=pytest.mark.long),
+]
+
+
+@pytest.mark.parametrize(("kind", "text", "latest"), SWITCHES)
+def test_a_bad_switch_ends_in_damping(kind: str, text: str, latest: float) -> None:
+    """A switch that is stuck closed is ignored in the air: the robot lands first, then stops."""
+    fault = {"kind": kind, "start": 0.02, "target": "left_heel"}
+    result = Executor(
+        aloft.load(GRAPHS / "jump_twin.yaml", {"robot.faults": [fault]}).checked, log=False
+    ).run()
+    assert not result.success and result.reason == f"safety: foot switch left_heel {text}"
+    assert float(result.metrics["safety_fault_time_s"]) < latest  # type: ignore[arg-type]
+    assert result.metrics["drives_at_end"] == "damped"
+    if kind == "stuck_switch":
+        assert float(result.metrics["apex_above_standing_m"]) > 0.1  # type: ignore[arg-type]
+        assert float(result.metrics["peak_tilt_deg"]) < 15.0  # type: ignore[arg-type]
+
+
 def run_behind_ports(folder: Path) -> tuple[str, float]:
     """Run jump_robot.yaml in another process; gives its hash, and how high the twin's torso was."""
     hardware = Hardware.for_twin(ROBOT)

@@ -4,6 +4,8 @@ from typing import Any
 
 import pytest
 
+from aloft.blocks.signals import DrivePhase
+from aloft.blocks.signals.drive_conditions import HEALTHY
 from aloft.hal.robot import Robot
 from aloft.hal.simulated.mujoco_robot import MujocoRobot
 from aloft.runtime.language.parameters import Parameters
@@ -42,11 +44,21 @@ def test_a_robot_lives_through_its_four_methods() -> None:
 
 
 def test_the_simulated_robot_has_every_robots_ports() -> None:
-    assert set(Robot.outputs) == {"imu", "joints", "contacts"} and set(Robot.inputs) == {"command"}
+    assert set(Robot.outputs) == {"imu", "joints", "contacts", "health"}
+    assert set(Robot.inputs) == {"command"}
     for name, port in {**Robot.outputs, **Robot.inputs}.items():
         assert {**MujocoRobot.outputs, **MujocoRobot.inputs}[name].signal is port.signal
     assert MujocoRobot.outputs["truth"].truth and MujocoRobot.inputs["push"].optional
     assert not any(output.truth for output in Robot.outputs.values())
+
+
+def test_a_robot_that_reports_nothing_of_itself_is_well() -> None:
+    bench = BlockBench(Recorded, robot="bruce")
+    bench.step(3)
+    health = bench.get("health")
+    assert set(health.condition.tolist()) == {HEALTHY} and health.state == DrivePhase.DRIVING
+    assert health.joints_valid and health.imu_valid and health.contacts_valid
+    assert health.stamp == 2 * 0.002 and not health.age.any()
 
 
 def test_a_driver_that_lacks_a_method_cannot_be_made() -> None:

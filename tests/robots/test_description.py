@@ -1,7 +1,6 @@
 """The robot's description: validation, derived figures and finding one by name."""
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -9,35 +8,7 @@ import yaml
 
 from aloft.robots.description import MotorRating, RobotDescription, find_robot, read_description
 
-
-def hopper() -> dict[str, Any]:
-    """A one-legged robot with a hip and a knee whose motors are coupled."""
-    inertia = [0.01, 0.01, 0.01, 0.0, 0.0, 0.0]
-    link = {"mass": 1.0, "com": [0, 0, 0], "inertia": inertia}
-    return {
-        "name": "hopper",
-        "base": "body",
-        "links": [{"name": name, **link} for name in ("body", "thigh", "shank")],
-        "joints": [
-            {"name": "hip", "parent": "body", "child": "thigh", "origin": [0, 0, 0],
-             "axis": [0, 1, 0], "limits": [-1, 1]},
-            {"name": "knee", "parent": "thigh", "child": "shank", "origin": [0, 0, -0.2],
-             "axis": [0, 1, 0], "limits": [0, 2]},
-        ],
-        "feet": [{"name": "foot", "link": "shank", "sole": [0, 0, -0.2]}],
-        "contacts": [
-            {"name": "toe", "foot": "foot", "position": [0, 0, -0.2], "radius": 0.005}
-        ],
-        "transmission": {"motors": ["a", "b"], "joint_to_motor": [[1, 0], [1, 1]]},
-        "profiles": {
-            "small": {
-                "peak_torque": 5.0, "corner_speed": 10.0, "no_load_speed": 20.0,
-                "continuous_torque": 2.0, "rotor_inertia": 0.001, "friction": 0.05,
-                "damping": 0.01,
-            }
-        },
-        "standing": {"knee": 0.5},
-    }  # fmt: skip
+from .validation.wrong_robots import hopper
 
 
 def test_derived_figures() -> None:

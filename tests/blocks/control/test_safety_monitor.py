@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from aloft.blocks.control.safety_monitor import Fault, SafetyMonitor
-from aloft.blocks.signals import CommandMode
+from aloft.blocks.control.safety_faults import Fault
+from aloft.blocks.control.safety_monitor import SafetyMonitor
+from aloft.blocks.signals import CommandMode, DrivePhase, SwitchFault
 from aloft.robots.description import find_robot
 from aloft.runtime.language.errors import BlockError
 from aloft.runtime.testing import BlockBench
@@ -205,6 +206,121 @@ def test_fault_survives_a_restore(bench):
     bench.set("desired", torque=0.0)
     bench.step()
     assert_damps(bench, Fault.ABSURD_COMMAND)
+
+
+HEALTHY = {
+    "state": int(DrivePhase.DRIVING), "condition": np.full(10, 0x80), "age": np.zeros(10),
+    "voltage": np.full(10, 14.8), "temperature": np.full(10, 40.0), "current": np.zeros(10),
+    "imu_age": 0.0, "stamp": -1.0,
+    "joints_valid": True, "imu_valid": True, "contacts_valid": True,
+}  # fmt: skip
+LIMITS = {"lowest_voltage": 13.2, "largest_current": 29.0}
+KNEE = 8
+
+
+def with_health(**health):
+    bench = make(**LIMITS)
+    bench.set("health", **{**HEALTHY, **health})
+    return bench
+
+
+def of_knee(values, value):
+    values = np.array(values)
+    values[KNEE] = value
+    return values
+
+
+@pytest.mark.parametrize(
+    ("field", "bad", "ticks", "reason", "text"),
+    [
+        ("condition", 0x88, 1, Fault.DRIVE,
+         "drive left_knee_motor: its watchdog ran out, or the emergency stop is pressed"),
+        ("condition", 0x00, 1, Fault.DRIVE, "drive left_knee_motor: its error byte is 0x00, whose"),
+        ("age", 0.021, 1, Fault.SILENT_DRIVE,
+         "drive left_knee_motor has not answered for 21 ms; answer_age is 20 ms"),
+        ("age", np.nan, 1, Fault.SILENT_DRIVE, "drive left_knee_motor has not answered for nan ms"),
+        ("voltage", 13.1, 11, Fault.VOLTAGE,
+         "drive left_knee_motor: 13.1 V is below lowest_voltage, 13.2 V"),
+        ("temperature", 81.0, 11, Fault.TEMPERATURE,
+         "drive left_knee_motor: its winding has 81 deg C; highest_temperature is 80"),
+        ("current", -29.5, 11, Fault.CURRENT,
+         "drive left_knee_motor: -29.5 A; largest_current is 29 A"),
+    ],
+)  # fmt: skip
+def test_a_drive_that_is_not_well(field, bad, ticks, reason, text):
+    bench = with_health(**{field: of_knee(HEALTHY[field], bad)})
+    bench.step(ticks - 1)
+    assert fault(bench) == Fault.NONE
+    bench.set("health", **{field: HEALTHY[field]})
+    bench.step()
+    assert fault(bench) == Fault.NONE, "it must be so in a row"
+    bench.set("health", **{field: of_knee(HEALTHY[field], bad)})
+    bench.step(ticks)
+    assert_damps(bench, reason)
+    metrics = bench.block.metrics()
+    assert metrics["success"] is False
+    assert text in metrics["reason"] and text in metrics["safety_reason"]
+    assert text in bench.clock.stop_reason
+
+
+@pytest.mark.parametrize(
+    ("bad", "ticks", "reason", "text"),
+    [
+        ({"imu_age": 0.03}, 1, Fault.SILENT_IMU,
+         "the sensor board has sent nothing for 30 ms; imu_age is 20 ms"),
+        ({"joints_valid": False}, 51, Fault.INVALID_JOINTS,
+         "the joint readings were marked as not valid for more than 100 ms"),
+        ({"imu_valid": False}, 51, Fault.INVALID_IMU,
+         "the IMU's readings were marked as not valid for more than 100 ms"),
+        ({"contacts_valid": False}, 51, Fault.INVALID_CONTACTS,
+         "the foot switches' readings were marked as not valid for more than 100 ms"),
+        ({"stamp": 1.0}, 27, Fault.STALE_HEALTH,
+         "the robot has measured nothing new for 50 ms"),
+    ],
+)  # fmt: skip
+def test_sensors_that_are_not_to_be_trusted(bad, ticks, reason, text):
+    bench = with_health(**bad)
+    bench.step(ticks - 1)
+    assert fault(bench) == Fault.NONE
+    bench.step()
+    assert_damps(bench, reason)
+    assert bench.block.metrics()["safety_reason"] == text
+    assert bench.clock.stop_reason == text
+
+
+@pytest.mark.parametrize("state", [DrivePhase.OFF, DrivePhase.DAMPED])
+def test_drives_that_do_not_drive_are_not_judged(state):
+    bench = with_health(condition=np.full(10, 0x88), voltage=np.full(10, 5.0), state=int(state))
+    bench.step(100)
+    assert fault(bench) == Fault.NONE
+
+
+def test_what_is_not_measured_is_not_judged():
+    bench = with_health(voltage=np.zeros(10))
+    bench.step(100)
+    assert fault(bench) == Fault.NONE
+    bench = make(lowest_voltage=13.2)  # nothing is wired to `health`
+    bench.step(100)
+    assert fault(bench) == Fault.NONE
+
+
+def test_a_fall_does_not_end_the_run_but_says_why(bench):
+    bench.set("base", orientation=leaning(2.0))
+    bench.step(11)
+    metrics = bench.block.metrics()
+    assert metrics["safety_reason"] == "the base leant more than `tilt_limit`"
+    assert "success" not in metrics and bench.clock.stop_reason is None
+
+
+def test_a_foot_switch_at_fault_ends_the_run_when_the_robot_may_stop(bench):
+    bench.set("switches", fault=[0, 0, 0, int(SwitchFault.STUCK_CLOSED)], stop=False)
+    bench.step(100)
+    assert fault(bench) == Fault.NONE
+    bench.set("switches", stop=True)
+    bench.step()
+    assert_damps(bench, Fault.SWITCH)
+    text = f"foot switch {ROBOT.contacts[3].name} is stuck: it was closed in the air"
+    assert bench.block.metrics()["safety_reason"] == text == bench.clock.stop_reason
 
 
 def test_needs_a_robot():

@@ -83,3 +83,16 @@ def test_restores_in_the_middle_of_a_hold():
     bench.restore(half)
     bench.step(5)
     assert bench.get("state").active.all()
+
+
+def test_a_switch_at_fault_counts_as_open():
+    bench = BlockBench(ContactDetector, dimensions=POINTS, rate=500.0)
+    bench.set("switches", closed=[True] * 4)
+    bench.set("faults", fault=[0, 1, 0, 3])
+    bench.step()
+    assert bench.get("state").active.tolist() == [True, False, True, False]
+    bench.set("faults", fault=[1, 1, 0, 3])
+    bench.step(15)
+    assert bench.get("state").active.tolist() == [True, False, True, False], "it is held a while"
+    bench.step()
+    assert bench.get("state").active.tolist() == [False, False, True, False]

@@ -6,7 +6,11 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from aloft.hal.simulated.actuator import (
+    MotorRecord,
+    Motors,
+    MotorScratch,
     clip_joint_torque,
+    drive_motors,
     joint_feedback_torque,
     motor_torque_limits,
 )
@@ -85,9 +89,31 @@ def test_hip_pitch_has_two_motors_and_knee_extension_shares_its_motor_with_the_a
 def test_joint_feedback_is_the_papers_law() -> None:
     random = np.random.default_rng(0)
     feedforward, stiffness, damping, target, rate, position, velocity = random.normal(size=(7, 10))
-    out, scratch = np.zeros(10), np.zeros(10)
-    joint_feedback_torque(
-        feedforward, stiffness, damping, target, rate, position, velocity, out, scratch
-    )
+    out = np.zeros(10)
+    joint_feedback_torque(feedforward, stiffness, damping, target, rate, position, velocity, out)
     expected = feedforward + stiffness * (target - position) + damping * (rate - velocity)
     np.testing.assert_allclose(out, expected, rtol=1e-14)
+
+
+def test_a_step_of_the_motors_is_recorded_and_what_is_not_a_number_is_not_hidden() -> None:
+    square = np.eye(3)
+    motors = Motors(square, square, square, np.full(3, 2.0), np.ones(3), np.full(3, 10.0))
+    scratch = MotorScratch(*np.zeros((5, 3)))
+    high, low = np.full(3, -np.inf), np.full(3, np.inf)
+    record = MotorRecord(
+        np.zeros(3, np.int64), high.copy(), low.copy(), high.copy(), low.copy(), *np.zeros((2, 3))
+    )
+    torque = np.array([1.0, -5.0, 0.5])
+    drive_motors(np.array([9.5, 0.5, -0.5]), torque, motors, scratch, record)
+    np.testing.assert_array_equal(torque, [0.5, -2.0, 0.5])
+    drive_motors(np.zeros(3), np.ones(3), motors, scratch, record)
+    np.testing.assert_array_equal(record.saturated, [1, 1, 0])
+    np.testing.assert_array_equal(record.torque_high, [1.0, 1.0, 1.0])
+    np.testing.assert_array_equal(record.torque_low, [0.5, -2.0, 0.5])
+    np.testing.assert_array_equal(record.speed_high, [9.5, 0.5, 0.0])
+    np.testing.assert_array_equal(record.overload, [0.0, 0.0, 0.0])
+    np.testing.assert_array_equal(record.joint_torque, [1.5, -1.0, 1.5])
+    drive_motors(np.zeros(3), np.full(3, np.nan), motors, scratch, record)
+    drive_motors(np.zeros(3), np.ones(3), motors, scratch, record)
+    for found in (record.torque_high, record.torque_low, record.overload, record.joint_torque):
+        assert np.isnan(found).all()

@@ -6,6 +6,7 @@ import hashlib
 import subprocess
 import sys
 import tracemalloc
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -18,6 +19,8 @@ from aloft.robots.description import find_robot
 from aloft.runtime.language.errors import BlockError
 from aloft.runtime.testing.bench import BlockBench
 
+from .simulated_bruce import bench, hold, lift
+
 ROBOT = find_robot("bruce")
 WEIGHT = 5.118 * 9.81
 STANDARD: dict[str, Any] = {
@@ -26,29 +29,6 @@ STANDARD: dict[str, Any] = {
     "switch_bounce": 0.002, "initial_attitude_error": 0.01, "latency": 0.002, "jitter": 0.0005,
     "random_start_phase": True,
 }  # fmt: skip
-
-
-def bench(rate: float = 500.0, **params: Any) -> BlockBench[MujocoRobot]:
-    return BlockBench(MujocoRobot, params, robot="bruce", rate=rate)
-
-
-def hold(robot: BlockBench[MujocoRobot]) -> None:
-    """Command the robot to hold the pose it is in."""
-    robot.block.emit()
-    joints = robot.get("joints")
-    robot.set(
-        "command", mode=CommandMode.ACTIVE, torque=joints.torque.copy(),
-        position=joints.position.copy(), velocity=0.0, stiffness=300.0, damping=1.5,
-    )  # fmt: skip
-
-
-def lift(robot: BlockBench[MujocoRobot], height: float = 3.0) -> None:
-    """Put the robot high up, legs in their standing pose, at rest and without gravity's pull yet."""
-    data: Any = robot.block.plant.data
-    data.qpos[2] += height
-    data.qvel[:] = 0.0
-    robot.block.freeze()
-    robot.block.thaw()
 
 
 def truth(robot: BlockBench[MujocoRobot]) -> Any:
@@ -264,8 +244,8 @@ def digest(seed: int) -> str:
 
 def test_same_seed_same_bytes_in_every_process_on_every_cpu() -> None:
     code = (
-        f"import sys; sys.path.insert(0, {str(__file__).rpartition('/')[0]!r})\n"
-        "from test_mujoco_robot import digest\nprint(digest(11))"
+        f"import sys; sys.path.insert(0, {str(Path(__file__).parents[1])!r})\n"
+        "from simulated.test_mujoco_robot import digest\nprint(digest(11))"
     )
     others = {
         subprocess.run(

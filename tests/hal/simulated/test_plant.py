@@ -67,29 +67,3 @@ def test_loaded_it_goes_on_bit_for_bit() -> None:
     plant.simulate(drives, 30)
     np.testing.assert_array_equal(plant.data.qpos, first[0])
     assert plant.streams[Purpose.GYRO].random() == first[1]
-
-
-@pytest.mark.parametrize(("speed", "sinks"), [(0.2, False), (3.0, True)])
-def test_soft_ground_may_reach_a_foot_whose_points_sink_in(speed: float, sinks: bool) -> None:
-    """After a drop the ground gives way by more than the 4 mm between contact points and foot."""
-    plant = plant_of(ROBOT, contact_stiffness=0.25)
-    drives = Held(plant)
-    plant.stand(drives, drives.hold)
-    plant.clear_record()
-    plant.data.qvel[2] = -speed
-    touched = 0
-    for _ in range(20):
-        plant.simulate(drives, 1)
-        touched += int(plant.data.sensor("contacts").data[0]) > len(ROBOT.contacts)
-    assert (touched > 0) is sinks
-    assert plant.record.forbidden == 0
-
-
-def test_a_foot_on_its_side_is_a_forbidden_contact() -> None:
-    plant = plant_of(ROBOT)
-    drives = Held(plant)
-    plant.stand(drives, drives.hold)
-    plant.clear_record()
-    plant.data.qpos[2:7] = [0.05, np.sqrt(0.5), np.sqrt(0.5), 0.0, 0.0]
-    plant.simulate(drives, 3)
-    assert plant.record.forbidden > 0

@@ -2,7 +2,7 @@
 
 import pytest
 
-from aloft.hal.bear.conditions import describe
+from aloft.blocks.signals.drive_conditions import describe
 from aloft.hal.bear.frames import Frame, Instruction
 from aloft.hal.bear.registers import CONFIG, STATUS, Mode, Torque
 from aloft.hal.twin.actuator import EmulatedActuator

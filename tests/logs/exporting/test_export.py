@@ -12,11 +12,11 @@ from pyarrow import parquet
 
 from aloft import load
 from aloft.logs.exporting.difference import ComparisonError, compare_runs, lift_off_tick
-from aloft.logs.exporting.export import export_mcap, export_parquet
-from aloft.logs.exporting.known_channels import quaternions_of_matrices
-from aloft.logs.file.reader import RecordedRun, read
+from aloft.logs.exporting.export import EXPORTS, export_mcap, export_parquet
+from aloft.logs.file.reader import READ_ALONE, RecordedRun, read
+from aloft.logs.file.row_sources import PackedRows
 from aloft.logs.recording.recorder import Recorder
-from aloft.robots.kinematics import link_poses, matrices_of_quaternions
+from aloft.robots.kinematics import link_poses, matrices_of_quaternions, quaternions_of_matrices
 from aloft.robots.robot_description import RobotDescription
 
 ROOT = Path(__file__).parents[3]
@@ -195,3 +195,40 @@ def test_what_cannot_be_compared_is_said(runs: list[RecordedRun]) -> None:
     slow = replace(runs[1], header=replace(runs[1].header, base_rate=250.0))
     with pytest.raises(ComparisonError, match=r"a\.rrd has 500 ticks a second and .*b\.rrd 250"):
         compare_runs(runs[0], slow)
+
+
+@pytest.mark.parametrize("kind", ["csv", "parquet", "mcap"])
+def test_an_export_never_has_all_rows_in_memory(
+    runs: list[RecordedRun], kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(_: object) -> None:
+        raise AssertionError("all rows were read at once")
+
+    monkeypatch.setattr(PackedRows, "rows", refuse)
+    monkeypatch.setattr(PackedRows, "signal", refuse)
+    path = tmp_path / f"a.{kind}"
+    run = read(runs[0].path)
+    EXPORTS[kind](run, path, ["robot.truth"] if kind != "mcap" else [])
+    assert path.stat().st_size > 10_000
+    if kind == "csv":
+        lines = path.read_text().splitlines()
+        assert len(lines) == len(run.ticks) + 1
+        assert lines[-1].startswith(f"{run.ticks[-1]},{float(run.time[-1])!r},")
+
+
+def test_many_signals_are_read_at_once(
+    runs: list[RecordedRun], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    found = read(runs[0].path)
+    names = list(found.signals())
+    few = {name: found[name] for name in names[:READ_ALONE]}
+    assert "rows" not in vars(found), "few signals do not need all"
+    _ = found[names[READ_ALONE]]
+    assert found.rows.shape == (len(found.ticks), found.header.bus.size)
+    for name, values in few.items():
+        np.testing.assert_array_equal(found[name], values)
+    monkeypatch.setattr("aloft.logs.file.reader.MOST_KEPT", 1000)
+    large = read(runs[0].path)
+    for name in names[: READ_ALONE + 2]:
+        np.testing.assert_array_equal(large[name], found[name])
+    assert "rows" not in vars(large), "what is too large is not kept"

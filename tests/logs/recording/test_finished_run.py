@@ -11,7 +11,9 @@ import pytest
 from aloft.logs.file.changed_rows import filled
 from aloft.logs.file.format import RecordedField
 from aloft.logs.file.header import make_header
+from aloft.logs.file.reader import read
 from aloft.logs.recording.finished_run import write_recording
+from aloft.logs.recording.whole_view import write_view
 from aloft.logs.viewing.flights import Flights
 from aloft.logs.viewing.robot_shapes import quaternion_from_z
 from aloft.logs.viewing.scene_ports import port_with_pose
@@ -113,6 +115,13 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> tuple[CheckedGraph, Ru
     return graph, result, path
 
 
+@pytest.fixture(scope="module")
+def drawn(recorded: tuple[CheckedGraph, RunResult, Path]) -> Path:
+    """What ``aloft view`` shows of the recording."""
+    *_, path = recorded
+    return write_view(path.with_name("view.rrd"), read(path))
+
+
 def batches(path: Path, content: str) -> dict[str, Any]:
     """The chunks of the matching entities as Arrow record batches, static ones left out."""
     from rerun.chunk import RrdReader
@@ -127,9 +136,17 @@ def batches(path: Path, content: str) -> dict[str, Any]:
 def test_every_signal_of_every_tick_is_read_back_exactly(
     recorded: tuple[CheckedGraph, RunResult, Path],
 ) -> None:
+    _, result, path = recorded
+    for name, signal in read(path).signals().items():
+        assert read(path)[name].tobytes() == result.signal(name).tobytes(), signal.name
+
+
+def test_every_signal_is_drawn_in_every_tick_in_which_it_changes(
+    recorded: tuple[CheckedGraph, RunResult, Path], drawn: Path
+) -> None:
     from rerun.chunk import RrdReader
 
-    _, result, path = recorded
+    result, path = recorded[1], drawn
     found: dict[str, list[Any]] = {}
     for chunk in RrdReader(path).stream().filter(content="/signals/**"):
         if not chunk.is_static:
@@ -153,8 +170,20 @@ def test_every_signal_of_every_tick_is_read_back_exactly(
             assert len(ticks) == 2  # it never does
 
 
-def test_states_and_events_are_said_by_name(recorded: tuple[CheckedGraph, RunResult, Path]) -> None:
+def test_a_recording_has_the_curves_that_are_shown_first(
+    recorded: tuple[CheckedGraph, RunResult, Path],
+) -> None:
     *_, path = recorded
+    assert set(batches(path, "/signals/**")) == {
+        f"signals/robot/truth/{name}" for name in ("com", "base_position")
+    }
+    assert set(batches(path, "/states/**")) == {"states/robot.stage", "states/leg.robot.stage"}
+    thigh = batches(path, "/world/robot/**")["world/robot/thigh"]
+    assert thigh["tick"].to_pylist() == list(range(0, TICKS, 10))  # 50 Hz of 500 Hz
+
+
+def test_states_and_events_are_said_by_name(drawn: Path) -> None:
+    path = drawn
     states = batches(path, "/states/**")
     batch = states["states/robot.stage"]
     assert batch["StateChange:state"].flatten().to_pylist() == ["ground", "air", "ground"]
@@ -176,8 +205,11 @@ def test_states_and_events_are_said_by_name(recorded: tuple[CheckedGraph, RunRes
     assert (200, "0.400 s  touchdown") in lines
 
 
-def test_the_robot_is_posed_in_space(recorded: tuple[CheckedGraph, RunResult, Path]) -> None:
-    graph, result, path = recorded
+def test_the_robot_is_posed_in_space(
+    recorded: tuple[CheckedGraph, RunResult, Path], drawn: Path
+) -> None:
+    graph, result, _ = recorded
+    path = drawn
     assert result.log is not None and result.log.layout is not None
     assert port_with_pose(make_header(graph, result.log.layout, b"")) == "robot.truth"
     found = batches(path, "/world/**")

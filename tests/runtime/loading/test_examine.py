@@ -262,3 +262,16 @@ blocks:
         load_text(use.replace("OFFSET", "10"), tmp_path / "graph.yaml")
     with pytest.raises(LoadError, match="offset"):
         load_text(use.replace("OFFSET", "-1"), tmp_path / "graph.yaml")
+
+
+def test_an_input_is_not_proposed_the_source_that_another_one_has(tmp_path: Path) -> None:
+    path = tmp_path / "graph.yaml"
+    path.write_text(
+        "rate: 100 Hz\nblocks:\n"
+        "  ref: {use: blocks.Step, with: {after: [1]}}\n"
+        "  other: {use: blocks.Constant, with: {value: [1]}}\n"
+        "  both: {use: blocks.Sum, in: {a: ref.y}}\n"
+    )
+    (problem,) = check(path).problems
+    assert problem.message == "input 'b' of both is not wired"
+    assert (problem.nearest, problem.fix) == (("other.y",), "in: {b: other.y}")

@@ -15,3 +15,18 @@ def test_one_missing_block_read_by_many(tmp_path: Path) -> None:
         assert text.count("there is no block 'nowhere'") == 20
         assert "40 more problems of the kind unknown-source; --json has all of them" in text
         assert text.endswith("graph.yaml: 60 problems")
+
+
+def test_a_ring_of_very_many_blocks(tmp_path: Path) -> None:
+    lines = [f"  b{k}: {{use: blocks.Gain, in: {{u: b{(k - 1) % 400}.y}}}}" for k in range(400)]
+    path = tmp_path / "graph.yaml"
+    path.write_text("\n".join(["rate: 100 Hz", "blocks:", *lines]))
+    report = check(path)
+    (problem,) = report.problems
+    assert problem.message.startswith(
+        "b0 -> b1 -> b2 -> b3 -> b4 -> b5 -> b6 -> b7 -> (385 more) ->"
+    )
+    assert "-> b398 -> b399 -> b0 is a loop without a delay" in problem.message
+    assert "-> b399.u -> b399.y -> b0.u" in problem.found
+    assert problem.fix == "u: {from: b399.y, delay: 1}"
+    assert len(report.text()) < 1000

@@ -2,8 +2,10 @@
 
 from pathlib import Path
 
+import pytest
+
 from aloft.runtime.language.stages import LinkPolicy, LinkSettings
-from aloft.runtime.loading import load_text
+from aloft.runtime.loading import LoadError, load_text
 
 PATH = Path("graph.yaml")
 GRAPH = """
@@ -36,3 +38,16 @@ def test_overrides_and_the_flat_text() -> None:
     graph = load_text(GRAPH, PATH, overrides)
     assert graph.links == LinkSettings("free", LinkPolicy(0.02, "safe"))
     assert load_text(graph.text, PATH).links == graph.links
+
+
+def test_what_is_watched() -> None:
+    found = settings("links: {watchdog: 20 ms, of: {one: {watch: false}}}")
+    assert found.watchdog == 0.02 and not found.policy_of("one").watch
+    assert found.policy_of("two").watch and settings("").watchdog is None
+    for text, expected in [
+        ("links: {watchdog: never}", "links.watchdog cannot be the text 'never'"),
+        ("links: {of: {one: {watch: 1}}}", "links.of.one.watch cannot be the number 1"),
+    ]:
+        with pytest.raises(LoadError) as caught:
+            settings(text)
+        assert expected in caught.value.report.problems[0].message

@@ -61,7 +61,10 @@ sys.exit(result.exit_code)
 
 def start(mode: str) -> subprocess.Popen[str]:
     process = subprocess.Popen(
-        [sys.executable, "-c", PROGRAM, mode], stdout=subprocess.PIPE, text=True
+        [sys.executable, "-c", PROGRAM, mode],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
     )
     assert process.stdout is not None
     assert process.stdout.readline() == "running\n"
@@ -78,6 +81,15 @@ def test_a_signal_stops_cleanly(number: signal.Signals, code: int) -> None:
     name = signal.Signals(number).name
     assert output.splitlines() == [*["stop cycle"] * 5, "close", f"stopped by {name}"]
     assert process.returncode == code
+
+
+def test_the_first_ctrl_c_says_what_happens() -> None:
+    process = start("runs")
+    process.send_signal(signal.SIGINT)
+    _, errors = process.communicate(timeout=240)
+    assert errors == (
+        "\nstopping after this tick, the robot in damping; Ctrl-C again ends a block that hangs\n"
+    )
 
 
 def test_a_second_signal_ends_a_block_that_hangs() -> None:

@@ -1,0 +1,67 @@
+"""Draws a recorded run from its numbers: every signal, the scene at its full rate, all lanes.
+
+A recording has only what is needed for a first look. ``aloft view`` shows a file that this writes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+from ..file.reader import RecordedRun
+from ..viewing.blueprint import recording_blueprint
+from .run_stream import RunStream
+
+DRAWN_TICKS = 4096
+"""Ticks that are drawn at once: the viewer likes few large pieces."""
+
+
+def write_view(path: str | PathLike[str], run: RecordedRun, layout: Any = None) -> Path:
+    """Write all that can be seen of a run, replacing an older file.
+
+    Args:
+        path: the file.
+        run: the recording; some thousand of its ticks are in memory at a time.
+        layout: by default the one that is made from the run's graph.
+
+    Raises:
+        RecordingError: the recording cannot be read.
+        ImportError: Rerun is not installed.
+        OSError: the file cannot be written.
+    """
+    path = Path(path)
+    shown = recording_blueprint(run.header) if layout is None else layout
+    with opened_stream(path, run.header.name, shown) as stream:
+        draw(RunStream(stream, run.header), run)
+    return path
+
+
+@contextmanager
+def opened_stream(path: Path, name: str, layout: Any) -> Iterator[Any]:
+    """A Rerun stream into a file, which is there at the end. Raises ``OSError``."""
+    import rerun as rr
+
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.open("wb").close()  # Rerun would only warn, so find out here whether it can be written
+    stream = rr.RecordingStream("aloft", recording_id=name, send_properties=False)
+    rr.set_log_time_enabled(False, recording=stream)
+    stream.save(path, default_blueprint=layout)
+    try:
+        yield stream
+    finally:
+        stream.flush(timeout_sec=30)
+        stream.disconnect()
+
+
+def draw(out: RunStream, run: RecordedRun) -> None:
+    """Draw a whole run into a stream."""
+    out.write_start()
+    for batch in run.batches(DRAWN_TICKS):
+        out.write_rows(batch.ticks, batch.rows)
+    out.write_rest()
+    out.write_notes(run.notes)
+    if run.outcome is not None:
+        out.write_times(dict(run.outcome))

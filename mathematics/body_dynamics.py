@@ -1,0 +1,312 @@
+"""The equations of motion of a tree of bodies: inertia, bias forces, momentum (in plain loops).
+
+The composite rigid body algorithm and the recursive Newton-Euler algorithm (Featherstone, Rigid Body
+Dynamics Algorithms, 2008, chapters 5 and 6), with all vectors in the world's axes, taken at the
+base's origin: see ``body_tree``.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .body_tree import BodyMotion, BodyTree, place_of
+from .constants import GRAVITY
+from .kernel import kernel
+
+Array = NDArray[np.float64]
+
+
+class Inertias(NamedTuple):
+    """Every body with all that it carries (the base: the whole robot).
+
+    ``mass`` (n_bodies,) [kg], ``moment`` (n_bodies, 3), mass times place of the centre of mass [kg m],
+    ``inertia`` (n_bodies, 6) about the base's origin [kg m^2]: xx, yy, zz, xy, xz, yz. ``force``
+    (n_bodies, 6) gives the bodies the acceleration of ``BodyMotion``, without gravity; ``spatial`` (6,),
+    ``centre`` (3,) and ``turned`` (3, 3) are scratch.
+    """
+
+    mass: Array
+    moment: Array
+    inertia: Array
+    force: Array
+    spatial: Array
+    centre: Array
+    turned: Array
+
+
+class MotionTerms(NamedTuple):
+    """The terms of the equations of motion, as in ``DynamicsTerms``; ``com`` is a place."""
+
+    mass_matrix: Array
+    nonlinear_effects: Array
+    com: Array
+    com_velocity: Array
+    centroidal_matrix: Array
+    centroidal_drift: Array
+    linear_momentum: Array
+    angular_momentum: Array
+
+
+def inertias(n_joints: int) -> Inertias:
+    """Memory for the inertias of a tree."""
+    n = n_joints + 1
+    return Inertias(
+        np.zeros(n), np.zeros((n, 3)), np.zeros((n, 6)), np.zeros((n, 6)),
+        np.zeros(6), np.zeros(3), np.zeros((3, 3)),
+    )  # fmt: skip
+
+
+@kernel
+def turn_inertia(inertia: Array, rotation: Array, turned: Array, out: Array) -> None:
+    """R I R' of an inertia (6,): xx, yy, zz, xy, xz, yz. ``turned`` (3, 3) is scratch."""
+    xx, yy, zz = float(inertia[0]), float(inertia[1]), float(inertia[2])
+    xy, xz, yz = float(inertia[3]), float(inertia[4]), float(inertia[5])
+    for row in range(3):
+        a, b, c = float(rotation[row, 0]), float(rotation[row, 1]), float(rotation[row, 2])
+        turned[row, 0] = a * xx + b * xy + c * xz
+        turned[row, 1] = a * xy + b * yy + c * yz
+        turned[row, 2] = a * xz + b * yz + c * zz
+    out[0] = _product(turned, rotation, 0, 0)
+    out[1] = _product(turned, rotation, 1, 1)
+    out[2] = _product(turned, rotation, 2, 2)
+    out[3] = _product(turned, rotation, 0, 1)
+    out[4] = _product(turned, rotation, 0, 2)
+    out[5] = _product(turned, rotation, 1, 2)
+
+
+@kernel
+def _product(a: Array, b: Array, row: int, other: int) -> float:
+    """Row ``row`` of ``a`` times row ``other`` of ``b``, both (3, 3)."""
+    first = float(a[row, 0]) * float(b[other, 0]) + float(a[row, 1]) * float(b[other, 1])
+    return first + float(a[row, 2]) * float(b[other, 2])
+
+
+@kernel
+def momentum_of(inertias: Inertias, body: int, spatial: Array, out: Array) -> None:
+    """The spatial momentum (6,) of a body, with all that it carries, at a spatial velocity (6,)."""
+    mass, moment, inertia = (
+        float(inertias.mass[body]),
+        inertias.moment[body],
+        inertias.inertia[body],
+    )
+    a, b, c = float(spatial[0]), float(spatial[1]), float(spatial[2])
+    p, q, r = float(spatial[3]), float(spatial[4]), float(spatial[5])
+    x, y, z = float(moment[0]), float(moment[1]), float(moment[2])
+    xx, yy, zz = float(inertia[0]), float(inertia[1]), float(inertia[2])
+    xy, xz, yz = float(inertia[3]), float(inertia[4]), float(inertia[5])
+    out[0] = mass * a + (q * z - r * y)
+    out[1] = mass * b + (r * x - p * z)
+    out[2] = mass * c + (p * y - q * x)
+    out[3] = (y * c - z * b) + (xx * p + xy * q + xz * r)
+    out[4] = (z * a - x * c) + (xy * p + yy * q + yz * r)
+    out[5] = (x * b - y * a) + (xz * p + yz * q + zz * r)
+
+
+@kernel
+def weigh_body(tree: BodyTree, motion: BodyMotion, body: int, own: Inertias) -> None:
+    """A body's own inertia, and the force that gives it its acceleration: f = I a + v x* I v."""
+    mass = float(tree.mass[body])
+    place_of(motion, body, tree.com[body], own.centre)
+    x, y, z = float(own.centre[0]), float(own.centre[1]), float(own.centre[2])
+    own.mass[body] = mass
+    own.moment[body, 0], own.moment[body, 1], own.moment[body, 2] = mass * x, mass * y, mass * z
+    inertia = own.inertia[body]
+    turn_inertia(tree.inertia[body], motion.rotation[body], own.turned, inertia)
+    inertia[0] = float(inertia[0]) + mass * (y * y + z * z)
+    inertia[1] = float(inertia[1]) + mass * (x * x + z * z)
+    inertia[2] = float(inertia[2]) + mass * (x * x + y * y)
+    inertia[3] = float(inertia[3]) - mass * x * y
+    inertia[4] = float(inertia[4]) - mass * x * z
+    inertia[5] = float(inertia[5]) - mass * y * z
+    force, spatial = own.force[body], own.spatial
+    momentum_of(own, body, motion.acceleration[body], force)
+    momentum_of(own, body, motion.velocity[body], spatial)
+    velocity = motion.velocity[body]
+    a, b, c = float(velocity[0]), float(velocity[1]), float(velocity[2])
+    p, q, r = float(velocity[3]), float(velocity[4]), float(velocity[5])
+    x, y, z = float(spatial[0]), float(spatial[1]), float(spatial[2])
+    u, v, w = float(spatial[3]), float(spatial[4]), float(spatial[5])
+    force[0] = float(force[0]) + (q * z - r * y)
+    force[1] = float(force[1]) + (r * x - p * z)
+    force[2] = float(force[2]) + (p * y - q * x)
+    force[3] = float(force[3]) + ((q * w - r * v) + (b * z - c * y))
+    force[4] = float(force[4]) + ((r * u - p * w) + (c * x - a * z))
+    force[5] = float(force[5]) + ((p * v - q * u) + (a * y - b * x))
+
+
+@kernel
+def weigh_bodies(tree: BodyTree, motion: BodyMotion, composite: Inertias) -> None:
+    """The inertia and the force of every body with all that it carries."""
+    n_joints = motion.joint.shape[0]
+    for body in range(n_joints + 1):
+        weigh_body(tree, motion, body, composite)
+    for joint in range(n_joints - 1, -1, -1):
+        carrier, carried = int(tree.parent[joint]), joint + 1
+        composite.mass[carrier] = float(composite.mass[carrier]) + float(composite.mass[carried])
+        for k in range(3):
+            composite.moment[carrier, k] = float(composite.moment[carrier, k]) + float(
+                composite.moment[carried, k]
+            )
+        for k in range(6):
+            composite.inertia[carrier, k] = float(composite.inertia[carrier, k]) + float(
+                composite.inertia[carried, k]
+            )
+            composite.force[carrier, k] = float(composite.force[carrier, k]) + float(
+                composite.force[carried, k]
+            )
+
+
+@kernel
+def write_column(
+    column: int, spatial: Array, com: Array, rotation: Array, scale: float, terms: MotionTerms
+) -> None:
+    """Write one column of the mass matrix's base rows and of the centroidal matrix.
+
+    Args:
+        spatial: the robot's spatial momentum per unit of that generalised velocity, (6,).
+        com: the place of the centre of mass, (3,).
+        rotation: of the base, (3, 3).
+    """
+    a, b, c = float(spatial[0]) * scale, float(spatial[1]) * scale, float(spatial[2]) * scale
+    p, q, r = float(spatial[3]) * scale, float(spatial[4]) * scale, float(spatial[5]) * scale
+    x, y, z = float(com[0]), float(com[1]), float(com[2])
+    centroidal = terms.centroidal_matrix
+    centroidal[0, column], centroidal[1, column], centroidal[2, column] = a, b, c
+    centroidal[3, column] = p - (y * c - z * b)
+    centroidal[4, column] = q - (z * a - x * c)
+    centroidal[5, column] = r - (x * b - y * a)
+    for k in range(3):
+        u, v, w = float(rotation[0, k]), float(rotation[1, k]), float(rotation[2, k])
+        linear, angular = u * a + v * b + w * c, u * p + v * q + w * r
+        terms.mass_matrix[k, column] = terms.mass_matrix[column, k] = linear
+        terms.mass_matrix[3 + k, column] = terms.mass_matrix[column, 3 + k] = angular
+
+
+@kernel
+def inner(a: Array, b: Array) -> float:
+    """The inner product of two spatial vectors (6,)."""
+    total = 0.0
+    for k in range(6):
+        total += float(a[k]) * float(b[k])
+    return total
+
+
+@kernel
+def write_matrices(
+    tree: BodyTree, motion: BodyMotion, composite: Inertias, rotors: Array, scale: float,
+    terms: MotionTerms,
+) -> None:  # fmt: skip
+    """The mass matrix, with the inertia of the rotors, and the centroidal matrix.
+
+    Args:
+        rotors: the rotors' part of the mass matrix, in the joints' rows and columns.
+        scale: the factor on all masses and inertias but the rotors'.
+    """
+    n, first = motion.joint.shape[0], 6
+    rotation, spatial = motion.rotation[0], composite.spatial
+    base = composite.turned[0]
+    for k in range(3):
+        for row in range(3):
+            base[row] = rotation[row, k]
+        a, b, c = float(base[0]), float(base[1]), float(base[2])
+        moment, inertia = composite.moment[0], composite.inertia[0]
+        x, y, z = float(moment[0]), float(moment[1]), float(moment[2])
+        mass = float(composite.mass[0])
+        spatial[0], spatial[1], spatial[2] = mass * a, mass * b, mass * c
+        spatial[3], spatial[4], spatial[5] = y * c - z * b, z * a - x * c, x * b - y * a
+        write_column(k, spatial, terms.com, rotation, scale, terms)
+        spatial[0], spatial[1], spatial[2] = b * z - c * y, c * x - a * z, a * y - b * x
+        xx, yy, zz = float(inertia[0]), float(inertia[1]), float(inertia[2])
+        xy, xz, yz = float(inertia[3]), float(inertia[4]), float(inertia[5])
+        spatial[3] = xx * a + xy * b + xz * c
+        spatial[4] = xy * a + yy * b + yz * c
+        spatial[5] = xz * a + yz * b + zz * c
+        write_column(3 + k, spatial, terms.com, rotation, scale, terms)
+    for i in range(n):
+        for j in range(n):
+            terms.mass_matrix[first + i, first + j] = rotors[i, j]
+    for j in range(n):
+        momentum_of(composite, j + 1, motion.joint[j], spatial)
+        write_column(first + j, spatial, terms.com, rotation, scale, terms)
+        i = j
+        while i >= 0:
+            shared = scale * inner(motion.joint[i], spatial)
+            terms.mass_matrix[first + i, first + j] = float(rotors[i, j]) + shared
+            terms.mass_matrix[first + j, first + i] = float(rotors[j, i]) + shared
+            i = int(tree.parent[i]) - 1
+
+
+@kernel
+def write_forces(motion: BodyMotion, composite: Inertias, scale: float, terms: MotionTerms) -> None:
+    """Bias forces, gravity included, the drift of the momentum, and the momentum itself."""
+    rotation, spatial, force = motion.rotation[0], composite.spatial, composite.force[0]
+    x, y, z = float(terms.com[0]), float(terms.com[1]), float(terms.com[2])
+    a, b, c = float(force[0]), float(force[1]), float(force[2])
+    drift = terms.centroidal_drift
+    drift[0], drift[1], drift[2] = scale * a, scale * b, scale * c
+    drift[3] = scale * (float(force[3]) - (y * c - z * b))
+    drift[4] = scale * (float(force[4]) - (z * a - x * c))
+    drift[5] = scale * (float(force[5]) - (x * b - y * a))
+    for body in range(motion.joint.shape[0] + 1):
+        # Weight pulls down, so what carries it pushes up, at the centre of mass.
+        moment, carried = composite.moment[body], composite.force[body]
+        for k in range(6):
+            spatial[k] = carried[k]
+        spatial[2] = float(spatial[2]) + GRAVITY * float(composite.mass[body])
+        spatial[3] = float(spatial[3]) + GRAVITY * float(moment[1])
+        spatial[4] = float(spatial[4]) - GRAVITY * float(moment[0])
+        if body > 0:
+            terms.nonlinear_effects[5 + body] = scale * inner(motion.joint[body - 1], spatial)
+            continue
+        for k in range(3):
+            u, v, w = float(rotation[0, k]), float(rotation[1, k]), float(rotation[2, k])
+            linear = u * float(spatial[0]) + v * float(spatial[1]) + w * float(spatial[2])
+            angular = u * float(spatial[3]) + v * float(spatial[4]) + w * float(spatial[5])
+            terms.nonlinear_effects[k] = scale * linear
+            terms.nonlinear_effects[3 + k] = scale * angular
+
+
+@kernel
+def write_momentum(velocity: Array, scale: float, mass: float, terms: MotionTerms) -> None:
+    """The momentum about the centre of mass, and its velocity, from the centroidal matrix.
+
+    Args:
+        velocity: the generalised velocity, (n_velocities,).
+        scale, mass: the factor on all masses, and their sum without it [kg].
+    """
+    for k in range(3):
+        linear, angular = 0.0, 0.0
+        for j in range(velocity.shape[0]):
+            linear += float(terms.centroidal_matrix[k, j]) * float(velocity[j])
+            angular += float(terms.centroidal_matrix[3 + k, j]) * float(velocity[j])
+        terms.linear_momentum[k], terms.angular_momentum[k] = linear, angular
+        terms.com_velocity[k] = linear / (scale * mass)
+
+
+@kernel
+def equations_of_motion(
+    tree: BodyTree,
+    motion: BodyMotion,
+    composite: Inertias,
+    rotors: Array,
+    scale: float,
+    velocity: Array,
+    terms: MotionTerms,
+) -> None:
+    """All terms of the equations of motion, of bodies that have been placed and moved.
+
+    Args:
+        rotors: the rotors' part of the mass matrix (n_joints, n_joints).
+        scale: the factor on all masses and inertias but the rotors'.
+        velocity: the generalised velocity: the base's linear and angular one in its own frame, then
+            the joints', (6 + n_joints,).
+    """
+    weigh_bodies(tree, motion, composite)
+    for k in range(3):
+        terms.com[k] = float(composite.moment[0, k]) / float(composite.mass[0])
+    write_matrices(tree, motion, composite, rotors, scale, terms)
+    write_forces(motion, composite, scale, terms)
+    write_momentum(velocity, scale, float(composite.mass[0]), terms)

@@ -1,0 +1,71 @@
+"""What follows from a plan and a robot alone, and is therefore computed once in a process.
+
+A study runs the same jump many times in every worker; its plan is checked and turned into a table
+in the first of these runs only. What counts is the content of plan and robot, not where they are
+kept, so a file that changes between two runs is checked anew.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections import OrderedDict
+from collections.abc import Callable, Hashable
+from typing import Generic, TypeVar
+
+from ...robots.robot_description import RobotDescription
+from ..checking.validity import require_valid
+from ..task.plan import ARRAYS, JumpPlan
+from .jump_table import JumpTable
+from .reference_table import reference_table
+
+KEPT = 32
+"""How many results are kept, of the plans used last."""
+
+_Result = TypeVar("_Result")
+
+
+class Kept(Generic[_Result]):
+    """The last results of a computation, by what they follow from."""
+
+    def __init__(self) -> None:
+        self._results: OrderedDict[Hashable, _Result] = OrderedDict()
+
+    def get(self, key: Hashable, compute: Callable[[], _Result]) -> _Result:
+        """The result for ``key``, computed if it is not kept. Nothing is kept of an error."""
+        if key not in self._results:
+            self._results[key] = compute()
+        self._results.move_to_end(key)
+        while len(self._results) > KEPT:
+            self._results.popitem(last=False)
+        return self._results[key]
+
+
+_valid = Kept[None]()
+_tables = Kept[JumpTable]()
+
+
+def content(plan: JumpPlan, robot: RobotDescription) -> bytes:
+    """A digest of all numbers of a plan, of its task, and of the robot."""
+    digest = hashlib.blake2b(digest_size=16)
+    for name in ARRAYS:
+        array = getattr(plan, name)
+        digest.update(f"{name} {array.dtype} {array.shape}".encode())
+        digest.update(array.tobytes())
+    for text in (repr(plan.flights), plan.task.model_dump_json(), robot.model_dump_json()):
+        digest.update(text.encode())
+    return digest.digest()
+
+
+def require_valid_once(plan: JumpPlan, robot: RobotDescription) -> None:
+    """As ``require_valid``, but only the first time for the same plan and robot in a process.
+
+    Raises:
+        InvalidPlanError: the plan is not valid.
+    """
+    _valid.get(content(plan, robot), lambda: require_valid(plan, robot))
+
+
+def reference_table_once(plan: JumpPlan, robot: RobotDescription, stand_time: float) -> JumpTable:
+    """As ``reference_table``, which is made once in a process. It is not to be written to."""
+    key = content(plan, robot), stand_time
+    return _tables.get(key, lambda: reference_table(plan, robot, stand_time))

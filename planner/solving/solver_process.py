@@ -1,0 +1,185 @@
+"""A process beside a program with several threads, in which solvers are called with a limit of time.
+
+``bounded`` copies the process that calls it, which is quick, and safe while that has one thread. A
+copy of a process with several may find a lock that another thread held, and wait for it for ever.
+So such a process starts this one, which has one thread, and sends it each solver once; this one
+then copies itself for every call.
+"""
+
+from __future__ import annotations
+
+import atexit
+import contextlib
+import json
+import os
+import pickle
+import signal
+import subprocess
+import sys
+import threading
+from collections import OrderedDict
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import IO, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .bounded import bounded, count, cpu_time
+
+Array = NDArray[np.float64]
+Answer = tuple[Array, dict[str, Any]]
+
+KEPT = 12
+"""Solvers that the process keeps; a further one is sent again when it is needed again."""
+_PROGRAM = """\
+import json, sys
+sys.path[:] = json.loads(sys.argv[1])
+from aloft.planner.solving.solver_process import serve
+serve()
+"""
+
+
+def has_one_thread() -> bool:
+    """Whether this process has no thread but the one that asks."""
+    try:
+        return len(os.listdir("/proc/self/task")) == 1
+    except OSError:  # a system that does not show the threads of libraries
+        return threading.active_count() == 1
+
+
+def call_solver(function: Any, arguments: Mapping[str, Array]) -> Answer:
+    """Call a solver of CasADi. Returns the variables, and what it says of its success."""
+    with quiet():
+        result = function(**arguments)
+    stats = function.stats()
+    wanted = ("success", "iter_count", "unified_return_status")
+    return np.array(result["x"]).ravel(), {key: stats.get(key) for key in wanted}
+
+
+def call_bounded(
+    function: Any, arguments: Mapping[str, Array], limit: int
+) -> tuple[bool, Answer | None]:
+    """As ``call_solver``, in a fresh copy of a process, given up after ``limit`` seconds of
+    processor time: whether it came to its end, and the answer.
+
+    Raises:
+        RuntimeError: the solver raised; the text is its error's.
+    """
+    if has_one_thread() or not hasattr(os, "fork"):
+        return bounded(lambda: call_solver(function, arguments), limit)
+    return _helper.call(function, arguments, limit)
+
+
+@contextlib.contextmanager
+def quiet() -> Iterator[None]:
+    """The solvers write to the process's standard output, whatever they are told; not now."""
+    kept = os.dup(1)
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    try:
+        os.dup2(nowhere, 1)
+        yield
+    finally:
+        os.dup2(kept, 1)
+        os.close(kept)
+        os.close(nowhere)
+
+
+@dataclass
+class _Helper:
+    """The process, as seen from here."""
+
+    _process: subprocess.Popen[bytes] | None = None
+    _owner: int = 0
+    _sent: OrderedDict[int, Any] = field(default_factory=OrderedDict)
+    _lock: threading.Lock = field(default_factory=threading.Lock)
+
+    def call(
+        self, function: Any, arguments: Mapping[str, Array], limit: int
+    ) -> tuple[bool, Answer | None]:
+        """See ``call_bounded``."""
+        with self._lock:
+            try:
+                ended, error, answer, used = self._ask(function, arguments, limit)
+            except BaseException:  # an answer may be under way, which nobody waits for any more
+                self.stop()
+                raise
+        count(used)
+        if error:
+            raise RuntimeError(error)
+        return ended, answer
+
+    def _ask(self, function: Any, arguments: Mapping[str, Array], limit: int) -> Any:
+        process = self._running()
+        number = id(function)
+        dropped: list[int] = []
+        data = None
+        if number in self._sent:  # kept here as well, so nothing else can have its number
+            self._sent.move_to_end(number)
+        else:
+            data = function.serialize()
+            self._sent[number] = function
+            if len(self._sent) > KEPT:
+                dropped.append(self._sent.popitem(last=False)[0])
+        assert process.stdin is not None and process.stdout is not None
+        plain = {name: np.array(value) for name, value in arguments.items()}
+        try:
+            pickle.dump((number, data, dropped, plain, limit), process.stdin)
+            process.stdin.flush()
+            return pickle.load(process.stdout)
+        except (OSError, EOFError) as error:
+            raise RuntimeError("the process that calls solvers has died") from error
+
+    def _running(self) -> subprocess.Popen[bytes]:
+        if self._owner != os.getpid():  # this process is a copy of the one that started it
+            self._process, self._owner = None, os.getpid()
+        if self._process is None or self._process.poll() is not None:
+            self._sent.clear()
+            folders = json.dumps([str(Path(folder).absolute()) for folder in sys.path])
+            self._process = subprocess.Popen(
+                [sys.executable, "-c", _PROGRAM, folders],
+                stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+                env={**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"},
+            )  # fmt: skip
+            atexit.register(self.stop)
+        return self._process
+
+    def stop(self) -> None:
+        """End the process, if it runs; the next call starts a new one."""
+        process, self._process = self._process, None
+        if process is not None and self._owner == os.getpid():
+            process.kill()
+            process.communicate()
+
+
+_helper = _Helper()
+
+
+def serve() -> None:
+    """What the process does: answers calls until its input ends."""
+    import casadi as ca
+
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # meant for the one that asks
+    requests: IO[bytes] = os.fdopen(os.dup(0), "rb")
+    answers: IO[bytes] = os.fdopen(os.dup(1), "wb")
+    kept: dict[int, Any] = {}
+    with contextlib.suppress(EOFError):
+        while True:
+            number, data, dropped, arguments, limit = pickle.load(requests)
+            started = cpu_time()
+            for old in dropped:
+                kept.pop(old, None)
+            if data is not None:
+                kept[number] = ca.Function.deserialize(data)
+            function, ended, error, answer = kept[number], True, "", None
+            try:
+                ended, answer = _bounded_call(function, arguments, limit)
+            except RuntimeError as failure:
+                error = str(failure)
+            pickle.dump((ended, error, answer, cpu_time() - started), answers)
+            answers.flush()
+
+
+def _bounded_call(function: Any, arguments: Mapping[str, Array], limit: int) -> Any:
+    return bounded(lambda: call_solver(function, arguments), limit)

@@ -1,0 +1,110 @@
+"""Holds what a run has measured against the ages that a graph allows on paths (``links.paths``)."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..language.block import Metric
+from ..language.stages import CheckedGraph
+from ..placement.measured_age import LinkTimes, Timeline, measured_ages
+from ..placement.placed import PlacedGraph
+from ..running.memory import BoundGraph
+from .latest import TICK_TIME, health_path
+
+LATEST = 20_000
+"""The last ticks of a run that are looked at."""
+GRANTED = 0.05
+"""What is granted to the jitter of clocks, in base periods."""
+NAME = "links.paths"
+"""What the check is called among the blocks that give metrics."""
+
+
+def path_sinks(graph: CheckedGraph, kind: str = "") -> list[PathAges]:
+    """What checks the ages of a run in one process, or in lockstep; nothing where none are allowed,
+    or where time is virtual. ``kind`` is that of the clock, by default the graph's."""
+    virtual = (kind or graph.clock.kind) == "free"
+    return [] if virtual or not graph.links.paths else [PathAges(graph)]
+
+
+class PathAges:
+    """The sink that keeps when ticks began, and judges at the end of the run.
+
+    Args:
+        graph: the whole graph.
+    """
+
+    name = NAME
+
+    def __init__(self, graph: CheckedGraph) -> None:
+        self._graph = graph
+        self._began: NDArray[np.int64] = np.zeros(LATEST, np.int64)
+        self._ticks: NDArray[np.int64] = np.zeros(LATEST, np.int64)
+        self._count = 0
+
+    def open(self, bound: BoundGraph) -> None:
+        """Begin."""
+        self._clock = bound.clock
+        self._count = 0
+
+    def record(self, tick: int) -> None:
+        """Keep when the tick began."""
+        place = self._count % LATEST
+        self._ticks[place], self._began[place] = tick, self._clock.began or time.perf_counter_ns()
+        self._count += 1
+
+    def close(self) -> None:
+        """Nothing to do."""
+
+    def metrics(self) -> Mapping[str, Metric]:
+        """The ages, and whether they were allowed."""
+        kept = min(self._count, LATEST)
+        order = np.argsort(self._ticks[:kept])
+        line = Timeline(self._ticks[:kept][order].tolist(), self._began[:kept][order].tolist())
+        return judged(self._graph, {"": line})
+
+
+def judged(graph: CheckedGraph, timelines: Mapping[str, Timeline]) -> dict[str, Metric]:
+    """For each path the median and the longest age [ms]; and no success where one is too long."""
+    found: dict[str, Metric] = {}
+    complaints = []
+    for path, limit in graph.links.paths.items():
+        source, _, target = (part.strip() for part in path.partition("->"))
+        ages = measured_ages(graph, timelines, source, target) * 1e3
+        if not len(ages):
+            complaints.append(f"no {source} came to {target}, so its age was not measured")
+            continue
+        found[f"age_p50_ms {path}"] = float(np.median(ages))
+        found[f"age_max_ms {path}"] = float(ages.max())
+        allowed = (limit + GRANTED * graph.base_period) * 1e3
+        late = int(np.count_nonzero(ages > allowed))
+        if late:
+            complaints.append(
+                f"{source} at {target} was up to {ages.max():.3g} ms old, at most "
+                f"{limit * 1e3:.6g} ms are allowed; it was older {late} times of {len(ages)}"
+            )
+    if complaints:
+        found |= {"success": False, "reason": "; ".join(complaints)}
+    return found
+
+
+def timeline_of(placed: PlacedGraph, machine: str, ticks: NDArray[Any], view: Any) -> Timeline:
+    """The timeline of a part that ran free, from what it has recorded.
+
+    Args:
+        placed: the graph.
+        machine: of the part.
+        ticks: (n,).
+        view: gives the values of a field, (n,), by its name ``block.port.field``.
+    """
+    links = {}
+    for link in placed.received_by(machine):
+        path = f"{health_path(link)}.health"
+        times = {name: view(f"{path}.{name}").tolist() for name in ("tick", "sent", "read")}
+        age = np.rint(view(f"{path}.age") * 1e9).astype(np.int64).tolist()
+        links[link.source] = LinkTimes(**times, age=age)
+    return Timeline(ticks.tolist(), view(f"{TICK_TIME}.began.time").tolist(), links)

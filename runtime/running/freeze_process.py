@@ -1,0 +1,145 @@
+"""The program beside a run that ends it where compiled code keeps the interpreter to itself.
+
+Such code (an endless loop in a solver, or in a function compiled by numba) lets no thread of Python
+run, so nothing in the process of the run can help. This process hears a beat from a thread there.
+When the beats stop, it asks with a signal for the stacks of all threads, which Python's fault
+handler writes without the interpreter, says which block hangs and where, and kills the process. It
+counts its own looks instead of reading a clock, so that a suspended process does not seem to hang.
+
+It knows nothing of aloft, so it starts fast, and nothing that the graph imports can fail in it::
+
+    python freeze_process.py PID LIMIT_IN_SECONDS AS_JSON
+
+The pipe on its standard input brings first the blocks, as a line of JSON, and then beats and stacks.
+"""
+
+from __future__ import annotations
+
+import ast
+import json
+import os
+import re
+import select
+import signal
+import sys
+from contextlib import suppress
+
+LOOKS = 8
+"""Looks in every limit of time."""
+ANSWER_TIME = 1.0
+"""Seconds that the fault handler has to write the stacks."""
+_FRAME = re.compile(r'^  File "(?P<file>[^"]*)", line (?P<line>\d+) in (?P<name>.*)$')
+
+
+def main() -> int:
+    """Watch until the pipe ends, or until the beats stop."""
+    pid, limit, as_json = int(sys.argv[1]), float(sys.argv[2]), sys.argv[3] == "1"
+    for number in (signal.SIGINT, signal.SIGTERM):  # meant for the run
+        signal.signal(number, signal.SIG_IGN)
+    head = b""
+    while not head.endswith(b"\n"):
+        letter = os.read(0, 1)
+        if not letter:
+            return 0
+        head += letter
+    told = json.loads(head)
+    silent = 0
+    while True:
+        piece = _read(limit / LOOKS)
+        if piece is None:
+            silent += 1
+        elif not piece:
+            return 0
+        else:
+            silent = 0
+        if silent > LOOKS:
+            silent = 0
+            stacks = _stacks(pid)
+            if stacks:
+                _say(told, stacks, limit, as_json)
+                with suppress(ProcessLookupError):
+                    os.kill(pid, signal.SIGKILL)
+                return 3
+
+
+def _read(seconds: float) -> bytes | None:
+    """What comes in within that time: nothing yet, or empty at the end of the pipe."""
+    ready, _, _ = select.select([0], [], [], seconds)
+    return os.read(0, 1 << 16) if ready else None
+
+
+def _stacks(pid: int) -> str:
+    """The stacks of all threads; empty where the process is suspended, or goes on after all."""
+    with suppress(ProcessLookupError):
+        os.kill(pid, signal.SIGUSR1)
+    text = b""
+    while piece := _read(ANSWER_TIME):
+        text += piece
+    found = text.decode(errors="replace")
+    return found if "(most recent call first)" in found and not found.endswith(".") else ""
+
+
+def _say(told: dict[str, object], stacks: str, limit: float, as_json: bool) -> None:
+    """Print which block hangs and where."""
+    frames = _run_frames(stacks)
+    own = [f for f in frames if not _is_installed(f[0], told)]
+    file, line, _ = (own or frames or [("", 0, "")])[0]
+    blocks = _blocks(told, frames)
+    who = "block " + " or ".join(f"'{path}'" for path in blocks) if blocks else "the run"
+    reason = (
+        f"{who} hangs in compiled code that lets nothing else run: no sign of life for {limit:g} s "
+        "(clock.hangs_after allows longer); the process is killed"
+    )
+    place = f"{file}:{line}" if file else ""
+    sys.stderr.write(f"\nno success: {reason}\n" + (f"  it is at {place}\n" if place else ""))
+    if as_json:
+        block = blocks[0] if len(blocks) == 1 else ""
+        error = {"message": reason, "block": block, "tick": -1, "where": place, "traceback": stacks}
+        outcome = {"graph": told["graph"], "success": False, "reason": reason, "error": error}
+        print(json.dumps({**outcome, "exit_code": 128 + signal.SIGKILL}), flush=True)
+
+
+def _run_frames(stacks: str) -> list[tuple[str, int, str]]:
+    """File, line and function of the frames within the control loop, innermost first."""
+    for part in re.split(r"^(?:Current thread|Thread) .*$", stacks, flags=re.MULTILINE):
+        found = [m for text in part.splitlines() if (m := _FRAME.match(text))]
+        frames = [(m["file"], int(m["line"]), m["name"]) for m in found]
+        loop = [i for i, f in enumerate(frames) if f[2] == "advance" and "ticker.py" in f[0]]
+        if loop:
+            return frames[: loop[0]]
+    return []
+
+
+def _is_installed(file: str, told: dict[str, object]) -> bool:
+    prefixes = told["installed"]
+    assert isinstance(prefixes, list)
+    return file.startswith(tuple(prefixes)) or "site-packages" in file
+
+
+def _blocks(told: dict[str, object], frames: list[tuple[str, int, str]]) -> list[str]:
+    """The paths of the blocks whose class has the outermost frame that belongs to a block."""
+    known = told["blocks"]
+    assert isinstance(known, list)
+    for file, line, _ in reversed(frames):
+        inside = _class_at(file, line) if any(of == file for _, of, _ in known) else ""
+        found = [path for path, of, name in known if of == file and name == inside]
+        if found:
+            return found
+    return []
+
+
+def _class_at(file: str, line: int) -> str:
+    """The name of the class whose text has that line."""
+    try:
+        with open(file, encoding="utf-8") as source:
+            tree = ast.parse(source.read())
+    except (OSError, SyntaxError, ValueError):
+        return ""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.ClassDef) and node.lineno <= line <= (node.end_lineno or 0):
+            return node.name
+    return ""
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,158 @@
+"""Ends a block that hangs: it is named, the run fails, and the stop cycles put the robot in damping.
+
+The watchdog is a thread that looks at the run a few times in every limit of time. It counts its own
+looks instead of reading a clock, so that a process that was suspended does not seem to hang. The
+control loop does nothing for it: the call under way is read from the frame of the loop.
+
+A block that hangs in Python, or in a call that signals interrupt, gets a ``Hang``. If that does not
+help, the run is abandoned: the thread of the watchdog sends the stop cycles itself. Where compiled
+code keeps the interpreter to itself, no thread can help; see ``freeze_guard``.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import sys
+import threading
+import traceback
+from collections.abc import Callable
+from types import FrameType, TracebackType
+from typing import Any, Self
+
+from ..language.block import Block
+from ..language.errors import RunError
+from .failures import Hang, place_of_frames
+from .interrupts import Interrupts
+from .life_cycle import STOP_CYCLES, LifeCycle, LifeState
+from .pacing import Paced, RobotDriven
+from .ticker import Ticker, hang_text
+
+LOOKS = 8
+"""How often the watchdog looks at the run in every limit of time."""
+TRIES = 3
+"""How often it interrupts a call before the run is abandoned: a block may catch what it gets."""
+_PATIENT = ("numba.", "importlib.", "bdb", "pdb", "pydevd", "_pydevd_bundle")
+"""Modules in which a call may stay for long: a compiler, an import, a debugger."""
+
+
+class Watchdog:
+    """Watches the thread that enters it, in a ``with`` statement, while a graph runs and stops.
+
+    Args:
+        ticker: what runs the ticks.
+        life: the life cycle; before the state ``RUNNING`` nothing is watched.
+        interrupts: what raises ``Hang`` in the main thread.
+        limit: the longest time that one call of a block may take [s].
+        abandon: called in the watchdog's thread with the block, the place and the stack of a call
+            that cannot be interrupted.
+    """
+
+    def __init__(
+        self,
+        ticker: Ticker,
+        life: LifeCycle,
+        interrupts: Interrupts,
+        limit: float,
+        abandon: Callable[[str, str, str], None],
+    ) -> None:
+        self._ticker = ticker
+        self._life = life
+        self._interrupts = interrupts
+        self._limit = limit
+        self._abandon = abandon
+        self._over = threading.Event()
+        self._watched = 0
+        self.hung: RunError | None = None
+        """The first call that hung in a tick."""
+        self._thread = threading.Thread(target=self._watch, name="watchdog", daemon=True)
+
+    def __enter__(self) -> Self:
+        self._watched = threading.get_ident()
+        self._thread.start()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._over.set()
+        self._thread.join()
+
+    def _watch(self) -> None:
+        period = self._limit / LOOKS
+        before: object = None
+        looks = tries = 0
+        while not self._over.wait(period):
+            call = self._call()
+            if call is None or call != before:
+                before, looks, tries = call, 0, 0
+                continue
+            looks += 1
+            patience = LOOKS if tries == 0 else 2
+            if self._life.state is LifeState.STOPPING:
+                patience = min(patience, max(2, LOOKS // STOP_CYCLES))
+            if looks < patience:
+                continue
+            if tries == TRIES:
+                self._give_up(call)
+                return
+            tries, looks = tries + 1, 0
+            if tries == 1 and self._life.state is LifeState.RUNNING:
+                self._note(call)
+            self._interrupt(again=tries > 1)
+
+    def _note(self, call: tuple[int, str]) -> None:
+        """The run ends also where the call catches what interrupts it, and returns."""
+        clock = self._ticker.bound.clock
+        who = f"block '{call[1]}'" if call[1] else "the runtime"
+        text = hang_text(who, self._ticker.instant(clock.tick), self._limit)
+        self.hung = RunError(text, block=call[1], tick=clock.tick)
+        if clock.stop_reason is None:
+            clock.stop_reason = text
+
+    def _call(self) -> tuple[int, str] | None:
+        """What tells the call under way from all others, and its block; nothing if there is none
+        that could hang."""
+        stopping = self._life.state is LifeState.STOPPING
+        if not stopping and self._life.state is not LifeState.RUNNING:
+            return None
+        code = LifeCycle._guard.__code__ if stopping else Ticker.advance.__code__
+        frame = sys._current_frames().get(self._watched)
+        while frame is not None and frame.f_code is not code:
+            if frame.f_trace is not None or _is_patient(frame):
+                return None
+            frame = frame.f_back
+        if frame is None:
+            return None
+        blocks = self._ticker.bound.blocks
+        if stopping:
+            path = str(frame.f_locals["path"])
+            waits = path not in blocks or blocks[path].waits_for_others
+            return None if waits else (-self._life.calls, path)
+        owner: Any = getattr(frame.f_locals["call"], "__self__", None)
+        if isinstance(owner, RobotDriven):
+            owner = owner.block
+        tick = self._ticker.bound.clock.tick
+        if isinstance(owner, Block):
+            return None if owner.waits_for_others else (tick, owner.context.path)
+        return None if owner is None or isinstance(owner, Paced) else (tick, "")
+
+    def _interrupt(self, *, again: bool) -> None:
+        """Raise ``Hang`` in the watched thread."""
+        if self._watched == threading.main_thread().ident:
+            self._interrupts.interrupt_hang(again=again)
+        else:  # only Python code can be interrupted there
+            ctypes.pythonapi.PyThreadState_SetAsyncExc(
+                ctypes.c_ulong(self._watched), ctypes.py_object(Hang)
+            )
+
+    def _give_up(self, call: tuple[int, str]) -> None:
+        stack = traceback.extract_stack(sys._current_frames()[self._watched])
+        place = place_of_frames(stack)
+        self._abandon(call[1], place, "".join(traceback.format_list(stack)))
+
+
+def _is_patient(frame: FrameType) -> bool:
+    return str(frame.f_globals.get("__name__", "")).startswith(_PATIENT)

@@ -1,0 +1,59 @@
+"""A plan is checked and made a table once for the same content, and anew for another."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from aloft.planner.checking.validity import InvalidPlanError
+from aloft.planner.library import once
+from aloft.planner.library.library import PlanLibrary
+from aloft.planner.library.shipped import shipped_graphs
+from aloft.planner.task.read_task import read_task
+from aloft.robots.description import find_robot
+
+ROBOT = find_robot("bruce")
+
+
+@pytest.fixture(scope="module")
+def plan():
+    found = PlanLibrary(ROBOT).find(read_task(shipped_graphs() / "tasks" / "in_situ_12cm.yaml"))
+    assert found is not None
+    return found
+
+
+def test_the_same_plan_is_checked_once_and_a_changed_one_again(plan, monkeypatch):
+    checked = []
+    monkeypatch.setattr(once, "_valid", once.Kept())
+    monkeypatch.setattr(once, "require_valid", lambda plan, robot: checked.append(plan))
+    once.require_valid_once(plan, ROBOT)
+    once.require_valid_once(replace(plan, com=plan.com.copy()), ROBOT)
+    assert len(checked) == 1
+    once.require_valid_once(replace(plan, com=plan.com + 1e-12), ROBOT)
+    once.require_valid_once(plan, ROBOT.with_profile("koala").model_copy(update={"name": "x"}))
+    assert len(checked) == 3
+
+
+def test_a_plan_that_is_not_valid_is_refused_every_time(plan):
+    wrong = replace(plan, contact_force=2.0 * plan.contact_force)
+    for _ in range(2):
+        with pytest.raises(InvalidPlanError):
+            once.require_valid_once(wrong, ROBOT)
+
+
+def test_tables_are_shared_by_what_they_are_made_from(plan):
+    first = once.reference_table_once(plan, ROBOT, 0.2)
+    assert once.reference_table_once(plan, ROBOT, 0.2) is first
+    later = once.reference_table_once(plan, ROBOT, 0.3)
+    assert later is not first
+    np.testing.assert_allclose(later.time[2:] - first.time[2:], 0.1)
+
+
+def test_only_the_results_used_last_are_kept():
+    kept = once.Kept[int]()
+    for key in range(once.KEPT + 1):
+        kept.get(key, lambda key=key: key)
+    assert kept.get(0, lambda: -1) == -1
+    assert kept.get(once.KEPT, lambda: -1) == once.KEPT

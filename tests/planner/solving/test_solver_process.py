@@ -1,0 +1,106 @@
+"""Solvers that are called from a process with several threads: the same answers, errors and ends."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import threading
+from collections.abc import Iterator
+from typing import Any
+
+import casadi as ca
+import numpy as np
+import pytest
+
+from aloft.planner.solving import solver_process
+from aloft.planner.solving.bounded import cpu_time
+from aloft.planner.solving.solver_process import _helper, call_bounded, call_solver, has_one_thread
+
+
+@pytest.fixture
+def thread() -> Iterator[None]:
+    """A second thread, which does nothing."""
+    over = threading.Event()
+    other = threading.Thread(target=over.wait)
+    other.start()
+    yield
+    over.set()
+    other.join()
+    _helper.stop()
+
+
+def quadratic(goal: float) -> Any:
+    x, p = ca.SX.sym("x", 3), ca.SX.sym("p")
+    nlp = {"x": x, "p": p, "f": ca.sumsqr(x - goal) + p * ca.sumsqr(x), "g": ca.sum1(x)}
+    options = {"print_time": False, "ipopt": {"print_level": 0, "sb": "yes"}}
+    return ca.nlpsol("quadratic", "ipopt", nlp, options)
+
+
+def arguments(p: float) -> dict[str, Any]:
+    return {"x0": np.zeros(3), "p": np.array([p]), "lbg": np.array([-9.0]), "ubg": np.array([9.0])}
+
+
+def test_threads_are_counted(thread: None) -> None:
+    assert not has_one_thread()
+    alone = "from aloft.planner.solving.solver_process import has_one_thread as f; print(f())"
+    single = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+    done = subprocess.run(
+        [sys.executable, "-c", alone],
+        check=True, capture_output=True, text=True, env={**os.environ, **single},
+    )  # fmt: skip
+    assert done.stdout == "True\n"
+
+
+def test_the_answers_are_those_of_this_process(thread: None) -> None:
+    before = cpu_time()
+    for goal in (1.0, 2.0, 1.0):
+        solver = quadratic(goal)
+        for p in (0.0, 1.0):
+            ended, answer = call_bounded(solver, arguments(p), 20)
+            values, stats = call_solver(solver, arguments(p))
+            assert ended and answer is not None
+            assert np.array_equal(answer[0], values)
+            assert answer[1] == stats and stats["success"]
+            assert values == pytest.approx([goal / (1.0 + p)] * 3, abs=1e-6)
+    process = _helper._process
+    assert process is not None and process.poll() is None  # one process for all calls
+    assert cpu_time() > before
+
+
+def test_a_solver_is_sent_again_when_the_process_has_dropped_it(
+    thread: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(solver_process, "KEPT", 1)
+    solvers = [quadratic(1.0), quadratic(2.0)]
+    for number in (0, 1, 0, 1):
+        _, answer = call_bounded(solvers[number], arguments(0.0), 20)
+        assert answer is not None and answer[0] == pytest.approx([number + 1.0] * 3, abs=1e-6)
+    assert len(_helper._sent) == 1
+
+
+def test_an_error_comes_back_and_the_next_call_works(thread: None) -> None:
+    solver = quadratic(1.0)
+    with pytest.raises(RuntimeError, match="no_such_argument"):
+        call_bounded(solver, {"no_such_argument": np.zeros(1)}, 20)
+    assert call_bounded(solver, arguments(0.0), 20)[0]
+
+
+def test_a_process_that_died_is_started_again(thread: None) -> None:
+    solver = quadratic(1.0)
+    call_bounded(solver, arguments(0.0), 20)
+    process = _helper._process
+    assert process is not None
+    process.kill()
+    process.wait()
+    assert call_bounded(solver, arguments(0.0), 20)[0]
+
+
+def test_a_call_that_takes_too_long_is_given_up(thread: None) -> None:
+    x = ca.SX.sym("x", 5000)  # Rosenbrock's function, in a chain: thousands of iterations
+    chain = ca.sumsqr(1.0 - x[:-1]) + 100.0 * ca.sumsqr(x[1:] - x[:-1] ** 2)
+    options = {
+        "print_time": False, "ipopt": {"print_level": 0, "sb": "yes", "max_iter": 10_000_000},
+    }  # fmt: skip
+    long = ca.nlpsol("long", "ipopt", {"x": x, "f": chain}, options)
+    assert call_bounded(long, {"x0": np.full(5000, -1.0)}, 1) == (False, None)
