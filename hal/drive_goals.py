@@ -22,15 +22,105 @@ in ``kappa`` and runs at the rate of the bus instead.
 
 from __future__ import annotations
 
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..mathematics.compiling.kernel_call import KernelCall
+from ..mathematics.kernel import kernel
+from ..mathematics.linear import multiply_vector
 from ..robots.robot_description import RobotDescription
-from ..robots.transmission import Transmission
 
 Array = NDArray[np.float64]
+
+
+class Targets(NamedTuple):
+    """What some commands say of the joints: ``JointTargets``, each (n_commands, n_joints)."""
+
+    torque: Array
+    position: Array
+    velocity: Array
+    stiffness: Array
+    damping: Array
+
+
+class Gears(NamedTuple):
+    """Between joints and drives: ``to_motor``, ``torque_to_motor`` and ``torque_to_joint`` (n, n), the
+    gains of the joints that the drives were set for, ``stiffness`` and ``damping`` (n,), the drives' own
+    gains at the motors' outputs, ``motor_stiffness`` and ``motor_damping`` (n,), and the ``lead`` [s]."""
+
+    to_motor: Array
+    torque_to_motor: Array
+    torque_to_joint: Array
+    stiffness: Array
+    damping: Array
+    motor_stiffness: Array
+    motor_damping: Array
+    lead: float
+
+
+class Goals(NamedTuple):
+    """The goals of every motor [N m, rad, rad/s], each (n,)."""
+
+    torque: Array
+    position: Array
+    velocity: Array
+
+
+class Measured(NamedTuple):
+    """The measured motion of motors and joints [rad, rad/s], each (n,)."""
+
+    position: Array
+    velocity: Array
+    joint_position: Array
+    joint_velocity: Array
+
+
+class Errors(NamedTuple):
+    """Scratch, each (n,): the joints' errors, and the torque that is asked of them."""
+
+    position: Array
+    velocity: Array
+    torque: Array
+
+
+@kernel
+def least_share(gears: Gears, motor: int, commanded: Array, drives: Array) -> float:
+    """Of a motor, the least share of the drives' gains among the joints it moves."""
+    share = 1.0
+    for joint in range(commanded.shape[0]):
+        own = float(drives[joint])
+        if gears.to_motor[motor, joint] != 0.0 and own > 0.0:
+            share = min(share, float(commanded[joint]) / own)
+    return share
+
+
+@kernel
+def make_goals(
+    gears: Gears, targets: Targets, row: int, measured: Measured, goals: Goals, errors: Errors
+) -> None:
+    """The goals of all drives for the command in a row of ``targets``: see the module."""
+    stiffness, damping = targets.stiffness[row], targets.damping[row]
+    for k in range(errors.torque.shape[0]):
+        position = float(targets.position[row, k]) - float(measured.joint_position[k])
+        velocity = float(targets.velocity[row, k]) - float(measured.joint_velocity[k])
+        errors.position[k], errors.velocity[k] = position, velocity
+        wanted = position * float(stiffness[k]) + float(targets.torque[row, k])
+        errors.torque[k] = wanted + velocity * float(damping[k])
+    multiply_vector(gears.torque_to_motor, errors.torque, goals.torque)
+    multiply_vector(gears.to_motor, errors.position, goals.position)
+    multiply_vector(gears.to_motor, errors.velocity, goals.velocity)
+    for k in range(errors.torque.shape[0]):
+        angle, speed = float(measured.position[k]), float(measured.velocity[k])
+        share = least_share(gears, k, stiffness, gears.stiffness)
+        error = float(goals.position[k]) * share
+        # Where the drive follows the target by itself, its goal needs no lead.
+        goals.position[k] = error + angle + (1.0 - share) * speed * gears.lead
+        torque = float(goals.torque[k]) - error * float(gears.motor_stiffness[k])
+        error = float(goals.velocity[k]) * least_share(gears, k, damping, gears.damping)
+        goals.torque[k] = torque - error * float(gears.motor_damping[k])
+        goals.velocity[k] = error + speed
 
 
 class JointTargets(Protocol):
@@ -66,46 +156,28 @@ class DriveGoals:
         motor_damping: Array, lead: float,
     ) -> None:  # fmt: skip
         n = len(robot.joints)
-        self._transmission = Transmission(robot)
-        self._gears = [np.flatnonzero(row).tolist() for row in robot.joint_to_motor]
-        self._stiffness, self._damping = stiffness.tolist(), damping.tolist()
-        self._motor_stiffness, self._motor_damping = motor_stiffness, motor_damping
-        self._lead = lead
+        self.gears = gears_of(robot, stiffness, damping, motor_stiffness, motor_damping, lead)
         self.torque, self.position, self.velocity = (np.zeros(n) for _ in range(3))
-        self._joint, self._rate, self._wanted = (np.zeros(n) for _ in range(3))
-        self._share, self._own = np.zeros(n), np.zeros(n)
+        self._targets = Targets(*(np.zeros((1, n)) for _ in Targets._fields))
+        self._measured = Measured(*(np.zeros(n) for _ in Measured._fields))
+        self._make = KernelCall(
+            make_goals, self.gears, self._targets, 0, self._measured,
+            Goals(self.torque, self.position, self.velocity),
+            Errors(*(np.zeros(n) for _ in Errors._fields)),
+        )  # fmt: skip
 
     def follow(
         self, command: JointTargets, position: Array, velocity: Array, joint_position: Array,
         joint_velocity: Array,
     ) -> None:  # fmt: skip
         """Set the goals for an active command and the measured motion of motors and joints."""
-        np.subtract(command.position, joint_position, out=self._joint)
-        np.subtract(command.velocity, joint_velocity, out=self._rate)
-        np.multiply(self._joint, command.stiffness, out=self._wanted)
-        np.add(self._wanted, command.torque, out=self._wanted)
-        np.multiply(self._rate, command.damping, out=self._own)
-        np.add(self._wanted, self._own, out=self._wanted)
-        self._transmission.motor_torque(self._wanted, self.torque)
-
-        self._transmission.motor_motion(self._joint, self.position)
-        self._set_shares(command.stiffness.tolist(), self._stiffness)
-        np.multiply(self.position, self._share, out=self.position)
-        np.multiply(self.position, self._motor_stiffness, out=self._own)
-        np.subtract(self.torque, self._own, out=self.torque)
-        np.add(self.position, position, out=self.position)
-
-        self._transmission.motor_motion(self._rate, self.velocity)
-        # Where the drive follows the target by itself, its goal needs no lead.
-        np.subtract(1.0, self._share, out=self._share)
-        np.multiply(self._share, velocity, out=self._own)
-        np.multiply(self._own, self._lead, out=self._own)
-        np.add(self.position, self._own, out=self.position)
-        self._set_shares(command.damping.tolist(), self._damping)
-        np.multiply(self.velocity, self._share, out=self.velocity)
-        np.multiply(self.velocity, self._motor_damping, out=self._own)
-        np.subtract(self.torque, self._own, out=self.torque)
-        np.add(self.velocity, velocity, out=self.velocity)
+        targets, measured = self._targets, self._measured
+        targets.torque[0], targets.position[0] = command.torque, command.position
+        targets.velocity[0] = command.velocity
+        targets.stiffness[0], targets.damping[0] = command.stiffness, command.damping
+        measured.position[:], measured.velocity[:] = position, velocity
+        measured.joint_position[:], measured.joint_velocity[:] = joint_position, joint_velocity
+        self._make.run()
 
     def hold(self, position: Array) -> None:
         """Set the goals to motor angles [rad] at rest, without any torque of their own."""
@@ -113,12 +185,15 @@ class DriveGoals:
         self.position[:] = position
         self.velocity.fill(0.0)
 
-    def _set_shares(self, commanded: list[float], drives: list[float]) -> None:
-        """Of each motor, the least share of the drives' gains among the joints it moves."""
-        for motor, joints in enumerate(self._gears):
-            share = 1.0
-            for joint in joints:
-                own = drives[joint]
-                if own > 0.0:
-                    share = min(share, commanded[joint] / own)
-            self._share[motor] = share
+
+def gears_of(
+    robot: RobotDescription, stiffness: Array, damping: Array, motor_stiffness: Array,
+    motor_damping: Array, lead: float,
+) -> Gears:  # fmt: skip
+    """The gears of a robot; arguments as for ``DriveGoals``."""
+    matrix = np.ascontiguousarray(robot.joint_to_motor)
+    return Gears(
+        matrix, np.ascontiguousarray(robot.torque_to_motor), np.ascontiguousarray(matrix.T),
+        np.array(stiffness), np.array(damping), np.array(motor_stiffness),
+        np.array(motor_damping), float(lead),
+    )  # fmt: skip

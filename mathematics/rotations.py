@@ -238,3 +238,14 @@ def tilt(quaternion: Array) -> float:
 def wrap(angle: float) -> float:
     """The equivalent angle [rad] between -pi and pi."""
     return angle - 2.0 * math.pi * math.floor(angle / (2.0 * math.pi) + 0.5)
+
+
+@kernel
+def mean_heading(rotations: Array, counted: NDArray[np.bool_]) -> float:
+    """The heading [rad] of the mean x axis of the rotations (n, 3, 3) that are ``counted`` (n,)."""
+    x = y = 0.0
+    for i in range(rotations.shape[0]):
+        if counted[i]:
+            x += float(rotations[i, 0, 0])
+            y += float(rotations[i, 1, 0])
+    return math.atan2(y, x)

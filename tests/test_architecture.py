@@ -15,7 +15,7 @@ from aloft.runtime.language.registry import find_block, known_names
 
 ROOT = Path(__file__).parent.parent
 PACKAGES = (
-    "mathematics", "robots", "runtime", "planner", "blocks", "hal", "logs", "studies",
+    "mathematics", "robots", "runtime", "planner", "blocks", "hal", "ros2", "logs", "studies",
     "benchmarks", "cli", "graphs",
 )  # fmt: skip
 ALLOWED: dict[str, tuple[str, ...]] = {
@@ -65,6 +65,7 @@ ALLOWED: dict[str, tuple[str, ...]] = {
     "blocks/jumping": ("blocks/signals", "mathematics", "robots", "runtime/language", "planner"),
     "blocks/scoring": ("blocks/signals", "mathematics", "robots", "runtime/language"),
     "hal": ("blocks/signals", "mathematics", "robots", "runtime/language"),
+    "ros2": ("robots", "runtime/language"),
     "logs/file": ("robots", "runtime/language", "runtime/running"),
     "logs/viewing": ("logs/file", "robots", "runtime/language"),
     "logs/recording": (
@@ -248,7 +249,7 @@ def block_files() -> dict[tuple[str, ...], Path]:
     found = {}
     for name in known_names():
         module = tuple(find_block(name).__module__.split(".")[1:])
-        if name.startswith(("blocks.", "hal.")):
+        if name.startswith(("blocks.", "hal.", "ros2.")):
             found[module] = ROOT.joinpath(*module).with_suffix(".py")
     return found
 

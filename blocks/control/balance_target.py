@@ -9,7 +9,14 @@ from numpy.typing import NDArray
 
 from ...mathematics.kernel import kernel
 from ...mathematics.polynomials import minimum_jerk
-from ...mathematics.rotations import conjugate, exponential, from_matrix, logarithm, multiply
+from ...mathematics.rotations import (
+    conjugate,
+    exponential,
+    from_matrix,
+    logarithm,
+    mean_heading,
+    multiply,
+)
 from ...robots.limb import FootKind, foot_shape
 from ...runtime.language.block import Block, Input, Output, State
 from ...runtime.language.parameters import Parameters, live_parameter
@@ -283,17 +290,6 @@ def middle_point(points: Array, out: Array) -> None:
     for i in range(points.shape[0]):
         for k in range(3):
             out[k] += float(points[i, k]) / points.shape[0]
-
-
-@kernel
-def mean_heading(rotations: Array, counted: NDArray[np.bool_]) -> float:
-    """The heading [rad] of the mean x axis of the rotations (n, 3, 3) that are ``counted`` (n,)."""
-    x = y = 0.0
-    for i in range(rotations.shape[0]):
-        if counted[i]:
-            x += float(rotations[i, 0, 0])
-            y += float(rotations[i, 1, 0])
-    return math.atan2(y, x)
 
 
 @kernel

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,7 @@ from .safety_faults import Fault
 
 Array = NDArray[np.float64]
 Counts = NDArray[np.int64]
+Flags = NDArray[np.bool_]
 
 _CRITICAL = 0x7C
 """The bits of a drive's condition with which it has switched its torque off."""
@@ -23,8 +24,9 @@ _ANSWERED = 0x80
 # What a compiled kernel can return.
 _DRIVE, _SILENT_DRIVE = int(Fault.DRIVE), int(Fault.SILENT_DRIVE)
 _VOLTAGE, _TEMPERATURE, _CURRENT = int(Fault.VOLTAGE), int(Fault.TEMPERATURE), int(Fault.CURRENT)
-_INVALID_JOINTS, _INVALID_IMU = int(Fault.INVALID_JOINTS), int(Fault.INVALID_IMU)
-_INVALID_CONTACTS, _STALE_HEALTH = int(Fault.INVALID_CONTACTS), int(Fault.STALE_HEALTH)
+_SILENT_IMU, _STALE_HEALTH = int(Fault.SILENT_IMU), int(Fault.STALE_HEALTH)
+_INVALID_JOINTS = int(Fault.INVALID_JOINTS)
+"""The first of three: joints, IMU, switches."""
 UNSTAMPED = -1.0
 """The stamp of a robot that does not say when it measured."""
 
@@ -60,12 +62,16 @@ class HealthParameters(Parameters):
 
 
 class Limits(NamedTuple):
-    """The limits as numbers; infinite where there is none."""
+    """The limits as numbers, infinite where there is none, and times as numbers of ticks."""
 
     lowest_voltage: float
     highest_temperature: float
     largest_current: float
     answer_age: float
+    imu_age: float
+    hold: int
+    invalid_hold: int
+    stamp_hold: int
 
 
 class Drives(NamedTuple):
@@ -81,67 +87,83 @@ class Drives(NamedTuple):
     strong: Counts
 
 
-class HealthLimits:
-    """Judges a robot's health once a tick.
+class Sensors(NamedTuple):
+    """What is reported of the sensors, and what is kept of it from tick to tick."""
 
-    Args:
-        params: the limits.
-        period: the time from tick to tick [s].
-        health: what the robot reports.
-        low, hot, strong: ticks in a row each drive was beyond a limit, (n_joints,).
-        invalid: ticks in a row joints, IMU and switches were not valid, (3,).
-        stamps: the last stamp [s], and the number of ticks since it changed, (2,).
-    """
+    imu_age: Array
+    stamp: Array
+    joints_valid: Flags
+    imu_valid: Flags
+    contacts_valid: Flags
+    invalid: Counts
+    stamps: Array
 
-    def __init__(
-        self, params: HealthParameters, period: float, health: RobotHealth, low: Counts, hot: Counts,
-        strong: Counts, invalid: Counts, stamps: Array,
-    ) -> None:  # fmt: skip
-        self._params, self._health = params, health
-        self._limits = Limits(
+
+class Health(NamedTuple):
+    """A robot's health and its limits; ``state`` is a field of ``RobotHealth``, and ``verdict`` (2,) what
+    ``judge_health`` writes."""
+
+    drives: Drives
+    sensors: Sensors
+    limits: Limits
+    state: Counts
+    verdict: Counts
+
+
+class HealthTimers(Protocol):
+    """The memory of what is beyond its limit: see ``SafetyState``."""
+
+    low: Any
+    hot: Any
+    strong: Any
+    invalid: Any
+    stamps: Any
+
+
+def health_of(
+    params: HealthParameters, period: float, health: RobotHealth, timers: HealthTimers
+) -> Health:
+    """What is judged of a robot once a tick, every ``period`` [s]."""
+    return Health(
+        Drives(
+            health.condition, health.age, health.voltage, health.temperature, health.current,
+            timers.low, timers.hot, timers.strong,
+        ),
+        Sensors(
+            health.imu_age, health.stamp, health.joints_valid, health.imu_valid,
+            health.contacts_valid, timers.invalid, timers.stamps,
+        ),
+        Limits(
             params.lowest_voltage or 0.0,
             params.highest_temperature,
             params.largest_current or np.inf,
             params.answer_age,
-        )
-        self._drives = Drives(
-            health.condition, health.age, health.voltage, health.temperature, health.current,
-            low, hot, strong,
-        )  # fmt: skip
-        self._invalid, self._stamps = invalid, stamps
-        self._hold = round(params.health_hold / period)
-        self._invalid_hold = round(params.invalid_hold / period)
-        self._stamp_hold = max(1, round(params.stamp_age / period))
+            params.imu_age,
+            round(params.health_hold / period),
+            round(params.invalid_hold / period),
+            max(1, round(params.stamp_age / period)),
+        ),
+        health.state,
+        np.zeros(2, dtype=np.int64),
+    )  # fmt: skip
 
-    def judge(self) -> tuple[Fault, int, float]:
-        """The gravest fault of this tick, the drive it befell, and the value that was measured."""
-        health, params = self._health, self._params
-        fault, place = judge_drives(self._drives, self._limits, self._hold)
-        if fault == Fault.NONE and float(health.imu_age) > params.imu_age:
-            fault = int(Fault.SILENT_IMU)
-        sensors = judge_sensors(
-            bool(health.joints_valid), bool(health.imu_valid), bool(health.contacts_valid),
-            float(health.stamp), self._invalid, self._stamps, self._invalid_hold, self._stamp_hold,
-        )  # fmt: skip
-        found = Fault(fault or sensors)
-        return found, place, self._measured(found, place)
 
-    def _measured(self, fault: Fault, place: int) -> float:
-        drives = self._drives
-        match fault:
-            case Fault.DRIVE:
-                return float(drives.condition[place])
-            case Fault.SILENT_DRIVE:
-                return float(drives.age[place])
-            case Fault.VOLTAGE:
-                return float(drives.voltage[place])
-            case Fault.TEMPERATURE:
-                return float(drives.temperature[place])
-            case Fault.CURRENT:
-                return float(drives.current[place])
-            case Fault.SILENT_IMU:
-                return float(self._health.imu_age)
-        return 0.0
+@kernel
+def measured(health: Health, fault: int, place: int) -> float:
+    """What was measured of a fault, in the unit of its signal."""
+    if fault == _DRIVE:
+        return float(health.drives.condition[place])
+    if fault == _SILENT_DRIVE:
+        return float(health.drives.age[place])
+    if fault == _VOLTAGE:
+        return float(health.drives.voltage[place])
+    if fault == _TEMPERATURE:
+        return float(health.drives.temperature[place])
+    if fault == _CURRENT:
+        return float(health.drives.current[place])
+    if fault == _SILENT_IMU:
+        return float(health.sensors.imu_age[()])
+    return 0.0
 
 
 def health_text(fault: Fault, who: str, value: float, params: HealthParameters) -> str:
@@ -188,61 +210,58 @@ def health_text(fault: Fault, who: str, value: float, params: HealthParameters) 
 
 
 @kernel
-def judge_drives(drives: Drives, limits: Limits, hold: int) -> tuple[int, int]:
-    """The gravest fault of any drive and its index; all counts are updated.
-
-    A voltage of zero is one that is not measured.
-    """
+def judge_health(drives: Drives, sensors: Sensors, limits: Limits, verdict: Counts) -> None:
+    """Write the gravest fault, and the drive that has it, to ``verdict``, (2,); all counts are updated.
+    A voltage of zero is one that is not measured."""
     fault, place = 0, 0
     for k in range(drives.condition.shape[0]):
-        condition = int(drives.condition[k])
-        voltage = float(drives.voltage[k])
-        low = 0.0 < voltage < limits.lowest_voltage
-        hot = not float(drives.temperature[k]) <= limits.highest_temperature
-        strong = not abs(float(drives.current[k])) <= limits.largest_current
-        drives.low[k] = int(drives.low[k]) + 1 if low else 0
-        drives.hot[k] = int(drives.hot[k]) + 1 if hot else 0
-        drives.strong[k] = int(drives.strong[k]) + 1 if strong else 0
-        found = 0
-        if condition & _CRITICAL != 0 or condition & _ANSWERED == 0:
-            found = _DRIVE
-        elif not float(drives.age[k]) <= limits.answer_age:
-            found = _SILENT_DRIVE
-        elif drives.low[k] > hold:
-            found = _VOLTAGE
-        elif drives.hot[k] > hold:
-            found = _TEMPERATURE
-        elif drives.strong[k] > hold:
-            found = _CURRENT
+        found = judge_drive(drives, limits, k)
         if found != 0 and (fault == 0 or found < fault):
             fault, place = found, k
-    return fault, place
+    found = judge_sensors(sensors, limits)
+    if fault == 0:
+        fault = found
+    verdict[0], verdict[1] = fault, place
 
 
 @kernel
-def judge_sensors(
-    joints: bool,
-    imu: bool,
-    contacts: bool,
-    stamp: float,
-    invalid: Counts,
-    stamps: Array,
-    invalid_hold: int,
-    stamp_hold: int,
-) -> int:
+def judge_drive(drives: Drives, limits: Limits, k: int) -> int:
+    """The gravest fault of drive ``k``; its counts are updated."""
+    condition, voltage = int(drives.condition[k]), float(drives.voltage[k])
+    low = 0.0 < voltage < limits.lowest_voltage
+    hot = not float(drives.temperature[k]) <= limits.highest_temperature
+    strong = not abs(float(drives.current[k])) <= limits.largest_current
+    drives.low[k] = int(drives.low[k]) + 1 if low else 0
+    drives.hot[k] = int(drives.hot[k]) + 1 if hot else 0
+    drives.strong[k] = int(drives.strong[k]) + 1 if strong else 0
+    if condition & _CRITICAL != 0 or condition & _ANSWERED == 0:
+        return _DRIVE
+    if not float(drives.age[k]) <= limits.answer_age:
+        return _SILENT_DRIVE
+    if drives.low[k] > limits.hold:
+        return _VOLTAGE
+    if drives.hot[k] > limits.hold:
+        return _TEMPERATURE
+    if drives.strong[k] > limits.hold:
+        return _CURRENT
+    return 0
+
+
+@kernel
+def judge_sensors(sensors: Sensors, limits: Limits) -> int:
     """The gravest fault of what is measured; all counts are updated."""
-    invalid[0] = 0 if joints else int(invalid[0]) + 1
-    invalid[1] = 0 if imu else int(invalid[1]) + 1
-    invalid[2] = 0 if contacts else int(invalid[2]) + 1
+    invalid, stamps, stamp = sensors.invalid, sensors.stamps, float(sensors.stamp[()])
+    invalid[0] = 0 if sensors.joints_valid[()] else int(invalid[0]) + 1
+    invalid[1] = 0 if sensors.imu_valid[()] else int(invalid[1]) + 1
+    invalid[2] = 0 if sensors.contacts_valid[()] else int(invalid[2]) + 1
     same = stamp >= 0.0 and stamp == float(stamps[0])
     stamps[1] = float(stamps[1]) + 1.0 if same else 0.0
     stamps[0] = stamp
-    if invalid[0] > invalid_hold:
-        return _INVALID_JOINTS
-    if invalid[1] > invalid_hold:
-        return _INVALID_IMU
-    if invalid[2] > invalid_hold:
-        return _INVALID_CONTACTS
-    if float(stamps[1]) > stamp_hold:
+    if not float(sensors.imu_age[()]) <= limits.imu_age:
+        return _SILENT_IMU
+    for k in range(3):
+        if invalid[k] > limits.invalid_hold:
+            return _INVALID_JOINTS + k
+    if float(stamps[1]) > limits.stamp_hold:
         return _STALE_HEALTH
     return 0

@@ -53,7 +53,8 @@ class JointPD(Block):
     A leg without one during FLIGHT or LANDING gets the flight gains, the targets of its inverse
     kinematics and, as tau_ff, ``flight_feedforward`` times the planned torques while the plan is in
     flight too, so that it lags less. A leg that lands late keeps swinging while the others already
-    stand. Gains, targets and torques change linearly from one set to the other within ``blend``.
+    stand; one that takes a step (``CaptureStep``) follows the whole-body controller instead.
+    Gains, targets and torques change linearly from one set to the other within ``blend``.
 
     **Other joints.** Joints that the robot's description holds always have tau_ff and the flight
     gains towards their held angle. Joints that belong to no leg and are not held follow the
@@ -203,7 +204,8 @@ class JointPD(Block):
         for foot, chain in enumerate(self._chains):
             swings = phase in (Phase.FLIGHT, Phase.LANDING)
             for point, owner in enumerate(self._foot_of_point):
-                if owner == foot and self.phase.stance[point]:
+                held = self.phase.stance[point] or self.phase.stepping[point]
+                if owner == foot and held:
                     swings = False
             weight = float(airborne[foot]) + (rate if swings else -rate)
             airborne[foot] = weight = min(max(weight, 0.0), 1.0)

@@ -8,15 +8,13 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from ...mathematics.kernel import kernel
-from ...mathematics.rotations import tilt
+from ...mathematics.compiling.kernel_call import KernelCall
 from ...runtime.language.block import Block, Input, Metric, Output, State
 from ...runtime.language.parameters import live_parameter, parameter
 from ...runtime.language.per_joint import PerJoint
 from ...runtime.language.signals import Field, Signal
 from ..signals import (
     BaseState,
-    CommandMode,
     DrivePhase,
     JointCommand,
     JointState,
@@ -26,8 +24,9 @@ from ..signals import (
     WholeBodyCommand,
 )
 from ..signals.drive_conditions import HEALTHY
-from .health_limits import UNSTAMPED, HealthLimits, HealthParameters, health_text
+from .health_limits import UNSTAMPED, HealthParameters, health_of, health_text
 from .safety_faults import SWITCH_TEXTS, TEXTS, Fault, is_of_hardware
+from .safety_watch import Bounds, Command, RobotState, Switches, Timers, Verdict, watch
 
 Array = NDArray[np.float64]
 
@@ -152,19 +151,26 @@ class SafetyMonitor(Block):
         torque_limit = 10.0 * self._peak if given[1] is None else given[1].resolve(robot)
         self._damping = np.zeros(n)
         self.on_parameters()
-        self._tilt_ticks = round(self.params.tilt_hold / self.period)
-        self._joint_ticks = round(self.params.joint_hold / self.period)
-        state = self.state
-        self._health = HealthLimits(
-            p, self.period, self.health, state.low, state.hot, state.strong, state.invalid, state.stamps
+        bounds = Bounds(
+            self._lower, self._upper, self._speed_limit, torque_limit, float(p.tilt_limit),
+            round(p.tilt_hold / self.period), round(p.joint_hold / self.period), p.stale_ticks,
+            p.unsolved_ticks,
         )  # fmt: skip
-        self._commands = (
-            (self.desired.torque, torque_limit),
-            (self.desired.position, np.full(n, 100.0)),
-            (self.desired.velocity, np.full(n, 1000.0)),
-            (self.desired.stiffness, np.full(n, 10000.0)),
-            (self.desired.damping, np.full(n, 1000.0)),
-        )
+        base, joints, state = self.base, self.joints, self.state
+        self._verdict = Verdict(np.zeros(2, np.int64), np.zeros(1))
+        self._watch = KernelCall(
+            watch, Command(*(getattr(self.desired, name) for name in Command._fields)),
+            RobotState(
+                base.position, base.orientation, base.linear_velocity, base.angular_velocity,
+                joints.position, joints.velocity, self.wbc.solved,
+            ),
+            bounds, Timers(*(getattr(state, name) for name in Timers._fields)),
+            health_of(p, self.period, self.health, state), Switches(*(
+                getattr(self.switches, name) for name in Switches._fields
+            )),
+            self._damping, state.fault,
+            Command(*(getattr(self.command, name) for name in Command._fields)), self._verdict,
+        )  # fmt: skip
 
     def on_parameters(self) -> None:
         given = self.params.damping
@@ -173,38 +179,16 @@ class SafetyMonitor(Block):
         )
 
     def step(self) -> None:
-        fault = self._judge()
-        state, desired, command = self.state, self.desired, self.command
-        place, value = 0, 0.0
-        if DrivePhase.OFF < self.health.state[()] < DrivePhase.DAMPED:
-            of_health, place, value = self._health.judge()
-            fault = fault or of_health
-        if fault == Fault.NONE and self.switches.stop[()]:
-            fault, place = Fault.SWITCH, int((self.switches.fault != SwitchFault.NONE).argmax())
-            value = float(self.switches.fault[place])
-        if fault != Fault.NONE and state.fault[()] == Fault.NONE:
+        self._watch.run()
+        state, verdict = self.state, self._verdict
+        if verdict.fault[0] != Fault.NONE and state.fault[()] == Fault.NONE:
+            fault = Fault(int(verdict.fault[0]))
             state.fault[()] = fault
             state.fault_tick[()] = self.tick
-            state.fault_place[()] = place
-            state.fault_value[()] = value
+            state.fault_place[()] = verdict.fault[1]
+            state.fault_value[()] = verdict.value[0]
             if is_of_hardware(fault):
                 self.request_stop(self._reason(fault))
-        if state.fault[()] == Fault.NONE:
-            command.mode[()] = desired.mode
-            command.torque[...] = desired.torque
-            command.position[...] = desired.position
-            command.velocity[...] = desired.velocity
-            command.stiffness[...] = desired.stiffness
-            command.damping[...] = desired.damping
-            return
-        command.mode[()] = CommandMode.DAMPING
-        command.torque.fill(0.0)
-        command.velocity.fill(0.0)
-        command.stiffness.fill(0.0)
-        command.damping[...] = self._damping
-        for joint in range(command.position.shape[0]):
-            angle = float(self.joints.position[joint])
-            command.position[joint] = angle if math.isfinite(angle) else 0.0
 
     def metrics(self) -> Mapping[str, Metric]:
         fault = Fault(int(self.state.fault[()]))
@@ -227,91 +211,3 @@ class SafetyMonitor(Block):
             return f"foot switch {point} {SWITCH_TEXTS[SwitchFault(int(self.state.fault_value))]}"
         motor = self.robot.transmission.motors[int(self.state.fault_place)]
         return health_text(fault, motor, float(self.state.fault_value), self.params)
-
-    def _judge(self) -> Fault:
-        """The gravest fault of this tick; all timers are updated."""
-        state, params, joints, base = self.state, self.params, self.joints, self.base
-        for values, limits in self._commands:
-            if not within_each(values, limits):
-                return Fault.ABSURD_COMMAND
-        plausible = (
-            within(joints.position, 100.0)
-            and within(joints.velocity, 1000.0)
-            and within(base.orientation, 2.0)
-            and within(base.linear_velocity, 10.0)
-            and within(base.angular_velocity, 100.0)
-            and within(base.position, 1e6)
-        )
-        if not plausible:
-            return Fault.ABSURD_STATE
-
-        leans = tilt(base.orientation) > params.tilt_limit
-        state.tilted[()] = int(state.tilted[()]) + 1 if leans else 0
-        beyond = count_beyond(joints.position, self._lower, self._upper, state.beyond)
-        fast = count_faster(joints.velocity, self._speed_limit, state.fast)
-        changed = not state.started[()]
-        for joint in range(joints.position.shape[0]):
-            position, velocity = joints.position[joint], joints.velocity[joint]
-            changed = changed or bool(
-                position != state.last_position[joint] or velocity != state.last_velocity[joint]
-            )
-            state.last_position[joint] = position
-            state.last_velocity[joint] = velocity
-        state.started[()] = True
-        state.stale[()] = 0 if changed else int(state.stale[()]) + 1
-        state.unsolved[()] = 0 if self.wbc.solved[()] else int(state.unsolved[()]) + 1
-
-        if state.tilted[()] > self._tilt_ticks:
-            return Fault.TILT
-        if beyond > self._joint_ticks:
-            return Fault.JOINT_LIMIT
-        if fast > self._joint_ticks:
-            return Fault.JOINT_SPEED
-        if 0 < params.stale_ticks <= int(state.stale[()]):
-            return Fault.STALE_SENSORS
-        if 0 < params.unsolved_ticks <= int(state.unsolved[()]):
-            return Fault.SOLVER
-        return Fault.NONE
-
-
-@kernel
-def within(values: Array, limit: float) -> bool:
-    """Whether all values are finite and their magnitudes at most ``limit``."""
-    inside = True
-    for i in range(values.shape[0]):
-        inside = inside and abs(float(values[i])) <= limit
-    return inside
-
-
-@kernel
-def within_each(values: Array, limits: Array) -> bool:
-    """Whether every value is finite and its magnitude at most its limit."""
-    inside = True
-    for i in range(values.shape[0]):
-        inside = inside and abs(float(values[i])) <= float(limits[i])
-    return inside
-
-
-@kernel
-def count_beyond(values: Array, lower: Array, upper: Array, counts: NDArray[np.int64]) -> int:
-    """Count how many times in a row each value was out of bounds; returns the largest count."""
-    largest = 0
-    for i in range(values.shape[0]):
-        out = not float(lower[i]) <= float(values[i]) <= float(upper[i])
-        counts[i] = count = int(counts[i]) + 1 if out else 0
-        largest = max(largest, count)
-    return largest
-
-
-@kernel
-def count_faster(values: Array, limits: Array, counts: NDArray[np.int64]) -> int:
-    """Count how many times in a row each value's magnitude was above its limit.
-
-    Returns the largest count.
-    """
-    largest = 0
-    for i in range(values.shape[0]):
-        above = abs(float(values[i])) > float(limits[i])
-        counts[i] = count = int(counts[i]) + 1 if above else 0
-        largest = max(largest, count)
-    return largest

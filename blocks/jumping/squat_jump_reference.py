@@ -105,7 +105,7 @@ class SquatJumpReference(Block):
         self._reader = JumpTableReader(_plan(robot.model_dump_json(), task), self.reference)
 
     def step(self) -> None:
-        self._reader.read(self.time, self.params.lead)
+        self._reader.read(self.time, self.params.lead, self.period)
 
 
 @lru_cache(maxsize=8)

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.kernel import kernel
 from ...runtime.language.block import Block, Input, Output, State
 from ...runtime.language.parameters import Parameters, parameter
@@ -33,9 +34,22 @@ class SwitchMemory(Signal):
     fault = Field("n_contacts", dtype="int64", values=SwitchFault, text="what is wrong with it")
 
 
-class Watched(NamedTuple):
-    """What is kept of every switch, each (n_contacts,): see ``SwitchMemory``."""
+class SwitchLimits(NamedTuple):
+    """Ticks in the air and of standing after which a switch is stuck, 0 for never; the time before
+    touchdown [s] in which it may close; by which factor the count of changes falls in a tick; and the
+    changes that a good switch may have made."""
 
+    air: int
+    stand: int
+    approach: float
+    fading: float
+    changes: float
+
+
+class Watched(NamedTuple):
+    """What is kept of the switches: see ``SwitchMemory``."""
+
+    started: Flags
     last: Flags
     changes: Array
     closed: Counts
@@ -88,60 +102,58 @@ class SwitchMonitor(Block):
 
     def setup(self) -> None:
         p, memory = self.params, self.memory
-        self._air = round(p.air_time / self.period)
-        self._stand = 0 if p.stand_time is None else max(1, round(p.stand_time / self.period))
-        self._fading = np.exp(-self.period / p.bounce_window).item()
-        self._watched = Watched(*(getattr(memory, name) for name in Watched._fields))
+        limits = SwitchLimits(
+            round(p.air_time / self.period),
+            0 if p.stand_time is None else max(1, round(p.stand_time / self.period)),
+            p.approach,
+            np.exp(-self.period / p.bounce_window).item(),
+            p.bounce_changes,
+        )
+        watched = Watched(*(getattr(memory, name) for name in Watched._fields))
+        self._watch = KernelCall(
+            watch_switches, self.switches.closed, self.phase.phase, self.phase.time_to_touchdown,
+            limits, watched, self.health.fault, self.health.stop,
+        )  # fmt: skip
 
     def step(self) -> None:
-        memory, phase = self.memory, int(self.phase.phase)
-        if not memory.started[()]:
-            memory.last[...] = self.switches.closed
-            memory.started[()] = True
-        in_the_air = phase == _FLIGHT and float(self.phase.time_to_touchdown) > self.params.approach
-        found = watch_switches(
-            self.switches.closed, in_the_air, phase == _STAND, self._air, self._stand, self._fading,
-            self.params.bounce_changes, self._watched,
-        )  # fmt: skip
-        self.health.fault[...] = memory.fault
-        self.health.stop[()] = found and phase not in (_FLIGHT, _LANDING)
+        self._watch.run()
 
 
 @kernel
 def watch_switches(
     switches: Flags,
-    in_the_air: bool,
-    stands: bool,
-    air: int,
-    stand: int,
-    fading: float,
-    most: float,
+    phase: Counts,
+    time_to_touchdown: Array,
+    limits: SwitchLimits,
     watched: Watched,
-) -> bool:
-    """Update the counts and faults of all switches in a tick; returns whether any is at fault.
+    fault: Counts,
+    stop: Flags,
+) -> None:
+    """Update what is kept of all switches in a tick, and write what is wrong to ``fault`` and ``stop``.
 
     Args:
         switches: which are closed, (n_contacts,).
-        in_the_air: no switch should be closed.
-        stands: all should be.
-        air, stand: ticks after which a switch that is not as it should be is stuck; 0: never.
-        fading: by which the count of changes falls in a tick.
-        most: changes that a good switch may have made.
+        phase: see ``Phase``, ().
+        time_to_touchdown: in flight [s], ().
     """
-    any_fault = False
+    now = int(phase[()])
+    in_the_air = now == _FLIGHT and float(time_to_touchdown[()]) > limits.approach
+    found = False
     for k in range(switches.shape[0]):
         closed = bool(switches[k])
-        changed = closed != bool(watched.last[k])
+        changed = bool(watched.started[()]) and closed != bool(watched.last[k])
         watched.last[k] = closed
-        watched.changes[k] = float(watched.changes[k]) * fading + (1.0 if changed else 0.0)
+        watched.changes[k] = float(watched.changes[k]) * limits.fading + (1.0 if changed else 0.0)
         watched.closed[k] = int(watched.closed[k]) + 1 if in_the_air and closed else 0
-        watched.opened[k] = int(watched.opened[k]) + 1 if stands and not closed else 0
+        watched.opened[k] = int(watched.opened[k]) + 1 if now == _STAND and not closed else 0
         if watched.fault[k] == 0:
-            if watched.changes[k] > most:
+            if watched.changes[k] > limits.changes:
                 watched.fault[k] = _BOUNCING
-            elif watched.closed[k] > air:
+            elif watched.closed[k] > limits.air:
                 watched.fault[k] = _CLOSED
-            elif stand > 0 and watched.opened[k] > stand:
+            elif 0 < limits.stand < watched.opened[k]:
                 watched.fault[k] = _OPEN
-        any_fault = any_fault or watched.fault[k] != 0
-    return any_fault
+        fault[k] = watched.fault[k]
+        found = found or fault[k] != 0
+    watched.started[()] = True
+    stop[()] = found and now != _FLIGHT and now != _LANDING

@@ -42,7 +42,9 @@ class JumpScore(Block):
        0.2 rad/s, every sole flat (all its points loaded, or three of more), each foot with over
        0.4 of an equal share of the weight, com at least 10 mm inside the support polygon.
     7. From 0.15 s after touchdown to the end: no foot unloaded for more than 20 ms, and the
-       middle of each foot stays within 5 mm horizontally (set 20 mm for pushes).
+       middle of each foot stays within 5 mm horizontally (set 20 mm for pushes). With ``steps`` the
+       feet may take so many steps in all: each is measured from its new place, 0.15 s after its
+       last step, and the rest is judged 1.5 s after the last step.
     8. Task: apex above standing within 10 % of its target, feet within 2 cm and 5 deg of theirs;
        every contact point above ground of the ``landing_height``. Targets are the parameters
        ``rise``, ``distance`` and ``yaw``, else the reference's, and without either not judged.
@@ -132,6 +134,7 @@ class JumpScore(Block):
                 "flight_time_s": float(record.touchdown_time - record.lift_off_time),
                 "peak_tilt_deg": degrees(record.peak_tilt),
                 "foot_slip_m": float(record.foot_slip),
+                "steps": int(record.steps),
                 "jump_distance_x_m": x,
                 "jump_distance_y_m": y,
                 "jump_yaw_deg": degrees(feet_turned(record)),
@@ -237,7 +240,12 @@ class JumpScore(Block):
         """Peaks since touchdown, feet that slide or step, and the rest when its time comes."""
         record, truth, params = self.record, self.truth, self.params
         record.peak_tilt[()] = max(record.peak_tilt.item(), tilt(truth.base_orientation))
-        note_feet(record, truth, self._footing, self.period, landed >= params.slip_delay - 1e-9)
+        note_feet(
+            record, truth, self._footing, self.period, landed >= params.slip_delay - 1e-9,
+            params, params.slip_delay,
+        )  # fmt: skip
+        if record.steps:
+            landed = min(landed, float(record.now) - max(record.step_end.tolist()))
         if record.judged_time == NEVER and landed >= params.rest_time - 1e-9:
             note_rest(record, truth, self._footing)
             record.ground_low[()] = min(truth.ground_height.tolist())

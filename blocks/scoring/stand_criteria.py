@@ -30,6 +30,8 @@ class StandRecord(Signal):
     landed_foot = Field(("n_feet", 2), unit="m", text="middle of every foot when it should stay")
     foot_slip = Field(unit="m", text="farthest that a foot's middle has moved since then")
     lifted_time = Field("n_feet", unit="s", text="for how long each foot has carried no load")
+    steps = Field(dtype="int64", text="steps that feet have taken while they should stand")
+    step_end = Field("n_feet", unit="s", text="when each foot last carried no load in a step")
     longest_lift = Field(unit="s", text="longest time that was, while it should stand")
     peak_tilt = Field(unit="rad", text="greatest tilt while it should stand")
     judged_time = Field(unit="s", text="when the rest was judged")
@@ -66,6 +68,12 @@ class StandCriteria(Parameters):
     )
     step_time: float = parameter(
         0.02, unit="s", text="a standing foot unloaded for longer has stepped"
+    )
+    steps: int = parameter(
+        0,
+        ge=0,
+        text="so many steps are allowed after touchdown; a foot that has taken one is measured "
+        "from its new place, and the robot comes to rest from then on",
     )
     peak_tilt: float = parameter(
         radians(15), unit="rad", text="largest while it stands; 45 deg for pushes"

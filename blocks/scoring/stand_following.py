@@ -48,23 +48,45 @@ def note_fall(record: StandRecord, truth: RobotTruth, limits: StandCriteria) -> 
 
 
 def note_feet(
-    record: StandRecord, truth: RobotTruth, footing: Footing, period: float, stay: bool
+    record: StandRecord,
+    truth: RobotTruth,
+    footing: Footing,
+    period: float,
+    stay: bool,
+    limits: StandCriteria,
+    settling: float,
 ) -> None:
-    """How far the feet slide and for how long one is off the ground, once they should ``stay``."""
+    """How far the feet slide and for how long one is off the ground, once they should ``stay``.
+
+    A foot that is off the ground for longer than a step takes has stepped, if it may. Then it may
+    move until it has been on the ground for ``settling`` [s].
+    """
     if not stay:
         record.landed_foot[:] = record.foot
         return
     touched = truth.contact_touched.tolist()
+    now = record.now.item()
     for number, points in enumerate(footing.points_of_foot):
+        loaded = any(touched[k] for k in points)
+        total = 0.0 if loaded else record.lifted_time.item(number) + period
+        record.lifted_time[number] = total
+        end = record.step_end.item(number)
+        if total > limits.step_time:
+            going_on = end > 0.0 and now - end < 1.5 * period
+            if going_on or record.steps < limits.steps:
+                record.steps += 0 if going_on else 1
+                record.step_end[number] = end = now
+        if end > 0.0 and now - end < settling:
+            record.landed_foot[number] = record.foot[number]
+            continue
         moved = hypot(
             record.foot.item(number, 0) - record.landed_foot.item(number, 0),
             record.foot.item(number, 1) - record.landed_foot.item(number, 1),
         )
-        record.foot_slip[()] = max(record.foot_slip.item(), moved)
-        loaded = any(touched[k] for k in points)
-        total = 0.0 if loaded else record.lifted_time.item(number) + period
-        record.lifted_time[number] = total
-        record.longest_lift[()] = max(record.longest_lift.item(), total)
+        if loaded or limits.steps == 0:
+            record.foot_slip[()] = max(record.foot_slip.item(), moved)
+        if total <= limits.step_time or record.steps >= limits.steps:
+            record.longest_lift[()] = max(record.longest_lift.item(), total)
 
 
 def note_rest(record: StandRecord, truth: RobotTruth, footing: Footing) -> None:

@@ -24,6 +24,9 @@ from .stand_criteria import (
 from .stand_following import begin, note_fall, note_feet, note_machine, note_rest
 from .stand_metrics import judgement_metrics, rest_metrics
 
+SETTLING = 0.15
+"""A foot that has taken a step may settle for so long [s]."""
+
 
 class SquatRecord(StandRecord):
     """What the judgement of a stance or a squat needs."""
@@ -106,7 +109,7 @@ class StandScore(Block):
         settled = self.time >= self.params.settle_time - 1e-9
         if settled:
             record.peak_tilt[()] = max(record.peak_tilt.item(), tilt(truth.base_orientation))
-        note_feet(record, truth, self._footing, self.period, settled)
+        note_feet(record, truth, self._footing, self.period, settled, self.params, SETTLING)
         if record.judged_time == NEVER and self.time >= self.params.judge_time - 1e-9:
             note_rest(record, truth, self._footing)
             self.request_stop(f"judged at {self.time:.2f} s")

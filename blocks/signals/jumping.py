@@ -55,3 +55,7 @@ class PhaseState(Signal):
     time_to_touchdown = Field(unit="s", text="predicted; zero outside flight")
     time_since_touchdown = Field(unit="s", text="zero before the first touchdown")
     stance = Field("n_contacts", dtype="bool", text="points the controller may push with")
+    stepping = Field("n_contacts", dtype="bool", text="points of a foot that takes a step")
+    step_acceleration = Field(
+        ("n_contacts", 3), unit="m/s^2", frame="world", text="what these points should do"
+    )

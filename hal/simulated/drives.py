@@ -11,6 +11,7 @@ from ...blocks.signals import CommandMode, JointCommand
 from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.kernel import kernel
 from ...robots.description import RobotDescription
+from ..drive_goals import Targets
 from .actuator import (
     MotorRecord,
     Motors,
@@ -18,7 +19,7 @@ from .actuator import (
     drive_motors,
     joint_feedback_torque,
 )
-from .motor_feedback import MotorFeedback
+from .motor_feedback import Loops, MotorFeedback, close_loops
 from .state import DriveState, TickRecord
 
 Array = NDArray[np.float64]
@@ -35,11 +36,7 @@ class Commands(NamedTuple):
     pending: Counts
     due: Counts
     mode: Counts
-    torque: Array
-    position: Array
-    velocity: Array
-    stiffness: Array
-    damping: Array
+    targets: Targets
 
 
 class Joints(NamedTuple):
@@ -74,9 +71,9 @@ def follow_commands(commands: Commands, released: Array, joints: Joints) -> None
     mode = int(commands.mode[active])
     if mode == _ACTIVE:
         joint_feedback_torque(
-            commands.torque[active], commands.stiffness[active], commands.damping[active],
-            commands.position[active], commands.velocity[active], joints.position,
-            joints.velocity, joints.torque,
+            commands.targets.torque[active], commands.targets.stiffness[active],
+            commands.targets.damping[active], commands.targets.position[active],
+            commands.targets.velocity[active], joints.position, joints.velocity, joints.torque,
         )  # fmt: skip
         return
     for k in range(joints.torque.shape[0]):
@@ -96,6 +93,27 @@ def drive_joints(
 ) -> None:
     """The joint torques of a physics step: what the commands ask for, as far as the motors can."""
     follow_commands(commands, released, joints)
+    drive_motors(joints.velocity, joints.torque, motors, scratch, record)
+
+
+@kernel
+def drive_loops(
+    commands: Commands,
+    released: Array,
+    loops: Loops,
+    joints: Joints,
+    motors: Motors,
+    scratch: MotorScratch,
+    record: MotorRecord,
+) -> None:
+    """The same where the drives close the loops per motor, once a command has arrived."""
+    follow_commands(commands, released, joints)
+    active = int(commands.active[()])
+    if int(commands.mode[active]) == _ACTIVE:
+        close_loops(
+            loops, commands.targets, active, bool(joints.arrived[0]), joints.position,
+            joints.velocity, joints.torque,
+        )  # fmt: skip
     drive_motors(joints.velocity, joints.torque, motors, scratch, record)
 
 
@@ -170,13 +188,16 @@ class Drives:
         joints = self._joints = Joints(
             np.zeros(1, np.int64), np.zeros(1, np.bool_), *(np.zeros(n) for _ in range(3))
         )
-        commands = Commands(*(getattr(state, name) for name in Commands._fields))
+        commands = Commands(
+            state.active, state.pending, state.due, state.mode,
+            Targets(*(getattr(state, name) for name in Targets._fields)),
+        )  # fmt: skip
         motors = limits.motors, limits.scratch, limits.record
         if feedback is None:
             self._drive = KernelCall(drive_joints, commands, damping, joints, *motors)
         else:
-            self._follow = KernelCall(follow_commands, commands, damping, joints)
-            self._limit = KernelCall(drive_motors, joints.velocity, joints.torque, *motors)
+            loops = feedback.loops
+            self._drive = KernelCall(drive_loops, commands, damping, loops, joints, *motors)
 
     def hold(self, position: Array, torque: Array, stiffness: Array, damping: Array) -> None:
         """Drop all commands and from now on hold the joints at a position with these gains.
@@ -230,14 +251,5 @@ class Drives:
         joints.step[0] = step
         joints.position[...] = position
         joints.velocity[...] = velocity
-        if self._feedback is None:
-            self._drive.run()
-        else:
-            self._follow.run()
-            active = int(self._state.active)
-            if int(self._state.mode[active]) == CommandMode.ACTIVE:
-                self._feedback.write(
-                    self._rows[active], bool(joints.arrived[0]), position, velocity, joints.torque
-                )
-            self._limit.run()
+        self._drive.run()
         out[...] = joints.torque

@@ -7,17 +7,31 @@ of the bus from the newest command and from the measurement of the exchange befo
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
 from ...mathematics.kernel import kernel
+from ...mathematics.linear import multiply_vector
 from ...robots.robot_description import RobotDescription
-from ...robots.transmission import Transmission, motor_gains
+from ...robots.transmission import motor_gains
 from ...runtime.language.signals import Field, Signal
 from ..drive_gains import DriveGains, joint_gains
-from ..drive_goals import DriveGoals, JointTargets
+from ..drive_goals import (
+    Errors,
+    Gears,
+    Goals,
+    JointTargets,
+    Measured,
+    Targets,
+    gears_of,
+    make_goals,
+)
 
 Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+Counts = NDArray[np.int64]
 
 _LEAD = 1.5
 """From a measurement to the middle of the time in which the goals made from it act, in periods."""
@@ -33,6 +47,22 @@ class FeedbackState(Signal):
     velocity = Field("n_joints", unit="rad/s", text="the motors' target velocities")
     seen_position = Field("n_joints", unit="rad", text="joint angles in the exchange before")
     seen_velocity = Field("n_joints", unit="rad/s", text="joint velocities in it")
+
+
+class Loops(NamedTuple):
+    """The drives' loops: how the goals are made and for how many physics ``steps``, what is kept of
+    them (``FeedbackState``), and scratch, of which the last three are (n_joints,)."""
+
+    gears: Gears
+    steps: int
+    following: Flags
+    age: Counts
+    goals: Goals
+    seen: Measured
+    errors: Errors
+    angle: Array
+    speed: Array
+    torque: Array
 
 
 class MotorFeedback:
@@ -52,17 +82,19 @@ class MotorFeedback:
     ) -> None:  # fmt: skip
         n = len(robot.joints)
         stiffness, damping = joint_gains(params, robot)
-        self._stiffness = motor_gains(robot, stiffness, "N m/rad").motor
-        self._damping = motor_gains(robot, damping, "N m s/rad").motor
-        self._goals = DriveGoals(
-            robot, stiffness, damping, self._stiffness, self._damping, _LEAD * period
-        )
-        self._goals.torque = state.torque
-        self._goals.position, self._goals.velocity = state.position, state.velocity
-        self._state, self._steps = state, steps
-        self._transmission = Transmission(robot)
-        self._angle, self._speed = np.zeros(n), np.zeros(n)
-        self._torque, self._scratch = np.zeros(n), np.zeros(n)
+        self.loops = Loops(
+            gears_of(
+                robot, stiffness, damping, motor_gains(robot, stiffness, "N m/rad").motor,
+                motor_gains(robot, damping, "N m s/rad").motor, _LEAD * period,
+            ),
+            steps, state.following, state.age,
+            Goals(state.torque, state.position, state.velocity),
+            Measured(np.zeros(n), np.zeros(n), state.seen_position, state.seen_velocity),
+            Errors(*(np.zeros(n) for _ in Errors._fields)),
+            *(np.zeros(n) for _ in range(3)),
+        )  # fmt: skip
+        self._state = state
+        self._targets = Targets(*(np.zeros((1, n)) for _ in Targets._fields))
 
     def reset(self) -> None:
         """No command has arrived."""
@@ -78,32 +110,50 @@ class MotorFeedback:
             arrived: whether it has just arrived, so that the goals are new ones.
             position, velocity: the joints' motion as the drives' encoders read it [rad, rad/s].
         """
-        state, goals, transmission = self._state, self._goals, self._transmission
-        if arrived and not state.following[()]:
-            state.seen_position[:] = position
-            state.seen_velocity[:] = velocity
-            state.following[()] = True
-        if not state.following[()]:
-            return False
-        age = int(state.age)
-        if arrived or age >= self._steps:
-            transmission.motor_motion(state.seen_position, self._angle)
-            transmission.motor_motion(state.seen_velocity, self._speed)
-            goals.follow(
-                command, self._angle, self._speed, state.seen_position, state.seen_velocity
-            )
-            state.seen_position[:] = position
-            state.seen_velocity[:] = velocity
-            age = 0
-        state.age[()] = age + 1
-        transmission.motor_motion(position, self._angle)
-        transmission.motor_motion(velocity, self._speed)
-        motor_feedback(
-            goals.torque, goals.position, goals.velocity, self._stiffness, self._damping,
-            self._angle, self._speed, self._torque, self._scratch,
-        )  # fmt: skip
-        transmission.joint_torque(self._torque, out)
-        return True
+        targets = self._targets
+        targets.torque[0], targets.position[0] = command.torque, command.position
+        targets.velocity[0] = command.velocity
+        targets.stiffness[0], targets.damping[0] = command.stiffness, command.damping
+        return close_loops(self.loops, targets, 0, arrived, position, velocity, out)
+
+
+@kernel
+def close_loops(
+    loops: Loops,
+    targets: Targets,
+    row: int,
+    arrived: bool,
+    position: Array,
+    velocity: Array,
+    out: Array,
+) -> bool:
+    """As ``MotorFeedback.write``, for the command in a row of ``targets``."""
+    gears, seen = loops.gears, loops.seen
+    if arrived and not loops.following[()]:
+        for k in range(out.shape[0]):
+            seen.joint_position[k] = position[k]
+            seen.joint_velocity[k] = velocity[k]
+        loops.following[()] = True
+    if not loops.following[()]:
+        return False
+    age = int(loops.age[()])
+    if arrived or age >= loops.steps:
+        multiply_vector(gears.to_motor, seen.joint_position, seen.position)
+        multiply_vector(gears.to_motor, seen.joint_velocity, seen.velocity)
+        make_goals(gears, targets, row, seen, loops.goals, loops.errors)
+        for k in range(out.shape[0]):
+            seen.joint_position[k] = position[k]
+            seen.joint_velocity[k] = velocity[k]
+        age = 0
+    loops.age[()] = age + 1
+    multiply_vector(gears.to_motor, position, loops.angle)
+    multiply_vector(gears.to_motor, velocity, loops.speed)
+    motor_feedback(
+        loops.goals.torque, loops.goals.position, loops.goals.velocity, gears.motor_stiffness,
+        gears.motor_damping, loops.angle, loops.speed, loops.torque,
+    )  # fmt: skip
+    multiply_vector(gears.torque_to_joint, loops.torque, out)
+    return True
 
 
 @kernel
@@ -116,14 +166,11 @@ def motor_feedback(
     position: Array,
     velocity: Array,
     out: Array,
-    scratch: Array,
 ) -> None:
     """Write what drives in direct-force mode ask of their motors to ``out``, each (n_motors,):
     ``torque + P (position_goal - position) + D (velocity_goal - velocity)``. Torques and gains may as
     well be in A, A/rad and A s/rad."""
-    np.subtract(position_goal, position, out)
-    np.multiply(out, stiffness, out)
-    np.add(out, torque, out)
-    np.subtract(velocity_goal, velocity, scratch)
-    np.multiply(scratch, damping, scratch)
-    np.add(out, scratch, out)
+    for k in range(out.shape[0]):
+        spring = (float(position_goal[k]) - float(position[k])) * float(stiffness[k])
+        damper = (float(velocity_goal[k]) - float(velocity[k])) * float(damping[k])
+        out[k] = (spring + float(torque[k])) + damper

@@ -142,7 +142,7 @@ class EmulatedDrives:
         goals, current, wanted = self.goals, self.current, self._wanted
         motor_feedback(
             goals[:, 0], goals[:, 1], goals[:, 2], goals[:, 3], goals[:, 4],
-            self.position, self.velocity, current, wanted,
+            self.position, self.velocity, current,
         )  # fmt: skip
         np.minimum(current, goals[:, 5], out=current)
         np.negative(goals[:, 5], out=wanted)

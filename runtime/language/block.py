@@ -216,6 +216,15 @@ class Block:
         return {n: v for n, v in values.items() if isinstance(v, int) and not isinstance(v, bool)}
 
     @classmethod
+    def fitted(cls, params: Parameters) -> type[Block]:
+        """The class whose ports are those that the parameters ask for; by default the class itself.
+
+        Another class is derived from this one and has its name. A ``BlockError`` that this raises
+        should be a misfit of ``requires`` as well.
+        """
+        return cls
+
+    @classmethod
     def requires(cls, params: Parameters, robot: RobotDescription | None) -> Iterable[Misfit]:
         """The misfits between this block and its parameters and robot; none if all is well.
 

@@ -10,7 +10,7 @@ from typing import Any
 from ...robots.description import find_robot
 from ...robots.shipped import robot_names
 from ..language.block import Block
-from ..language.errors import UnknownBlockError
+from ..language.errors import BlockError, UnknownBlockError
 from ..language.fit import fix_without_robot
 from ..language.importing import BlockImportError, UnknownModuleError
 from ..language.registry import find_block, nearest_names
@@ -82,6 +82,12 @@ def _draft(flat: FlatBlock, graph: FlatGraph, settings: Settings, problems: Prob
     draft.params = check_parameters(flat, draft.block_type, problems, settings.robot)
     draft.dimensions = settings.dimensions
     if draft.params is None:
+        return draft
+    try:
+        draft.block_type = draft.block_type.fitted(draft.params)
+    except BlockError as error:
+        problems.add(Code.MISFIT, f"{flat.path}: {error}", flat.where, at=flat.path)
+        draft.block_type = None
         return draft
     try:
         local = draft.block_type.local_dimensions(draft.params, settings.robot)

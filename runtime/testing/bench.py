@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Generic, Self, TypeVar
+from typing import Any, Generic, Self, TypeVar, cast
 
 import numpy as np
 
@@ -69,6 +69,7 @@ class BlockBench(Generic[B]):
         description = find_robot(robot) if isinstance(robot, str) else robot
         if not isinstance(params, Parameters):
             params = block_type.Params.model_validate(dict(params or {}))
+        block_type = cast("type[B]", block_type.fitted(params))
         sizes = {
             **(description.dimensions if description else {}),
             **(dimensions or {}),

@@ -346,9 +346,10 @@ def check_block(
     Raises:
         ConformanceError: the block breaks a promise.
     """
+    given = block_type.example_parameters() if params is None else params
     subject = Subject(
-        block_type,
-        block_type.example_parameters() if params is None else params,
+        block_type.fitted(block_type.Params.model_validate(dict(given))),
+        given,
         robot,
         rate,
         dimensions or {},

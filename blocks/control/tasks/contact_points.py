@@ -44,6 +44,9 @@ class ContactGains(Parameters):
     swing_damping: float = parameter(
         110.0, unit="1/s", ge=0.0, text="damping of the velocity of points without load"
     )
+    step_weight: float = parameter(
+        1000.0, ge=0.0, text="weight of the acceleration of points that take a step, per m/s^2"
+    )
     rolling_weight: float = parameter(
         0.1, ge=0.0, text="weight of the ankle of a foot that rolls over its toes, per rad/s^2"
     )
@@ -63,6 +66,7 @@ class PointGains(NamedTuple):
     swing_weight: float
     swing_stiffness: float
     swing_damping: float
+    step_weight: float
     rolling_weight: float
     rolling_stiffness: float
     rolling_damping: float
@@ -75,6 +79,13 @@ class Points(NamedTuple):
     drift: Array
     position: Array
     velocity: Array
+
+
+class Steps(NamedTuple):
+    """The points of a foot that takes a step, (n,), and their acceleration [m/s^2, world] (n, 3)."""
+
+    stepping: Flags
+    acceleration: Array
 
 
 class Ankles(NamedTuple):
@@ -102,6 +113,8 @@ class ContactPoints(Task[KernelCall]):
     with an ankle are free to rise, as the heels do while the toes still push, and are damped across
     their foot, while the ankle follows the plan with feedforward and feedback. The points of a foot
     without an ankle (see ``foot_joints.rolling_joint``) only have their velocity damped.
+
+    Points of a foot that takes a step have the acceleration that ``PhaseState`` gives them.
     """
 
     Gains = ContactGains
@@ -113,6 +126,7 @@ class ContactPoints(Task[KernelCall]):
             terms.contact_jacobian, terms.contact_drift, terms.contact_position,
             terms.contact_velocity,
         )  # fmt: skip
+        self._steps = Steps(situation.phase.stepping, situation.phase.step_acceleration)
         self._foot = np.array(robot.foot_of_contact(), dtype=np.int64)
         joints = [rolling_joint(robot, foot) for foot in range(len(robot.feet))]
         first = robot.base_velocities
@@ -130,7 +144,7 @@ class ContactPoints(Task[KernelCall]):
         now = self.situation
         numbers = {name: float(getattr(gains, name)) for name in PointGains._fields}
         return KernelCall(
-            contact_task, self._points, now.phase.stance, now.phase.phase, self._foot,
+            contact_task, self._points, now.phase.stance, self._steps, now.phase.phase, self._foot,
             now.terms.foot_rotation, self._planned, now.joints.position, now.terms.velocity,
             self._ankles, PointGains(**numbers), self.rows,
         )  # fmt: skip
@@ -143,6 +157,7 @@ class ContactPoints(Task[KernelCall]):
 def contact_task(
     points: Points,
     stance: Flags,
+    steps: Steps,
     phase: Indices,
     foot: Indices,
     foot_rotation: Array,
@@ -164,6 +179,7 @@ def contact_task(
         points, stance, gains.stance_weight, gains.stance_damping, gains.swing_weight,
         gains.swing_stiffness, gains.swing_damping, rows,
     )  # fmt: skip
+    step_rows(points, steps, gains.step_weight, rows)
     if int(phase[()]) == _THRUST:
         follow_plan(
             planned, position, velocity, gains.rolling_stiffness, gains.rolling_damping, ankles
@@ -212,6 +228,18 @@ def contact_rows(
                 if k == 2:
                     wanted += swing_stiffness * (ground - float(points.position[i, 2]))
                 rows.desired[row] = wanted - drift
+
+
+@kernel
+def step_rows(points: Points, steps: Steps, weight: float, rows: TaskRows) -> None:
+    """Give the points of a foot that takes a step their acceleration."""
+    for i in range(steps.stepping.shape[0]):
+        if not steps.stepping[i]:
+            continue
+        for k in range(3):
+            row = 3 * i + k
+            rows.weights[row] = weight
+            rows.desired[row] = float(steps.acceleration[i, k]) - float(points.drift[i, k])
 
 
 @kernel

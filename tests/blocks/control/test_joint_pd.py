@@ -66,6 +66,14 @@ def test_a_leg_that_lands_late_keeps_swinging():
     assert np.array_equal(command.stiffness, np.r_[np.zeros(5), FLIGHT_KP[5:]])
 
 
+def test_a_leg_that_takes_a_step_follows_the_whole_body_controller():
+    bench = make()
+    bench.set("phase", stepping=[False, False, True, True])
+    command = settle(bench, Phase.LANDING, [True, True, False, False])
+    assert np.array_equal(command.torque, np.arange(1.0, 11.0))
+    assert not command.stiffness.any()
+
+
 def test_a_standing_robot_without_contact_does_not_swing_its_legs():
     command = settle(make(), Phase.STAND, False)
     assert not command.stiffness.any()

@@ -298,3 +298,45 @@ def test_a_robot_is_needed() -> None:
     dimensions = {"n_joints": 10, "n_velocities": 16, "n_contacts": 4, "n_feet": 2}
     with pytest.raises(BlockError, match="it needs a robot, and the graph names none"):
         BlockBench(JumpScore, {}, dimensions=dimensions)
+
+
+def stepping(number: int) -> Callable[[float, Fields], None]:
+    """The feet step back by 15 mm in turn, left first, ``number`` times."""
+
+    def change(time: float, truth: Fields) -> None:
+        place = np.column_stack([FEET, np.zeros(4)])
+        touched = np.full(4, True)
+        for step in range(number):
+            begin = TOUCHDOWN + 0.4 + 0.2 * step
+            points = slice(2, 4) if step % 2 == 0 else slice(0, 2)
+            if time > begin:
+                place[points, 0] -= 0.015 * min((time - begin) / 0.1, 1.0)
+                touched[points] = touched[points] & (time > begin + 0.1)
+        if time > TOUCHDOWN:
+            truth["contact_position"], truth["contact_touched"] = place, touched
+
+    return change
+
+
+def test_steps_are_allowed_and_the_rest_is_judged_after_them() -> None:
+    metrics, _ = run(stepping(2), steps=2, distance_tolerance=0.04)
+    assert metrics["success"] is True, metrics["reason"]
+    assert metrics["steps"] == 2 and metrics["foot_slip_m"] < 1e-3
+    _, bench = run(stepping(2), steps=2, distance_tolerance=0.04)
+    ended = TOUCHDOWN + 0.7
+    assert bench.clock.tick * PERIOD == pytest.approx(ended + 1.6, abs=0.01)
+
+
+def test_more_steps_than_allowed_fail() -> None:
+    metrics, _ = run(stepping(3), steps=2, distance_tolerance=0.1)
+    assert metrics["success"] is False and metrics["reason"].startswith("stepped: a foot was off")
+
+
+def test_a_foot_that_slides_after_its_step_fails() -> None:
+    def change(time: float, truth: Fields) -> None:
+        stepping(1)(time, truth)
+        if time > TOUCHDOWN + 1.0:
+            truth["contact_position"] = truth["contact_position"] + [0.007, 0.0, 0.0]
+
+    metrics, _ = run(change, steps=2, distance_tolerance=0.04)
+    assert metrics["success"] is False and metrics["reason"].startswith("feet slid 7.0 mm")

@@ -9,9 +9,11 @@ from aloft.blocks.control.tasks.contact_points import (
     Ankles,
     JointMotion,
     Points,
+    Steps,
     contact_rows,
     follow_plan,
     lifting_rows,
+    step_rows,
 )
 from aloft.mathematics.whole_body_qp import TaskRows
 
@@ -92,3 +94,14 @@ def test_an_ankle_follows_the_plan_and_a_foot_without_one_is_left_out():
     wanted = planned.acceleration[4] + 1000.0 * (planned.position[4] - position[4])
     wanted += 60.0 * (planned.velocity[4] - velocity[10])
     assert ankles.acceleration == pytest.approx([wanted, 5.0])
+
+
+def test_points_of_a_step_get_their_acceleration():
+    out, at = rows(), points(drift=RANDOM.normal(size=(4, 3)))
+    stance, stepping = np.array([True, True, False, False]), np.array([False, False, True, True])
+    contact_rows(at, stance, 1e3, 0.0, 10.0, 400.0, 40.0, out)
+    before = out.desired.copy()
+    wanted = RANDOM.normal(size=(4, 3))
+    step_rows(at, Steps(stepping, wanted), 500.0, out)
+    assert (out.desired[:6] == before[:6]).all() and out.weights.tolist() == [1e3] * 6 + [500.0] * 6
+    assert out.desired[6:] == pytest.approx((wanted - at.drift)[2:].ravel())

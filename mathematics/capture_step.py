@@ -1,0 +1,244 @@
+"""Where a robot that loses its balance must step, and how a foot gets there.
+
+The linear inverted pendulum of height h has the natural frequency w, w^2 = g / h. Its capture point
+
+    xi = c + c' / w + (k_y, -k_x) w / (m g)
+
+is the place above which it would come to rest if the ground pushed there; the last term is how far
+the ground's force can move off that place to remove the angular momentum k within 1 / w. While the
+force acts at p, the capture point moves away from it: xi(t) = p + (xi - p) exp(w t). So outside the
+support polygon it cannot be brought back, and only a step helps (Pratt et al., "Capture point: a
+step toward humanoid push recovery", Humanoids 2006; Englsberger et al., IROS 2011).
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .constants import GRAVITY
+from .kernel import kernel
+
+Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+Indices = NDArray[np.int64]
+
+_SHORTEST = 0.03
+"""The motion of a foot counts on at least this much time [s], which limits its feedback gains."""
+
+
+@kernel
+def capture_point(
+    com: Array, velocity: Array, angular: Array, mass: float, height: float, turn: float, out: Array
+) -> float:
+    """Compute the capture point ``out`` (2,) [m]; returns the pendulum's frequency w [1/s].
+
+    Args:
+        com, velocity: of the centre of mass [m, m/s], (3,).
+        angular: momentum about it [N m s], (3,).
+        height: of the centre of mass above the ground [m]; less than 0.05 m counts as that.
+        turn: the share of the angular momentum that counts.
+    """
+    rate = math.sqrt(GRAVITY / max(height, 0.05))
+    way = turn * rate / (mass * GRAVITY)
+    out[0] = float(com[0]) + float(velocity[0]) / rate + way * float(angular[1])
+    out[1] = float(com[1]) + float(velocity[1]) / rate - way * float(angular[0])
+    return rate
+
+
+@kernel
+def nearest_in_foot(
+    points: Array, foot_of_point: Indices, foot: int, place: Array, out: Array
+) -> float:
+    """The place ``out`` (2,) nearest to a ``place`` (2,) between two contact points of a ``foot``.
+
+    Args:
+        points: all contact points [m], (n, 3).
+        foot_of_point: the foot of every point, (n,).
+
+    Returns:
+        The distance [m].
+    """
+    x, y = float(place[0]), float(place[1])
+    least = math.inf
+    for i in range(points.shape[0]):
+        if foot_of_point[i] != foot:
+            continue
+        ax, ay = float(points[i, 0]), float(points[i, 1])
+        for j in range(i, points.shape[0]):
+            if foot_of_point[j] != foot:
+                continue
+            dx, dy = float(points[j, 0]) - ax, float(points[j, 1]) - ay
+            square = dx * dx + dy * dy
+            share = 0.0
+            if square > 1e-12:
+                share = min(max(((x - ax) * dx + (y - ay) * dy) / square, 0.0), 1.0)
+            px, py = ax + share * dx, ay + share * dy
+            distance = math.hypot(x - px, y - py)
+            if distance < least:
+                least = distance
+                out[0], out[1] = px, py
+    return least
+
+
+@kernel
+def farthest_foot(
+    points: Array, foot_of_point: Indices, n_feet: int, place: Array, scratch: Array
+) -> int:
+    """The foot that is farthest from a ``place`` (2,): the one that carries least there.
+
+    ``scratch`` has the shape (2,).
+    """
+    chosen, most = 0, -1.0
+    for foot in range(n_feet):
+        distance = nearest_in_foot(points, foot_of_point, foot, place, scratch)
+        if distance > most + 1e-9:
+            chosen, most = foot, distance
+    return chosen
+
+
+@kernel
+def choose_foothold(
+    capture: Array,
+    rate: float,
+    left: float,
+    beyond: float,
+    points: Array,
+    foot_of_point: Indices,
+    swing: int,
+    n_feet: int,
+    nearest: Array,
+    scratch: Array,
+    out: Array,
+) -> None:
+    """Where the foot ``swing`` should land: at the capture point of that instant, and beyond.
+
+    The force is taken to act where the other feet are nearest to the capture point.
+
+    Args:
+        capture: the capture point now [m], (2,).
+        rate: the pendulum's frequency [1/s].
+        left: time until the foot lands [s].
+        beyond: how far beyond it lands, as a share of the way from the force to the capture point.
+        nearest, scratch: scratch, (2,).
+        out: becomes the foothold; its height stays, (3,).
+    """
+    least = math.inf
+    for foot in range(n_feet):
+        if foot == swing:
+            continue
+        distance = nearest_in_foot(points, foot_of_point, foot, capture, scratch)
+        if distance < least:
+            least = distance
+            nearest[:] = scratch
+    grown = (1.0 + beyond) * math.exp(rate * left)
+    for k in range(2):
+        out[k] = float(nearest[k]) + grown * (float(capture[k]) - float(nearest[k]))
+
+
+@kernel
+def limit_foothold(
+    stance: Array,
+    heading: float,
+    side: float,
+    ahead: float,
+    nearest: float,
+    farthest: float,
+    out: Array,
+) -> None:
+    """Move a foothold to where the legs reach and do not cross.
+
+    Args:
+        stance: the middle of the feet that stand [m], (3,).
+        heading: of these feet [rad].
+        side: 1 if the foot belongs on their left, -1 on their right, 0 for either.
+        ahead: the farthest place ahead of or behind them [m].
+        nearest, farthest: the range of its distance to that side [m].
+        out: the foothold, (3,), changed.
+    """
+    cosine, sine = math.cos(heading), math.sin(heading)
+    dx, dy = float(out[0]) - float(stance[0]), float(out[1]) - float(stance[1])
+    along = min(max(cosine * dx + sine * dy, -ahead), ahead)
+    across = cosine * dy - sine * dx
+    if side != 0.0:
+        across = side * min(max(side * across, nearest), farthest)
+    else:
+        across = min(max(across, -farthest), farthest)
+    out[0] = float(stance[0]) + cosine * along - sine * across
+    out[1] = float(stance[1]) + sine * along + cosine * across
+
+
+@kernel
+def approach(place: float, speed: float, goal: float, left: float) -> float:
+    """The acceleration [m/s^2] now of the motion that arrives at ``goal`` at rest after ``left`` [s].
+
+    It is the motion of least mean square acceleration: 6 (goal - place) / left^2 - 4 speed / left.
+    """
+    return 6.0 * (goal - place) / (left * left) - 4.0 * speed / left
+
+
+@kernel
+def spread_to_feet(stance: Flags, foot: Indices, n_feet: int, out: Flags) -> int:
+    """All points of the feet that have a point in ``stance``; returns how many feet these are."""
+    count = 0
+    for number in range(n_feet):
+        stands = False
+        for i in range(stance.shape[0]):
+            if foot[i] == number and stance[i]:
+                stands = True
+        for i in range(stance.shape[0]):
+            if foot[i] == number:
+                out[i] = stands
+        count += 1 if stands else 0
+    return count
+
+
+@kernel
+def swing_points(
+    swing: int,
+    foot: Indices,
+    offset: Array,
+    place: Array,
+    heading: float,
+    elapsed: float,
+    duration: float,
+    height: float,
+    position: Array,
+    velocity: Array,
+    stance: Flags,
+    stepping: Flags,
+    acceleration: Array,
+) -> None:
+    """The acceleration of the points of the foot ``swing`` to its place, with a flat sole.
+
+    In the first half of the step the sole rises by ``height``. In the second it comes down as if the
+    ground were lower by that, so it is still moving when it meets the ground.
+
+    Args:
+        foot: the foot of every point, (n,).
+        offset: of the points from the centre of the sole [m, foot], (n, 3).
+        place, heading: where the centre of the sole goes [m, world], (3,), and its heading [rad].
+        elapsed, duration: of the step [s].
+        position, velocity: of the points [m, m/s, world], (n, 3).
+        stance: becomes false for these points, (n,).
+        stepping: becomes true for them.
+        acceleration: becomes theirs [m/s^2, world], (n, 3).
+    """
+    cosine, sine = math.cos(heading), math.sin(heading)
+    left = max(duration - elapsed, _SHORTEST)
+    rises = elapsed < 0.5 * duration
+    for i in range(foot.shape[0]):
+        if foot[i] != swing:
+            continue
+        stance[i], stepping[i] = False, True
+        x = float(place[0]) + cosine * float(offset[i, 0]) - sine * float(offset[i, 1])
+        y = float(place[1]) + sine * float(offset[i, 0]) + cosine * float(offset[i, 1])
+        z, until = float(place[2]) - height, left
+        if rises:
+            z = float(place[2]) + height
+            until = max(0.5 * duration - elapsed, _SHORTEST)
+        acceleration[i, 0] = approach(float(position[i, 0]), float(velocity[i, 0]), x, left)
+        acceleration[i, 1] = approach(float(position[i, 1]), float(velocity[i, 1]), y, left)
+        acceleration[i, 2] = approach(float(position[i, 2]), float(velocity[i, 2]), z, until)

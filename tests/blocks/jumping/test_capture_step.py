@@ -1,0 +1,145 @@
+"""When a foot steps after touchdown, which one, where to, and what becomes of the phase."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from aloft.blocks.jumping.capture_step import CaptureStep
+from aloft.blocks.signals import Phase
+from aloft.runtime.testing import BlockBench
+
+PERIOD = 0.002
+POINTS = np.array([
+    [0.0425, -0.076, 0.0], [-0.0425, -0.076, 0.0], [0.0425, 0.076, 0.0], [-0.0425, 0.076, 0.0],
+])  # fmt: skip
+
+
+def make(steps=2, **params):
+    bench = BlockBench(CaptureStep, {"steps": steps, **params}, robot="bruce", rate=1 / PERIOD)
+    bench.set("reference", time=2.0, lift_off_time=1.0, touchdown_time=1.3)
+    bench.set(
+        "terms",
+        contact_position=POINTS,
+        foot_position=[[0.0, -0.076, 0.0], [0.0, 0.076, 0.0]],
+        foot_rotation=[np.eye(3)] * 2,
+        com=[0.0, 0.0, 0.25],
+    )
+    bench.now = 0.0
+    return bench
+
+
+def run(bench, until, *, velocity=(0.0, 0.0), stance=(True,) * 4, landing_time=0.35):
+    """Step to a time after touchdown; returns whether each point stepped in each tick."""
+    bench.set("terms", com_velocity=[*velocity, 0.0])
+    seen = []
+    while bench.now < until - 1e-9:
+        recovers = bench.now >= landing_time
+        bench.set(
+            "before",
+            phase=Phase.RECOVER if recovers else Phase.LANDING,
+            time_in_phase=bench.now - landing_time if recovers else bench.now,
+            time_since_touchdown=bench.now,
+            stance=stance,
+        )
+        bench.step()
+        seen.append(bench.get("phase").stepping.tolist())
+        bench.now = round(bench.now + PERIOD, 6)
+    return seen
+
+
+def test_without_steps_the_phase_is_passed_on():
+    bench = make(steps=0)
+    assert not np.any(run(bench, 0.5, velocity=(-1.0, 0.0)))
+    out = bench.get("phase")
+    assert int(out.phase) == Phase.RECOVER and out.stance.all()
+    assert float(out.time_since_touchdown) == pytest.approx(0.498)
+    assert float(out.time_in_phase) == pytest.approx(0.148)
+
+
+def test_a_supported_robot_takes_no_step():
+    bench = make()
+    assert not np.any(run(bench, 0.6, velocity=(-0.25, 0.1)))
+
+
+def test_no_step_right_after_touchdown_nor_before_another_jump():
+    bench = make(after=0.08)
+    assert not np.any(run(bench, 0.08, velocity=(-0.8, 0.0)))
+    bench.set("reference", time=2.0, lift_off_time=3.0)
+    assert not np.any(run(bench, 0.3, velocity=(-0.8, 0.0)))
+    bench.set("reference", time=2.0, lift_off_time=1.0)
+    assert np.any(run(bench, 0.34, velocity=(-0.8, 0.0)))
+
+
+def test_a_robot_that_stands_on_one_foot_waits_for_the_other():
+    bench = make()
+    assert not np.any(run(bench, 0.3, velocity=(-0.8, 0.0), stance=(True, True, False, False)))
+
+
+@pytest.mark.parametrize(
+    ("velocity", "foot"),
+    [
+        ((-0.6, 0.15), 0),  # the robot falls over its left heel: the right foot is free
+        ((-0.6, -0.15), 1),
+        ((0.7, 0.15), 0),
+        ((0.0, 0.45), 1),  # it falls to the left, beyond its left foot, which must go farther
+        ((0.0, -0.45), 0),
+    ],
+)
+def test_which_foot_steps_and_that_the_other_stands(velocity, foot):
+    bench = make()
+    if velocity[0] == 0.0:  # its feet are close together
+        bench.set("terms", contact_position=POINTS * [1.0, 0.6, 1.0])
+        bench.set("terms", foot_position=[[0.0, -0.046, 0.0], [0.0, 0.046, 0.0]])
+    seen = run(bench, 0.12, velocity=velocity)
+    assert np.any(seen)
+    out = bench.get("phase")
+    assert out.stepping.tolist() == [foot == 0] * 2 + [foot == 1] * 2
+    assert out.stance.tolist() == [foot == 1] * 2 + [foot == 0] * 2
+    assert out.step_acceleration[~out.stepping].tolist() == [[0.0] * 3] * 2
+    pushed = out.step_acceleration[out.stepping]
+    assert (pushed[:, 2] > 1.0).all()  # it rises
+    along = 0 if abs(velocity[0]) > abs(velocity[1]) else 1
+    assert (np.sign(pushed[:, along]) == np.sign(velocity[along])).all()
+
+
+def test_a_step_ends_at_contact_and_there_are_no_more_than_allowed():
+    bench = make(steps=1, duration=0.13)
+    run(bench, 0.12, velocity=(-0.6, 0.15))
+    assert bench.get("phase").stepping.any()
+    seen = run(bench, 1.0, velocity=(-0.6, 0.15))  # its points keep their contact
+    ended = [np.any(tick) for tick in seen].index(False)
+    began = 0.084
+    assert 0.12 + ended * PERIOD - began == pytest.approx(0.6 * 0.13, abs=0.006)
+    assert not np.any(seen[ended:])
+
+
+def test_a_foot_that_finds_no_ground_stops_stepping():
+    bench = make(steps=1, duration=0.1)
+    run(bench, 0.12, velocity=(-0.6, 0.15))
+    seen = run(bench, 0.4, velocity=(-0.6, 0.15), stance=(False, False, True, True))
+    assert sum(np.any(tick) for tick in seen) == pytest.approx(0.15 / PERIOD - 18, abs=3)
+
+
+def test_it_stays_low_until_it_has_settled_and_then_recovers_from_the_start():
+    bench = make(steps=1, duration=0.13, settle=0.35)
+    run(bench, 0.30)
+    run(bench, 0.44, velocity=(-0.6, 0.15))
+    out = bench.get("phase")
+    assert int(out.phase) == Phase.LANDING
+    run(bench, 0.70)
+    assert int(out.phase) == Phase.LANDING
+    assert float(out.time_in_phase) == pytest.approx(0.698)
+    run(bench, 0.85)
+    assert int(out.phase) == Phase.RECOVER
+    assert 0.0 < float(out.time_in_phase) < 0.2
+
+
+def test_another_flight_forgets_the_steps():
+    bench = make(steps=1)
+    run(bench, 0.4, velocity=(-0.6, 0.15))
+    bench.set("before", phase=Phase.FLIGHT, stance=False)
+    bench.step()
+    assert not bench.get("phase").stepping.any()
+    bench.now = 0.0
+    assert np.any(run(bench, 0.12, velocity=(-0.6, 0.15)))
