@@ -14,6 +14,7 @@ BEGIN, END = "<!-- task parameters -->\n", "<!-- end of task parameters -->"
 def task_tables() -> str:
     """The tables of everything a task file may say, from the declarations."""
     from ..planner.task.margins import Margins
+    from ..planner.task.rough_ground import RoughGround
     from ..planner.task.sequence import Hop, Span
     from ..planner.task.task import JumpTask, Knots, Weights
 
@@ -22,6 +23,7 @@ def task_tables() -> str:
         ("", JumpTask),
         ("One of `jumps`", Hop),
         ("One of `phases`", Span),
+        ("`rough`", RoughGround),
         ("`knots`", Knots),
         ("`weights`", Weights),
         ("`margins`", Margins),

@@ -17,11 +17,11 @@ from ...mathematics.capture_step import (
 )
 from ...mathematics.rotations import mean_heading
 from ...mathematics.support_margin import support_margin
+from ...robots.standing_feet import foot_sides, standing_feet
 from ...runtime.language.block import Block, Input, Output, State
 from ...runtime.language.parameters import Parameters, live_parameter
 from ...runtime.language.signals import Field, Signal
 from ..signals import DynamicsTerms, JumpReference, Phase, PhaseState
-from .landing_heuristic import foot_sides, standing_feet
 
 Array = NDArray[np.float64]
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable
 from typing import Annotated, Literal
 
@@ -32,7 +31,7 @@ from ...mathematics.rotations import (
     yaw,
 )
 from ...robots.description import RobotDescription
-from ...robots.kinematics import link_poses
+from ...robots.standing_feet import foot_sides, standing_feet
 from ...runtime.language.block import Block, Input, Misfit, Output, State
 from ...runtime.language.parameters import Parameters, live_parameter, parameter
 from ...runtime.language.signals import Field, Signal
@@ -334,22 +333,3 @@ class LandingHeuristic(Block):
         np.subtract(velocity, scratch, out=velocity)
         heading_matrix(float(self.reference.foot_yaw[foot]), self._heading)
         np.dot(turn, self._heading, feet.rotation[foot])
-
-
-def standing_feet(robot: RobotDescription) -> Array:
-    """The sole centres (n_feet, 3) [m] from the centre of mass, of a robot in its standing pose."""
-    level = np.array([[0.0, 0.0, 0.0, 1.0]])
-    poses = link_poses(robot, np.zeros((1, 3)), level, robot.standing_position[None])
-    com, feet = np.zeros(3), np.zeros((len(robot.feet), 3))
-    for link in robot.links:
-        place, turn = poses.of(link.name)
-        com += link.mass / robot.total_mass * (place[0] + turn[0] @ np.array(link.com))
-    for number, foot in enumerate(robot.feet):
-        place, turn = poses.of(foot.link)
-        feet[number] = place[0] + turn[0] @ np.array(foot.sole) - com
-    return feet
-
-
-def foot_sides(feet: Array) -> tuple[float, ...]:
-    """For every foot 1 on the left of the base, -1 on the right, 0 in the middle (1 mm)."""
-    return tuple(math.copysign(1.0, y) if abs(y) > 1e-3 else 0.0 for y in feet[:, 1].tolist())

@@ -121,7 +121,7 @@ def task_done(e: Evidence) -> Iterator[Found]:
         errors = [abs(found - wanted) for found, wanted in missed if wanted is not None]
         if errors:
             yield Found(name, max(errors), limit, unit, text, _which(e, int(np.argmax(errors))))
-    standing = [*(start for start, _ in r.flights[1:]), -1]
+    standing = [*_standing_knots(e), -1]
     goals = np.array([(place.x, place.y, place.z) for place in places[1:]])
     missed_by = np.abs(r.soles[standing].mean(axis=1) - goals)
     jump, axis = worst(missed_by)
@@ -140,6 +140,16 @@ def task_done(e: Evidence) -> Iterator[Found]:
     else:
         yield Found("whole_turn", abs(yaw - places[-1].heading), 20 * DEGREE, "rad",
                     "how far the torso's turn differs from the feet's")  # fmt: skip
+
+
+def _standing_knots(e: Evidence) -> list[int]:
+    """After each jump but the last, the last knot at which all contact points are on the ground: in a
+    later part of the thrust the heels may have left it. The lift-off where there is no such knot."""
+    found = []
+    for (_, touchdown), (lift_off, _) in zip(e.replay.flights, e.replay.flights[1:], strict=False):
+        level = np.flatnonzero(e.plan.contact[touchdown:lift_off].all(axis=1))
+        found.append(touchdown + int(level[-1]) + 1 if len(level) else lift_off)
+    return found
 
 
 def _which(e: Evidence, jump: int) -> str:

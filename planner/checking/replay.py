@@ -7,6 +7,7 @@ also integrated as a whole, from lift-off to touchdown.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,7 +21,9 @@ from ..task.plan import JumpPlan
 
 Array = NDArray[np.float64]
 
-FLIGHT_STEP = 0.001
+Row = tuple[float, int, Array, Array]
+"""A time [s], its interval, and the state."""
+FLIGHT_STEP = 0.002
 """Longest step of the flight's integration [s]; halving it changes a landing by less than 1 um."""
 
 
@@ -79,9 +82,13 @@ def replay(plan: JumpPlan, robot: RobotDescription) -> Replay:
     dynamics = ExactDynamics(robot)
     flights = flight_knots(plan)
     flown = [_fly(plan, dynamics, lift_off, touchdown) for lift_off, touchdown in flights]
-    defect = np.array([_interval_defect(plan, dynamics, k) for k in range(len(plan.time) - 1)])
+    flying = {k for first, end in flights for k in range(first, end)}
+    followed = [_follow_interval(plan, dynamics, k) for k in range(len(plan.time) - 1)]
+    defect = np.array([missed for missed, _ in followed])
     gap, wrench = midpoint_residuals(plan, dynamics)
-    samples = _sample(plan, dynamics, [row for rows, _ in flown for row in rows])
+    between = [row for rows, _ in flown for row in rows]
+    between += [row for k, (_, row) in enumerate(followed) if row is not None and k not in flying]
+    samples = _sample(plan, dynamics, between)
     states = [dynamics.centroidal(q, v) for q, v in zip(plan.position, plan.velocity, strict=True)]
     placed = [dynamics.soles(q) for q in plan.position]
     return Replay(
@@ -119,7 +126,7 @@ def flight_knots(plan: JumpPlan) -> tuple[tuple[int, int], ...]:
 
 def _fly(
     plan: JumpPlan, dynamics: ExactDynamics, lift_off: int, touchdown: int
-) -> tuple[list[tuple[float, int, Array, Array]], tuple[float, float]]:
+) -> tuple[list[Row], tuple[float, float]]:
     """Integrate the flight from the plan's state at lift-off, and compare its end with the planned touchdown."""
     q, v = plan.position[lift_off], plan.velocity[lift_off]
     nothing = np.zeros(plan.contact_force.shape[1:])
@@ -128,7 +135,9 @@ def _fly(
         joints = joint_motion(plan.position, plan.velocity, plan.time, k)
         q = np.concatenate([q[:7], plan.position[k, 7:]])
         v = np.concatenate([v[:6], plan.velocity[k, 6:]])
-        steps = dynamics.integrate(q, v, joints, nothing, FLIGHT_STEP)
+        # An even number of steps, so that the interval's middle is among them.
+        step = 0.5 * joints.duration / math.ceil(0.5 * joints.duration / FLIGHT_STEP)
+        steps = dynamics.integrate(q, v, joints, nothing, step)
         out += [(float(plan.time[k]) + t, k, there, moving) for t, there, moving in steps]
         _, q, v = steps[-1]
     planned = plan.position[touchdown]
@@ -143,18 +152,22 @@ def held_joints(plan: JumpPlan, k: int) -> NDArray[np.bool_]:
     return np.asarray(still)
 
 
-def _interval_defect(plan: JumpPlan, dynamics: ExactDynamics, k: int) -> Array:
-    """How far exact dynamics from knot ``k`` misses the next knot; see ``Replay``."""
+def _follow_interval(plan: JumpPlan, dynamics: ExactDynamics, k: int) -> tuple[Array, Row | None]:
+    """How far exact dynamics from knot ``k`` misses the next knot, see ``Replay``, and the middle of
+    the interval where it lasts."""
     q, v, planned_q, planned_v = (
         plan.position[k], plan.velocity[k], plan.position[k + 1], plan.velocity[k + 1],
     )  # fmt: skip
-    force = plan.contact_force[k]
+    force, middle = plan.contact_force[k], None
     if plan.time[k + 1] > plan.time[k]:
         joints = joint_motion(plan.position, plan.velocity, plan.time, k)
-        _, q, v = dynamics.integrate(q, v, joints, force, 0.5 * joints.duration)[-1]
+        steps = dynamics.integrate(q, v, joints, force, 0.5 * joints.duration)
+        t, there, moving = steps[0]
+        middle = (float(plan.time[k]) + t, k, there, moving)
+        _, q, v = steps[-1]
     else:
         v, _ = dynamics.velocity_after_impact(q, v, force, held_joints(plan, k))
-    return np.array(
+    missed = np.array(
         [
             np.linalg.norm(q[:3] - planned_q[:3]),
             rotation_between(q[3:7], planned_q[3:7]),
@@ -162,26 +175,19 @@ def _interval_defect(plan: JumpPlan, dynamics: ExactDynamics, k: int) -> Array:
             np.linalg.norm(v[3:6] - planned_v[3:6]),
         ]
     )
+    return missed, middle
 
 
-def _sample(
-    plan: JumpPlan, dynamics: ExactDynamics, flight: list[tuple[float, int, Array, Array]]
-) -> Samples:
-    """All knots, the middles of stance intervals and the steps of the flight, in time's order."""
-    rows: list[tuple[float, int, Array, Array]] = []
-    fallen = {k for _, k, _, _ in flight}
+def _sample(plan: JumpPlan, dynamics: ExactDynamics, between: list[Row]) -> Samples:
+    """All knots, the middles of stance intervals and the steps of the flights, in time's order."""
+    inside: dict[int, list[Row]] = {}
+    for row in between:
+        inside.setdefault(row[1], []).append(row)
+    rows = list[Row]()
     for k in range(len(plan.time)):
-        rows.append(
-            (float(plan.time[k]), min(k, len(plan.time) - 2), plan.position[k], plan.velocity[k])
-        )
-        if k in fallen:
-            rows += [row for row in flight if row[1] == k]
-        elif k + 1 < len(plan.time) and plan.time[k + 1] > plan.time[k]:
-            joints = joint_motion(plan.position, plan.velocity, plan.time, k)
-            force, h = plan.contact_force[k], joints.duration
-            q, v = plan.position[k], plan.velocity[k]
-            t, q, v = dynamics.integrate(q, v, joints, force, 0.5 * h)[0]
-            rows.append((float(plan.time[k]) + t, k, q, v))
+        interval = min(k, len(plan.time) - 2)
+        rows.append((float(plan.time[k]), interval, plan.position[k], plan.velocity[k]))
+        rows += inside.get(k, [])
     torque, points, velocities = [], [], []
     for time, k, q, v in rows:
         places, jacobian = dynamics.contact_jacobians(q)

@@ -23,6 +23,9 @@ from ...robots.pinocchio_model import build_pinocchio_model
 
 Array = NDArray[np.float64]
 
+AFTER, BEFORE = [1, 2, 0], [2, 0, 1]
+"""The axes after and before each one: for cross products, which NumPy's own makes slowly."""
+
 
 @dataclass(frozen=True)
 class JointMotion:
@@ -63,6 +66,16 @@ class ExactDynamics:
         self.balls = ball_feet(robot)
         self.mass = robot.total_mass
         self._rotor_coupling = built.rotor_coupling
+        self._known = np.zeros(self.model.nv)
+        self._columns = [self._moving(frame) for frame in built.contact_frames]
+
+    def _moving(self, frame: int) -> list[int]:
+        """The generalised velocities that move a frame."""
+        found = list[int]()
+        for joint in self.model.supports[self.model.frames[frame].parentJoint]:
+            first = self.model.joints[joint].idx_v
+            found += range(first, first + self.model.joints[joint].nv) if joint > 0 else ()
+        return found
 
     def contact_jacobians(self, q: Array) -> tuple[Array, Array]:
         """Contact points (n_contacts, 3) and their Jacobians (3 n_contacts, n_velocities), world
@@ -152,25 +165,36 @@ class ExactDynamics:
     def base_acceleration(self, q: Array, v: Array, joints: Array, force: Array) -> Array:
         """How the base accelerates (6,) if the joints do as given [rad/s^2] under these contact
         forces [N, world], (n_contacts, 3)."""
-        pushed = self._pushed(q, force)
-        known = np.concatenate([np.zeros(6), joints])
-        bias = self.pin.rnea(self.model, self.data, q, v, known)[:6]
+        return self._base_acceleration(q, v, joints, self._pushed(q, force))
+
+    def _base_acceleration(self, q: Array, v: Array, joints: Array, pushed: Array) -> Array:
+        self._known[6:] = joints
+        bias = self.pin.rnea(self.model, self.data, q, v, self._known)[:6]
+        # Of the base's own block Pinocchio writes both triangles.
         inertia = self.pin.crba(self.model, self.data, q)[:6, :6]
-        inertia = np.triu(inertia) + np.triu(inertia, 1).T
         return np.asarray(np.linalg.solve(inertia, pushed[:6] - bias))
 
     def joint_torque(self, q: Array, v: Array, joints: Array, force: Array) -> Array:
         """The torques [N m] of that motion, (n_joints,), without friction."""
-        acceleration = np.concatenate([self.base_acceleration(q, v, joints, force), joints])
         pushed = self._pushed(q, force)
+        base = self._base_acceleration(q, v, joints, pushed)
+        acceleration = np.concatenate([base, joints])
         whole = self.pin.rnea(self.model, self.data, q, v, acceleration)
         return np.asarray((whole + self._rotor_coupling @ acceleration - pushed)[6:])
 
     def _pushed(self, q: Array, force: Array) -> Array:
         """J' F: the generalised force of the contacts."""
+        pushed = np.zeros(self.model.nv)
         if not force.any():
-            return np.zeros(self.model.nv)
-        return np.asarray(self.contact_jacobians(q)[1].T @ force.ravel())
+            return pushed
+        jacobian = self.pin.computeJointJacobians(self.model, self.data, q)
+        self.pin.updateFramePlacements(self.model, self.data)
+        places = self._contact_places()
+        moment = places[:, AFTER] * force[:, BEFORE] - places[:, BEFORE] * force[:, AFTER]
+        for point, columns in enumerate(self._columns):
+            column = jacobian[:, columns]
+            pushed[columns] += force[point] @ column[:3] + moment[point] @ column[3:]
+        return pushed
 
     def velocity_after_impact(
         self, q: Array, v: Array, impulse: Array, held: NDArray[np.bool_] | None = None

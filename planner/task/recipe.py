@@ -40,14 +40,18 @@ WEIGHTS = {"force": 0.01, "orientation": 20.0, "impulse": 5.0}
 SCALED_WEIGHTS = ("force", "impulse")
 THRUST, TOES, TOE_KNOTS = 0.25, 0.04, 8
 """s; of the whole thrust and of its part on the toes, for a robot of BRUCE's size."""
+CONTACT = 0.6
+"""s on the ground between two jumps in a row, for a robot of BRUCE's size."""
 KNOTS = {"squat": 12, "thrust": 12, "flight": 16, "landing": 12}
 LANDING_LEAN, KNEE_BEND, JOINTS = 0.1, 0.4, 0.06
 """rad"""
-STEP, STEP_FALL, FOOT_CLEARANCE = 0.012, 0.05, 0.12
-"""m from a step, how much more for each m that it goes down, and the feet's height in the middle of
+STEP, STEP_HEIGHT, FOOT_CLEARANCE = 0.012, 0.05, 0.12
+"""m from a step, how much more for each m that it goes up or down, and the feet's height in the middle of
 the flight as a share of that of the centre of mass."""
 SQUAT_LEAN, FAR = 0.9, 1.2
 """rad, and from which distance ahead on, as a multiple of the centre of mass's height."""
+STEP_LEAN = 0.85
+"""rad, in front of a step, whatever its distance."""
 
 
 class Asked(Protocol):
@@ -56,6 +60,7 @@ class Asked(Protocol):
     recipe: Any
     formulation: Any
     thrust_time: float | None
+    contact_time: float | None
     margins: Margins | None
     weights: Any
     knots: Any
@@ -134,21 +139,42 @@ def _plain(task: Asked, robot: RobotDescription) -> Iterator[Choice]:
     if "knots" not in said:
         why = "the flight is exact on any grid; where feet stand knots are closer"
         yield Choice("knots", task.knots.model_copy(update=KNOTS), why)
-    toes = word_of_toes(robot)
-    if "phases" in said or len(task.hops()) > 1:
+    rows = len(task.hops()) > 1
+    if "phases" in said:
         return
-    if toes and task.thrust_time is not None:
+    contact = _contact_time(task, slow)
+    if rows and "contact_time" not in said:
+        yield Choice("contact_time", contact, "between two jumps the robot comes to balance")
+    toes = word_of_toes(robot)
+    if toes and task.thrust_time is not None and not (rows and contact is None):
         whole = task.thrust_time if "thrust_time" in said else rounded(THRUST * slow)
         late = min(rounded(TOES * slow), 0.5 * whole)
-        spans = (
+        half = 0.5 * (contact or 0.0)
+        spans = [
             Span(phase="squat", time=_time(task, "squat_time", slow)),
-            Span(phase="thrust", time=round(whole - late, 6)),
-            Span(phase="thrust", time=late, contacts=toes, knots=TOE_KNOTS),
-            Span(phase="flight"),
-            Span(phase="landing", time=_time(task, "landing_time", slow)),
-        )
-        yield Choice("phases", spans, f"the heels rise {1000 * late:.0f} ms before the {toes}s leave "
+            *_thrust(whole, late, toes),
+        ]
+        for _ in task.hops()[1:]:
+            between = _thrust(half, min(late, 0.5 * half), toes)
+            spans += [Span(phase="flight"), Span(phase="landing", time=half), *between]
+        last = Span(phase="landing", time=_time(task, "landing_time", slow))
+        yield Choice("phases", (*spans, Span(phase="flight"), last),
+                     f"the heels rise {1000 * late:.0f} ms before the {toes}s leave "
                      "the ground: the foot lengthens the leg")  # fmt: skip
+
+
+def _thrust(whole: float, late: float, toes: str) -> tuple[Span, Span]:
+    """A thrust [s], first on all contacts and at last on the toes."""
+    return (
+        Span(phase="thrust", time=round(whole - late, 6)),
+        Span(phase="thrust", time=late, contacts=toes, knots=TOE_KNOTS),
+    )
+
+
+def _contact_time(task: Asked, slow: float) -> float | None:
+    """The time on the ground between two jumps [s]: what the task says, or what gives room for balance."""
+    said = "contact_time" in task.model_fields_set
+    return task.contact_time if said else rounded(CONTACT * slow)
 
 
 def _time(task: Asked, name: str, slow: float) -> float | None:
@@ -179,14 +205,17 @@ def _margins(task: Asked, robot: RobotDescription) -> Iterator[Choice]:
     if "squat_lean" not in said and far > FAR:
         why = f"{far:.2g} times the centre of mass's height ahead; without it the torso lies down"
         yield Choice("margins.squat_lean", SQUAT_LEAN, why)
+    elif "squat_lean" not in said and any((hop.landing_height or 0.0) > 0.0 for hop in task.hops()):
+        why = "the torso lies down in front of a step, as the calves keep away from it"
+        yield Choice("margins.squat_lean", STEP_LEAN, why)
     if "landing_lean" not in said:
         yield Choice("margins.landing_lean", LANDING_LEAN, "it lands upright")
     knees = knee_limits(robot, KNEE_BEND)
     if "landing_limits" not in said and knees:
         yield Choice("margins.landing_limits", knees, "it lands on bent knees, which can give way")
-    fall = max(0.0, *(-(hop.landing_height or 0.0) for hop in task.hops()))
+    height = max(abs(hop.landing_height or 0.0) for hop in task.hops())
     if "step" not in said and any(hop.landing_height for hop in task.hops()):
-        gap = rounded(STEP + STEP_FALL * fall)
+        gap = rounded(STEP + STEP_HEIGHT * height)
         yield Choice("margins.step", gap, "a disturbed robot must not touch the step")
     if "joints" not in said:
         room = math.floor(100.0 * min(JOINTS, 0.5 * least_distance_to_limits(robot))) / 100.0

@@ -73,6 +73,9 @@ class Hop(FreeTimes):
         le=2.0,
         text="where the ground changes its height, along x from the start of this jump",
     )
+    gap: float | None = parameter(
+        None, unit="m", ge=0.0, le=1.0, text="width of a gap in the ground, midway or at the edge"
+    )
     rotation: float | None = parameter(
         None, unit="rad", ge=-12.6, le=12.6, text="the body's turn in pitch"
     )

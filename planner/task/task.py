@@ -21,6 +21,7 @@ from .errors import TaskError
 from .margins import Margins
 from .placed_file import PlacedFile
 from .recipe import choices, chosen_fields
+from .rough_ground import RoughGround
 from .scaling import scaled_defaults
 from .sequence import FreeTimes, Hop, Place, Span, check_spans, places_of
 
@@ -103,6 +104,13 @@ class JumpTask(FreeTimes):
         None, unit="m", ge=-2.0, le=2.0,
         text="x at which the ground changes its height; None: midway between start and landing",
     )  # fmt: skip
+    gap: float | None = parameter(
+        None, unit="m", ge=0.0, le=1.0,
+        text="width of a gap in the ground that it jumps over, midway or at the step's edge",
+    )  # fmt: skip
+    rough: RoughGround | None = parameter(
+        None, text="uneven ground under all the jumps, drawn by a seed; None: what they say"
+    )
     rotation: float = parameter(
         0.0, unit="rad", ge=-12.6, le=12.6,
         text="the body's turn in pitch from start to landing; 360 deg is a forward somersault",
@@ -131,7 +139,7 @@ class JumpTask(FreeTimes):
         None, min_length=1, max_length=50, text="jumps in a row; None: one jump"
     )
     repeat: int | None = parameter(
-        None, ge=1, le=50, text="how often the jumps are repeated in a row"
+        None, ge=1, le=100, text="how often the jumps are repeated in a row"
     )
     phases: tuple[Span, ...] | None = parameter(
         None, text="the sequence of contacts; None: squat, thrust, flight, landing, on all contacts"
@@ -184,6 +192,13 @@ class JumpTask(FreeTimes):
     def _check_together(self) -> JumpTask:
         if self.rise is not None and self.take_off_speed is not None:
             raise ValueError("give rise or take_off_speed, not both: one follows from the other")
+        own: tuple[JumpTask | Hop, ...] = (self, *(self.jumps or ()))
+        if self.rough is not None and any(
+            one.landing_height or one.gap or one.step_edge is not None for one in own
+        ):
+            raise ValueError(
+                "rough draws the ground: give rough, or landing_height, step_edge and gap, not both"
+            )
         for number, hop in enumerate(self.hops()):
             which = f"jump {number + 1}: " if self.jumps else ""
             up = hop.landing_height or 0.0
@@ -214,7 +229,8 @@ class JumpTask(FreeTimes):
             found.append(
                 Hop(**{k: v for k, v in own.items() if not (k in how and how & set(given))} | given)
             )
-        return tuple(found) * (self.repeat or 1)
+        row = tuple(found) * (self.repeat or 1)
+        return row if self.rough is None else self.rough.under(row)
 
     def places(self) -> tuple[Place, ...]:
         """Where the robot stands at the start, between its jumps, and at the end."""
@@ -335,7 +351,8 @@ def _explain(problem: Any) -> str:
     message = str(problem["msg"]).removeprefix("Value error, ")
     if problem["type"] == "extra_forbidden":
         nested: dict[str, type[Parameters]] = {
-            "knots": Knots, "weights": Weights, "margins": Margins, "jumps": Hop, "phases": Span
+            "knots": Knots, "weights": Weights, "margins": Margins, "jumps": Hop, "phases": Span,
+            "rough": RoughGround,
         }  # fmt: skip
         owner = nested.get(str(problem["loc"][0]), JumpTask)
         near = get_close_matches(key.rpartition(".")[2], owner.model_fields, 1, 0.0)

@@ -19,7 +19,7 @@ def test_there_are_the_basic_tasks() -> None:
     names = {path.stem for path in TASKS}
     assert {"in_situ", "forward_10cm", "back_10cm", "side_10cm", "twist_30deg"} <= names
     assert {"step_up_5cm", "step_down_5cm"} <= names
-    assert {"hops_10", "hops_forward_10", "step_up_and_down"} <= names
+    assert {"hops_10", "hops_forward_10", "hops_rough_10", "up_and_down"} <= names
 
 
 @pytest.mark.parametrize("path", TASKS, ids=[path.stem for path in TASKS])

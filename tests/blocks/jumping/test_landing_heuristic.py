@@ -10,12 +10,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from aloft.blocks.control.dynamics import Dynamics
-from aloft.blocks.jumping.landing_heuristic import LandingHeuristic, foot_sides, standing_feet
+from aloft.blocks.jumping.landing_heuristic import LandingHeuristic
 from aloft.blocks.signals import Phase
 from aloft.mathematics.constants import GRAVITY
 from aloft.mathematics.landing_law import landing_place, retraction, swing
 from aloft.mathematics.rotations import exponential, multiply, rotate, to_matrix
 from aloft.robots.description import find_robot
+from aloft.robots.standing_feet import foot_sides, standing_feet
 from aloft.runtime.testing import BlockBench
 
 from ...robots.limbed_robots import quadruped

@@ -120,3 +120,20 @@ def test_a_robot_without_soles_has_no_toe_phase() -> None:
     assert task.phases is None
     assert task.margins is not None
     assert task.margins.landing_limits, "it has knees all the same"
+
+
+def test_a_row_comes_to_balance_between_its_jumps_and_leaves_on_the_toes() -> None:
+    spans = make_task({"name": "a", "rise": "6 cm", "repeat": 2}).resolved(BRUCE).spans()
+    assert [(span.phase, span.time, span.contacts) for span in spans] == [
+        ("squat", 0.4, "all"), ("thrust", 0.21, "all"), ("thrust", 0.04, "toe"), ("flight", None, "all"),
+        ("landing", 0.3, "all"), ("thrust", 0.26, "all"), ("thrust", 0.04, "toe"),
+        ("flight", None, "all"), ("landing", 0.5, "all"),
+    ]  # fmt: skip
+
+
+def test_the_time_on_the_ground_that_is_said_is_kept() -> None:
+    said = make_task({"name": "a", "rise": "6 cm", "repeat": 2, "contact_time": "0.4 s"})
+    spans = said.resolved(BRUCE).spans()
+    assert [span.time for span in spans[4:7]] == [0.2, 0.16, 0.04]
+    free = make_task({"name": "a", "rise": "6 cm", "repeat": 2, "contact_time": "free"})
+    assert free.resolved(BRUCE).phases is None, "a free time is found on flat feet"

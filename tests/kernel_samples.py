@@ -1,0 +1,184 @@
+"""Arguments for those kernels that a jump does not call, for ``test_kernels_compile``."""
+
+import numpy as np
+
+from aloft.mathematics.body_tree import BodyMotion
+from aloft.mathematics.flight_prediction import LandingCost, flight_map
+from aloft.mathematics.joint_feedback import Feedback, Motion, SoftStops
+from aloft.mathematics.pid import PidGains, PidMemory
+from aloft.robots.description import find_robot
+from aloft.robots.five_joint_leg import read_leg
+from aloft.robots.limb import read_limb
+from aloft.robots.limb_inverse import limb_scratch
+
+LEG = read_leg(find_robot("bruce"), 0)
+LIMB = read_limb(find_robot("bruce"), 0)
+MIDDLE = LIMB.limits.mean(axis=1)
+TARGET = np.array([[0.05, -0.08, -0.3], [0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+POSE = np.array([[0.02, -0.06, -0.3], [1.0, 0.0, 0.0], [0.0, 0.8, -0.6], [0.0, 0.6, 0.8]])
+CHAIN = (LIMB.links, LIMB.tip, LIMB.limits, TARGET, np.array([1.0, 0.9, 0.3]))
+COEFFICIENTS = np.array([0.2, 0.1, 0.05, -0.5, 0.1])
+GAINS = PidGains(
+    *np.linspace(-0.5, 2.0, 15).reshape(5, 3), -np.ones(3), np.ones(3), 0.01, 0.3, 0.002
+)
+NORMAL = np.random.default_rng(3).standard_normal
+FLIGHT = flight_map(10, 4)._replace(
+    drift=NORMAL((3, 3)), carried=NORMAL((12, 3)), turn=NORMAL((2, 12))
+)
+REGULAR = 3.0 * np.eye(3) + 0.5 * POSE[1:]
+"""A matrix whose inverse is computed to the last bits."""
+LANDING = LandingCost(
+    np.array([0.02, -0.01, 0.03]),
+    np.array([1.0, 2.0, 3.0, 1.5, 0.4, 0.3]),
+    np.array([[-0.01, 0.02], [-0.03, 0.01]]),
+    np.array([-0.02, 0.01]),
+)
+SOLES = np.array([[0.05, -0.08, 0.0], [-0.04, -0.08, 0.0], [0.05, 0.08, 0.0], [-0.04, 0.08, 0.0]])
+MOVING = BodyMotion(*(NORMAL(shape) for shape in ((2, 3, 3), (2, 3), (1, 6), (2, 6), (2, 6))))
+UNUSED = {
+    "aloft.mathematics.capture_step.nearest_in_foot": (
+        SOLES, np.array([0, 0, 1, 1]), 1, np.array([0.1, 0.02]), np.zeros(2),
+    ),
+    "aloft.mathematics.capture_step.farthest_foot": (
+        SOLES, np.array([0, 0, 1, 1]), 2, np.array([0.1, 0.02]), np.zeros(2),
+    ),
+    "aloft.mathematics.capture_step.choose_foothold": (
+        np.array([-0.1, 0.02]), 6.0, 0.1, 0.1, SOLES, np.array([0, 0, 1, 1]), 1, 2, np.zeros(2),
+        np.zeros(2), np.zeros(3),
+    ),
+    "aloft.mathematics.capture_step.limit_foothold": (
+        np.array([0.1, -0.08, 0.0]), 0.3, 1.0, 0.2, 0.09, 0.27, np.array([-0.3, 0.02, 0.0]),
+    ),
+    "aloft.mathematics.capture_step.approach": (0.1, -0.3, 0.2, 0.05),
+    "aloft.mathematics.capture_step.swing_points": (
+        1, np.array([0, 0, 1, 1]), np.array([[0.045, 0.0, 0.0], [-0.045, 0.0, 0.0]] * 2),
+        np.array([-0.1, 0.1, 0.0]), 0.1, 0.03, 0.13, 0.015, SOLES, NORMAL((4, 3)),
+        np.ones(4, bool), np.zeros(4, bool), np.zeros((4, 3)),
+    ),
+    "aloft.mathematics.flight_prediction.map_flight": (
+        np.vstack([NORMAL((3, 16)), np.hstack([REGULAR, NORMAL((3, 13))])]), NORMAL((4, 3, 16)),
+        np.eye(3), 4.8, 0.5, flight_map(10, 4),
+    ),
+    "aloft.mathematics.flight_prediction.predict_tilt": (
+        FLIGHT, np.array([0.1, -0.05, 0.02]), np.array([0.02, 0.03, -0.01]), NORMAL(12), 0.2,
+        np.array([1.0, 1.0, -1.0, -1.0]), np.zeros(2), np.zeros((2, 4)),
+    ),
+    "aloft.mathematics.flight_prediction.choose_shift": (
+        np.array([0.1, -0.05]), NORMAL((2, 4)), LANDING, np.zeros((4, 4)), np.zeros(4),
+    ),
+    "aloft.mathematics.flight_prediction.invert": (REGULAR, np.zeros((3, 3))),
+    "aloft.mathematics.flight_prediction.solve_rows": (
+        REGULAR + REGULAR.T, np.array([[0.3, -0.2, 0.5], [1.0, 0.4, -0.7]]),
+    ),
+    "aloft.blocks.control.balance_target.pattern_turn": (
+        POSE, POSE[0], TARGET, np.array([0.01, 0.02, 0.0]),
+    ),
+    "aloft.mathematics.landing_law.landing_place": (
+        POSE[0], 1.0, POSE[1], POSE[2], np.array([0.1, 0.2, 0.3]), np.array([0.3, 0.2, 0.1]), 0.05,
+        np.array([0.1, 0.2]), POSE[3], np.zeros(3),
+    ),
+    "aloft.mathematics.landing_law.turn_places": (POSE, 0.3, np.zeros((4, 3))),
+    "aloft.robots.limb.place_limb": (
+        LIMB.links, LIMB.tip, MIDDLE, np.zeros((5, 6)), np.zeros((4, 3)),
+    ),
+    "aloft.robots.limb.limb_jacobian": (LIMB.links, np.ones((5, 6)), POSE, np.zeros((6, 5))),
+    "aloft.robots.limb_error.aim": (POSE[0], POSE[1:], np.zeros((4, 3))),
+    "aloft.robots.limb_error.foot_error": (
+        LIMB.tip, POSE, TARGET, np.array([1.0, 0.9, 0.3]), np.zeros(6),
+    ),
+    "aloft.robots.limb_error.weigh_rows": (
+        LIMB.tip, POSE, TARGET, np.array([1.0, 0.9, 0.3]), np.ones((6, 5)),
+    ),
+    "aloft.robots.limb_inverse.approach": (*CHAIN, 3, limb_scratch(5), MIDDLE),
+    "aloft.robots.limb_inverse.reach": (
+        *CHAIN, np.tile([*MIDDLE, 0.0], (3, 1)), 3, 3, limb_scratch(5), np.zeros(5),
+    ),
+    "aloft.robots.limb_inverse.limb_velocity": (
+        *CHAIN, MIDDLE, np.ones(6), 3e-4, limb_scratch(5), np.zeros(5),
+    ),
+    "aloft.robots.limb_error.turning": (LIMB.tip, POSE, TARGET, 0.002, 10.0, np.zeros(3)),
+    "aloft.robots.limb_inverse._stuck": (LIMB.limits, 1, 0.3, 1.0),
+    "aloft.robots.limb_error._along": (POSE, LIMB.tip),
+    "aloft.robots.limb_error._product": (POSE, TARGET, 1, 2),
+    "aloft.robots.limb_error._unit": (0.1, 0.2, 0.3, 1.0, 0.0, 0.0),
+    "aloft.robots.five_joint_reach.slide": (
+        LEG.hip, LEG.plane, LEG.signs, LEG.limits, np.add(LEG.hip, [0.25, 0.02, -0.3]), np.eye(3), 0.005,
+        0.1, np.zeros(3), np.zeros(5),
+    ),
+    "aloft.mathematics.rotations.skew": (np.ones(3), np.zeros((3, 3))),
+    "aloft.robots.five_joint_reach.pitched_line": (np.eye(3), 0.4, np.zeros(3)),
+    "aloft.mathematics.rotations.yaw": (np.array([0.1, 0.2, 0.3, 0.9]),),
+    "aloft.blocks.control.balance_target.lengthen": (
+        np.array([0.01, -0.04, 0.0]), 0.7, 0.02, 0.25, 0.2, 0.6, *(np.ones(3) for _ in range(3)),
+    ),
+    "aloft.blocks.control.dynamics.lowest_point": (
+        np.array([0.01, 0.0, -0.2]), 0.022, np.eye(3), np.zeros(3),
+    ),
+    "aloft.blocks.control.dynamics.rolling_drift": (MOVING, 1, POSE[0], POSE[1], np.zeros(3)),
+    "aloft.robots.contact_kinematics.see_pattern": (POSE[1:3], REGULAR, *np.ones((3, 3))),
+    "aloft.mathematics.joint_feedback.integrate_accelerations": (
+        0.002, 0.02, np.ones(10), Motion(np.ones(10), np.ones(10)), Motion(np.ones(10), np.ones(10)),
+    ),
+    "aloft.mathematics.joint_feedback.add_friction": (
+        np.linspace(-1.0, 1.0, 10), np.full(10, 0.07), np.full(10, 0.01), 0.3, np.zeros(10),
+        np.ones(10),
+    ),
+    "aloft.mathematics.joint_feedback.add_soft_stops": (
+        np.linspace(-1.0, 1.0, 5),
+        SoftStops(np.tile([-0.8, 0.7], (5, 1)), 0.1, 2.0, np.full(5, 60.0), np.full(5, 1.5)),
+        Feedback(*(np.full(5, x) for x in (40.0, 0.2, 1.0, 0.3))),
+    ),
+    "aloft.robots.five_joint_reach.keep_along": (
+        np.array([0.0, 0.6, 0.8]), np.array([0.1, 0.2, 0.3]),
+    ),
+    "aloft.mathematics.inertial_filter.right_up": (
+        np.array([0.0, 0.0, 0.0, 1.0]), np.array([0.3, 0.2, 9.8]), 0.01, np.zeros(3),
+    ),
+    "aloft.mathematics.invariant_contacts.remove_contact": (1, np.full((37, 37), 0.5)),
+    "aloft.mathematics.extended_pose.exponential": (
+        np.linspace(-0.5, 0.6, 12), np.zeros(4), np.zeros((3, 3)),
+    ),
+    "aloft.mathematics.extended_pose.unbend": (
+        np.array([0.1, -0.4, 0.3]), np.array([0.5, 0.2, -0.3]), np.zeros(3),
+    ),
+    "aloft.mathematics.extended_pose.logarithm": (
+        np.array([0.1, 0.2, 0.3, 0.92]), np.ones((3, 3)), np.zeros(12),
+    ),
+    "aloft.mathematics.extended_pose.divide": (
+        np.array([0.1, 0.2, 0.3, 0.92]), np.ones((3, 3)), np.array([0.6, 0.0, 0.0, 0.8]),
+        np.ones((3, 3)), np.zeros(4), np.zeros((3, 3)), np.zeros(4),
+    ),
+    "aloft.blocks.control.balance_target.add_quadratic_growth": (np.ones(3), 0.6, 0.25, np.zeros(3), np.zeros(3)),
+    "aloft.blocks.general.periods.first_tick": (0.5, 0.002),
+    "aloft.mathematics.linear.add_product": (POSE, POSE[0], np.ones(4)),
+    "aloft.mathematics.linear.multiply_matrices": (POSE, TARGET[1:], np.zeros((4, 3))),
+    "aloft.mathematics.discretisation.matrix_exponential": (
+        4.0 * POSE[1:], np.zeros((3, 3)), np.zeros((3, 3)), np.zeros((3, 3)),
+    ),
+    "aloft.mathematics.second_order_filter.first_order": (20.0, 0.002, True, np.zeros(5)),
+    "aloft.mathematics.second_order_filter.second_order": (20.0, 0.7, 0.002, False, np.zeros(5)),
+    "aloft.mathematics.second_order_filter.band_stop": (20.0, 2.0, 0.002, np.zeros(5)),
+    "aloft.mathematics.second_order_filter.settle": (COEFFICIENTS, POSE[0], np.ones((3, 2))),
+    "aloft.mathematics.second_order_filter.advance": (
+        COEFFICIENTS, POSE[0], np.ones((3, 2)), np.zeros(3),
+    ),
+    "aloft.mathematics.pid.start_pid": (GAINS, POSE[0], POSE[2], PidMemory(*np.ones((3, 3)))),
+    "aloft.mathematics.pid.step_pid": (
+        GAINS, POSE[0], POSE[2], POSE[3], PidMemory(*np.ones((3, 3))), np.zeros(3),
+    ),
+    "aloft.mathematics.lookup.interval": (np.linspace(-1.0, 1.0, 9), 0, 9, 0.3),
+    "aloft.mathematics.lookup.interpolate": (np.linspace(-1.0, 1.0, 4), POSE[:, 2], 0.3, True),
+    "aloft.mathematics.lookup.interpolate_grid": (
+        np.array([0.0, 1.0, 2.0, 4.0]), np.array([2, 2]), POSE[:, 1], np.array([0.3, 5.0]), False,
+        np.zeros(2, np.int64), np.zeros(2),
+    ),
+    "aloft.mathematics.transfer_function.advance": (
+        POSE[1:], POSE[0], TARGET[0], 0.5, POSE[:, 0], TARGET, np.zeros(3), np.zeros(4),
+    ),
+    "aloft.mathematics.euler_angles.from_euler": (POSE[1], np.zeros(4)),
+    "aloft.mathematics.euler_angles.to_euler": (np.array([0.1, 0.2, 0.3, 0.92]), np.zeros(3)),
+    "aloft.mathematics.whole_body_qp.share_weight": (
+        np.array([True, False, True, True]), 50.0, np.zeros((4, 3)),
+    ),
+}  # fmt: skip
+"""Arguments of kernels that ``graphs/jump.yaml`` does not call with either estimator."""
