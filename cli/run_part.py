@@ -10,6 +10,7 @@ from ..runtime.language.errors import AloftError
 from ..runtime.language.stages import CheckedGraph
 from ..runtime.links.key_folder import check_endpoints, secured
 from ..runtime.links.part import BoundPart, run_part
+from ..runtime.links.showing import Showing
 from ..runtime.links.zenoh_transport import ZenohTransport
 from ..runtime.placement.place import place
 from ..runtime.running.run_result import RunResult
@@ -55,7 +56,9 @@ class Part:
 
     def run(self, *, sinks: Sequence[Sink], log: bool, plain: bool = False) -> RunResult:
         """Run the part once."""
-        self._result = run_part(self.bound, sinks=sinks, log=log, plain=plain)
+        bound = self.bound
+        showing = Showing(bound.machine, bound.transport, bound.others, bound.inboxes)
+        self._result = run_part(bound, sinks=[*sinks, showing], log=log, plain=plain)
         return self._result
 
     def about(self) -> Mapping[str, Any]:

@@ -16,7 +16,7 @@ from .transport import beacon_key, data_key, tick_key
 from .zenoh_transport import as_chunk, prefix_of
 
 WATCH = "watch"
-"""What parts say of themselves to whoever may watch: keys ``watch/MACHINE/...``."""
+"""What parts say of themselves to whoever may watch: keys ``watch/MACHINE/...``; see ``showing``."""
 
 
 def keys_from(placed: PlacedGraph, sender: str, receiver: str) -> list[str]:

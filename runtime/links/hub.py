@@ -72,6 +72,15 @@ class HubTransport:
 
         return send
 
+    @property
+    def is_open(self) -> bool:
+        """Whether it has entered the hub."""
+        return bool(self.machine)
+
+    def shower(self, key: str) -> Take:
+        """What shows something to observers: a hub has no priorities."""
+        return self.publisher(key)
+
     def subscribe(self, key: str, take: Take) -> None:
         """Have messages taken until this end is closed."""
 

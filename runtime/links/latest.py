@@ -83,6 +83,7 @@ class LatestInbox:
 
     Attributes:
         heard_at: when the newest message came, by ``clock``; zero before the first.
+        age: of the message at the last tick of the reader [ns].
     """
 
     def __init__(
@@ -98,7 +99,7 @@ class LatestInbox:
         self.link = link
         self.policy = policy
         self.received = self.lost = self.surplus = self.damaged = self.late_ticks = 0
-        self.heard_at = 0
+        self.heard_at = self.age = 0
         self._reader = reader
         self._others = others
         self._health = health
@@ -165,7 +166,7 @@ class LatestInbox:
         if message is not None and message is not self._shown and not safe:
             self._reader.show(message.payload)
             self._shown = message
-        self._ages[self._count % KEPT] = age
+        self.age = self._ages[self._count % KEPT] = age
         self._count += 1
         self._write(message, now, age, late)
 

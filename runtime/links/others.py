@@ -115,6 +115,16 @@ class Others:
         return link in self._checked
 
     @property
+    def graph_hash(self) -> str:
+        """The hash of the graph that this part runs."""
+        return self._hashes[0]
+
+    @property
+    def phase(self) -> Phase:
+        """How far this part is."""
+        return self._phase
+
+    @property
     def started(self) -> bool:
         """Whether all blocks of this part have started."""
         return self._phase >= Phase.STARTED

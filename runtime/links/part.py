@@ -134,7 +134,7 @@ class BoundPart(BoundGraph):
         )
         self.inboxes: list[Inbox | LatestInbox] = []
         self.path_ages: list[PathAges] = []
-        self._transport = transport
+        self.transport = transport
         conductor = self._block(CONDUCTOR, Conductor)
         for path, phase in ((PREPARED, Phase.PREPARED), (STARTED, Phase.STARTED)):
             self._block(path, Gate).connect(conductor, phase)
@@ -190,10 +190,10 @@ class BoundPart(BoundGraph):
         for inbox in self.inboxes:
             link = inbox.link
             key = data_key(link.sender, link.receiver, link.source)
-            self._transport.subscribe(key, inbox.hear)
+            self.transport.subscribe(key, inbox.hear)
         for link in self.placed.sent_by(self.machine):
             writer = MessageWriter(link, layout, bus, self.others.run)
-            put = self._transport.publisher(data_key(link.sender, link.receiver, link.source))
+            put = self.transport.publisher(data_key(link.sender, link.receiver, link.source))
             self._block(sender_path(link), Send).connect(writer, put)
 
     def _in_order_of_start(self) -> dict[str, Block]:

@@ -23,6 +23,14 @@ class Transport(Protocol):
     def publisher(self, key: str) -> Take:
         """What sends a message under ``key`` to whoever subscribes to it."""
 
+    @property
+    def is_open(self) -> bool:
+        """Whether it is connected."""
+
+    def shower(self, key: str) -> Take:
+        """What shows something under ``key`` to observers: at the lowest priority, and dropped where
+        a queue is full."""
+
     def subscribe(self, key: str, take: Take) -> None:
         """Have every message under ``key`` taken."""
 
@@ -38,6 +46,16 @@ def data_key(sender: str, receiver: str, source: str) -> str:
 def beacon_key(sender: str, receiver: str) -> str:
     """The key under which a machine says how far it is."""
     return f"beacon/{sender}/{receiver}"
+
+
+def status_key(machine: str) -> str:
+    """The key under which a machine tells observers how it does."""
+    return f"watch/{machine}/status"
+
+
+def rows_key(machine: str) -> str:
+    """The key under which a machine shows its signals to observers."""
+    return f"watch/{machine}/rows"
 
 
 def tick_key(sender: str, receiver: str) -> str:

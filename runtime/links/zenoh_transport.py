@@ -133,6 +133,26 @@ class ZenohTransport:
     def _keep(self, declared: Any) -> None:
         self._kept.append(declared)
 
+    @property
+    def is_open(self) -> bool:
+        """Whether it is connected."""
+        return self._session is not None
+
+    def shower(self, key: str) -> Take:
+        """A publisher that never delays any other."""
+        import zenoh
+
+        publisher = self._session.declare_publisher(
+            f"{self._prefix}/{as_chunk(key)}",
+            congestion_control=zenoh.CongestionControl.DROP,
+            express=False,
+            priority=zenoh.Priority.BACKGROUND,
+            reliability=zenoh.Reliability.BEST_EFFORT,
+        )
+        self._keep(publisher)
+        put: Take = publisher.put
+        return put
+
     def publisher(self, key: str) -> Take:
         """A publisher whose messages go out at once."""
         import zenoh

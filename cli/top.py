@@ -1,0 +1,132 @@
+"""``aloft top``: shows the machines of a graph that runs: rates, ages, losses, overruns."""
+
+from __future__ import annotations
+
+import time
+from contextlib import suppress
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from ..runtime.language.errors import AloftError, ExitCode
+from .output import SET_HELP, console, errors_reported, print_json, table
+
+if TYPE_CHECKING:
+    from rich.console import Group
+
+    from ..runtime.links.observer import Observer
+
+PERIOD = 0.5
+
+Keys = Annotated[
+    Path | None, typer.Option(help="The folder of `aloft keys`, or the observer's own, for TLS.")
+]
+As = Annotated[str, typer.Option("--as", help="The observer's name, of `aloft keys --observer`.")]
+
+
+def top(
+    graph: Annotated[Path, typer.Argument(help="The graph file that the machines run.")],
+    once: Annotated[bool, typer.Option("--once", help="Print it once, and end.")] = False,
+    wait: Annotated[float, typer.Option(min=0.1, help="With --once: seconds to wait.")] = 5.0,
+    keys: Keys = None,
+    name: As = "viewer",
+    overrides: Annotated[list[str] | None, typer.Option("--set", help=SET_HELP)] = None,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="With --once: print one JSON object.")
+    ] = False,
+) -> None:
+    """Show what runs on each machine. Nothing is sent; the graph does not notice."""
+    with errors_reported(as_json):
+        if as_json and not once:
+            raise AloftError("--json is for --once")
+        with observer_of(graph, overrides or [], keys, name) as observer:
+            machines = tuple(spec.name for spec in observer.placed.machines)
+            if not once:
+                _live(observer)
+                return
+            missing = observer.wait_for(machines, wait)
+            about = report(observer)
+            if as_json:
+                found = "" if not missing else f"nothing was heard of {', '.join(missing)}"
+                print_json({"success": not missing, "reason": found, "machines": about})
+            else:
+                console().print(_tables(observer))
+    raise typer.Exit(ExitCode.NOT_SUCCESSFUL if missing else ExitCode.SUCCESS)
+
+
+def observer_of(graph: Path, overrides: list[str], keys: Path | None, name: str) -> Observer:
+    """An observer of a graph's machines, not yet connected.
+
+    Raises:
+        AloftError: the graph is wrong, names no machines, or does not fit the keys.
+    """
+    from ..runtime.links.key_folder import secured
+    from ..runtime.links.observer import Observer
+    from ..runtime.loading import load
+    from ..runtime.placement.place import place
+
+    placed = place(load(graph, overrides))
+    return Observer(placed, None if keys is None else secured(placed, keys, name))
+
+
+def report(observer: Observer) -> dict[str, Any]:
+    """The status of each machine; of one that was never heard only its state."""
+    return {
+        spec.name: {
+            "state": observer.state_of(spec.name),
+            "silent_s": observer.seconds_since(spec.name),
+            **observer.statuses.get(spec.name, {}),
+        }
+        for spec in observer.placed.machines
+    }
+
+
+def _live(observer: Observer) -> None:
+    from rich.live import Live
+
+    with (
+        suppress(KeyboardInterrupt),
+        Live(_tables(observer), console=console(), screen=False, auto_refresh=False) as shown,
+    ):
+        while True:
+            time.sleep(PERIOD)
+            shown.update(_tables(observer), refresh=True)
+
+
+def _tables(observer: Observer) -> Group:
+    from rich.console import Group
+
+    machines, links = [], []
+    for name, found in report(observer).items():
+        known = "tick" in found
+        machines.append(
+            (
+                name,
+                str(found["state"]),
+                str(found["tick"]) if known else "",
+                f"{found['rate_hz']:.1f} of {found['base_rate_hz']:g}" if known else "",
+                str(found["overruns"]) if known else "",
+                str(found["skipped_periods"]) if known else "",
+                "" if found["silent_s"] is None else f"{found['silent_s']:.1f}",
+            )
+        )
+        for link in found.get("links", ()):
+            links.append(
+                (
+                    link["name"],
+                    str(link["received"]),
+                    f"{link['age_ms']:.1f}" if "age_ms" in link else "",
+                    str(link.get("late_ticks", "")),
+                    str(link.get("lost", "")),
+                    str(link["damaged"]),
+                    str(link["surplus"]),
+                )
+            )
+    columns = ("machine", "state", ">tick", ">rate [Hz]", ">overruns", ">skipped", ">heard [s ago]")
+    parts = [table(observer.placed.graph.name, columns, machines)]
+    if links:
+        columns = ("link", ">messages", ">age [ms]", ">late ticks", ">lost", ">damaged",
+                   ">twice or late")  # fmt: skip
+        parts.append(table("", columns, links))
+    return Group(*parts)
