@@ -16,10 +16,11 @@ from pathlib import Path
 import numba
 import numpy as np
 import pytest
-from kernel_samples import UNUSED
 
 import aloft
 from aloft.mathematics.kernel import kernel, kernels
+
+from .kernel_samples import UNUSED
 
 ROOT = Path(__file__).parent.parent
 ROOMS = ("mathematics", "blocks", "hal")
