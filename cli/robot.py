@@ -12,6 +12,7 @@ import typer
 from ..runtime.language.errors import AloftError, ExitCode
 from .output import console, errors_reported, print_error, print_json, say, table
 from .robot_bench import add_bench_verbs
+from .robot_identify import identify
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -26,6 +27,7 @@ robot = typer.Typer(
 )
 
 add_bench_verbs(robot)
+robot.command("identify")(identify)
 
 Name = Annotated[str, typer.Argument(help="A robot of ours, or a YAML, URDF or MJCF file.")]
 ModelFile = Annotated[Path, typer.Argument(help="The URDF or MJCF file.")]

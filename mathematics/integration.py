@@ -111,10 +111,10 @@ class Implicit:
         """Find k = f(time, base + h GAMMA k) from a first guess."""
         at, f, residual = self._at, self._f, self._residual
         for _ in range(NEWTON_STEPS):
-            size = 1e-300
+            size, large = 1e-300, 0.0
             for i in range(len(k)):
                 at[i] = self._base[i] + h * GAMMA * k[i]
-                size = max(size, abs(k[i]))
+                size, large = max(size, abs(k[i])), max(large, abs(at[i]))
             self._factorise(time, at, h)
             for i in range(len(k)):
                 residual[i] = f[i] - k[i]
@@ -124,7 +124,7 @@ class Implicit:
                 k[i] += residual[i]
                 correction = max(correction, abs(residual[i]))
             # what is left is of the size of the correction's square, or of rounding in x / h
-            if correction <= CONVERGED * size + 1e-15 * _largest(at) / h:
+            if correction <= CONVERGED * size + 1e-15 * large / h:
                 return
         raise ArithmeticError(
             f"the implicit step of {h:g} s at {time:g} s does not converge; take more substeps"
@@ -172,10 +172,3 @@ class Implicit:
             for j in range(i + 1, n):
                 vector[i] -= matrix[i, j] * vector[j]
             vector[i] /= matrix[i, i]
-
-
-def _largest(values: Array) -> float:
-    largest = 0.0
-    for value in values:
-        largest = max(largest, abs(float(value)))
-    return largest

@@ -19,8 +19,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..mathematics.kernel import kernel
-from ..mathematics.least_squares import solve_damped
-from ..mathematics.linear import multiply_matrices
 from ..mathematics.rotations import wrap
 from .limb import FootKind, chain_to, foot_shape
 from .robot_description import RobotDescription
@@ -34,8 +32,8 @@ _FAR = 10.0
 _SLANT = 1e-3
 """Below this sine of the angle between the foot's line and the line from hip to sole, the leg
 plane is undefined and blends into the upright one."""
-_GIMBAL = 1e-3
-"""Below this cosine of the hip pitch, yaw and roll turn about one axis and yaw is held."""
+LEVEL = 1e-3
+"""The least ``level`` of ``inverse``: nearer to gimbal lock the exact yaw would be noise."""
 
 
 @dataclass(frozen=True)
@@ -184,7 +182,8 @@ def inverse(
     sole: Array,
     line: Array,
     softness: float,
-    present_yaw: float,
+    kept_yaw: float,
+    level: float,
     out: Array,
 ) -> tuple[bool, float]:
     """The joint angles (5,) that bring the sole centre to ``sole`` and its line along ``line``.
@@ -197,12 +196,19 @@ def inverse(
     ever faster; therefore, within ``softness`` of the full length d, the distance approaches d as
     d - softness exp(-(x - d + softness) / softness).
 
+    Where the thigh is level, hip yaw and roll turn about one axis (gimbal lock): a foot that is a
+    few millimetres beside its planned place would ask for any yaw, and for the opposite one as soon
+    as the thigh is past that pose. Therefore, where the cosine of the hip's pitch is less than
+    ``level``, the yaw goes over to ``kept_yaw`` and the roll takes up the rest. The thigh then points
+    past its place by at most ``level`` times the yaw that is left out.
+
     Args:
         hip, plane, signs, limits: of the ``Leg``; limits with any margin already taken off.
         sole: where the sole centre should be [m, base frame].
         line: the direction from heel to toe [base frame], of any length.
         softness: see above [m]; zero for none.
-        present_yaw: the yaw angle that is kept where the hip is in gimbal lock [rad].
+        kept_yaw: the robot's hip yaw that is kept in gimbal lock [rad].
+        level: see above; at least 1e-3, with which the answer is exact to 1e-3 of gimbal lock.
         out: the robot's angles [rad].
 
     Returns:
@@ -251,14 +257,15 @@ def inverse(
     zx, zy = cos_t * ux - sin_t * fx, cos_t * uy - sin_t * fy
 
     # The thigh's axes are yaw, then pitch, then roll. Of the two answers for yaw the one with the
-    # roll below a right angle; in gimbal lock the present yaw, and roll takes up the rest.
+    # roll below a right angle; in gimbal lock the kept yaw, and roll takes up the rest.
     flat = math.sqrt(xx * xx + xy * xy)
     yaw = math.atan2(xy, xx)
     if ny * math.cos(yaw) - nx * math.sin(yaw) < 0.0:
         yaw = wrap(yaw + math.pi)
-    if flat < _GIMBAL:
-        present = wrap(present_yaw * float(signs[0]))
-        yaw = present + flat / _GIMBAL * wrap(yaw - present)
+    share_of_yaw = yaw_share(flat, level)
+    if share_of_yaw < 1.0:
+        kept = wrap(kept_yaw * float(signs[0]))
+        yaw = kept + share_of_yaw * wrap(yaw - kept)
     cos_y, sin_y = math.cos(yaw), math.sin(yaw)
     out[0] = yaw
     out[1] = math.atan2(xz, cos_y * xx + sin_y * xy)
@@ -275,49 +282,12 @@ def inverse(
 
 
 @kernel
-def inverse_velocity(
-    sole_jacobian: Array,
-    rotation: Array,
-    velocity: Array,
-    line_rate: Array,
-    length: float,
-    damping: float,
-    rows: Array,
-    turns: Array,
-    normal: Array,
-    out: Array,
-) -> None:
-    """Joint velocities (5,) for a sole velocity and a rate of the foot's line.
-
-    Least squares, damped: (A'A + damping^2) out = A'b. A's rows are the sole's velocity and, times
-    ``length``, the two turns of the line.
-
-    Args:
-        sole_jacobian: from ``jacobian``.
-        rotation: the foot's, from ``forward``.
-        velocity: of the sole [m/s, base frame].
-        line_rate: the time derivative of the line's unit direction [1/s, base frame].
-        length: the distance that a rotation by 1 rad is equal to [m].
-        damping: in m; 1e-4 has no effect until a leg is within 1e-4 rad of full stretch.
-        rows, turns, normal: scratch of shapes (5, 5), (3, 5) and (5, 5).
+def yaw_share(flat: float, level: float) -> float:
+    """How much of the hip's exact yaw counts where ``flat`` is the cosine of its pitch: all of it
+    from ``level`` on, nothing in gimbal lock, and between them 3 s^2 - 2 s^3 with s = flat / level.
     """
-    multiply_matrices(rotation.T, sole_jacobian[3:6, :], turns)
-    turn = nod = 0.0
-    for i in range(3):
-        turn += float(rotation[i, 1]) * float(line_rate[i])
-        nod -= float(rotation[i, 2]) * float(line_rate[i])
-    for j in range(5):
-        for i in range(3):
-            rows[i, j] = sole_jacobian[i, j]
-        rows[3, j] = length * float(turns[2, j])
-        rows[4, j] = length * float(turns[1, j])
-    # With the task (velocity, length * turn, length * nod), whose product with the rows is:
-    for j in range(5):
-        value = length * (float(rows[3, j]) * turn + float(rows[4, j]) * nod)
-        for i in range(3):
-            value += float(rows[i, j]) * float(velocity[i])
-        out[j] = value
-    solve_damped(rows, damping, normal, out)
+    part = min(abs(flat) / max(level, LEVEL), 1.0)
+    return part * part * (3.0 - 2.0 * part)
 
 
 @kernel

@@ -13,6 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..mathematics.kernel import kernel
+from ..mathematics.least_squares import solve_damped
+from ..mathematics.linear import multiply_matrices
 from .five_joint_leg import inverse
 
 Array = NDArray[np.float64]
@@ -44,7 +46,8 @@ def slide(
     sole: Array,
     rotation: Array,
     softness: float,
-    present_yaw: float,
+    kept_yaw: float,
+    level: float,
     place: Array,
     angles: Array,
 ) -> tuple[bool, float]:
@@ -56,7 +59,7 @@ def slide(
     is found by bisection, to within a 256th of their distance.
 
     Args:
-        hip, plane, signs, limits, softness, present_yaw: as for ``five_joint_leg.inverse``.
+        hip, plane, signs, limits, softness, kept_yaw, level: as for ``five_joint_leg.inverse``.
         sole, rotation: the target's place and axes, of which the third is normal to the sole.
         place: scratch (3,).
         angles: out, the joint angles (5,) for that place; as they were where there is none.
@@ -86,7 +89,7 @@ def slide(
             place[1] = ay + part * (sy - ay)
             place[2] = az + part * (sz - az)
             inside, kept = inverse(
-                hip, plane, signs, limits, place, line, softness, present_yaw, angles
+                hip, plane, signs, limits, place, line, softness, kept_yaw, level, angles
             )
             if inside:
                 near, share = part, kept
@@ -96,7 +99,7 @@ def slide(
                 far = part
             if last:
                 return True, share
-    inverse(hip, plane, signs, limits, sole, line, softness, present_yaw, angles)
+    inverse(hip, plane, signs, limits, sole, line, softness, kept_yaw, level, angles)
     return False, 1.0
 
 
@@ -154,3 +157,55 @@ def line_rate(line: Array, last: Array, period: float, known: bool, out: Array) 
     scale = 0.0 if jumped or not known else 1.0 / period
     out[0], out[1], out[2] = scale * dx, scale * dy, scale * dz
     last[0], last[1], last[2] = x, y, z
+
+
+@kernel
+def inverse_velocity(
+    sole_jacobian: Array,
+    rotation: Array,
+    velocity: Array,
+    line_rate: Array,
+    length: float,
+    damping: float,
+    held: float,
+    kept_rate: float,
+    rows: Array,
+    turns: Array,
+    normal: Array,
+    out: Array,
+) -> None:
+    """Joint velocities (5,) for a sole velocity and a rate of the foot's line.
+
+    Least squares, damped: (A'A + damping^2) out = A'b. A's rows are the sole's velocity, times
+    ``length`` the two turns of the line, and times ``held length`` the hip's yaw.
+
+    Args:
+        sole_jacobian: from ``jacobian``.
+        rotation: the foot's, from ``forward``.
+        velocity: of the sole [m/s, base frame].
+        line_rate: the time derivative of the line's unit direction [1/s, base frame].
+        length: the distance that a rotation by 1 rad is equal to [m].
+        damping: in m; 1e-4 has no effect until a leg is within 1e-4 rad of full stretch.
+        held: from 0 to 1, how much the hip's yaw keeps to ``kept_rate``; see ``yaw_share``.
+        kept_rate: of the robot's hip yaw near gimbal lock [rad/s].
+        rows, turns, normal: scratch of shapes (6, 5), (3, 5) and (5, 5).
+    """
+    multiply_matrices(rotation.T, sole_jacobian[3:6, :], turns)
+    turn = nod = 0.0
+    for i in range(3):
+        turn += float(rotation[i, 1]) * float(line_rate[i])
+        nod -= float(rotation[i, 2]) * float(line_rate[i])
+    for j in range(5):
+        for i in range(3):
+            rows[i, j] = sole_jacobian[i, j]
+        rows[3, j] = length * float(turns[2, j])
+        rows[4, j] = length * float(turns[1, j])
+        rows[5, j] = 0.0
+    rows[5, 0] = held * length
+    # With the task (velocity, length * turn, length * nod), whose product with the rows is:
+    for j in range(5):
+        value = length * (float(rows[3, j]) * turn + float(rows[4, j]) * nod)
+        for i in range(3):
+            value += float(rows[i, j]) * float(velocity[i])
+        out[j] = value + float(rows[5, j]) * held * length * kept_rate
+    solve_damped(rows, damping, normal, out)

@@ -6,14 +6,22 @@ that a leg is one call.
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..mathematics.kernel import kernel
-from .five_joint_leg import Leg, forward, inverse, inverse_velocity, jacobian
-from .five_joint_reach import keep_along, line_rate, pitched_line, slide, slow_stretch
+from .five_joint_leg import Leg, forward, inverse, jacobian, yaw_share
+from .five_joint_reach import (
+    inverse_velocity,
+    keep_along,
+    line_rate,
+    pitched_line,
+    slide,
+    slow_stretch,
+)
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -70,13 +78,14 @@ class LegSettings(NamedTuple):
     """Settings that may change during a run, each an array of one element.
 
     ``softness`` [m], ``turn_length`` [m] and ``damping`` [m] are those of ``inverse`` and
-    ``inverse_velocity``; ``speed_limit`` [rad/s] limits the joints' velocities; ``slides`` says
+    ``inverse_velocity``; ``level`` says where the hip's yaw is kept; ``speed_limit`` [rad/s] limits the joints' velocities; ``slides`` says
     whether a foot out of reach slides in the plane of its sole first.
     """
 
     softness: Array
     turn_length: Array
     damping: Array
+    level: Array
     speed_limit: Array
     slides: Flags
 
@@ -89,15 +98,13 @@ def leg_geometry(leg: Leg, margin: float) -> LegGeometry:
 
 def leg_scratch() -> LegScratch:
     """Zero memory for one leg."""
-    shapes = (3, 3, 5, 5, 3, (3, 3), 3, 3, (6, 5), (5, 5), (3, 5), (5, 5))
+    shapes = (3, 3, 5, 5, 3, (3, 3), 3, 3, (6, 5), (6, 5), (3, 5), (5, 5))
     return LegScratch(*(np.zeros(shape) for shape in shapes))
 
 
 def leg_settings() -> LegSettings:
     """Settings that are all zero."""
-    return LegSettings(
-        np.zeros(1), np.zeros(1), np.zeros(1), np.zeros(1), np.zeros(1, dtype=np.bool_)
-    )
+    return LegSettings(*(np.zeros(1) for _ in range(5)), np.zeros(1, dtype=np.bool_))
 
 
 @kernel
@@ -130,7 +137,8 @@ def follow_foot(
     leg: LegGeometry,
     number: int,
     foot: FootMotion,
-    measured: Array,
+    kept: Array,
+    kept_rates: Array,
     settings: LegSettings,
     scratch: LegScratch,
     target: LegTargets,
@@ -139,12 +147,14 @@ def follow_foot(
 
     Args:
         number: the foot's.
-        measured: angles of all joints [rad], (n_joints,), for where any angle is a solution.
+        kept, kept_rates: angles [rad] and velocities [rad/s] of all joints, (n_joints,), of which the
+            hip's yaw takes over those of its joint where the thigh is level.
         scratch: with the line and its rate from ``watch_line``.
         target: out; only the leg's joints are written.
     """
     angles, speeds, turn, velocity = scratch.angles, scratch.speeds, scratch.turn, scratch.velocity
-    softness, yaw = float(settings.softness[0]), float(measured[leg.joints[0]])
+    softness, level = float(settings.softness[0]), float(settings.level[0])
+    yaw, yaw_rate = float(kept[leg.joints[0]]), float(kept_rates[leg.joints[0]])
     inside, share = inverse(
         leg.hip,
         leg.plane,
@@ -154,6 +164,7 @@ def follow_foot(
         scratch.line,
         softness,
         yaw,
+        level,
         angles,
     )
     target.reachable[number] = inside
@@ -162,7 +173,7 @@ def follow_foot(
     if settings.slides[0] and not inside:
         slid, kept = slide(
             leg.hip, leg.plane, leg.signs, leg.limits, foot.position, foot.rotation, softness, yaw,
-            scratch.place, angles,
+            level, scratch.place, angles,
         )  # fmt: skip
         if slid:
             share = kept
@@ -170,9 +181,10 @@ def follow_foot(
     forward(leg.hip, leg.plane, leg.signs, angles, scratch.sole, turn)
     jacobian(leg.plane, leg.signs, angles, scratch.jacobian)
     slow_stretch(leg.hip, leg.plane, scratch.sole, turn, share, velocity)
+    held = 1.0 - yaw_share(math.cos(float(angles[1])), level)
     inverse_velocity(
         scratch.jacobian, turn, velocity, scratch.rate, float(settings.turn_length[0]),
-        float(settings.damping[0]), scratch.rows, scratch.turns, scratch.normal, speeds,
+        float(settings.damping[0]), held, yaw_rate, scratch.rows, scratch.turns, scratch.normal, speeds,
     )  # fmt: skip
     limit = float(settings.speed_limit[0])
     for i in range(5):

@@ -5,14 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from contextlib import closing
 from dataclasses import dataclass
-from pathlib import Path
 from time import perf_counter
 
-from ..runtime.graph import Graph
 from ..runtime.language.errors import AloftError, ExitCode
 from ..runtime.running.run_result import RunResult
 from .batch.jobs import job_results
-from .expansion import Cell, Job, job, load_cell
+from .expansion import Cell, Job, job, seeded_graph
 from .journal import Journal, Outcome
 
 
@@ -39,12 +37,8 @@ def run_job(work: Job) -> Outcome:
         AloftError: the process was told to stop.
     """
     begin = perf_counter()
-    graph, origin = Path(work.graph), Path(work.origin)
-    include = [Path(file) for file in work.include]
-    seeded: Graph = load_cell(graph, include, work.overrides, origin)
-    seeds = dict.fromkeys(seeded.seed_parameters, work.seed)
     try:
-        result = load_cell(graph, include, {**work.overrides, **seeds}, origin).run(log=False)
+        result = seeded_graph(work).run(log=False)
     except AloftError as error:
         text = str(error)
         return Outcome(False, text, error=text, wall_time_s=perf_counter() - begin)

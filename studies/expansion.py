@@ -144,6 +144,18 @@ def load_cell(
     return Graph(load_text(f"include: {text_of(files)}\n", origin, overrides))
 
 
+def seeded_graph(work: Job) -> Graph:
+    """The graph of one run: that of its cell, with the seed in all of its parameters for seeds.
+
+    Raises:
+        LoadError: the graph cannot be loaded.
+    """
+    graph, origin = Path(work.graph), Path(work.origin)
+    include = [Path(file) for file in work.include]
+    seeds = load_cell(graph, include, work.overrides, origin).seed_parameters
+    return load_cell(graph, include, {**work.overrides, **dict.fromkeys(seeds, work.seed)}, origin)
+
+
 def job(cell: Cell, seed: int) -> Job:
     """A run of the cell, for another process."""
     return Job(

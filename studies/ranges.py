@@ -11,6 +11,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -88,9 +89,13 @@ def draw(found: Range, generator: np.random.Generator) -> Any:
     """One value from the range, as a parameter takes it."""
     if found.choices:
         return found.choices[int(generator.integers(len(found.choices)))]
+    return value_at(found, [float(generator.random()) for _ in found.bounds])
+
+
+def value_at(found: Range, shares: Sequence[float]) -> Any:
+    """The value at a share, from 0 to 1, of each of its numbers' ranges."""
     values = []
-    for low, high in found.bounds:
-        share = float(generator.random())
+    for (low, high), share in zip(found.bounds, shares, strict=True):
         if found.log:
             number = math.exp(math.log(low) + share * (math.log(high) - math.log(low)))
         else:

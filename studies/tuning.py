@@ -81,13 +81,21 @@ def tuning_runs(study: Study, chosen: Sequence[Cell]) -> list[tuple[str, int, Ru
     for arm in study.arms:
         mine = [cell for cell in chosen if cell.arm == arm.name]
         for each in draws(arm, study.tuning):
-            for cell in mine:
-                where = Position(f"draw {each.number} of arm {arm.name}", 0, 0)
-                tried = cell.with_sets(each.values, where)
-                if each.values:
-                    text = f"{cell.key} {text_of(dict(each.values))}"
-                    tried = replace(tried, key=hashlib.sha256(text.encode()).hexdigest()[:24])
-                found += [(arm.name, each.number, Run(tried, s)) for s in study.tuning.seeds]
+            found += [(arm.name, each.number, run) for run in draw_runs(study, arm, each, mine)]
+    return found
+
+
+def draw_runs(study: Study, arm: Arm, each: Draw, mine: Sequence[Cell]) -> list[Run]:
+    """The runs of one draw on the checked cells of its arm."""
+    assert study.tuning is not None
+    found = []
+    for cell in mine:
+        where = Position(f"draw {each.number} of arm {arm.name}", 0, 0)
+        tried = cell.with_sets(each.values, where)
+        if each.values:
+            text = f"{cell.key} {text_of(dict(each.values))}"
+            tried = replace(tried, key=hashlib.sha256(text.encode()).hexdigest()[:24])
+        found += [Run(tried, seed) for seed in study.tuning.seeds]
     return found
 
 
@@ -101,21 +109,23 @@ def best_draws(study: Study, done: Sequence[tuple[str, int, Run]]) -> dict[str, 
             if name == arm.name:
                 by_draw.setdefault(number, []).append(run)
         tried = [
-            _scored(each, by_draw[each.number], study.tuning.least)
+            scored(each, by_draw[each.number], study.tuning.least)
             for each in draws(arm, study.tuning)
             if each.number in by_draw
         ]
         if tried:
-            best[arm.name] = min(tried, key=_order)
+            best[arm.name] = min(tried, key=order)
     return best
 
 
-def _order(found: Draw) -> tuple[float, float, int]:
+def order(found: Draw) -> tuple[float, float, int]:
+    """What is least for the best draw."""
     least = math.inf if math.isnan(found.least) else found.least
     return -found.successes, least, found.number
 
 
-def _scored(found: Draw, runs: Sequence[Run], least: str) -> Draw:
+def scored(found: Draw, runs: Sequence[Run], least: str) -> Draw:
+    """The draw with the results of its runs."""
     outcomes = [run.outcome for run in runs if run.outcome is not None]
     values = [float(o.metrics[least]) for o in outcomes if o.metrics.get(least) is not None]
     mean = math.fsum(values) / len(values) if values else math.nan
@@ -143,12 +153,14 @@ def definition(study: Study) -> str:
     return hashlib.sha256(text_of(searched).encode()).hexdigest()[:16]
 
 
-def write_tuned(study: Study, best: Mapping[str, Draw]) -> Path:
-    """Write the best parameters of every arm. Raises ``AloftError``."""
+def write_tuned(study: Study, best: Mapping[str, Draw], found_by: str = "study --tune") -> Path:
+    """Write the best parameters of every arm, and by which command. Raises ``AloftError``."""
     assert study.tuning is not None
     tuning = study.tuning
+    verb, _, option = found_by.partition(" ")
+    option = f" {option}" if option else ""
     lines = [
-        f"# What `aloft study {study.path.name} --tune` found; its runs take it from here.",
+        f"# What `aloft {verb} {study.path.name}{option}` found; its runs take it from here.",
         f"definition: {text_of(definition(study))}",
         f"seeds: {text_of(list(tuning.seeds))}",
         f"draws_per_arm: {tuning.draws}",

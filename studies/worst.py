@@ -13,7 +13,7 @@ from ..runtime.language.errors import AloftError
 from ..runtime.running.run_result import RunResult
 from ..runtime.running.sinks import Sink
 from .execution import Run
-from .expansion import job, load_cell
+from .expansion import job, seeded_graph
 from .journal import Outcome
 from .study import Study
 
@@ -32,9 +32,14 @@ def worst_first(runs: Sequence[Run]) -> list[Run]:
 def _rank(run: Run) -> tuple[int, float]:
     outcome = run.outcome
     assert outcome is not None
+    tilt = tilt_of(outcome)
+    return (0 if outcome.error else 2 if outcome.success else 1), 0.0 if tilt is None else -tilt
+
+
+def tilt_of(outcome: Outcome) -> float | None:
+    """How far the robot leant at most [deg], where that is known."""
     tilt = outcome.metrics.get(TILT)
-    lean = -float(tilt) if isinstance(tilt, int | float) and not isnan(tilt) else 0.0
-    return (0 if outcome.error else 2 if outcome.success else 1), lean
+    return float(tilt) if isinstance(tilt, int | float) and not isnan(tilt) else None
 
 
 def labels_of(run: Run) -> str:
@@ -65,13 +70,7 @@ def file_name(run: Run) -> str:
 
 def run_again(run: Run, sinks: Sequence[Sink]) -> RunResult:
     """Make the run once more. Raises ``AloftError`` where it cannot be set up."""
-    work = job(run.cell, run.seed)
-    graph, origin = Path(work.graph), Path(work.origin)
-    include = [Path(file) for file in work.include]
-    seeded = load_cell(graph, include, work.overrides, origin)
-    seeds = dict.fromkeys(seeded.seed_parameters, work.seed)
-    again = load_cell(graph, include, {**work.overrides, **seeds}, origin)
-    return again.run(sinks=sinks, log=False)
+    return seeded_graph(job(run.cell, run.seed)).run(sinks=sinks, log=False)
 
 
 def write_page(
@@ -109,8 +108,8 @@ def _result(run: Run) -> str:
 
 def _tilt(run: Run) -> str:
     assert run.outcome is not None
-    tilt = run.outcome.metrics.get(TILT)
-    return f"{tilt:.1f}" if isinstance(tilt, int | float) else ""
+    tilt = tilt_of(run.outcome)
+    return "" if tilt is None else f"{tilt:.1f}"
 
 
 def with_outcomes(runs: Sequence[Run], outcomes: Mapping[str, Outcome]) -> list[Run]:

@@ -94,6 +94,10 @@ class LegInverseKinematics(Block):
     somersault depends on how far the legs are tucked, so its rotation is right only if all joints
     follow the plan.
 
+    Where a thigh is level, hip yaw and roll turn about one axis: a foot a few millimetres beside its
+    planned place would ask for any yaw. The closed form keeps the yaw of the plan there, or straight
+    ahead if there is no plan: below ``level``, the cosine of the hip's pitch, it goes over to it.
+
     Joints that the description holds have their held position as the target; other joints that
     belong to no leg have their measured position. The block does not avoid collisions between the
     legs. The load report names every joint that carries two feet and is not held.
@@ -122,6 +126,10 @@ class LegInverseKinematics(Block):
             le=0.05,
             text="distance from full stretch over which a leg slows down",
         )
+        level: float = live_parameter(
+            0.3, ge=0.001, le=1.0,
+            text="cosine of the hip's pitch below which the hip's yaw goes over to the plan's",
+        )  # fmt: skip
         follow: Literal["feet", "pitch", "plan"] = parameter(
             "feet", text="the feet's targets; those with the soles' planned pitch; or the plan's "
             "joints as long as the plan flies"
@@ -134,8 +142,11 @@ class LegInverseKinematics(Block):
     params: Params
 
     feet = Input(FootTarget, text="where the feet should be, relative to the base")
-    joints = Input(JointState, text="measured joints, kept where any angle is a solution")
-    reference = Input(JumpReference, default={}, text="the plan, where its joints are followed")
+    joints = Input(JointState, text="measured joints, where the least squares begin")
+    reference = Input(
+        JumpReference, default={},
+        text="the plan: its joints, where they are followed, and its hip yaw where a thigh is level",
+    )  # fmt: skip
     target = Output(JointTarget, text="joint angles and velocities to track")
     memory = State(LegMemory, text="the last targets and the last solution")
 
@@ -174,6 +185,7 @@ class LegInverseKinematics(Block):
         p, settings = self.params, self.leg_settings
         settings.softness[0], settings.turn_length[0] = p.softness, p.turn_length
         settings.damping[0], settings.speed_limit[0] = p.damping, p.speed_limit
+        settings.level[0] = p.level
         settings.slides[0] = p.beyond == "slide"
 
     def step(self) -> None:
@@ -209,7 +221,8 @@ class _ClosedForm:
         self._follow = KernelCall(
             follow_foot, leg_geometry(leg, block.params.margin), foot,
             FootMotion(feet.position[foot], feet.velocity[foot], feet.rotation[foot]),
-            block.joints.position, block.leg_settings, scratch,
+            block.reference.joint_position, block.reference.joint_velocity, block.leg_settings,
+            scratch,
             LegTargets(target.position, target.velocity, target.reachable),
         )  # fmt: skip
 

@@ -64,8 +64,8 @@ class MassEstimator(Block):
     it is an unknown too: the offset that is found then is the one for which the robot balances.
     The height of the torso's centre of mass is hardly observable while the torso is level.
 
-    Before anything is measured the estimate is the description's, with the standard deviations
-    ``mass_spread`` and ``com_spread``. Equations further than ``gate`` standard deviations off,
+    Before anything is measured the estimate is ``mass`` and ``com_offset``, by default the
+    description's, with the standard deviations ``mass_spread`` and ``com_spread``. Equations further than ``gate`` standard deviations off,
     such as those during a push, are left out. The outputs follow the estimate with the time
     constant ``smoothing``, because controllers follow them. From the first thrust on the estimate
     stays.
@@ -76,6 +76,13 @@ class MassEstimator(Block):
     """
 
     class Params(Parameters):
+        mass: float | None = parameter(
+            None, unit="kg", gt=0.0, text="the robot's mass before; none: the description's"
+        )
+        com_offset: list[float] = parameter(
+            [0.0, 0.0, 0.0], unit="m", min_length=3, max_length=3,
+            text="offset of the torso's CoM before",
+        )  # fmt: skip
         mass_spread: float = parameter(
             0.1, gt=0.0, le=1.0, text="standard deviation of the mass before, as a share"
         )
@@ -165,13 +172,15 @@ class MassEstimator(Block):
         self._step, self._change = np.zeros(4), np.zeros(n)
 
     def start(self) -> None:
-        """Begin with the description and its uncertainty."""
+        """Begin with what was known before, and its uncertainty."""
         p, memory = self.params, self.memory
         deviations = np.empty(len(memory.unknowns))
         deviations[SCALE], deviations[COM:TILT] = p.mass_spread, p.com_spread
         deviations[TILT:FRICTION], deviations[FRICTION:] = p.tilt_std, p.friction_share
         memory.covariance[...] = np.diag(deviations**2)
-        memory.unknowns[SCALE] = memory.published[0] = 1.0
+        scale = 1.0 if p.mass is None else p.mass / self._mass
+        memory.unknowns[SCALE] = memory.published[0] = scale
+        memory.unknowns[COM:TILT] = memory.published[1:] = p.com_offset
 
     def emit(self) -> None:
         memory, out = self.memory, self.estimate

@@ -51,12 +51,14 @@ CONTACT_IMPEDANCE = (0.95, 0.99, 0.001, 0.5, 2.0)
 @dataclass(frozen=True)
 class Variation:
     """The differences from the nominal world: friction coefficient, factor on the stiffness of the
-    contacts, factor on every mass and inertia, offset of the base link's CoM [m, base frame]."""
+    contacts, factor on every mass and inertia, offset of the base link's CoM [m, base frame], factor on
+    the friction and damping of the motors."""
 
     friction: float = 0.7
     contact_stiffness: float = 1.0
     mass: float = 1.0
     base_com_offset: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    joint_friction: float = 1.0
 
 
 def build_mujoco_model(
@@ -239,7 +241,8 @@ def _add_robot(spec: MjSpec, robot: RobotDescription, variation: Variation) -> N
             name=joint.name, type=slide if joint.kind == "slide" else hinge, axis=joint.axis,
             limited=no if joint.limits is None else yes, range=joint.limits or (0.0, 0.0),
             solref_limit=[CONTACT_TIME_CONSTANT, 1.0], armature=armature[k],
-            frictionloss=motors.friction[k], damping=[motors.damping[k], 0.0, 0.0],
+            frictionloss=motors.friction[k] * variation.joint_friction,
+            damping=[motors.damping[k] * variation.joint_friction, 0.0, 0.0],
         )  # fmt: skip
         motor = spec.add_actuator(
             name=f"motor/{joint.name}", target=joint.name, trntype=mujoco.mjtTrn.mjTRN_JOINT

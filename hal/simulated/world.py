@@ -32,7 +32,7 @@ def draw_variation(params: SimulatorParameters) -> Variation:
         for nominal, draw in zip(params.base_com_offset, offsets, strict=True)
     )
     mass = params.mass_scale * (1.0 + params.mass_spread * uniform(Purpose.MASS))
-    return Variation(friction, stiffness, mass, (x, y, z))
+    return Variation(friction, stiffness, mass, (x, y, z), params.joint_friction)
 
 
 def build_world(

@@ -3,7 +3,8 @@
 A file is known by an entry and by the SHA-256 of its content. The entry of a file that a parameter
 names is ``block.parameter: value``. A file that a block found in a folder, which one of its
 parameters names, has the entry ``block.parameter/name``; a file that a block found otherwise has
-the entry ``block: name``.
+the entry ``block: name``. A shipped file that a block found is named from the folder of the shipped
+graphs on.
 """
 
 from __future__ import annotations
@@ -48,8 +49,15 @@ def files_read(bound: BoundGraph) -> dict[str, Path]:
     for path, block in bound.blocks.items():
         folder = getattr(block, "files_folder", "")
         for file in getattr(block, "files_read", ()):
-            found[f"{path}.{folder}/{file.name}" if folder else f"{path}: {file.name}"] = file
+            name = found_name(file)
+            found[f"{path}.{folder}/{name}" if folder else f"{path}: {name}"] = file
     return found
+
+
+def found_name(file: Path) -> str:
+    """What a file that a block found is called: a shipped one by its place, another by its name."""
+    file = file.absolute()
+    return file.relative_to(_SHIPPED).as_posix() if file.is_relative_to(_SHIPPED) else file.name
 
 
 def digests(files: Mapping[str, Path]) -> dict[str, str]:

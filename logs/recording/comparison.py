@@ -1,11 +1,12 @@
 """Writes two runs into one Rerun file, which shows them together in every view.
 
-The file has everything that ``format`` describes, except rows, keyframes and properties: the first
-run below ``first`` and the second one below ``second``. Both runs begin at the same time.
+The file has everything that ``format`` describes, except rows, keyframes and properties: each run
+below the name of its file, as the viewer shows these names. Both runs begin at the same time.
 """
 
 from __future__ import annotations
 
+import re
 from os import PathLike
 from pathlib import Path
 
@@ -27,7 +28,10 @@ def write_comparison(path: str | PathLike[str], first: RecordedRun, second: Reco
     """
     path = Path(path)
     name, other = _labels(first, second)
-    shown = (Shown("first/", name), Shown("second/", other))
+    shown = tuple(
+        Shown(f"{root}/", label)
+        for root, label in zip(_roots(name, other), (name, other), strict=True)
+    )
     layout = recording_blueprint(first.header, shown)
     with opened_stream(path, f"{name} and {other}", layout) as stream:
         for run, place, colors in zip((first, second), shown, (Colors(), OTHER_RUN), strict=True):
@@ -43,3 +47,9 @@ def _labels(first: RecordedRun, second: RecordedRun) -> tuple[str, str]:
         return one, two
     one, two = (str(run.path.parent.name + "/" + run.path.stem) for run in (first, second))
     return (one, two) if one != two else ("first", "second")
+
+
+def _roots(name: str, other: str) -> tuple[str, str]:
+    """The labels as names of entities."""
+    one, two = (re.sub(r"[^A-Za-z0-9_-]+", "_", label) for label in (name, other))
+    return (one, two) if one != two else (f"first_{one}", f"second_{two}")

@@ -54,7 +54,7 @@ def restored(header: Header, text: str, graph_folder: Path, folder: Path) -> Res
     for entry, block, parameter, kind, name in _entries(header):
         content = unpacked(header.contents[header.files[entry]])
         found_in_folder = kind == "/"
-        now = named_file(f"plans/{name}" if found_in_folder else name, graph_folder)
+        now = named_file(name, graph_folder)
         if now is not None and sha256(now.read_bytes()).hexdigest() == header.files[entry]:
             continue
         place = folder / f"{block}.{parameter}"

@@ -19,14 +19,14 @@ class Detail:
             range; without it, only values are left out that do not change.
         row_rate: how often a value is taken [Hz]; by default in every tick.
         picture_rate: how often the scene in 3D is drawn [Hz].
-        estimate: whether it has the estimated robot beside the true one.
+        extras: whether it has the estimated robot beside the true one, and the friction cones.
     """
 
     main_only: bool = False
     tolerance: float | None = None
     row_rate: float | None = None
     picture_rate: float = 100.0
-    estimate: bool = True
+    extras: bool = True
     most: int = 64
 
     def picker(self) -> ChangedRows | ThinnedRows | None:
@@ -36,7 +36,7 @@ class Detail:
         return ChangedRows() if self.tolerance is None else ThinnedRows(self.tolerance)
 
 
-RECORDED = Detail(main_only=True, tolerance=1.0 / 400.0, picture_rate=50.0, estimate=False)
+RECORDED = Detail(main_only=True, tolerance=1.0 / 400.0, picture_rate=50.0, extras=False)
 """What a recording has beside its numbers: enough for a first look with any Rerun. The tolerance is
 less than half a pixel of a plot."""
 WHOLE = Detail()

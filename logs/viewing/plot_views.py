@@ -122,7 +122,7 @@ def feet_plot(header: Header, shown: Sequence[Shown]) -> Any:
         name=f"{FEET} [N]{looks((), shown)}",
         axis_y=rrb.ScalarAxis(range=(RANGE[0] * weight, RANGE[1] * weight)),
         overrides=overrides or None,
-        plot_legend=legend(len(names) * len(shown)),
+        plot_legend=legend(len(names) * len(shown) + 1),
     )
 
 

@@ -57,10 +57,8 @@ class ContactPart(ScenePart):
         arrows = rr.Arrows3D.from_fields(colors=[self.colors.force], radii=[width])
         self.log("contact_forces", arrows)
         thin, thick = 0.0006 * self.scale, 0.002 * self.scale
-        if self.ports.friction:
-            line = cone_lines(self.ports.friction, CONE_HEIGHT * self.scale)
-            cone = rr.LineStrips3D([line], colors=[self.colors.cone], radii=[thin])
-            self.log("friction_cones", cone)
+        cones = rr.LineStrips3D.from_fields(colors=[self.colors.cone], radii=[thin])
+        self.log("friction_cones", cones)
         polygon = rr.LineStrips3D.from_fields(colors=[self.colors.support], radii=[thick])
         self.log("support_polygon", polygon)
 
@@ -79,18 +77,17 @@ class ContactPart(ScenePart):
         counts = np.full(len(position), position.shape[1])
         self.send("contact_forces", moments, arrows.partition(counts))
         loaded = (force != 0.0).any(axis=2)
-        if self.ports.friction:
-            self._write_cones(moments, position, loaded)
+        if self.ports.friction and self.detail.extras:
+            self._write_cones(moments, position, loaded, self.ports.friction)
         self._write_polygon(moments, position, loaded)
 
-    def _write_cones(self, moments: Moments, position: Array, loaded: NDArray[np.bool_]) -> None:
-        """A copy of the cone on each point; those without load are a point in size."""
-        import rerun as rr
-
-        count = position.shape[1]
-        size = np.repeat(loaded.reshape(-1, 1), 3, axis=1).astype(np.float64)
-        copies = rr.InstancePoses3D.columns(translations=position.reshape(-1, 3), scales=size)
-        self.send("friction_cones", moments, copies.partition(np.full(len(position), count)))
+    def _write_cones(
+        self, moments: Moments, position: Array, loaded: NDArray[np.bool_], friction: float
+    ) -> None:
+        cone = cone_lines(friction, CONE_HEIGHT * self.scale)
+        self._write_lines(
+            "friction_cones", moments, position[loaded][:, None] + cone, loaded.sum(1)
+        )
 
     def _write_polygon(self, moments: Moments, position: Array, loaded: NDArray[np.bool_]) -> None:
         polygons = [

@@ -53,6 +53,6 @@ class RobotPart(ScenePart):
 
     def _robots(self) -> list[tuple[str, PoseSource, int]]:
         robots = [("robot", self.ports.pose, self.colors.robot)]
-        if self.ports.estimate is not None and self.detail.estimate:
+        if self.ports.estimate is not None and self.detail.extras:
             robots.append(("estimate", self.ports.estimate, self.colors.estimate))
         return robots

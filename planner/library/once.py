@@ -15,6 +15,7 @@ from typing import Generic, TypeVar
 from ...robots.robot_description import RobotDescription
 from ..checking.validity import require_valid
 from ..task.plan import ARRAYS, JumpPlan
+from .checked_before import unless_passed
 from .jump_table import JumpTable
 from .reference_table import reference_table
 
@@ -57,12 +58,13 @@ def content(plan: JumpPlan, robot: RobotDescription) -> bytes:
 
 
 def require_valid_once(plan: JumpPlan, robot: RobotDescription) -> None:
-    """As ``require_valid``, but only the first time for the same plan and robot in a process.
+    """As ``require_valid``, but only the first time for the same plan, robot and check, in any process.
 
     Raises:
         InvalidPlanError: the plan is not valid.
     """
-    _valid.get(content(plan, robot), lambda: require_valid(plan, robot))
+    key = content(plan, robot)
+    _valid.get(key, lambda: unless_passed(key, lambda: require_valid(plan, robot)))
 
 
 def reference_table_once(plan: JumpPlan, robot: RobotDescription, stand_time: float) -> JumpTable:

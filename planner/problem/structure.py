@@ -23,7 +23,9 @@ from .obstacles import ObstacleRows
 from .stage_functions import Piece
 
 Array = NDArray[np.float64]
-STEP_UP_SHARE, STEP_DOWN_SHARE = 0.45, 0.75
+STEP_UP_SHARE, STEP_DOWN_SHARE = 0.45, 0.5
+"""Shares of the flight at which feet pass a step's edge. Feet that pass a high platform's edge later
+must be drawn up to the falling body first, and then stretched at once."""
 
 
 def _along_feet(stance: Stance) -> Array:

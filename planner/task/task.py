@@ -192,7 +192,7 @@ class JumpTask(FreeTimes):
     def _check_together(self) -> JumpTask:
         if self.rise is not None and self.take_off_speed is not None:
             raise ValueError("give rise or take_off_speed, not both: one follows from the other")
-        own = (self, *(self.jumps or ()))
+        own: tuple[JumpTask | Hop, ...] = (self, *(self.jumps or ()))
         if self.rough is not None and any(
             one.landing_height or one.gap or one.step_edge is not None for one in own
         ):

@@ -38,10 +38,10 @@ def main() -> int:
         signal.signal(number, signal.SIG_IGN)
     head = b""
     while not head.endswith(b"\n"):
-        piece = os.read(0, 1)
-        if not piece:
+        letter = os.read(0, 1)
+        if not letter:
             return 0
-        head += piece
+        head += letter
     told = json.loads(head)
     silent = 0
     while True:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import multiprocessing
 import os
+import pickle
 import signal
 import threading
 from collections import deque
@@ -100,6 +101,13 @@ def _assign(worker: _Worker, job: Numbered | None, begun: dict[int, int]) -> boo
 
 def _start(function: Callable[[Any], Any]) -> _Worker:
     """Start a worker's process. It is spawned, not forked, so it has no state of this process."""
+    try:
+        pickle.dumps(function)
+    except Exception as error:  # the errors and their texts differ between versions of Python
+        raise AloftError(
+            f"{getattr(function, '__qualname__', function)} cannot be sent to another process, which "
+            f"imports it by its name: write it at the top level of a module ({error})"
+        ) from error
     context = multiprocessing.get_context("spawn")
     here, there = context.Pipe()
     process = context.Process(target=_work, args=(there, function), daemon=True)

@@ -185,6 +185,31 @@ def test_tuning_writes_a_file_that_the_runs_take(
     )
 
 
+def test_optuna_proposes_and_a_lost_part_is_made_again(
+    study: Path, folder: Path, call: Call, call_json: CallJson
+) -> None:
+    assert "grid.yaml has no section 'tune'" in call("tune", "grid.yaml", code=2).stderr
+    pytest.importorskip("optuna")
+    ranges = "{set: {counter.goal: 90}, tune: {counter.goal: [80, 120]}}"
+    text = STUDY.replace("{counter.goal: 1101}", ranges).replace("{}", "{counter.goal: 90}")
+    study.write_text(text + "tune: {seeds: 5:7, draws: 12, where: {stop: 1 s}, ranges: {}}\n")
+    said = call_json("tune", "grid.yaml", "--workers", "1")
+    assert (said["draws_per_arm"], said["seeds"], said["errors"]) == (12, [5, 6], 0)
+    assert said["arms"]["low"] == {"draw": 0, "successes": 0, "n": 2, "set": {}}
+    assert said["arms"]["high"]["successes"] == 2
+    journal = folder / "results" / "grid" / "tuning.jsonl"
+    lines = journal.read_bytes().splitlines(keepends=True)
+    assert 20 <= len(lines) <= 2 + 12 * 2  # two draws may be the same
+    journal.write_bytes(b"".join(lines[:9]))
+    written = (folder / "grid.tuned.yaml").read_text()
+    assert written.startswith("# What `aloft tune grid.yaml` found; its runs take it from here.")
+    assert call_json("tune", "grid.yaml", "--workers", "1") == said
+    assert (folder / "grid.tuned.yaml").read_text() == written
+    assert len(journal.read_bytes().splitlines()) == len(lines)
+    result = call_json("study", "grid.yaml", "--workers", "1", code=1)
+    assert result["tuned"]["high"] == said["arms"]["high"]["set"]
+
+
 def test_part_of_a_study_and_plots_that_cannot_be_drawn(
     study: Path, folder: Path, call: Call, call_json: CallJson
 ) -> None:

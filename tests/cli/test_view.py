@@ -61,7 +61,7 @@ def test_two_runs_become_one_file(tmp_path: Path) -> None:
     from rerun.chunk import RrdReader
 
     entities = {str(chunk.entity_path) for chunk in RrdReader(both).stream()}
-    for root in ("first", "second"):
+    for root in ("a", "b"):
         assert f"/{root}/signals/robot/truth/com" in entities
         assert any(entity.startswith(f"/{root}/world/robot/") for entity in entities)
 

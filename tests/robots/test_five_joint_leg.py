@@ -6,12 +6,13 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import assume, given
+from hypothesis import assume, example, given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from aloft.robots import five_joint_leg as legs
 from aloft.robots.description import find_robot
+from aloft.robots.five_joint_reach import inverse_velocity
 from aloft.robots.kinematics import link_poses
 
 ROBOT = find_robot("bruce")
@@ -28,11 +29,11 @@ def forward(leg, angles):
     return position, rotation
 
 
-def inverse(leg, sole, line, present_yaw=0.0, softness=0.0):
+def inverse(leg, sole, line, kept_yaw=0.0, softness=0.0, level=legs.LEVEL):
     out = np.full(5, np.nan)
     inside, _ = legs.inverse(
         leg.hip, leg.plane, leg.signs, leg.limits, np.asarray(sole), np.asarray(line),
-        softness, present_yaw, out,
+        softness, kept_yaw, level, out,
     )  # fmt: skip
     return out, inside
 
@@ -81,10 +82,27 @@ def test_inverse_in_gimbal_lock_is_still_exact():
     leg = LEGS[0]
     angles = np.array([0.2, math.pi / 2, 0.1, -1.2, -0.3])
     sole, rotation = forward(leg, angles)
-    out, inside = inverse(leg, sole, rotation[:, 0], present_yaw=0.25)
+    out, inside = inverse(leg, sole, rotation[:, 0], kept_yaw=0.25)
     assert inside
     assert out[0] == pytest.approx(0.25, abs=1e-9)
     assert np.abs(forward(leg, out)[0] - sole).max() < 1e-9
+
+
+@given(sides, st.floats(1.0, 2.2), arrays(np.float64, 3, elements=st.floats(-1.0, 1.0)))
+@example(0, 1.52, np.array([0.0, 1.0, 0.0]))
+@example(1, 1.60, np.array([0.0, 1.0, 0.0]))
+def test_a_thigh_that_passes_level_keeps_its_yaw(side, pitch, beside):
+    """A leg drawn up passes gimbal lock twice. With a foot 5 mm beside its place the exact answer
+    turns the hip by up to a right angle there and half a turn back; with a wide level it does not,
+    and the foot is within 15 mm of its target."""
+    leg = LEGS[side]
+    sole, rotation = forward(leg, [0.0, pitch, 0.0, -1.6, 0.3])
+    target = sole + 0.005 * beside
+    out, inside = inverse(leg, target, rotation[:, 0], kept_yaw=0.0, level=0.3)
+    assert inside
+    assert abs(out[0]) < 0.15
+    assert abs(out[2]) < 0.15
+    assert np.abs(forward(leg, out)[0] - target).max() < 0.015
 
 
 @given(
@@ -139,7 +157,7 @@ def test_a_soft_stretch_slows_the_knee_and_says_by_how_much():
             )
             inside, share = legs.inverse(
                 leg.hip, leg.plane, leg.signs, leg.limits, target, np.array([1.0, 0.0, 0.0]),
-                softness, 0.0, out,
+                softness, 0.0, legs.LEVEL, out,
             )  # fmt: skip
             assert inside == (share == 1.0)
             knees.append(out[3])
@@ -212,9 +230,9 @@ def test_inverse_velocity_undoes_the_jacobian(side, fraction, rate):
     rows = np.vstack([sole_jacobian[:3], rotation[:, 1:].T @ sole_jacobian[3:]])
     assume(np.linalg.svd(rows)[1][-1] > 0.02)
     out = np.empty(5)
-    legs.inverse_velocity(
-        sole_jacobian, rotation, twist[:3], np.cross(twist[3:], rotation[:, 0]), 0.3, 1e-5,
-        np.empty((5, 5)), np.empty((3, 5)), np.empty((5, 5)), out,
+    inverse_velocity(
+        sole_jacobian, rotation, twist[:3], np.cross(twist[3:], rotation[:, 0]), 0.3, 1e-5, 0.0, 0.0,
+        np.empty((6, 5)), np.empty((3, 5)), np.empty((5, 5)), out,
     )  # fmt: skip
     assert np.abs(out - rate).max() < 1e-5
 

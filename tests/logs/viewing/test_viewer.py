@@ -15,6 +15,7 @@ from aloft import load
 from aloft.logs.file.reader import read
 from aloft.logs.recording.comparison import write_comparison
 from aloft.logs.recording.recorder import Recorder
+from aloft.logs.recording.whole_view import write_view
 from aloft.logs.viewing.page_server import OUTSIDE, policy
 from aloft.logs.viewing.viewer import ViewerError, find_program, free_ports, start_viewer
 
@@ -69,9 +70,19 @@ def test_the_viewer_finds_no_fault(recording: Path, tmp_path: Path) -> None:
         viewer.stop()
 
 
+def photograph(client: Any, instant: float, path: Path) -> Any:
+    """The pixels of the viewer at an instant [s], (rows, columns, 3)."""
+    client.set_time("t", duration=instant, play_state="paused")
+    time.sleep(3.0)
+    path.unlink(missing_ok=True)
+    client.save_screenshot(str(path))
+    return np.asarray(Image.open(path).convert("RGB")).astype(int)
+
+
 @pytest.mark.long
 @needs_vulkan
-def test_the_ground_is_drawn_and_forces_are_zero_in_flight(tmp_path: Path) -> None:
+@pytest.mark.parametrize("whole", [False, True], ids=["the file itself", "aloft view"])
+def test_the_ground_is_drawn_and_forces_are_zero_in_flight(tmp_path: Path, whole: bool) -> None:
     """What a picture of a jump onto a step must show, counted in pixels of the colours drawn."""
     from rerun.experimental import ViewerClient
 
@@ -83,17 +94,18 @@ def test_the_ground_is_drawn_and_forces_are_zero_in_flight(tmp_path: Path) -> No
     assert recording.stat().st_size < 4200 * len(run.ticks)
     force = run["robot.truth.contact_force"]
     flight = np.flatnonzero(~(force != 0.0).any(axis=(1, 2)) & (run.time > 0.5))
-    viewer = start_viewer("headless", [recording], size="1600x900")
+    drawn = write_view(tmp_path / "view.rrd", run)
+    viewer = start_viewer("headless", [drawn if whole else recording], size="1600x900")
     try:
         client = ViewerClient.connect(viewer.source)
         check_views(client, len(run.ticks))
-        client.set_time("t", duration=float(run.time[flight].mean()), play_state="paused")
-        time.sleep(3.0)
-        client.save_screenshot(str(picture))
+        standing = photograph(client, 0.2, picture)
+        pixels = photograph(client, float(run.time[flight].mean()), picture)
     finally:
         viewer.stop()
-    pixels = np.asarray(Image.open(picture).convert("RGB")).astype(int)
     scene, plots = pixels[60:530, :635], pixels[:, 645:]
+    cones = near(standing[60:530, :635], (255, 183, 77), 30).sum()
+    assert not whole or cones > 40, "friction cones under the feet, where all is drawn"
     assert near(scene, (141, 146, 153), 45).sum() > 2000, "the step is there"
     assert near(scene, (229, 57, 53), 40).sum() == 0, "no force arrow in flight"
     view = plots[365:590, 475:]  # the plot of the forces on the feet

@@ -17,6 +17,11 @@ from aloft.robots.description import find_robot
 ROBOT = find_robot("bruce")
 
 
+@pytest.fixture(autouse=True)
+def _own_cache(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+
+
 @pytest.fixture(scope="module")
 def plan():
     found = PlanLibrary(ROBOT).find(read_task(shipped_graphs() / "tasks" / "in_situ_12cm.yaml"))

@@ -13,6 +13,7 @@ from typing import Any
 
 import pytest
 
+from aloft.runtime.language.errors import AloftError
 from aloft.runtime.language.units import parse_unit
 from aloft.studies.batch.job import JobResult, attempt
 from aloft.studies.batch.jobs import job_results, processors, run_jobs
@@ -118,7 +119,7 @@ def test_what_on_result_raises_stops_the_jobs() -> None:
 
 
 def test_a_function_that_has_no_name_is_refused() -> None:
-    with pytest.raises(Exception, match=r"[Pp]ickle"):
+    with pytest.raises(AloftError, match="cannot be sent to another process"):
         results(lambda x: x, [1])
 
 

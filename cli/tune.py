@@ -1,0 +1,77 @@
+"""``aloft tune``: search the parameters of a study's graphs with Optuna, against the study's score."""
+
+from __future__ import annotations
+
+import signal
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from ..runtime.language.errors import AloftError, ExitCode
+from .output import console, errors_reported, print_json, say
+from .study_output import print_tuned, tuned_json
+from .study_runs import check_cells, make_all, report_stop
+
+if TYPE_CHECKING:
+    from ..studies.execution import Run
+
+
+def tune(
+    file: Annotated[Path, typer.Argument(help="The study file, which has a section 'tune'.")],
+    out: Annotated[
+        Path | None, typer.Option(help="Folder for the runs; by default results/NAME.")
+    ] = None,
+    workers: Annotated[int, typer.Option(help="Processes; 0: one a core.", min=0)] = 0,
+    cluster: Annotated[str, typer.Option(help="Run on a Dask cluster: tcp://127.0.0.1:8786.")] = "",
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Tables go to standard error, one JSON object to output.")
+    ] = False,
+) -> None:
+    """Search the best parameters of every arm of a study with Optuna (extra 'tune').
+
+    The study says what is searched: ranges, graphs, seeds and the number of draws. 'aloft study
+    FILE --tune' draws at random instead. A search that was stopped goes on where it was. What is
+    found goes into a file beside the study, from which 'aloft study FILE' takes it.
+    """
+    from ..studies import searching, tuning
+    from ..studies.journal import Journal
+    from ..studies.reading import read_study
+
+    screen = console(to_stderr=as_json)
+    with errors_reported(as_json):
+        found = read_study(file)
+        if found.tuning is None:
+            raise AloftError(f"{found.path} has no section 'tune'")
+        tried = tuning.tuning_cells(found)
+        if not tried:
+            raise AloftError(f"{found.path}: 'where' of 'tune' leaves nothing to run")
+        both = [*tried, *tuning.extreme_cells(found, tried)]
+        checked = check_cells(found, both, screen)[: len(tried)]
+        asked: list[Run] = []
+        made: list[Run] = []
+        stops: list[signal.Signals] = []
+        folder = out or Path("results") / found.name
+        with Journal(folder / "tuning.jsonl") as journal:
+
+            def make(runs: Sequence[Run]) -> list[Run] | None:
+                asked.extend(runs)
+                text = f"tuning {found.name}, from run {len(made) + 1}"
+                done = make_all(runs, journal, workers, cluster, screen, text)
+                if isinstance(done, signal.Signals):
+                    stops.append(done)
+                    return None
+                made.extend(done)
+                return done
+
+            best = searching.search(found, checked, make)
+            if best is None:
+                raise typer.Exit(report_stop(stops[0], asked, journal, screen, as_json))
+        path = tuning.write_tuned(found, best, "tune")
+        print_tuned(screen, found, best)
+        say(screen, f"tuned parameters: {path}")
+        if as_json:
+            broken = sum(bool(run.outcome and run.outcome.error) for run in made)
+            print_json(tuned_json(found, best, path, broken))
+    raise typer.Exit(ExitCode.SUCCESS)

@@ -1,0 +1,62 @@
+#!/bin/sh
+# Run the fast tests of the runtime in another environment than .venv:
+#
+#   sh scripts/test_elsewhere.sh newest [PYTHON]   another Python, the newest packages that are allowed
+#   sh scripts/test_elsewhere.sh oldest [PYTHON]   the oldest minor versions that pyproject.toml allows
+#
+# Without PYTHON, `newest` takes the first one it finds whose version is not that of .venv, and does
+# nothing if there is none; `oldest` takes the one that .venv was made with. The environment goes to
+# build/ and is used again. `.ci/run` runs the first; run the second after a change of the lower bounds and
+# before a release. LIMIT bounds the seconds of the installation and of the tests, each.
+set -e
+cd "$(dirname "$0")/.."
+which=$1
+limit=${LIMIT:-85}
+version='import sys; print("%d.%d" % sys.version_info[:2])'
+ours=$(.venv/bin/python -c "$version")
+
+python=$2
+if [ -z "$python" ] && [ "$which" = oldest ]; then
+    python=.venv/bin/python
+elif [ -z "$python" ]; then
+    for candidate in python3.14 python3.13 python3.12 python3.11 "$HOME"/.pyenv/versions/3.1[1-4]*/bin/python; do
+        found=$("$candidate" -c "$version; import ensurepip" 2>/dev/null) || continue
+        case $found in 3.11 | 3.12 | 3.13 | 3.14) ;; *) continue ;; esac
+        if [ "$found" != "$ours" ]; then
+            python=$candidate
+            break
+        fi
+    done
+fi
+if [ -z "$python" ]; then
+    echo "no Python from 3.11 to 3.14 but the $ours of .venv was found; nothing is tested elsewhere"
+    exit 0
+fi
+
+folder=build/elsewhere-$which-$("$python" -c "$version")
+"$python" -m venv "$folder"
+.venv/bin/python - "$which" > "$folder/wanted.txt" <<'PROGRAM'
+import re
+import sys
+import tomllib
+
+with open("pyproject.toml", "rb") as file:
+    project = tomllib.load(file)["project"]
+for text in project["dependencies"]:
+    name, oldest = re.match(r"([\w.-]+)>=([\d.]+)", text).groups()
+    exact = f"{name}~={oldest}.0" if oldest.count(".") == 1 else f"{name}=={oldest}"
+    print(exact if sys.argv[1] == "oldest" else text)
+print("pytest>=8\npytest-xdist>=3.6\nhypothesis>=6.100\njsonschema>=4.21\nscipy>=1.13\nsetuptools>=77")
+PROGRAM
+pip="$folder/bin/python -m pip install -qq --disable-pip-version-check"
+if ! timeout "$limit" $pip -r "$folder/wanted.txt" || ! $pip --no-deps --no-build-isolation --editable .; then
+    echo "the packages could not be installed within $limit s: nothing is tested with $which on $python"
+    exit 0
+fi
+echo "$("$folder/bin/python" --version), the $which packages:"
+OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 timeout "$limit" "$folder/bin/python" -m pytest \
+    --numprocesses auto -m "not long" -p no:cacheprovider \
+    tests/runtime/language tests/runtime/running tests/runtime/loading/test_examine.py \
+    tests/blocks/general/test_pid.py tests/blocks/general/test_transfer_function.py \
+    tests/studies/batch/test_jobs.py tests/planner/solving/test_bounded.py \
+    tests/logs/file tests/cli/test_run.py
