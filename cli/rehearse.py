@@ -51,12 +51,17 @@ def rehearsal(
         AloftError: the graph does not take what is learnt, a run could not be made, or what was
             learnt before is damaged.
     """
-    from ..planner.library.rehearsed import FOLDER, controller_hash, find_rehearsed, keep_rehearsed
+    from ..planner.library.rehearsed import (
+        controller_hash,
+        find_rehearsed,
+        keep_rehearsed,
+        was_rehearsed,
+    )
     from ..runtime.graph import load
     from ..runtime.loading import flatten
     from ..studies.rehearsal import LEVER, corrected_parameters, rehearse
 
-    if not wanted and not (library.folder / FOLDER).is_dir():
+    if not wanted and not was_rehearsed(library, task):
         return {}
     flat = flatten(path, settings)
     # A damaged file must not be in the way of making it anew.

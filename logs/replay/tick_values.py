@@ -36,6 +36,6 @@ class TickValues:
         row = int(known.searchsorted(tick, side="right")) - 1
         _, rows = self._run.window(int(known[row]), int(known[row]) + 1)
         return {
-            name: shown(self._layout.view(rows, name)[0], signal.unit)
+            name: shown(self._layout.view(rows, name)[0], signal.unit or "")
             for name, signal in self._signals.items()
         }

@@ -95,6 +95,11 @@ class PlanLibrary:
         self.folder = user_folder() if folder is None else folder
         self._folders = (*others, self.folder) if folder is None else (self.folder, *others)
 
+    @property
+    def folders(self) -> tuple[Path, ...]:
+        """Where plans are looked for, in that order."""
+        return self._folders
+
     def path_of(self, task: JumpTask) -> Path | None:
         """The file of that very task, or ``None``."""
         for folder in self._folders:

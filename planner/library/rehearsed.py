@@ -113,14 +113,18 @@ def _sources(wires: Any, blocks: Mapping[str, Any]) -> Iterator[str]:
 def find_rehearsed(library: PlanLibrary, task: JumpTask, controller: str) -> Rehearsed | None:
     """What was learnt for the kept plan of a task with that controller, or ``None``.
 
+    What lies in the library's own folder comes before what is shipped.
+
     Raises:
         RehearsalFileError: its file is damaged; the message names it and the fix.
     """
-    if not (library.folder / FOLDER).is_dir():
-        return None
     plan = library.path_of(task)
-    path = None if plan is None else _path(library, plan, controller)
-    if path is None or not path.is_file():
+    if plan is None:
+        return None
+    own_first = sorted(library.folders, key=lambda folder: folder != library.folder)
+    paths = [_path(folder, plan, controller) for folder in own_first]
+    path = next((path for path in paths if path.is_file()), None)
+    if path is None:
         return None
     try:
         data = json.loads(path.read_text("utf-8"))
@@ -136,8 +140,15 @@ def find_rehearsed(library: PlanLibrary, task: JumpTask, controller: str) -> Reh
             f"{path}: expected what a rehearsal has learnt, found a damaged file "
             f"({type(error).__name__}: {error}); remove it, or rehearse again with --rehearse"
         ) from error
-    assert plan is not None
     return found if key == (FORMAT, _hash_of(plan), controller) else None
+
+
+def was_rehearsed(library: PlanLibrary, task: JumpTask) -> bool:
+    """Whether the kept plan of a task was ever rehearsed, with whichever controller."""
+    plan = library.path_of(task)
+    return plan is not None and any(
+        any((folder / FOLDER).glob(f"{plan.stem}.*.json")) for folder in library.folders
+    )
 
 
 def keep_rehearsed(
@@ -153,14 +164,14 @@ def keep_rehearsed(
         raise RehearsalFileError(f"there is no plan of {task.name!r} to keep a rehearsal with")
     key = {"format": FORMAT, "plan": _hash_of(plan), "controller": controller}
     text = json.dumps({**key, **asdict(rehearsed)}, indent=1) + "\n"
-    return write_whole(_path(library, plan, controller), text.encode())
+    return write_whole(_path(library.folder, plan, controller), text.encode())
 
 
 KINDS = ("velocity", "momentum")
 
 
-def _path(library: PlanLibrary, plan: Path, controller: str) -> Path:
-    return library.folder / FOLDER / f"{plan.stem}.{controller}.json"
+def _path(folder: Path, plan: Path, controller: str) -> Path:
+    return folder / FOLDER / f"{plan.stem}.{controller}.json"
 
 
 def _hash_of(plan: Path) -> str:

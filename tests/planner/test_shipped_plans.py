@@ -1,6 +1,8 @@
 """The plans that come with aloft: one for every shipped task, of that very task, and valid."""
 
+import json
 from pathlib import Path
+from typing import Any
 
 import pytest
 from tests.robots.example_robots import INSTALLED
@@ -10,8 +12,10 @@ from aloft.planner.library.library import SHIPPED, PlanLibrary
 from aloft.planner.task.plan import read_plan
 from aloft.planner.task.read_task import read_task
 from aloft.robots.description import find_robot
+from aloft.runtime.graph import load
 
 TASKS = sorted((SHIPPED.parent / "tasks").glob("*.yaml"))
+REHEARSED = sorted((SHIPPED / "rehearsed").glob("*.json"))
 REMEDY = "run: make plans"
 
 
@@ -33,6 +37,17 @@ def test_every_task_has_its_valid_plan(path: Path, tmp_path: Path) -> None:
     report = check_plan(plan, robot)
     assert report.valid, f"{report.explain()}\nthe planner or the check has changed; {REMEDY}"
     assert plan.valid, "the file says so itself"
+
+
+@pytest.mark.parametrize("path", REHEARSED, ids=[path.stem.partition("-")[0] for path in REHEARSED])
+def test_what_was_rehearsed_is_of_the_shipped_plan_and_controller(path: Path) -> None:
+    task = path.stem.partition("-")[0]
+    graph = load(SHIPPED.parent / "jump.yaml", {"plan.task": f"tasks/{task}.yaml"})
+    learnt = json.loads(path.read_text())
+    used: Any = graph.checked.block("targets").params
+    remedy = "the plan or the controller has changed since the rehearsal; " + REMEDY
+    assert list(used.velocity_correction) == learnt["velocity_correction"], remedy
+    assert list(used.momentum_correction) == learnt["momentum_correction"], remedy
 
 
 def test_no_plan_is_there_without_its_task() -> None:

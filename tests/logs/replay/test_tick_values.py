@@ -25,6 +25,7 @@ rate: 100 Hz
 duration: 0.5 s
 blocks:
   wave: {use: blocks.SineWave, with: {n: 2, amplitude: 3 m, frequency: 2 Hz}}
+  plain: {use: blocks.Constant, with: {value: [7], unit: unchecked}}
   twice: {use: blocks.Gain, with: {n: 2, gain: 2}, in: {u: wave.y}}
 """
 
@@ -55,6 +56,7 @@ def test_values_are_those_of_the_run(ran: tuple[RunResult, OpenedRun]) -> None:
         expected = result.signal("twice.y.value")[min(tick, 49)]
         text = values.at(tick)["twice.y.value"]
         assert text.startswith(f"[{expected[0]:.6g}, {expected[1]:.6g}]")
+    assert values.at(0)["plain.y.value"] == "7"
     assert values.times["twice"].startswith("50 runs, median ")
     assert values.times["twice"].endswith("0 deadlines missed")
 
@@ -67,7 +69,7 @@ def test_the_page_asks_for_the_values_of_a_tick(
     assert '<input type="range" id="tick" min="0" max="49" value="0">' in text
     data = json.loads(text.partition('id="data">')[2].partition("</script>")[0])
     assert data["blocks"]["twice"]["sources"] == {"u": "wave.y"}
-    assert data["recorded"]["times"].keys() == {"wave", "twice"}
+    assert data["recorded"]["times"].keys() == {"wave", "plain", "twice"}
     with urllib.request.urlopen(f"{base}/at?tick=17", timeout=20) as answer:
         assert json.loads(answer.read()) == TickValues(ran[1].file).at(17)
     with pytest.raises(urllib.error.HTTPError, match="404"):
