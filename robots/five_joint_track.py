@@ -78,8 +78,9 @@ class LegSettings(NamedTuple):
     """Settings that may change during a run, each an array of one element.
 
     ``softness`` [m], ``turn_length`` [m] and ``damping`` [m] are those of ``inverse`` and
-    ``inverse_velocity``; ``level`` says where the hip's yaw is kept; ``speed_limit`` [rad/s] limits the joints' velocities; ``slides`` says
-    whether a foot out of reach slides in the plane of its sole first.
+    ``inverse_velocity``; ``level`` says where the hip's yaw is kept; ``speed_limit`` [rad/s] limits
+    the joints' velocities; ``slides`` says whether a foot out of reach slides in the plane of its
+    sole first.
     """
 
     softness: Array
@@ -104,7 +105,11 @@ def leg_scratch() -> LegScratch:
 
 def leg_settings() -> LegSettings:
     """Settings that are all zero."""
-    return LegSettings(*(np.zeros(1) for _ in range(5)), np.zeros(1, dtype=np.bool_))
+    numbers = [np.zeros(1) for _ in range(5)]
+    softness, turn_length, damping, level, speed_limit = numbers
+    return LegSettings(
+        softness, turn_length, damping, level, speed_limit, np.zeros(1, dtype=np.bool_)
+    )
 
 
 @kernel
@@ -171,20 +176,20 @@ def follow_foot(
     for i in range(3):
         velocity[i] = min(max(float(foot.velocity[i]), -_FASTEST), _FASTEST)
     if settings.slides[0] and not inside:
-        slid, kept = slide(
+        slid, slid_share = slide(
             leg.hip, leg.plane, leg.signs, leg.limits, foot.position, foot.rotation, softness, yaw,
             level, scratch.place, angles,
         )  # fmt: skip
         if slid:
-            share = kept
+            share = slid_share
             keep_along(foot.rotation[:, 2], velocity)
     forward(leg.hip, leg.plane, leg.signs, angles, scratch.sole, turn)
     jacobian(leg.plane, leg.signs, angles, scratch.jacobian)
     slow_stretch(leg.hip, leg.plane, scratch.sole, turn, share, velocity)
-    held = 1.0 - yaw_share(math.cos(float(angles[1])), level)
+    yaw_held = 1.0 - yaw_share(math.cos(float(angles[1])), level)
     inverse_velocity(
         scratch.jacobian, turn, velocity, scratch.rate, float(settings.turn_length[0]),
-        float(settings.damping[0]), held, yaw_rate, scratch.rows, scratch.turns, scratch.normal, speeds,
+        float(settings.damping[0]), yaw_held, yaw_rate, scratch.rows, scratch.turns, scratch.normal, speeds,
     )  # fmt: skip
     limit = float(settings.speed_limit[0])
     for i in range(5):

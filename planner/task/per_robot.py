@@ -48,4 +48,4 @@ def per_robot(function: _OfRobot[_Parameters, _Result]) -> _OfRobot[_Parameters,
             kept.popitem(last=False)
         return kept[key]
 
-    return called
+    return called  # type: ignore[return-value]  # mypy types what wraps gives by itself

@@ -222,7 +222,7 @@ class _Assembly:
     ) -> Array:  # fmt: skip
         """The covariance that unknown offsets of the encoders and an unknown tilt add."""
         inverse = np.linalg.pinv(weighted.reshape(-1, weighted.shape[2]))
-        found = np.zeros((weighted.shape[2],) * 2)
+        found: Array = np.zeros((weighted.shape[2],) * 2)
         nominal, side, _ = self.blocks(motion, ticks)
         best = inverse @ (side[kept] / scale).ravel()
         changed = [
@@ -236,13 +236,13 @@ class _Assembly:
             rows, right, _ = self.blocks(each, ticks)
             left = (right - rows @ best)[kept] / scale
             shift = inverse @ (left - ((side - nominal @ best)[kept] / scale)).ravel()
-            found += np.outer(shift, shift)
+            found = found + np.outer(shift, shift)
         return found
 
 
 def _solve(rows: Array, right: Array) -> Array:
-    solution: Array = np.linalg.lstsq(rows.reshape(-1, rows.shape[2]), right.ravel(), rcond=None)[0]
-    return solution
+    solution = np.linalg.lstsq(rows.reshape(-1, rows.shape[2]), right.ravel(), rcond=None)[0]
+    return np.asarray(solution, dtype=np.float64)
 
 
 def _clustered(rows: Array, error: Array, where: NDArray[np.int64]) -> Array:
