@@ -31,6 +31,7 @@ NOT_HOT = {
     "blocks.signals.drive_conditions.describe": "of an error byte, for people",
     "blocks.signals.drive_conditions.is_critical": "of an error byte, by integer arithmetic",
     "hal.simulated.start_check._millimetres": "for the text of an error, before a run",
+    "hal.simulated.mujoco_robot._is_whole": "when a graph is loaded",
     "hal.simulated.mujoco_robot._nearest_step": "for the text of an error, when a graph is loaded",
     "hal.simulated.random_streams._signed": "of exact integers, when a run is restored",
     "hal.bear.supervision._first_lasting": "of plain numbers, in the driver's own Python",
