@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from .frontier import frontier
+from .link_delays import link_delays
 from .links import links
 from .planner import planner
 from .random_jumps import jumps
@@ -26,12 +27,13 @@ BENCHMARKS: Mapping[str, Callable[..., list[Row]]] = {
     "planner": planner,
     "recorder": recorder,
     "links": links,
+    "link_delays": link_delays,
     "jumps": jumps,
     "frontier": frontier,
 }
 """All benchmarks by name; each returns its rows."""
-LONG = ("jumps", "frontier")
-"""Those that take an hour or more and run only where they are named."""
+LONG = ("jumps", "frontier", "link_delays")
+"""Those that take minutes or hours and run only where they are named."""
 COUNTED = ("jumps",)
 """Those that can be told how many cases to draw (``count``), and with which ``seed``."""
 SEEDED = ("frontier",)

@@ -15,11 +15,12 @@ from .output import SET_HELP, console, errors_reported, print_json, say, table
 if TYPE_CHECKING:
     from rich.console import Console
 
+    from ..runtime.drawing.values import Values
     from ..runtime.language.stages import CheckedGraph
 
 
 def graph(
-    graph: Annotated[Path, typer.Argument(help="The graph file.")],
+    graph: Annotated[Path, typer.Argument(help="The graph file, or a recording: its graph.")],
     overrides: Annotated[
         list[str] | None,
         typer.Option("--set", help=SET_HELP, autocompletion=parameter_names),
@@ -47,7 +48,9 @@ def graph(
 ) -> None:
     """Print the order of execution, rates, offsets, delays, and every wire with its type.
 
-    With --svg, --png or --web, draw the blocks with their ports and wires.
+    With --svg, --png or --web, draw the blocks with their ports and wires. The page of a recording
+    (RUN.rrd --web) has a slider for the time, and shows the values that a chosen block reads and writes
+    then.
     """
     from ..runtime.loading import load, picture
     from ..runtime.placement.picture import placement_json
@@ -56,7 +59,16 @@ def graph(
     with errors_reported(as_json):
         if as_table + mermaid + flat + as_json + web > 1:
             raise AloftError("choose one of --table, --mermaid, --flat, --json and --web")
-        checked = load(graph, overrides or [])
+        values: Values | None = None
+        if graph.suffix == ".rrd":
+            from ..logs.replay.opened_run import OpenedRun
+            from ..logs.replay.tick_values import TickValues
+
+            opened = OpenedRun.of(graph)
+            checked = opened.load(overrides or [])
+            values = TickValues(opened.file)
+        else:
+            checked = load(graph, overrides or [])
         if svg or png:
             draw_files(checked, closed or (), svg, png, dark=dark)
     if as_json:
@@ -67,7 +79,7 @@ def graph(
     elif flat:
         typer.echo(checked.text, nl=False)
     elif web:
-        serve(checked)
+        serve(checked, values)
     elif as_table or not (svg or png):
         print_table(console(), checked)
 
@@ -103,12 +115,12 @@ def draw_files(
         raise AloftError(f"cannot write the diagram: {error}") from error
 
 
-def serve(graph: CheckedGraph) -> None:
+def serve(graph: CheckedGraph, values: Values | None = None) -> None:
     """Show the diagram in a browser until Ctrl-C is pressed."""
     from ..runtime.drawing.page_server import ADDRESS, page_server
     from .view import open_page
 
-    server = page_server(graph)
+    server = page_server(graph, values=values)
     page = f"http://{ADDRESS}:{server.server_address[1]}/"
     typer.echo(f"{page}\nthe page is there until you press Ctrl-C")
     open_page(page)

@@ -21,6 +21,10 @@ PAGE = ROOT / "docs" / "landing.md"
 QUARTERS = {"ahead": 0, "left": 90, "back": 180, "right": 270}
 """Each with the directions within 45 degrees of it, those at its edges counted half on each side."""
 
+SPEED = 5.118 * (9.80665 * 0.32) ** 0.5
+"""The impulse [N s] that changes BRUCE's speed by sqrt(g h), with h = 0.32 m."""
+SHIPPED = "predicted"
+"""The arm of the shipped law."""
 Row = Mapping[str, Any]
 
 
@@ -29,19 +33,32 @@ def arms_of(rows: Sequence[Row]) -> list[str]:
     return list(dict.fromkeys(row["arm"] for row in rows))
 
 
+def rate(successes: float, runs: float) -> str:
+    """A success rate in percent, or a dash where nothing was run."""
+    return f"{100 * successes / runs:.0f} %" if runs else "-"
+
+
+def impulses_of(rows: Sequence[Row]) -> list[float]:
+    """The impulses [N s] in the study's order."""
+    return list(dict.fromkeys(row["impulse_n_s"] for row in rows))
+
+
+def count(rows: Sequence[Row], **wanted: object) -> tuple[int, int]:
+    """Successes and runs of the rows with these values."""
+    mine = [row for row in rows if all(row[name] == value for name, value in wanted.items())]
+    return sum(row["successes"] for row in mine), sum(row["n"] for row in mine)
+
+
 def impulse_table(rows: Sequence[Row]) -> str:
     """Success over all directions, a line an arm, a column an impulse."""
-    impulses = list(dict.fromkeys(row["impulse_n_s"] for row in rows))
-    lines = [
-        "| arm | " + " | ".join(f"{impulse:g} N s" for impulse in impulses) + " |",
-        "|---" * (len(impulses) + 1) + "|",
-    ]
+    impulses = impulses_of(rows)
+    names = [f"{impulse:g} N s, {impulse / SPEED:.3f} sqrt(g h)" for impulse in impulses]
+    lines = [f"| arm | {' | '.join(names)} |", "|---" * (len(impulses) + 1) + "|"]
     for arm in arms_of(rows):
         cells = []
         for impulse in impulses:
-            mine = [r for r in rows if r["arm"] == arm and r["impulse_n_s"] == impulse]
-            done, n = sum(r["successes"] for r in mine), sum(r["n"] for r in mine)
-            cells.append(f"{done} of {n} ({100 * done / n:.0f} %)")
+            done, n = count(rows, arm=arm, impulse_n_s=impulse)
+            cells.append(f"{done} of {n} ({rate(done, n)})")
         lines.append(f"| {arm} | " + " | ".join(cells) + " |")
     return "\n".join(lines) + "\n"
 
@@ -58,8 +75,26 @@ def quarter_table(rows: Sequence[Row]) -> str:
                 if row["arm"] == arm and away <= 45:
                     share = 0.5 if away == 45 else 1.0
                     done, n = done + share * row["successes"], n + share * row["n"]
-            cells.append(f"{100 * done / n:.0f} %")
+            cells.append(rate(done, n))
         lines.append(f"| {arm} | " + " | ".join(cells) + " |")
+    return "\n".join(lines) + "\n"
+
+
+def direction_table(rows: Sequence[Row]) -> str:
+    """The shipped law's and the best other arm's successes, a line a direction."""
+    impulses = impulses_of(rows)
+    others = [arm for arm in arms_of(rows) if arm != SHIPPED]
+    names = [f"{impulse:g} N s" for impulse in impulses]
+    lines = [f"| direction | {' | '.join(names)} |", "|---" * (len(impulses) + 1) + "|"]
+    for direction in sorted({row["direction_deg"] for row in rows}):
+        cells = []
+        for impulse in impulses:
+            where = {"direction_deg": direction, "impulse_n_s": impulse}
+            done, n = count(rows, arm=SHIPPED, **where)
+            best = max((count(rows, arm=arm, **where)[0] for arm in others), default=0)
+            better = f" (best other arm {best})" if best > done else ""
+            cells.append(f"{done} of {n}{better}")
+        lines.append(f"| {direction:g} deg | " + " | ".join(cells) + " |")
     return "\n".join(lines) + "\n"
 
 
@@ -77,4 +112,5 @@ if __name__ == "__main__":
         every = json.loads(Path(file).read_text())["rows"]
         page = replaced(page, "impulses" + mark, impulse_table(every))
         page = replaced(page, "quarters" + mark, quarter_table(every))
+        page = replaced(page, "directions" + mark, direction_table(every))
     PAGE.write_text(page)

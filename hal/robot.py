@@ -128,6 +128,10 @@ class Robot(Block, ABC):
         health = self.health
         health.state[()] = DrivePhase.DRIVING
         health.condition.fill(HEALTHY)
+        for unmeasured in (health.voltage, health.temperature, health.current, health.age):
+            unmeasured.fill(0.0)
+        health.imu_age[()] = 0.0
+        health.late_cycles[()] = health.lost_answers[()] = 0
         health.stamp[()] = self.tick * self.context.clock.base_period
         health.joints_valid[()] = health.imu_valid[()] = health.contacts_valid[()] = True
 

@@ -201,11 +201,14 @@ def _margins(task: Asked, robot: RobotDescription) -> Iterator[Choice]:
     if "margins" in task.model_fields_set and task.margins is None:
         return
     said = set() if task.margins is None else task.margins.model_fields_set
-    far = max(abs(hop.distance_x or 0.0) for hop in task.hops()) / size_of(robot).height
+    hops = task.hops()
+    # Only for a single jump: in a row nothing squats that deep in front of a step.
+    onto = max(0.0, hops[0].landing_height or 0.0) if len(hops) == 1 else 0.0
+    far = max(abs(hop.distance_x or 0.0) for hop in hops) / size_of(robot).height
     if "squat_lean" not in said and far > FAR:
         why = f"{far:.2g} times the centre of mass's height ahead; without it the torso lies down"
         yield Choice("margins.squat_lean", SQUAT_LEAN, why)
-    elif "squat_lean" not in said and any((hop.landing_height or 0.0) > 0.0 for hop in task.hops()):
+    elif "squat_lean" not in said and onto:
         why = "the torso lies down in front of a step, as the calves keep away from it"
         yield Choice("margins.squat_lean", STEP_LEAN, why)
     if "landing_lean" not in said:
@@ -213,9 +216,9 @@ def _margins(task: Asked, robot: RobotDescription) -> Iterator[Choice]:
     knees = knee_limits(robot, KNEE_BEND)
     if "landing_limits" not in said and knees:
         yield Choice("margins.landing_limits", knees, "it lands on bent knees, which can give way")
-    height = max(abs(hop.landing_height or 0.0) for hop in task.hops())
-    if "step" not in said and any(hop.landing_height for hop in task.hops()):
-        gap = rounded(STEP + STEP_HEIGHT * height)
+    fall = max(0.0, *(-(hop.landing_height or 0.0) for hop in hops))
+    if "step" not in said and any(hop.landing_height for hop in hops):
+        gap = rounded(STEP + STEP_HEIGHT * max(fall, onto))
         yield Choice("margins.step", gap, "a disturbed robot must not touch the step")
     if "joints" not in said:
         room = math.floor(100.0 * min(JOINTS, 0.5 * least_distance_to_limits(robot))) / 100.0

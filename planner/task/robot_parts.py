@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 from numpy.typing import NDArray
 
 from ...robots.description import RobotDescription
 from ...robots.kinematics import link_poses
 from ...robots.limb import chain_to
+from .per_robot import per_robot
 
 Array = NDArray[np.float64]
 SAME_PLACE = 0.01
@@ -36,7 +39,8 @@ def word_of_toes(robot: RobotDescription) -> str:
     return ""
 
 
-def knee_limits(robot: RobotDescription, bend: float) -> dict[str, tuple[float, float]]:
+@per_robot
+def knee_limits(robot: RobotDescription, bend: float) -> Mapping[str, tuple[float, float]]:
     """Limits [rad] that keep every knee bent by that much, by the joint's name or by the part of it
     that is the same for all of them; no more than most of what the standing robot bends them."""
     found: dict[str, tuple[float, float]] = {}
@@ -59,6 +63,7 @@ def knee_limits(robot: RobotDescription, bend: float) -> dict[str, tuple[float, 
     return found
 
 
+@per_robot
 def least_distance_to_limits(robot: RobotDescription) -> float:
     """The least distance [rad] of a joint of the standing robot from its limits."""
     angles, limits = robot.standing_position, robot.joint_limits

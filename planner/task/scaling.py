@@ -16,6 +16,7 @@ import numpy as np
 from ...robots.description import RobotDescription
 from ...robots.kinematics import link_poses
 from ...runtime.language.parameters import Parameters
+from .per_robot import per_robot
 
 MASS, POINTS, HEIGHT = 5.118, 4, 0.3287
 """The robot of the defaults: kg, contact points, m."""
@@ -52,6 +53,7 @@ class Size:
     light: float
 
 
+@per_robot
 def size_of(robot: RobotDescription) -> Size:
     """The size of a robot that stands on something."""
     height = standing_height(robot)

@@ -29,6 +29,7 @@ def _of(row: BlockRow, spec: BlockSpec) -> dict[str, Any]:
         "summary": reference.summary,
         "text": reference.text,
         "inputs": [[item.name, item.text().partition(" <- ")[2]] for item in row.inputs],
+        "sources": {name: wire.source for name, wire in spec.wires.items()},
         "outputs": [[port.name, _fields(port, spec)] for port in reference.outputs],
         "parameters": [
             [item.name, _short(values.get(item.name)), item.unit, item.text]

@@ -13,6 +13,7 @@ from .details import details
 from .diagram import diagram, subgraphs
 from .placing import draw
 from .svg import svg
+from .values import Values
 
 _STYLE = """
 :root{color-scheme:light dark} body{margin:0;font:14px/1.45 'DejaVu Sans',Verdana,Arial,sans-serif;
@@ -47,7 +48,14 @@ function toggle(path) {
   if (!closed.delete(path)) closed.add(path);
   location.search = [...closed].map(p => "closed=" + encodeURIComponent(p)).join("&");
 }
+let chosen = "", now = {};
+function values(title, ports) {
+  rows(title, ports.flatMap(([name, port]) => Object.keys(now).filter(
+    key => key.slice(0, key.lastIndexOf(".")) === port).map(
+    key => [name + "." + key.slice(key.lastIndexOf(".") + 1), now[key]])));
+}
 function show(path) {
+  chosen = path;
   panel.replaceChildren();
   const block = data.blocks[path];
   panel.append(make("h1", path));
@@ -61,10 +69,27 @@ function show(path) {
   panel.append(make("p", block.use + ", " + block.rate + ", number " + block.order +
     " in a tick" + on, "soft"));
   if (block.place) panel.append(make("p", block.place));
+  if (data.recorded) {
+    values("Inputs at this tick", Object.entries(block.sources));
+    values("Outputs at this tick", block.outputs.map(row => [row[0], path + "." + row[0]]));
+    if (data.recorded.times[path]) rows("Time", [["took", data.recorded.times[path]]]);
+  }
   rows("Parameters", block.parameters);
   rows("Inputs", block.inputs);
   rows("Outputs", block.outputs);
   panel.append(make("h2", "Contract"), make("pre", block.text));
+}
+if (data.recorded) {
+  const slider = document.getElementById("tick"), said = document.getElementById("time");
+  let asking = false, asked = "";
+  const ask = async () => {
+    said.textContent = (slider.value * data.recorded.period).toFixed(4) + " s, tick " + slider.value;
+    if (asking || asked === slider.value) return;
+    asking = true; asked = slider.value;
+    try { now = await (await fetch("at?tick=" + asked)).json(); if (chosen) show(chosen); }
+    finally { asking = false; if (asked !== slider.value) ask(); }
+  };
+  slider.oninput = ask; ask();
 }
 const nodeOf = event => event.target.closest(".node");
 drawing.addEventListener("click", e => { const n = nodeOf(e); if (n) show(n.dataset.path); });
@@ -85,17 +110,30 @@ fit();
 """
 
 
-def page(graph: CheckedGraph, closed: Collection[str] = ()) -> str:
-    """The page's text. It asks no other machine for anything."""
+def page(graph: CheckedGraph, closed: Collection[str] = (), values: Values | None = None) -> str:
+    """The page's text. It asks no other machine for anything.
+
+    With ``values`` it has a slider over the ticks of a run, and shows what a chosen block reads and
+    writes there, and the time it took.
+    """
     known = subgraphs(graph)
     shut = [path for path in known if path in closed]
-    data = json.dumps({"blocks": details(graph), "closed": shut})
+    recorded, slider = None, ""
+    if values is not None:
+        first, last = values.ticks
+        recorded = {"period": values.period, "times": dict(values.times)}
+        slider = (
+            f'<label>time <input type="range" id="tick" min="{first}" max="{last}" value="{first}">'
+            '</label><output id="time"></output>'
+        )
+    data = json.dumps({"blocks": details(graph), "closed": shut, "recorded": recorded})
     name = escape(graph.name)
     body = data.replace("<", "\\u003c")
     return (
         f'<!doctype html><html lang="en"><head><meta charset="utf-8"><title>{name}</title>'
         f"<style>{_STYLE}</style></head><body><main><header><h1>{name}</h1>"
         '<button id="fit">fit</button><button id="in">+</button><button id="out">−</button>'
+        f"{slider}"
         '<span class="soft">a click on a block shows what it does</span></header>'
         f"{svg(draw(diagram(graph, shut)), graph.name)}</main>"
         '<aside><p class="soft">Nothing is chosen.</p></aside>'
@@ -109,5 +147,6 @@ def policy() -> str:
     digest = base64.b64encode(hashlib.sha256(_SCRIPT.encode()).digest()).decode()
     return (
         f"default-src 'none'; script-src 'sha256-{digest}'; style-src 'unsafe-inline'; "
+        "connect-src 'self'; "
         "base-uri 'none'; form-action 'self'; frame-ancestors 'none'"
     )

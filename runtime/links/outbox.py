@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 
 from ..language.block import Block
 from .inbox import PROBE
@@ -16,16 +17,18 @@ class Send(Block):
     writer: MessageWriter | None = None
     put: Take | None = None
 
-    def connect(self, writer: MessageWriter, put: Take) -> None:
-        """Take what makes the messages, and what sends them."""
-        self.writer, self.put = writer, put
+    def connect(
+        self, writer: MessageWriter, put: Take, clock: Callable[[], int] = time.monotonic_ns
+    ) -> None:
+        """Take what makes the messages, what sends them, and the time [ns]."""
+        self.writer, self.put, self.now = writer, put, clock
 
     def probe(self) -> None:
         """Send a message that only shows that the link works."""
         assert self.writer is not None and self.put is not None
-        self.put(self.writer.write(PROBE, time.monotonic_ns()))
+        self.put(self.writer.write(PROBE, self.now()))
 
     def step(self) -> None:
         """Send."""
         assert self.writer is not None and self.put is not None
-        self.put(self.writer.write(self.context.clock.tick, time.monotonic_ns()))
+        self.put(self.writer.write(self.context.clock.tick, self.now()))

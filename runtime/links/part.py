@@ -6,7 +6,8 @@ source would have written, and rows of several parts can be laid over one anothe
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import time
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -106,6 +107,7 @@ class BoundPart(BoundGraph):
         transport: what carries messages; the part opens it when it starts.
         patience: the seconds to wait for a message.
         connect_time: the seconds to wait for the others at the start.
+        clock: the time [ns] by which free-running links and the watch of commands go.
 
     Raises:
         PlacementError: there is no such machine.
@@ -122,15 +124,21 @@ class BoundPart(BoundGraph):
         *,
         patience: float = PATIENCE,
         connect_time: float = CONNECT_TIME,
+        clock: Callable[[], int] = time.monotonic_ns,
     ) -> None:
+        self._now = clock
         super().__init__(part_graph(placed, machine))
         assert isinstance(self.clock, PartClock)
-        clock = self.clock
+        own_clock = self.clock
         self.placed = placed
         self.machine = machine
         self.parameters = SpreadParameters(self.blocks)
         self.others = Others(
-            placed, machine, transport, lambda: clock.wish and clock.wish[0], free=self.is_free
+            placed,
+            machine,
+            transport,
+            lambda: own_clock.wish and own_clock.wish[0],
+            free=self.is_free,
         )
         self.inboxes: list[Inbox | LatestInbox] = []
         self.path_ages: list[PathAges] = []
@@ -139,13 +147,13 @@ class BoundPart(BoundGraph):
         for path, phase in ((PREPARED, Phase.PREPARED), (STARTED, Phase.STARTED)):
             self._block(path, Gate).connect(conductor, phase)
         self._make_inboxes(patience)
-        self.watch = CommandWatch(placed, machine, self.inboxes)
+        self.watch = CommandWatch(placed, machine, self.inboxes, clock)
         if self.watch.links:
-            clock.heard, clock.command_limit = self.watch.heard, self.watch.limit
+            own_clock.heard, own_clock.command_limit = self.watch.heard, self.watch.limit
         conductor.connect(
             self.others, transport, self.inboxes,
             {link.name: self._block(sender_path(link), Send) for link in placed.sent_by(machine)},
-            self.parameters, clock=clock, on_open=self._open_links, patience=patience,
+            self.parameters, clock=own_clock, on_open=self.open_links, patience=patience,
             connect_time=connect_time, moves=bool(self._moving()), watch=self.watch,
             elsewhere={s.path: s.machine for s in placed.graph.blocks if s.machine != machine},
         )  # fmt: skip
@@ -158,6 +166,8 @@ class BoundPart(BoundGraph):
         return block
 
     def _make_inboxes(self, patience: float) -> None:
+        if self.is_free:
+            self._block(TICK_TIME, TickTime).now = self._now
         bus, layout = self.memory.bus.buffer.data, self.memory.bus.layout
         for link in self.placed.received_by(self.machine):
             reader = MessageReader(link, layout, bus)
@@ -165,7 +175,9 @@ class BoundPart(BoundGraph):
             if self.is_free:
                 policy = self.placed.graph.links.policy_of(link.source)
                 health = self._block(health_path(link), Health).health
-                inbox = LatestInbox(link, reader, self.others, policy, health, self._ask_to_stop)
+                inbox = LatestInbox(
+                    link, reader, self.others, policy, health, self._ask_to_stop, self._now
+                )
             else:
                 inbox = Inbox(link, reader, self.others, patience)
             self._block(link.source, Received).inbox = inbox
@@ -184,7 +196,7 @@ class BoundPart(BoundGraph):
         still = Block.stop_cycle
         return {p: block for p, block in self.blocks.items() if type(block).stop_cycle is not still}
 
-    def _open_links(self) -> None:
+    def open_links(self) -> None:
         """Declare all links; the transport is open."""
         bus, layout = self.memory.bus.buffer.data, self.memory.bus.layout
         for inbox in self.inboxes:
@@ -194,7 +206,7 @@ class BoundPart(BoundGraph):
         for link in self.placed.sent_by(self.machine):
             writer = MessageWriter(link, layout, bus, self.others.run)
             put = self.transport.publisher(data_key(link.sender, link.receiver, link.source))
-            self._block(sender_path(link), Send).connect(writer, put)
+            self._block(sender_path(link), Send).connect(writer, put, self._now)
 
     def _in_order_of_start(self) -> dict[str, Block]:
         """The blocks in the order in which they start: those that move actuators come last.

@@ -24,13 +24,21 @@ def test_a_push_in_the_air_is_landed(angle):
     assert result.success, result.reason
 
 
+STRONG = {"robot.seed": 70, "push.force": 100.0}
+OFF = {"landing.law": "paper", "landing.w_l": [0.0, 0.0], "landing.w_c": 0.0}
+
+
 def test_without_the_landing_heuristic_the_push_from_behind_ends_in_a_fall():
-    strong = {"robot.seed": 70, "push.force": 100.0}
-    off = {"landing.law": "paper", "landing.w_l": [0.0, 0.0], "landing.w_c": 0.0}
-    assert aloft.load(PUSH, strong).run(log=False).success
-    result = aloft.load(PUSH, strong | off).run(log=False)
+    assert aloft.load(PUSH, STRONG).run(log=False).success
+    result = aloft.load(PUSH, STRONG | OFF | {"step.steps": 0}).run(log=False)
     assert not result.success
     assert result.metrics["peak_tilt_deg"] > 60.0
+
+
+def test_steps_after_touchdown_keep_the_robot_from_that_fall():
+    result = aloft.load(PUSH, STRONG | OFF).run(log=False)
+    assert result.metrics["steps"] >= 2
+    assert result.metrics["peak_tilt_deg"] < 45.0 and result.metrics["final_tilt_deg"] < 5.0
 
 
 def test_the_parametric_jump_goes_higher():

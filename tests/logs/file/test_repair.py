@@ -1,5 +1,6 @@
 """A recording cut anywhere is mended, and what stood whole before the cut is all there."""
 
+import resource
 from pathlib import Path
 
 import numpy as np
@@ -82,3 +83,22 @@ def test_what_cannot_be_mended(tmp_path: Path) -> None:
         repair(tmp_path / "a.rrd")
     with pytest.raises(FileNotFoundError):
         repair(tmp_path / "none.rrd")
+
+
+def test_a_full_disk_does_not_hinder(written: tuple[Path, list[int]], tmp_path: Path) -> None:
+    path, sizes = written
+    cut = tmp_path / "cut.rrd"
+    data = bytearray(path.read_bytes()[: sizes[-1]])
+    data[sizes[2] + 200] ^= 1
+    cut.write_bytes(data)
+    size, file = cut.stat().st_size, cut.stat().st_ino
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, limits[1]))
+    try:
+        done = repair(cut)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    assert len(done.damage) == 1 and cut.stat().st_size < size
+    assert cut.stat().st_ino == file and list(tmp_path.iterdir()) == [cut], "mended in place"
+    ticks = read(cut).ticks
+    assert len(ticks) == (len(sizes) - 1) * BATCH

@@ -12,6 +12,7 @@ from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from threading import Timer
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -19,6 +20,7 @@ import pytest
 from aloft.logs import RecordedRun, RecordingError, read
 from aloft.logs.recording import recorder_link
 from aloft.logs.recording.recorder import Recorder
+from aloft.logs.recording.recorder_process import RecorderProcess, Task
 from aloft.runtime.language.block import Block, Output, State
 from aloft.runtime.language.signals import Field, Signal
 from aloft.runtime.language.stages import CheckedGraph, ClockSpec
@@ -372,3 +374,16 @@ def test_what_a_killed_recorder_left_is_kept(tmp_path: Path) -> None:
     assert "a.part.rrd was left by a run whose recorder was killed; it is kept as" in warning
     assert len(read(tmp_path / "a-cut.rrd").ticks) >= 1000
     assert len(read(tmp_path / "a.rrd").ticks) == 10
+
+
+@pytest.mark.parametrize(
+    ("filled", "waited", "due"),
+    [(250, 0.5, True), (250, 0.4, False), (40, 0.5, False), (40, 1.9, False), (40, 2.0, True)],
+)
+def test_a_slow_simulation_writes_larger_batches(filled: int, waited: float, due: bool) -> None:
+    # half a second of the graph's time at 500 Hz is 250 ticks
+    recorder = object.__new__(RecorderProcess)
+    recorder._task = Task(0, 0, "", 0, 0, flush_period=0.5, sync_period=5.0)
+    recorder._header = SimpleNamespace(base_rate=500.0)  # type: ignore[assignment]
+    recorder._filled = filled
+    assert recorder._flush_is_due(waited) is due

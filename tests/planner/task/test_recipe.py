@@ -114,6 +114,20 @@ def test_far_jumps_keep_the_torso_off_the_thighs() -> None:
     assert far.margins.squat_lean == 0.9
 
 
+@pytest.mark.parametrize(
+    ("height", "lean", "gap"),
+    [("10 cm", 0.85, 0.017), ("-10 cm", None, 0.017), ("-30 cm", None, 0.027)],
+)
+def test_a_step_is_kept_away_from_and_not_lain_down_in_front_of(
+    height: str, lean: float | None, gap: float
+) -> None:
+    margins = resolved(rise="16 cm", distance_x="18 cm", landing_height=height).margins
+    assert margins is not None
+    assert (margins.squat_lean, margins.step) == (lean, gap)
+    row = resolved(landing_height=height, repeat=2).margins
+    assert row is not None and row.squat_lean is None, "in a row nothing squats in front of a step"
+
+
 def test_a_robot_without_soles_has_no_toe_phase() -> None:
     robot = quadruped()
     task = make_task({"name": "a", "robot": "quadruped", "rise": 0.1}).resolved(robot)
