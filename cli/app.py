@@ -27,7 +27,7 @@ Exit codes:
 
 VERBS = (
     "new", "run", "jump", "view", "plot", "replay", "check", "graph", "graphs", "blocks", "plan", "bench", "study", "tune", "test", "params",
-    "keys", "top", "watch", "log", "robot", "twin",
+    "keys", "top", "watch", "log", "robot", "twin", "doctor",
 )  # fmt: skip
 """All verbs, in the order of the help. The file of each has its name, and so has what it offers:
 a command, or a group of commands."""

@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from ..logs.viewing.viewer import Viewer
     from ..runtime.language.stages import CheckedGraph
     from ..runtime.parameter_endpoint import ParameterEndpoint
+    from ..runtime.running.real_time import RealTime
     from ..runtime.running.run_result import RunResult
     from ..runtime.running.sinks import Sink
     from ..studies.batch.seeds import SeedRow
@@ -103,9 +104,20 @@ def run(
         bool,
         typer.Option("--plain", help="Compile nothing: slower, with the same bytes."),
     ] = False,
+    cpu: Annotated[
+        int | None, typer.Option(min=0, help="Pin the control thread to this processor.")
+    ] = None,
+    priority: Annotated[
+        int | None,
+        typer.Option(help="Run the control thread with SCHED_FIFO at this priority, 1 to 99."),
+    ] = None,
+    lock_memory: Annotated[
+        bool, typer.Option("--lock-memory", help="Keep all memory in the machine's (mlockall).")
+    ] = False,
 ) -> None:
     """Run a graph; print its metrics and the time each block took; write a recording."""
     from ..runtime.graph import load
+    from ..runtime.running.real_time import NO_WISHES, RealTime
     from ..studies.batch.seeds import parse_seeds
 
     settings = [*(overrides or []), *([f"duration={duration}"] if duration else [])]
@@ -119,6 +131,9 @@ def run(
             raise AloftError("choose one of --machine, --local and --seeds")
         if keys is not None and not (machine or local):
             raise AloftError("--keys is for links between machines: --machine NAME, or --local")
+        wishes_of_thread = RealTime(cpu, priority, lock_memory)
+        if wishes_of_thread != NO_WISHES and (seeds or local):
+            raise AloftError("--cpu, --priority and --lock-memory are for one run, in one process")
         if local:
             from .run_local import Wishes, run_local
 
@@ -143,6 +158,7 @@ def run(
             code = run_once(
                 loaded, place, out, as_json, sinks, viewer,
                 keep=keep, split=split_time(split), said=said, traceback=traceback, plain=plain,
+                real_time=wishes_of_thread,
             )  # fmt: skip
             if viewer is not None:
                 leave_viewer(viewer, wait=not as_json and sys.stdin.isatty())
@@ -219,7 +235,9 @@ class Runs(Protocol):
     def checked(self) -> CheckedGraph:
         """The graph that runs."""
 
-    def run(self, *, sinks: Sequence[Sink], log: bool, plain: bool) -> RunResult:
+    def run(
+        self, *, sinks: Sequence[Sink], log: bool, plain: bool, real_time: RealTime
+    ) -> RunResult:
         """Run it once."""
 
     def about(self) -> Mapping[str, Any]:
@@ -241,12 +259,14 @@ def run_once(
     times: bool = True,
     traceback: bool = False,
     plain: bool = False,
+    real_time: RealTime | None = None,
 ) -> ExitCode:
     """Run the graph, record and show it, and print the result; ``said`` are warnings so far,
     ``also`` is what else the JSON object has, and ``times`` says whether those of blocks are
     printed."""
     from ..logs.recording.recorder import Recorder
     from ..runtime.running.freeze_guard import FreezeGuard
+    from ..runtime.running.real_time import NO_WISHES
     from .last_words import LastWords
     from .progress import TickCounter, compiling_shown, progress_bar
     from .view import how_to_view
@@ -265,8 +285,9 @@ def run_once(
         last_words = LastWords(name, as_json)
         with FreezeGuard(graph.checked, as_json=as_json) as guard:
             result = graph.run(
-                sinks=[*recorders, counter, last_words, *sinks, guard], log=False, plain=plain
-            )
+                sinks=[*recorders, counter, last_words, *sinks, guard], log=False, plain=plain,
+                real_time=real_time or NO_WISHES,
+            )  # fmt: skip
     recording = recorder.recording if recorder is not None else None
     print_result(out, name, result, times=times)
     if recorder is not None and recording is not None:

@@ -13,6 +13,7 @@ from ..runtime.links.part import BoundPart, run_part
 from ..runtime.links.showing import Showing
 from ..runtime.links.zenoh_transport import ZenohTransport
 from ..runtime.placement.place import place
+from ..runtime.running.real_time import NO_WISHES, RealTime
 from ..runtime.running.run_result import RunResult
 from ..runtime.running.sinks import Sink
 
@@ -54,11 +55,20 @@ class Part:
         """The graph of this part."""
         return self.bound.graph
 
-    def run(self, *, sinks: Sequence[Sink], log: bool, plain: bool = False) -> RunResult:
+    def run(
+        self,
+        *,
+        sinks: Sequence[Sink],
+        log: bool,
+        plain: bool = False,
+        real_time: RealTime = NO_WISHES,
+    ) -> RunResult:
         """Run the part once."""
         bound = self.bound
         showing = Showing(bound.machine, bound.transport, bound.others, bound.inboxes)
-        self._result = run_part(bound, sinks=[*sinks, showing], log=log, plain=plain)
+        self._result = run_part(
+            bound, sinks=[*sinks, showing], log=log, plain=plain, real_time=real_time
+        )
         return self._result
 
     def about(self) -> Mapping[str, Any]:

@@ -22,6 +22,7 @@ from .loading import load as load_checked
 from .loading import load_text
 from .loading.nodes import text_of
 from .running.executor import Executor
+from .running.real_time import NO_WISHES, RealTime
 from .running.run_result import RunResult
 from .running.sinks import Sink
 from .running.stepping import SteppedRun
@@ -59,6 +60,7 @@ class Graph:
         sinks: Sequence[Sink] = (),
         log: bool = True,
         plain: bool = False,
+        real_time: RealTime = NO_WISHES,
     ) -> RunResult:
         """Run the graph from start to close.
 
@@ -68,12 +70,14 @@ class Graph:
             sinks: what else records the run.
             log: whether to keep every signal of every tick.
             plain: whether to run all kernels as plain Python: slower, with the same bytes.
+            real_time: what the control thread asks of the operating system while it ticks.
 
         Returns:
             The outcome; a run that failed is one too, see ``RunResult.raise_if_failed``.
 
         Raises:
-            AloftError: the duration is no time, or a block could not be set up.
+            AloftError: the duration is no time, a block could not be set up, or the operating
+                system refuses what ``real_time`` asks.
         """
         ticks = None
         if duration is not None:
@@ -81,7 +85,9 @@ class Graph:
             if ticks < 1:
                 raise AloftError(f"a run of {duration} s is shorter than one tick")
         sinks = [*path_sinks(self.checked, clock.kind if clock is not None else ""), *sinks]
-        return Executor(self.checked, clock=clock, sinks=sinks, log=log, plain=plain).run(ticks)
+        return Executor(
+            self.checked, clock=clock, sinks=sinks, log=log, plain=plain, real_time=real_time
+        ).run(ticks)
 
     def open(self, *, seed: int | None = None, plain: bool = False) -> SteppedRun:
         """A run that is stepped from Python, for a ``with`` statement; see ``SteppedRun``.

@@ -24,6 +24,7 @@ from .life_cycle import LifeCycle, LifeState
 from .memory import BoundGraph
 from .notes import Note, TakesNotes
 from .pacing import TimeSource, WallTime
+from .real_time import NO_WISHES, RealTime
 from .run_result import RunResult, TakesAbandoned, TakesResult, merge_metrics
 from .sinks import GivesMetrics, MemoryLog, RunHash, Sink
 from .ticker import Ticker, hang_text
@@ -46,9 +47,11 @@ class Executor:
         on_ready: called once all blocks have started, before the first tick; a replay restores a
             keyframe here.
         plain: whether to run all kernels as plain Python, which is slower and gives the same bytes.
+        real_time: what the control thread asks of the operating system while it ticks.
 
     Raises:
         RunError: a block could not be set up.
+        RealTimeError: the operating system refuses what ``real_time`` asks.
         AloftError: the graph's clock is the robot's, and there is none to drive it.
     """
 
@@ -65,7 +68,10 @@ class Executor:
         time_source: TimeSource | None = None,
         on_ready: Callable[[], None] | None = None,
         plain: bool = False,
+        real_time: RealTime = NO_WISHES,
     ) -> None:
+        real_time.check()
+        self._real_time = real_time
         self.bound = graph if isinstance(graph, BoundGraph) else BoundGraph(graph)
         self.life = LifeCycle(self.bound.blocks)
         self._time: TimeSource = time_source or WallTime()
@@ -128,8 +134,9 @@ class Executor:
                         self._on_ready()
                     self.life.move(LifeState.RUNNING)
                     self._note("life", "running")
-                    start_time = self._time.now()
-                    self.ticker.advance(limit)
+                    with self._real_time.granted():
+                        start_time = self._time.now()
+                        self.ticker.advance(limit)
                     if watchdog.hung is not None:
                         raise watchdog.hung
                 finally:  # within the outer try, so that nothing interrupts what follows
