@@ -36,7 +36,7 @@ LONG = ("jumps", "frontier", "link_delays")
 """Those that take minutes or hours and run only where they are named."""
 COUNTED = ("jumps",)
 """Those that can be told how many cases to draw (``count``), and with which ``seed``."""
-SEEDED = ("frontier",)
+SEEDED = ("frontier", "link_delays")
 """Those that can be told the ``seeds`` of the trial to run with."""
 TIMED = ("recorder",)
 """Those that can be told how many ``seconds`` to run in real time."""

@@ -30,7 +30,7 @@ def bench(
         int | None, typer.Option(help="The seed that 'jumps' draws them by.", min=0)
     ] = None,
     seeds: Annotated[
-        str, typer.Option(help="Seeds of the trial for 'frontier'; by default 9000:9020.")
+        str, typer.Option(help="Seeds of the trial for 'frontier' and 'link_delays'.")
     ] = "",
     as_json: Annotated[
         bool, typer.Option("--json", help="Tables go to standard error, one JSON object to output.")
