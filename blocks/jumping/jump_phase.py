@@ -168,6 +168,8 @@ class JumpPhase(Block):
         since = now - float(memory.touchdown) if float(memory.touchdown) >= 0.0 else 0.0
         out.time_since_touchdown[()] = since
         out.stance[...] = memory.stance
+        out.stepping[...] = False  # steps are for CaptureStep to take
+        out.step_acceleration[...] = 0.0
 
 
 @kernel

@@ -92,8 +92,30 @@ def displaced(tick: int) -> Inputs:
 
 def hopping(tick: int) -> Inputs:
     """In the air for ten ticks, on the ground for ten."""
-    phase = {"phase": Phase.FLIGHT, "stance": tick // 10 % 2 == 0}
+    phase = {"phase": Phase.FLIGHT, "stance": tick // 10 % 2 == 0, "stepping": False}
     return {"reference": {"phase": Phase.FLIGHT}, "phase": phase}
+
+
+def tottering(*velocity: float, turning: float = 0.0) -> Callable[[int], Inputs]:
+    """After a touchdown the robot moves so fast that its feet cannot hold it; it stays where it is."""
+    points = np.array([[x, y, 0.0] for y in (-0.076, 0.076) for x in (0.0425, -0.0425)])
+
+    def inputs(tick: int) -> Inputs:
+        since = 0.002 * tick
+        return {
+            "reference": {"time": 2.0, "lift_off_time": 1.0, "touchdown_time": 1.3},
+            "terms": {
+                "contact_position": points, "foot_position": [[0, -0.076, 0], [0, 0.076, 0]],
+                "foot_rotation": [np.eye(3)] * 2, "com": [0, 0, 0.25],
+                "com_velocity": [*velocity, 0], "angular_momentum": [turning, turning, 0],
+            },
+            "before": {
+                "phase": Phase.RECOVER if since > 0.1 else Phase.LANDING, "time_in_phase": since,
+                "time_since_touchdown": since, "stance": True, "stepping": False,
+            },
+        }  # fmt: skip
+
+    return inputs
 
 
 def recovering(tick: int) -> Inputs:
@@ -156,7 +178,19 @@ SCENES: Mapping[str, list[Scene]] = {
         Scene({"law": "predicted"}, reacting),
         Scene({"law": "predicted", "height_range": (0.0, 0.0)}, reacting),
     ],
-    "blocks.LegInverseKinematics": [Scene({"speed_limit": 0.5})],
+    "blocks.CaptureStep": [
+        Scene({"steps": 1, "after": 0.01, "duration": 0.05, "settle": 0.02}, tottering(-0.8, 0.1)),
+        Scene({"steps": 1, "after": 0.01, "reach": 0.02}, tottering(-0.8, 0.1)),
+        Scene({"steps": 1, "after": 0.01, "apart": (0.9, 1.1)}, tottering(0.1, 0.8)),
+        Scene({"steps": 1, "after": 0.01, "apart": (0.9, 1.1)}, tottering(0.1, -0.8)),
+        Scene({"steps": 1, "after": 0.01, "confirmation": 0.05}, tottering(-0.8, 0.0)),
+        Scene({"steps": 1, "after": 0.01, "margin": 0.02}, tottering(-0.393, 0.0)),
+        *(
+            Scene({"steps": 1, "after": 0.01, "turn": 0.9}, tottering(-0.35, 0.0, turning=k))
+            for k in np.linspace(-0.3, 0.3, 7)
+        ),
+    ],
+    "blocks.LegInverseKinematics": [Scene({"speed_limit": 0.5}), Scene({"level": 0.9})],
     "blocks.WholeBodyController": [
         Scene({"force_max": 20.0, "force_min": 1.0}),
         Scene({"tasks": ["ContactPoints", {"task": "Posture", "gains": {"joints": ["*"]}}]}),

@@ -102,8 +102,9 @@ def test_agrees_with_the_closed_form_of_a_five_joint_leg(foot, fraction):
     sole, rotation, closed = np.zeros(3), np.zeros((3, 3)), np.zeros(5)
     five_joint_leg.forward(leg.hip, leg.plane, leg.signs, angles, sole, rotation)
     inside, _ = five_joint_leg.inverse(
-        leg.hip, leg.plane, leg.signs, leg.limits, sole, rotation[:, 0], 0.0, angles[0], closed
-    )
+        leg.hip, leg.plane, leg.signs, leg.limits, sole, rotation[:, 0], 0.0, angles[0],
+        five_joint_leg.LEVEL, closed,
+    )  # fmt: skip
     if not inside:
         return
     target, out = np.zeros((4, 3)), closed + 0.02 * np.array([1.0, -1.0, 1.0, -1.0, 1.0])

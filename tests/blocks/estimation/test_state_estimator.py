@@ -52,8 +52,9 @@ class Motion:
             out = np.empty(5)
             sole = matrix.T @ (foot - self.position(time))
             inside, _ = five_joint_leg.inverse(
-                leg.hip, leg.plane, leg.signs, leg.limits, sole, line, 0.0, 0.0, out
-            )
+                leg.hip, leg.plane, leg.signs, leg.limits, sole, line, 0.0, 0.0,
+                five_joint_leg.LEVEL, out,
+            )  # fmt: skip
             assert inside
             joints[list(leg.joints)] = out
         return joints
