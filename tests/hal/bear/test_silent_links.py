@@ -75,7 +75,8 @@ def test_a_controller_that_is_killed_or_stands_still(
     parts["ground"].send_signal(how)
     bench.wait_for(3)
     found = result(parts["onboard"])
-    assert "600 ms" in found["reason"], found
+    # On a loaded machine the drives' own watchdog may be seen before the part gives up waiting.
+    assert "600 ms" in found["reason"] or "watchdog ran out" in found["reason"], found
     assert found["metrics"]["drives_at_end"] == "damped"
 
 
