@@ -12,7 +12,7 @@ from ...blocks.signals import ExternalForce, RobotTruth
 from ...robots.description import RobotDescription
 from ...runtime.language.block import Context, Input, Metric, Misfit, Output, State
 from ...runtime.language.parameters import Parameters
-from ...runtime.language.terrain import Ground, Terrain
+from ...runtime.language.terrain import Terrain
 from ..drive_gains import gain_misfits, lost_gains
 from ..robot import Robot
 from .drives import Drives
@@ -145,12 +145,7 @@ class MujocoRobot(Robot):
     def terrain(cls, params: Parameters) -> Terrain | None:
         """The scene's floor and boxes."""
         assert isinstance(params, SimulatorParameters)
-        scene = params.build_scene()
-        boxes = (
-            Ground((box.x[0], box.y[0], box.bottom), (box.x[1], box.y[1], box.top))
-            for box in scene.boxes
-        )
-        return Terrain(scene.floor, tuple(boxes))
+        return params.build_scene().terrain()
 
     @classmethod
     def local_dimensions(

@@ -7,10 +7,11 @@ they were. Streams depend on the seed and the purpose's number only.
 from __future__ import annotations
 
 from enum import IntEnum
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from ...runtime.language.random_stream import load_generator, save_generator
 
 
 class Purpose(IntEnum):
@@ -47,10 +48,6 @@ def stream(seed: int, purpose: Purpose) -> np.random.Generator:
     return np.random.Generator(np.random.PCG64(sequence))
 
 
-def _signed(word: int) -> int:
-    return word - (1 << 64) if word >= 1 << 63 else word
-
-
 class RandomStreams:
     """The streams of a run, whose state can be saved as integers and restored exactly."""
 
@@ -63,21 +60,9 @@ class RandomStreams:
     def save(self, out: NDArray[np.int64]) -> None:
         """Write the state of all streams into ``WORDS`` integers."""
         for k, generator in enumerate(self._streams.values()):
-            state = generator.bit_generator.state
-            value = state["state"]["state"]
-            out[3 * k] = _signed(value & (1 << 64) - 1)
-            out[3 * k + 1] = _signed(value >> 64)
-            out[3 * k + 2] = state["has_uint32"] << 32 | state["uinteger"]
+            save_generator(generator.bit_generator, out[3 * k : 3 * k + 3])
 
     def load(self, words: NDArray[np.int64]) -> None:
         """Restore the state; the seed must be the one that the state was saved with."""
-        mask = (1 << 64) - 1
         for k, generator in enumerate(self._streams.values()):
-            low, high, rest = (int(word) & mask for word in words[3 * k : 3 * k + 3])
-            present: Any = generator.bit_generator.state
-            generator.bit_generator.state = {
-                **present,
-                "state": {**present["state"], "state": high << 64 | low},
-                "has_uint32": rest >> 32,
-                "uinteger": rest & (1 << 32) - 1,
-            }
+            load_generator(generator.bit_generator, words[3 * k : 3 * k + 3])

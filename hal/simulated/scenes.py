@@ -12,6 +12,7 @@ from typing import Self
 from pydantic import model_validator
 
 from ...runtime.language.parameters import Parameters, parameter
+from ...runtime.language.terrain import Ground, Terrain
 
 Span = tuple[float, float]
 
@@ -41,6 +42,14 @@ class Scene:
             if box.top > height and box.x[0] <= x <= box.x[1] and box.y[0] <= y <= box.y[1]:
                 height = box.top
         return height
+
+    def terrain(self) -> Terrain:
+        """The same ground as a viewer draws it."""
+        boxes = (
+            Ground((box.x[0], box.y[0], box.bottom), (box.x[1], box.y[1], box.top))
+            for box in self.boxes
+        )
+        return Terrain(self.floor, tuple(boxes))
 
 
 def flat() -> Scene:

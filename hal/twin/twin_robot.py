@@ -10,7 +10,7 @@ from ...robots.description import RobotDescription
 from ...runtime.language.block import Context, Input, Metric, Misfit, Output, State
 from ...runtime.language.parameters import Parameters, parameter
 from ...runtime.language.signals import Field, Signal
-from ...runtime.language.terrain import Ground, Terrain
+from ...runtime.language.terrain import Terrain
 from ..bear.command_queue import CommandQueue
 from ..bear.configuration import Hardware
 from ..bear.driven_robot import DrivenRobot, DriveParameters, read_hardware
@@ -116,12 +116,7 @@ class TwinRobot(DrivenRobot):
     def terrain(cls, params: Parameters) -> Terrain | None:
         """The scene's floor and boxes."""
         assert isinstance(params, SimulatorParameters)
-        scene = params.build_scene()
-        boxes = (
-            Ground((box.x[0], box.y[0], box.bottom), (box.x[1], box.y[1], box.top))
-            for box in scene.boxes
-        )
-        return Terrain(scene.floor, tuple(boxes))
+        return params.build_scene().terrain()
 
     @classmethod
     def local_dimensions(

@@ -26,6 +26,7 @@ import zlib
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .block import Block
 from .signals import Field, Signal
@@ -53,23 +54,33 @@ class RandomStream:
 
     def save(self, state: StreamState) -> None:
         """Write where the stream is; for ``Block.freeze``."""
-        present: Any = self._bits.state
-        number = int(present["state"]["state"])
-        state.words[0] = _signed(number & _MASK)
-        state.words[1] = _signed(number >> 64)
-        state.words[2] = int(present["has_uint32"]) << 32 | int(present["uinteger"])
+        save_generator(self._bits, state.words)
 
     def load(self, state: StreamState) -> None:
         """Go back to where the stream was; for ``Block.thaw``."""
-        low, high, rest = (int(word) & _MASK for word in state.words)
-        present: Any = self._bits.state
-        restored: Any = {
-            **present,
-            "state": {**present["state"], "state": high << 64 | low},
-            "has_uint32": rest >> 32,
-            "uinteger": rest & (1 << 32) - 1,
-        }
-        self._bits.state = restored
+        load_generator(self._bits, state.words)
+
+
+def save_generator(bits: np.random.BitGenerator, words: NDArray[np.int64]) -> None:
+    """Write the state of a PCG64 generator into ``words``, (3,), as ``StreamState`` describes them."""
+    present: Any = bits.state
+    number = int(present["state"]["state"])
+    words[0] = _signed(number & _MASK)
+    words[1] = _signed(number >> 64)
+    words[2] = int(present["has_uint32"]) << 32 | int(present["uinteger"])
+
+
+def load_generator(bits: np.random.BitGenerator, words: NDArray[np.int64]) -> None:
+    """Restore the state from ``words``, (3,); the generator must have the seed it was saved with."""
+    low, high, rest = (int(word) & _MASK for word in words)
+    present: Any = bits.state
+    restored: Any = {
+        **present,
+        "state": {**present["state"], "state": high << 64 | low},
+        "has_uint32": rest >> 32,
+        "uinteger": rest & (1 << 32) - 1,
+    }
+    bits.state = restored
 
 
 def _signed(word: int) -> int:
