@@ -33,7 +33,6 @@ NOT_HOT = {
     "hal.simulated.start_check._millimetres": "for the text of an error, before a run",
     "hal.simulated.mujoco_robot._is_whole": "when a graph is loaded",
     "hal.simulated.mujoco_robot._nearest_step": "for the text of an error, when a graph is loaded",
-    "hal.simulated.random_streams._signed": "of exact integers, when a run is restored",
     "hal.bear.supervision._first_lasting": "of plain numbers, in the driver's own Python",
     "mathematics.body_dynamics.inertias": "memory, when a block is set up",
     "mathematics.body_tree.body_motion": "memory, when a block is set up",

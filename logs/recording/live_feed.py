@@ -27,7 +27,11 @@ WAITING = 64
 PATIENCE = 10.0
 """Seconds without any progress, though there is work, after which the viewer is given up."""
 LAST_WAIT = 3.0
-"""Seconds that the end of the run waits for the viewer to have everything."""
+"""Seconds without progress after which the end of the run no longer waits for the viewer."""
+LONGEST_WAIT = 20.0
+"""Seconds that the end of the run waits for the viewer in all."""
+STARTING = 15.0
+"""Seconds that the viewer library may take to load and to send the scene."""
 
 
 class LiveFeed:
@@ -43,7 +47,8 @@ class LiveFeed:
         self.left_out = 0
         self._source, self._header = source, header
         self._work: Queue[Callable[[RunStream], None] | None] = Queue(WAITING)
-        self._stirred = time.monotonic()
+        self._stirred = self._progressed = time.monotonic()
+        self._started = threading.Event()
         self._thread = threading.Thread(target=self._run, daemon=True)
         self._thread.start()
 
@@ -60,7 +65,12 @@ class LiveFeed:
         if outcome is not None:
             self._put(lambda run: run.write_times(outcome))
         self._put(None)
-        self._thread.join(LAST_WAIT)
+        begun = time.monotonic()
+        while self._thread.is_alive() and time.monotonic() < begun + LONGEST_WAIT:
+            patience = LAST_WAIT if self._started.is_set() else STARTING
+            if time.monotonic() - max(self._progressed, begun) > patience:
+                break
+            self._thread.join(0.05)
         if self._thread.is_alive() and not self.problem:
             self.problem = "the viewer did not take the end of the run"
 
@@ -85,6 +95,8 @@ class LiveFeed:
             stream.connect_grpc(self._source, default_blueprint=layout)
             run = RunStream(stream, header, detail=LIVE)
             run.write_start()
+            self._progressed = time.monotonic()
+            self._started.set()
             while not self.problem:
                 self._stirred = time.monotonic()
                 try:
@@ -94,19 +106,28 @@ class LiveFeed:
                 if work is None:
                     break
                 work(run)
-                _raise_if_severed(stream)
+                if _has_taken(stream):
+                    self._progressed = time.monotonic()
             stream.flush(timeout_sec=LAST_WAIT)
         except Exception as error:  # noqa: BLE001  # whatever it is, the recording goes on
             self.problem = describe(error)
 
 
-def _raise_if_severed(stream: Any) -> None:
-    """Raise if the viewer has gone. Sending does not fail then, so only a flush can tell."""
+def _has_taken(stream: Any) -> bool:
+    """Whether the viewer takes what it was sent within a second.
+
+    Sending does not fail when the viewer has gone, so only a flush can tell.
+
+    Raises:
+        ViewerGoneError: the viewer has gone.
+    """
     try:
         stream.flush(timeout_sec=1.0)
     except RuntimeError as error:
         if "severed" in str(error):
             raise ViewerGoneError("the viewer has been closed") from error
+        return False
+    return True
 
 
 class ViewerGoneError(Exception):
