@@ -21,7 +21,7 @@ PACKAGES = (
 ALLOWED: dict[str, tuple[str, ...]] = {
     "mathematics": (),
     "robots": ("mathematics",),
-    "runtime/language": ("robots",),
+    "runtime/language": ("robots", "mathematics/compiling"),
     "runtime/running": ("runtime/language", "robots", "mathematics/compiling"),
     "runtime/loading": ("runtime/language", "runtime/placement", "robots"),
     "runtime/placement": ("runtime/language", "robots"),

@@ -47,6 +47,7 @@ class Executor:
         on_ready: called once all blocks have started, before the first tick; a replay restores a
             keyframe here.
         plain: whether to run all kernels as plain Python, which is slower and gives the same bytes.
+        fuse: whether blocks of kernels that follow each other are one compiled call.
         real_time: what the control thread asks of the operating system while it ticks.
 
     Raises:
@@ -68,6 +69,7 @@ class Executor:
         time_source: TimeSource | None = None,
         on_ready: Callable[[], None] | None = None,
         plain: bool = False,
+        fuse: bool = True,
         real_time: RealTime = NO_WISHES,
     ) -> None:
         real_time.check()
@@ -92,6 +94,7 @@ class Executor:
         self._opened: list[Sink] = []
         self._on_ready = on_ready
         self._plain = plain
+        self._fuse = fuse and not plain
         self._cautions: list[str] = []
 
     def run(self, ticks: int | None = None) -> RunResult:
@@ -127,6 +130,8 @@ class Executor:
                     interrupts.armed = True
                     self._compile_kernels()
                     self._open_sinks(limit)
+                    if self._fuse:
+                        self.ticker.fuse()
                     self.life.start()
                     self._note("life", "ready: every block has started")
                     self._ask_for_cautions()
