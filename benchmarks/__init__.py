@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from .driver import driver
 from .frontier import frontier
 from .link_delays import link_delays
 from .links import links
@@ -27,6 +28,7 @@ BENCHMARKS: Mapping[str, Callable[..., list[Row]]] = {
     "planner": planner,
     "recorder": recorder,
     "links": links,
+    "driver": driver,
     "link_delays": link_delays,
     "jumps": jumps,
     "frontier": frontier,
