@@ -22,8 +22,10 @@ from .random_jumps import jumps
 from .recorder import recorder
 from .rows import Row
 from .scheduler import scheduler
+from .tick import tick
 
 BENCHMARKS: Mapping[str, Callable[..., list[Row]]] = {
+    "tick": tick,
     "scheduler": scheduler,
     "planner": planner,
     "recorder": recorder,
