@@ -29,6 +29,9 @@ ALLOWED: dict[str, tuple[str, ...]] = {
         "runtime/language", "runtime/loading", "runtime/running", "runtime/placement", "robots",
     ),
     "runtime/drawing": ("runtime/language", "runtime/loading", "robots"),
+    "runtime/live": (
+        "runtime/language", "runtime/loading", "runtime/running", "runtime/drawing", "robots",
+    ),
     "runtime/testing": (
         "runtime/language", "runtime/loading", "runtime/running", "runtime/placement",
         "runtime/links", "robots", "mathematics/compiling",
