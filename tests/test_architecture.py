@@ -78,7 +78,9 @@ ALLOWED: dict[str, tuple[str, ...]] = {
     "logs/exporting": ("logs/file", "logs/viewing", "robots", "runtime/language"),
     "logs": ("logs/file",),
     "studies": ("mathematics", "robots", "runtime", "planner", "blocks", "hal", "logs"),
-    "benchmarks": ("robots", "runtime", "planner", "blocks", "hal", "logs", "studies"),
+    "benchmarks": (
+        "mathematics", "robots", "runtime", "planner", "blocks", "hal", "logs", "studies",
+    ),
     "cli": PACKAGES,
     "graphs": (),
 }  # fmt: skip
