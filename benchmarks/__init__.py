@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from .driver import driver
 from .frontier import frontier
 from .link_delays import link_delays
 from .links import links
@@ -21,12 +22,15 @@ from .random_jumps import jumps
 from .recorder import recorder
 from .rows import Row
 from .scheduler import scheduler
+from .tick import tick
 
 BENCHMARKS: Mapping[str, Callable[..., list[Row]]] = {
+    "tick": tick,
     "scheduler": scheduler,
     "planner": planner,
     "recorder": recorder,
     "links": links,
+    "driver": driver,
     "link_delays": link_delays,
     "jumps": jumps,
     "frontier": frontier,

@@ -71,14 +71,19 @@ def print_results(out: Console, results: Mapping[str, Any]) -> None:
             row["unit"],
             "" if row["ratio"] is None else number(row["ratio"]),
             row["peer"],
-            "" if row["goal"] is None else f"≤ {row['goal']:g}",
+            _limit(row["goal"]),
+            _limit(row.get("floor")),
             "" if row["met"] is None else number(row["met"]),
             row.get("note", ""),
         )
         for row in results["rows"]
     ]
-    columns = ("case", ">value", "unit", ">ratio", "to", ">goal", "met", "note")
+    columns = ("case", ">value", "unit", ">ratio", "to", ">goal", ">floor", "met", "note")
     out.print(table("", columns, rows))
     machine = results["machine"]
     say(out, f"{machine['processor']}, {machine['cores']} cores, Python {machine['python']}")
     say(out, f"load before {results['load']['before']}, after {results['load']['after']}")
+
+
+def _limit(value: float | None) -> str:
+    return "" if value is None else f"≤ {value:.3g}"

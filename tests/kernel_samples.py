@@ -100,7 +100,7 @@ UNUSED = {
     "aloft.robots.limb_inverse._stuck": (LIMB.limits, 1, 0.3, 1.0),
     "aloft.robots.limb_error._along": (POSE, LIMB.tip),
     "aloft.robots.limb_error._product": (POSE, TARGET, 1, 2),
-    "aloft.robots.limb_error._unit": (0.1, 0.2, 0.3, 1.0, 0.0, 0.0),
+    "aloft.mathematics.directions.unit": (0.1, 0.2, 0.3, 1.0, 0.0, 0.0),
     "aloft.robots.five_joint_reach.slide": (
         LEG.hip, LEG.plane, LEG.signs, LEG.limits, np.add(LEG.hip, [0.25, 0.02, -0.3]), np.eye(3), 0.005,
         0.1, 0.05, np.zeros(3), np.zeros(5),

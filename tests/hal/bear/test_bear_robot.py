@@ -30,6 +30,7 @@ from aloft.hal.twin.faults import Fault
 from aloft.hal.twin.server import TwinServer
 from aloft.hal.twin.standing_twin import standing_twin
 from aloft.robots.description import find_robot
+from aloft.runtime.running.memory import BoundGraph
 
 ROBOT = find_robot("bruce")
 LONG = 60.0
@@ -211,3 +212,10 @@ def test_an_instruction_is_told_from_an_answer() -> None:
     instruction = frame_bytes(3, Instruction.READ_STATUS, b"\x09")
     answer = frame_bytes(3, 0x80, bytes(4))
     assert instruction[4] < 0x80 <= answer[4]
+
+
+def test_the_kernel_of_the_goals_is_compiled_with_the_graph() -> None:
+    """The driver opens later; goals by plain Python would take longer than all else in a cycle."""
+    graph = aloft.load(Path(aloft.__file__).parent / "graphs" / "jump_robot.yaml")
+    calls = BoundGraph(graph.checked).kernel_calls
+    assert "aloft.hal.drive_goals.make_goals" in [call.name for call in calls]
