@@ -27,7 +27,7 @@ from .pacing import TimeSource, WallTime
 from .real_time import NO_WISHES, RealTime
 from .run_result import RunResult, TakesAbandoned, TakesResult, merge_metrics
 from .sinks import GivesMetrics, MemoryLog, RunHash, Sink
-from .ticker import Ticker, hang_text
+from .ticker import TakesTicker, Ticker, hang_text
 from .timing import block_times
 from .watchdog import Watchdog
 
@@ -130,8 +130,6 @@ class Executor:
                     interrupts.armed = True
                     self._compile_kernels()
                     self._open_sinks(limit)
-                    if self._fuse:
-                        self.ticker.fuse()
                     self.life.start()
                     self._note("life", "ready: every block has started")
                     self._ask_for_cautions()
@@ -212,6 +210,11 @@ class Executor:
             self.ticker.records.append(sink.record)
             if isinstance(sink, TakesNotes):
                 self.ticker.notes.append(sink.note)
+        if self._fuse:  # once the freeze guard has said where the block that runs is written
+            self.ticker.fuse()
+        for sink in self._sinks:
+            if isinstance(sink, TakesTicker):
+                sink.watch_ticker(self.ticker)
 
     def _close_sinks(self) -> list[str]:
         problems = []

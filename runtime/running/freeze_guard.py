@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from ..language.stages import CheckedGraph
 from .failures import INSTALLED
 from .memory import BoundGraph
+from .shared_memory import nameless_memory
 
 BEATS = 4
 """Beats in every limit of time."""
@@ -99,11 +100,11 @@ class FreezeGuard:
 def _shared_number() -> tuple[int, NDArray[np.int64]]:
     """An integer in memory that another process can read, (1,), and the file of that memory; where
     the system has none, memory of this process, and -1."""
-    if not hasattr(os, "memfd_create"):
+    try:
+        file = nameless_memory(8, "aloft-running")
+        return file, np.frombuffer(mmap(file, 8), np.int64)
+    except OSError:
         return -1, np.full(1, -1)
-    file = os.memfd_create("aloft")
-    os.ftruncate(file, 8)
-    return file, np.frombuffer(mmap(file, 8), np.int64)
 
 
 def _told(graph: CheckedGraph) -> dict[str, object]:

@@ -12,7 +12,7 @@ import time
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from itertools import groupby
-from typing import Any
+from typing import Any, Protocol, runtime_checkable
 
 from ...mathematics.compiling.chain_code import clock_address
 from ..language.block import Block
@@ -261,6 +261,14 @@ def owner_of(call: Callable[..., Any] | None) -> object:
     if isinstance(owner, RobotDriven):
         return owner.block
     return owner.current if isinstance(owner, Chain) else owner
+
+
+@runtime_checkable
+class TakesTicker(Protocol):
+    """The method that a sink has, beside ``record``, if it shows the times of blocks."""
+
+    def watch_ticker(self, ticker: Ticker) -> None:
+        """Take what measures the times, after ``open`` and before the first tick."""
 
 
 def hang_text(who: str, instant: str, limit: float) -> str:

@@ -99,6 +99,19 @@ class Program:
             self.fold()
         self._place_value[0] = self._base + self._cursor
 
+    @property
+    def last_stamps(self) -> tuple[NDArray[np.int64], int]:
+        """The buffer of stamps, (STAMPED_TICKS, owners + 1), in the order ``stamp_order``, and how
+        many of its rows are newer than the rest. The other rows are those of the ticks before, if
+        as many have run."""
+        return self._stamps, self._cursor // self._row
+
+    @property
+    def stamp_order(self) -> tuple[int, ...]:
+        """The places of a tick's stamps in their row, in the order of time: the one before the
+        first owner, and the one after each."""
+        return (0, *self._ends.tolist())
+
     def fold(self) -> None:
         """Add the kept stamps to the statistics and empty their buffer."""
         rows = self._cursor // self._row
