@@ -120,12 +120,11 @@ UNUSED = {
         0.002, 0.02, np.ones(10), Motion(np.ones(10), np.ones(10)), Motion(np.ones(10), np.ones(10)),
     ),
     "aloft.mathematics.joint_feedback.add_friction": (
-        np.linspace(-1.0, 1.0, 10), np.full(10, 0.07), np.full(10, 0.01), 0.3, np.zeros(10),
-        np.ones(10),
+        np.linspace(-1.0, 1.0, 10), np.full(10, 0.07), np.full(10, 0.01), 0.3, np.ones(10),
     ),
     "aloft.mathematics.joint_feedback.add_soft_stops": (
         np.linspace(-1.0, 1.0, 5),
-        SoftStops(np.tile([-0.8, 0.7], (5, 1)), 0.1, 2.0, np.full(5, 60.0), np.full(5, 1.5)),
+        SoftStops(np.tile([-0.8, 0.7], (5, 1)), np.array([0.1]), np.array([2.0]), np.full(5, 60.0), np.full(5, 1.5)),
         Feedback(*(np.full(5, x) for x in (40.0, 0.2, 1.0, 0.3))),
     ),
     "aloft.robots.five_joint_reach.keep_along": (
