@@ -22,7 +22,9 @@ ALLOWED: dict[str, tuple[str, ...]] = {
     "mathematics": (),
     "robots": ("mathematics",),
     "runtime/language": ("robots",),
-    "runtime/running": ("runtime/language", "robots", "mathematics/compiling"),
+    "runtime/running": (
+        "runtime/language", "runtime/loading/selection", "robots", "mathematics/compiling",
+    ),
     "runtime/loading": ("runtime/language", "runtime/placement", "robots"),
     "runtime/placement": ("runtime/language", "robots"),
     "runtime/links": (

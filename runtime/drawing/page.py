@@ -27,14 +27,19 @@ h1{font-size:17px;margin:0 0 2px} h2{font-size:13px;margin:14px 0 4px} p,pre{mar
 pre{white-space:pre-wrap;font:inherit} table{border-collapse:collapse;width:100%}
 td{vertical-align:top;padding:2px 8px 2px 0;overflow-wrap:anywhere} td:first-child{font-weight:bold;white-space:nowrap} p{overflow-wrap:anywhere}
 .soft{opacity:.72} button{font:inherit} header{display:flex;gap:.8em;align-items:baseline}
-@media print{aside,header{display:none} body{display:block;height:auto}}
+.wide{flex-direction:column} .wide main{flex:none;max-height:72vh} .wide aside{flex:1;width:auto;
+border-left:0;border-top:1px solid GrayText} .wide #panel{columns:25em;column-gap:2em}
+#panel>h1{column-span:all} #panel h2{break-after:avoid} tr,.whole{break-inside:avoid}
+@page{size:landscape;margin:8mm}
+@media print{aside,header{display:none} body{display:block!important;height:auto} main{overflow:visible;
+max-height:none!important;padding:0} svg{width:100%!important;height:auto!important}}
 @media (max-width:60em){body{flex-direction:column} aside{width:auto;max-height:45%;border:0;
 border-top:1px solid GrayText}}
 """
 _SCRIPT = """
 "use strict";
 const data = JSON.parse(document.getElementById("data").textContent);
-const panel = document.querySelector("aside"), drawing = document.querySelector("svg");
+const panel = document.getElementById("panel"), drawing = document.querySelector("svg");
 const make = (tag, text, kind) => { const e = document.createElement(tag);
   e.textContent = text; if (kind) e.className = kind; return e; };
 function rows(into, title, found) {
@@ -111,6 +116,8 @@ drawing.addEventListener("keydown", e => { const n = nodeOf(e);
   if (n && e.key === "Enter") show(n.dataset.path); });
 const width = drawing.viewBox.baseVal.width;
 let scale = 1;
+// a drawing that is wide has the whole width of the screen, and what is chosen stands below it
+document.body.classList.toggle("wide", width > 2 * drawing.viewBox.baseVal.height);
 function zoom(to) { scale = Math.min(4, Math.max(0.2, to));
   drawing.setAttribute("width", width * scale);
   drawing.setAttribute("height", drawing.viewBox.baseVal.height * scale); }
@@ -171,7 +178,7 @@ def page(
         f"{controls}"
         '<span class="soft">a click on a block shows what it does</span></header>'
         f"{svg(draw(diagram(graph, shut)), graph.name)}</main>"
-        '<aside><p class="soft">Nothing is chosen.</p></aside>'
+        '<aside><div id="panel"><p class="soft">Nothing is chosen.</p></div></aside>'
         f'<script type="application/json" id="data">{body}</script>'
         f"<script>{_SCRIPT}</script>{also}</body></html>\n"
     )

@@ -109,7 +109,7 @@ function input(kind, value) {
 }
 const written = value => typeof value === "string" ? value : JSON.stringify(value);
 function tunable(row) {
-  const box = make("div", "", "tunable"), error = make("div", "", "error");
+  const box = make("div", "", "tunable whole"), error = make("div", "", "error");
   box.dataset.path = row.path;
   const heading = document.createElement("div");
   heading.append(make("b", all ? row.path : row.name));

@@ -161,6 +161,8 @@ class LiveRun:
 def _load(about: dict[str, Any]) -> CheckedGraph:
     """The graph that runs. Raises ``LoadError`` where its code or files have gone since."""
     file, text = Path(about["file"] or f"{about['graph']}.yaml"), about["text"]
+    if file.is_relative_to(Path.cwd()):
+        file = file.relative_to(Path.cwd())  # so that places in it are short
     if file.is_file():
         try:
             graph = load(file, about["overrides"])

@@ -209,7 +209,12 @@ def ask_to_watch(path: Path) -> tuple[dict[str, Any], int]:
     """
     end = time.monotonic() + START_TIME
     while True:
-        answer, descriptors = _exchange(path, {"verb": "watch"})
+        try:
+            answer, descriptors = _exchange(path, {"verb": "watch"})
+        except EndpointError as error:  # one that compiles its kernels may be slow to answer
+            if not isinstance(error.__cause__, TimeoutError) or time.monotonic() > end:
+                raise
+            continue
         if len(descriptors) == 1:
             return answer, descriptors[0]
         if time.monotonic() > end:

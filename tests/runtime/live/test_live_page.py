@@ -110,7 +110,7 @@ def test_a_run_is_watched_and_tuned(server: LiveServer, running: Running, tmp_pa
             "3,4",
         )
         assert page.ask("document.querySelector('[data-path=\"pid.kp\"]').className") == (
-            "tunable changed"
+            "tunable whole changed"
         )
         page.ask("document.querySelector('[data-path=\"pid.kp\"] button').click()")
         wait_until(lambda: running.bound.blocks["pid"].params.kp == [1, 2])  # type: ignore[attr-defined]
