@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
     from ..logs.viewing.viewer import Viewer
     from ..runtime.language.stages import CheckedGraph
-    from ..runtime.parameter_endpoint import ParameterEndpoint
+    from ..runtime.live.parameter_endpoint import ParameterEndpoint
     from ..runtime.running.real_time import RealTime
     from ..runtime.running.run_result import RunResult
     from ..runtime.running.sinks import Sink

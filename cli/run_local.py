@@ -28,6 +28,7 @@ from ..runtime.placement.placed import PlacedGraph
 from ..runtime.running.memory import BoundGraph
 from ..runtime.running.run_result import RunResult, merge_metrics
 from ..runtime.running.timing import BlockTimes
+from .local_runs import registered
 from .output import number, print_json, print_place, print_warning, say, table
 from .run_output import print_result, print_verdict
 
@@ -107,8 +108,10 @@ def _run_processes(
     settings = [
         f"machines.{name}={endpoint}" for name, endpoint in zip(files, endpoints, strict=True)
     ]
-    sets = [text for setting in (*wishes.settings, *settings) for text in ("--set", setting)]
+    settings = [*wishes.settings, *settings]
+    sets = [text for setting in settings for text in ("--set", setting)]
     with ExitStack() as stack:
+        stack.enter_context(registered(path, settings))
         running: dict[str, subprocess.Popen[str]] = {}
         for number, (machine, file) in enumerate(files.items()):
             params = wishes.params if wishes.params and number == 0 else "none"
@@ -279,11 +282,11 @@ def _print_links(out: Console, said: Mapping[str, Mapping[str, Any]]) -> None:
     if any("age_p50_ms" in link for link in links):
         columns: tuple[str, ...] = (
             "link", ">messages", ">lost", ">damaged", ">late ticks", ">median age [ms]",
-            ">99 % [ms]", ">oldest [ms]",
+            ">99 % [ms]", ">oldest [ms]", ">jitter [ms]",
         )  # fmt: skip
         keys: tuple[str, ...] = (
             "name", "received", "lost", "damaged", "late_ticks", "age_p50_ms", "age_p99_ms",
-            "age_max_ms",
+            "age_max_ms", "jitter_ms",
         )  # fmt: skip
     else:
         columns = ("link", ">messages", ">damaged", ">twice or late")

@@ -22,6 +22,7 @@ class WrittenClass:
     bases: tuple[str, ...]
     """The base classes, each by the last part of its name: ``Block`` for ``aloft.Block``."""
     has_ports: bool
+    """Whether it declares a port, or says by ``fitted`` which ports it has."""
     has_machine: bool
     """Whether it defines ``step`` or ``emit``."""
     is_abstract: bool
@@ -111,7 +112,8 @@ def _written(node: ast.ClassDef) -> WrittenClass:
     return WrittenClass(
         node.name,
         tuple(filter(None, map(_last_name, node.bases))),
-        any(isinstance(value, ast.Call) and _last_name(value.func) in _PORTS for value in values),
+        any(isinstance(value, ast.Call) and _last_name(value.func) in _PORTS for value in values)
+        or any(function.name == "fitted" for function in functions),
         any(function.name in _MACHINE for function in functions),
         any(
             _last_name(decorator) == "abstractmethod"

@@ -27,7 +27,7 @@ from .pacing import TimeSource, WallTime
 from .real_time import NO_WISHES, RealTime
 from .run_result import RunResult, TakesAbandoned, TakesResult, merge_metrics
 from .sinks import GivesMetrics, MemoryLog, RunHash, Sink
-from .ticker import Ticker, hang_text
+from .ticker import TakesTicker, Ticker, hang_text
 from .timing import block_times
 from .watchdog import Watchdog
 
@@ -205,6 +205,8 @@ class Executor:
             self._opened.append(sink)  # before the call, as a failed open may have opened a file
             sink.open(self.bound)
             self.ticker.records.append(sink.record)
+            if isinstance(sink, TakesTicker):
+                sink.watch_ticker(self.ticker)
             if isinstance(sink, TakesNotes):
                 self.ticker.notes.append(sink.note)
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from typing import Any
+from typing import Any, Protocol, runtime_checkable
 
 from ..language.block import Block
 from ..language.errors import RunError
@@ -211,6 +211,14 @@ class Ticker:
                 block=block,
                 tick=tick,
             )
+
+
+@runtime_checkable
+class TakesTicker(Protocol):
+    """The method that a sink has, beside ``record``, if it shows the times of blocks."""
+
+    def watch_ticker(self, ticker: Ticker) -> None:
+        """Take what measures the times, after ``open`` and before the first tick."""
 
 
 def hang_text(who: str, instant: str, limit: float) -> str:

@@ -72,6 +72,12 @@ class Program:
         if self._cursor == len(self._bytes):
             self.fold()
 
+    @property
+    def last_stamps(self) -> tuple[NDArray[np.int64], int]:
+        """The buffer of stamps, (STAMPED_TICKS, calls + 1), and how many of its rows are newer than
+        the rest. The other rows are those of the ticks before, if as many have run."""
+        return self._stamps, self._cursor // (8 * self.width)
+
     def fold(self) -> None:
         """Add the kept stamps to the statistics and empty their buffer."""
         rows = self._cursor // (8 * self.width)
