@@ -284,11 +284,11 @@ def _print_links(out: Console, said: Mapping[str, Mapping[str, Any]]) -> None:
     if any("age_p50_ms" in link for link in links):
         columns: tuple[str, ...] = (
             "link", ">messages", ">lost", ">damaged", ">late ticks", ">median age [ms]",
-            ">99 % [ms]", ">oldest [ms]",
+            ">99 % [ms]", ">oldest [ms]", ">jitter [ms]",
         )  # fmt: skip
         keys: tuple[str, ...] = (
             "name", "received", "lost", "damaged", "late_ticks", "age_p50_ms", "age_p99_ms",
-            "age_max_ms",
+            "age_max_ms", "jitter_ms",
         )  # fmt: skip
     else:
         columns = ("link", ">messages", ">damaged", ">twice or late")
