@@ -21,14 +21,19 @@ PACKAGES = (
 ALLOWED: dict[str, tuple[str, ...]] = {
     "mathematics": (),
     "robots": ("mathematics",),
-    "runtime/language": ("robots",),
-    "runtime/running": ("runtime/language", "robots", "mathematics/compiling"),
+    "runtime/language": ("robots", "mathematics/compiling"),
+    "runtime/running": (
+        "runtime/language", "runtime/loading/selection", "robots", "mathematics/compiling",
+    ),
     "runtime/loading": ("runtime/language", "runtime/placement", "robots"),
     "runtime/placement": ("runtime/language", "robots"),
     "runtime/links": (
         "runtime/language", "runtime/loading", "runtime/running", "runtime/placement", "robots",
     ),
     "runtime/drawing": ("runtime/language", "runtime/loading", "robots"),
+    "runtime/live": (
+        "runtime/language", "runtime/loading", "runtime/running", "runtime/drawing", "robots",
+    ),
     "runtime/testing": (
         "runtime/language", "runtime/loading", "runtime/running", "runtime/placement",
         "runtime/links", "robots", "mathematics/compiling",
