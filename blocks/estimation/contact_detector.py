@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.kernel import kernel
 from ...runtime.language.block import Block, Input, Output, State
 from ...runtime.language.parameters import Parameters, live_parameter
@@ -49,42 +50,48 @@ class ContactDetector(Block):
     state = Output(ContactState, text="which points carry load")
     timers = State(ContactTimers, text="one timer a point")
 
-    def step(self) -> None:
+    def setup(self) -> None:
         timers = self.timers
-        latch(
-            self.switches.closed,
-            self.faults.fault,
-            self.params.close_samples,
-            round(self.params.hold / self.period),
-            timers.closed,
-            timers.opened,
-            timers.active,
-        )
-        self.state.active[...] = timers.active
+        self._close_samples, self._hold_samples = np.zeros(1, np.int64), np.zeros(1, np.int64)
+        self.on_parameters()
+        self._latch = KernelCall(
+            latch, self.switches.closed, self.faults.fault, self._close_samples,
+            self._hold_samples, timers.closed, timers.opened, timers.active, self.state.active,
+        )  # fmt: skip
+
+    def on_parameters(self) -> None:
+        self._close_samples[0] = self.params.close_samples
+        self._hold_samples[0] = round(self.params.hold / self.period)
+
+    def step(self) -> None:
+        self._latch.run()
 
 
 @kernel
 def latch(
     switches: NDArray[np.bool_],
     faults: NDArray[np.int64],
-    close_samples: int,
-    hold_samples: int,
+    close_samples: NDArray[np.int64],
+    hold_samples: NDArray[np.int64],
     closed: NDArray[np.int64],
     opened: NDArray[np.int64],
     active: NDArray[np.bool_],
+    out: NDArray[np.bool_],
 ) -> None:
     """Update ``closed``, ``opened`` and ``active`` (n_contacts,) by the switches of one tick.
 
-    A switch with a fault counts as open.
+    A switch with a fault counts as open. ``close_samples`` and ``hold_samples`` have one element;
+    ``out`` becomes a copy of ``active``.
     """
     for point in range(switches.shape[0]):
         if switches[point] and faults[point] == 0:
             closed[point] += 1
             opened[point] = 0
-            if closed[point] >= close_samples:
+            if closed[point] >= close_samples[0]:
                 active[point] = True
         else:
             closed[point] = 0
             opened[point] += 1
-            if opened[point] > hold_samples:
+            if opened[point] > hold_samples[0]:
                 active[point] = False
+        out[point] = active[point]
