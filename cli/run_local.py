@@ -43,7 +43,8 @@ GRACE = 15.0
 class Wishes:
     """What the command line asks for: settings, where the recording goes (by default where one of
     the graph goes) and whether it is kept, the name for ``aloft params``, how to print,
-    whether nothing is compiled, and the folder of keys, for links over TLS."""
+    whether nothing is compiled, the folder of keys, for links over TLS, and whether blocks of kernels
+    are fused."""
 
     settings: Sequence[str]
     record: Path | None
@@ -53,6 +54,7 @@ class Wishes:
     traceback: bool
     plain: bool
     keys: Path | None = None
+    fuse: bool = True
 
 
 def run_local(path: Path, wishes: Wishes, out: Console) -> ExitCode:
@@ -118,7 +120,7 @@ def _run_processes(
             command = [
                 sys.executable, "-m", "aloft", "run", str(path), *sets, "--machine", machine,
                 "--record", str(file), "--params", params, "--json", "--quiet",
-                *(["--plain"] if wishes.plain else []),
+                *(["--plain"] if wishes.plain else []), *([] if wishes.fuse else ["--no-fuse"]),
                 *(["--keys", str(wishes.keys)] if wishes.keys is not None else []),
             ]  # fmt: skip
             # in a group of its own, so that Ctrl-C reaches it once, from here

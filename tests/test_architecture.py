@@ -21,7 +21,7 @@ PACKAGES = (
 ALLOWED: dict[str, tuple[str, ...]] = {
     "mathematics": (),
     "robots": ("mathematics",),
-    "runtime/language": ("robots",),
+    "runtime/language": ("robots", "mathematics/compiling"),
     "runtime/running": (
         "runtime/language", "runtime/loading/selection", "robots", "mathematics/compiling",
     ),

@@ -45,11 +45,13 @@ class Shape:
     Attributes:
         blocks: the paths of all blocks, whose missed deadlines are counted.
         programs: for each phase of the hyperperiod, the block of each call; see ``Program``.
+        orders: for each phase, the places of a tick's stamps in the order of time.
         bus: the size of the bus [bytes].
     """
 
     blocks: Sequence[str]
     programs: Sequence[Sequence[str]]
+    orders: Sequence[Sequence[int]]
     bus: int
 
     @property
@@ -108,6 +110,7 @@ class Window:
         shape = Shape(
             tuple(ticker.overruns_by_block),
             tuple(program.owners for program in programs),
+            tuple(program.stamp_order for program in programs),
             len(self._bus),
         )
         try:
