@@ -84,6 +84,7 @@ class Driver:
             arming.check_ready(self.loop, self._standing, self._names)
             arming.enable(self.loop, self._names)
             arming.soft_start(self.loop, self._standing, next_cycle)
+            self.loop.measured.forget_torques()  # those of the way to the standing pose
         except BaseException:
             self.loop.phase = DrivePhase.DAMPED
             self.damp(STOP_CYCLES)

@@ -71,7 +71,7 @@ def test_machines_and_links_are_shown(running: Path) -> None:
     try:
         with Observer(placed) as observer:
             watched = WatchedPart(observer, "onboard", viewer.source)
-            assert wait_for(lambda: watched.taken > 5, 30.0)
+            assert wait_for(lambda: watched.taken > 5)
             watched.close()
             assert watched.problem == ""
     finally:
