@@ -7,6 +7,7 @@ else the machine does hits them alike. A ratio is the median over the ratios of 
 from __future__ import annotations
 
 import gc
+import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 
@@ -17,7 +18,7 @@ from ..blocks.control.whole_body_controller import WholeBodyController
 from ..blocks.control.whole_body_program import WholeBodyProgram
 from ..mathematics.whole_body_qp import joint_torque
 from ..runtime.running.timing import block_times
-from .rows import Row, compare, take_turns
+from .rows import Row, compare
 from .tick_controller import HandWrittenLoop, RecordedController, RecordedJump, record_jump
 from .tick_process import busy_wait_row, process_row
 from .tick_programs import DaqpProgram, OsqpController, OsqpProgram, PeerProgram
@@ -37,6 +38,8 @@ STATE_TO_TORQUE = ("dynamics", "wbc")
 CHUNK = 50
 EVERY = 10
 """One in so many ticks in stance is a state for the solvers by themselves."""
+ROUNDS = 5
+"""Turns of the solvers in each of these states, of which the median counts."""
 TORQUE_ERROR = 1e-6
 """How much the torques of two exact methods may differ [N m]."""
 Times = dict[str, NDArray[np.float64]]
@@ -74,6 +77,7 @@ def tick(rounds: int = 3, ticks: int | None = None, process: bool = True) -> lis
     rows = [
         *_block_rows(own, "block "),
         *_block_rows(fused, "fused block "),
+        *(_block_rows(cases[OSQP], "OSQP block ") if OSQP in cases else []),
         *_controller_rows(times, of_first, missing),
     ]
     rows += _program_rows(programs.times, missing)
@@ -128,15 +132,18 @@ class _Programs:
         if tick % EVERY or not active.size:
             return
         prepared = self._daqp.assemble(active)
-        cases: dict[str, Callable[[int], object]] = {
-            QP: _repeated(self._block._solve.run),
-            QP_DAQP: _repeated(lambda: self._solve(self._daqp, active, prepared)),
+        cases: dict[str, Callable[[], object]] = {
+            QP: self._block._solve.run,
+            QP_DAQP: lambda: self._solve(self._daqp, active, prepared),
         }
         if self._osqp is not None:
             osqp = self._osqp
             ready = osqp.assemble(active)
-            cases[QP_OSQP] = _repeated(lambda: self._solve(osqp, active, ready))
-        taken = take_turns(cases, 5, 1)
+            cases[QP_OSQP] = lambda: self._solve(osqp, active, ready)
+        taken: dict[str, list[float]] = {name: [] for name in cases}
+        for _ in range(ROUNDS):
+            for name, body in cases.items():
+                taken[name].append(_hot(body))
         self._found.append({name: float(np.median(found)) for name, found in taken.items()})
         self.times = {name: np.array([each[name] for each in self._found]) for name in cases}
         self._solve(self._daqp, active, prepared)
@@ -175,12 +182,13 @@ def _osqp_controller(jump: RecordedJump) -> RecordedController:
     return controller
 
 
-def _repeated(body: Callable[[], object]) -> Callable[[int], object]:
-    def run(count: int) -> None:
-        for _ in range(count):
-            body()
-
-    return run
+def _hot(body: Callable[[], object]) -> float:
+    """Microseconds of a call that follows two others, as in a loop that does nothing else."""
+    body()
+    body()
+    start = time.perf_counter_ns()
+    body()
+    return (time.perf_counter_ns() - start) * 1e-3
 
 
 def _block_rows(controller: RecordedController, prefix: str) -> list[Row]:
