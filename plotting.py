@@ -11,6 +11,7 @@ import io
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -199,6 +200,36 @@ def draw_panels(panels: Sequence[tuple[Axes, Panel]]) -> None:
                 if line.name
             ],
         )
+
+
+def panels_figure(panels: Sequence[Panel], title: str) -> Figure:
+    """Panels one below the other, each as wide as a page."""
+    figure = new_figure(9.0, 0.6 + 2.4 * len(panels), title)
+    axes = figure.subplots(len(panels), 1, squeeze=False)[:, 0]
+    draw_panels(list(zip(axes, panels, strict=True)))
+    return figure
+
+
+def panels_svg(panels: Sequence[Panel], title: str) -> str:
+    """Panels one below the other, as the text of an SVG file."""
+    with style():
+        return svg_text(panels_figure(panels, title))
+
+
+def save_panels(panels: Sequence[Panel], title: str, path: Path) -> None:
+    """Draw panels one below the other into a file, as its ending says.
+
+    Raises:
+        ValueError: the ending is neither ``.svg`` nor ``.png``.
+        OSError: the file cannot be written.
+    """
+    if path.suffix not in (".svg", ".png"):
+        raise ValueError(f"{path}: a plot is written as .svg or .png")
+    if path.suffix == ".svg":
+        path.write_text(panels_svg(panels, title), encoding="utf-8")
+        return
+    with style():
+        image(panels_figure(panels, title)).save(path, format="PNG")
 
 
 def _draw_panel(axes: Axes, panel: Panel) -> None:

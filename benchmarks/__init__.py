@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from .driver import driver
 from .frontier import frontier
 from .link_delays import link_delays
 from .links import links
@@ -21,12 +22,15 @@ from .random_jumps import jumps
 from .recorder import recorder
 from .rows import Row
 from .scheduler import scheduler
+from .tick import tick
 
 BENCHMARKS: Mapping[str, Callable[..., list[Row]]] = {
+    "tick": tick,
     "scheduler": scheduler,
     "planner": planner,
     "recorder": recorder,
     "links": links,
+    "driver": driver,
     "link_delays": link_delays,
     "jumps": jumps,
     "frontier": frontier,
@@ -40,14 +44,18 @@ SEEDED = ("frontier", "link_delays")
 """Those that can be told the ``seeds`` of the trial to run with."""
 TIMED = ("recorder",)
 """Those that can be told how many ``seconds`` to run in real time."""
+LINKED = ("link_delays",)
+"""Those that can be told the ``jitter`` [s] of messages and the share of them that is lost (``loss``)."""
 
 
 def run_benchmarks(
     names: Iterable[str] | None = None, seconds: float | None = None,
     count: int | None = None, seed: int | None = None, seeds: Sequence[int] | None = None,
+    jitter: float | None = None, loss: float | None = None,
 ) -> dict[str, Any]:  # fmt: skip
     """Run the named benchmarks, by default all but those in ``LONG``; ``seconds`` is for those in
-    ``TIMED``, ``count`` and ``seed`` for those in ``COUNTED``, ``seeds`` for those in ``SEEDED``.
+    ``TIMED``, ``count`` and ``seed`` for those in ``COUNTED``, ``seeds`` for those in ``SEEDED``,
+    ``jitter`` [s] and ``loss`` for those in ``LINKED``.
 
     Returns:
         ``machine``, ``load`` (averages before and after) and ``rows``, as plain data for JSON.
@@ -63,7 +71,7 @@ def run_benchmarks(
     rows = []
     for name in chosen:
         told = {"seconds": (seconds, TIMED), "count": (count, COUNTED), "seed": (seed, COUNTED),
-                "seeds": (seeds, SEEDED)}  # fmt: skip
+                "seeds": (seeds, SEEDED), "jitter": (jitter, LINKED), "loss": (loss, LINKED)}  # fmt: skip
         given = {k: v for k, (v, known) in told.items() if v is not None and name in known}
         rows += BENCHMARKS[name](**given)
     return {

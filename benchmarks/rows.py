@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 @dataclass(frozen=True)
 class Row:
     """One measured value. ``ratio`` is to ``peer``, ``ratio_p10`` and ``ratio_p90`` its spread over
-    the rounds; ``goal`` is the largest good ratio (or value, without one); ``met`` is none where
-    nothing was promised or measured, and ``note`` says why."""
+    the rounds; ``goal`` is the largest good ratio (or value, without one), and ``floor`` the largest
+    that is still acceptable, where that is another; ``met`` is none where nothing was promised or
+    measured, and ``note`` says why."""
 
     name: str
     value: float | None
@@ -26,6 +27,7 @@ class Row:
     ratio_p10: float | None = None
     ratio_p90: float | None = None
     note: str = ""
+    floor: float | None = None
 
     @property
     def met(self) -> bool | None:
@@ -66,10 +68,11 @@ def compare(
     peer: str,
     *,
     goal: float | None = None,
+    floor: float | None = None,
     note: str = "",
 ) -> Row:
     """The row of a case: median time, and the median ratio to the peer of the same round."""
     ratios = times[name] / times[peer]
     p10, p50, p90 = (float(value) for value in np.percentile(ratios, (10, 50, 90)))
     value = float(np.median(times[name]))
-    return Row(name, value, "us/tick", peer, p50, goal, p10, p90, note)
+    return Row(name, value, "us/tick", peer, p50, goal, p10, p90, note, floor)

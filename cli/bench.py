@@ -32,12 +32,18 @@ def bench(
     seeds: Annotated[
         str, typer.Option(help="Seeds of the trial for 'frontier' and 'link_delays'.")
     ] = "",
+    jitter: Annotated[
+        str, typer.Option(help="How much longer messages of 'link_delays' take at most: '1 ms'.")
+    ] = "",
+    loss: Annotated[
+        str, typer.Option(help="The share of messages that 'link_delays' loses: '5 %'.")
+    ] = "",
     as_json: Annotated[
         bool, typer.Option("--json", help="Tables go to standard error, one JSON object to output.")
     ] = False,
 ) -> None:
     """Measure the runtime beside hand-written loops and peers; exit with 1 if a goal is missed."""
-    from ..benchmarks import BENCHMARKS, COUNTED, SEEDED, TIMED, run_benchmarks
+    from ..benchmarks import BENCHMARKS, COUNTED, LINKED, SEEDED, TIMED, run_benchmarks
     from ..studies.batch.seeds import parse_seeds
 
     out = console(to_stderr=as_json)
@@ -52,14 +58,38 @@ def bench(
             )
         if seeds and name not in SEEDED:
             raise AloftError(f"--seeds is for {', '.join(SEEDED)}, not for {name or 'all'}")
+        if (jitter or loss) and name not in LINKED:
+            raise AloftError(
+                f"--jitter and --loss are for {', '.join(LINKED)}, not for {name or 'all'}"
+            )
         chosen = parse_seeds(seeds) if seeds else None
+        longer = _number("--jitter", jitter, "s", 1.0, "'1 ms', up to a second")
+        lost = _number("--loss", loss, "1", 0.999, "'5 %', less than all")
         with out.status("measuring"):
-            results = run_benchmarks([name] if name else None, seconds, count, seed, chosen)
+            results = run_benchmarks(
+                [name] if name else None, seconds, count, seed, chosen, longer, lost
+            )
     print_results(out, results)
     if as_json:
         print_json(results)
     missed = any(row["met"] is False for row in results["rows"])
     raise typer.Exit(ExitCode.NOT_SUCCESSFUL if missed else ExitCode.SUCCESS)
+
+
+def _number(option: str, text: str, unit: str, most: float, expected: str) -> float | None:
+    """The number in an option's text, from zero to ``most``; none where there is no text.
+
+    Raises:
+        AloftError: the text says no such number.
+    """
+    from ..studies.quantities import in_unit
+
+    if not text:
+        return None
+    found = in_unit(text, unit)
+    if found is None or not 0.0 <= found <= most:
+        raise AloftError(f"{option} cannot be {text!r}; expected {expected}")
+    return found
 
 
 def print_results(out: Console, results: Mapping[str, Any]) -> None:
@@ -71,14 +101,19 @@ def print_results(out: Console, results: Mapping[str, Any]) -> None:
             row["unit"],
             "" if row["ratio"] is None else number(row["ratio"]),
             row["peer"],
-            "" if row["goal"] is None else f"≤ {row['goal']:g}",
+            _limit(row["goal"]),
+            _limit(row.get("floor")),
             "" if row["met"] is None else number(row["met"]),
             row.get("note", ""),
         )
         for row in results["rows"]
     ]
-    columns = ("case", ">value", "unit", ">ratio", "to", ">goal", "met", "note")
+    columns = ("case", ">value", "unit", ">ratio", "to", ">goal", ">floor", "met", "note")
     out.print(table("", columns, rows))
     machine = results["machine"]
     say(out, f"{machine['processor']}, {machine['cores']} cores, Python {machine['python']}")
     say(out, f"load before {results['load']['before']}, after {results['load']['after']}")
+
+
+def _limit(value: float | None) -> str:
+    return "" if value is None else f"≤ {value:.3g}"

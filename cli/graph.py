@@ -20,7 +20,10 @@ if TYPE_CHECKING:
 
 
 def graph(
-    graph: Annotated[Path, typer.Argument(help="The graph file, or a recording: its graph.")],
+    graph: Annotated[
+        Path | None,
+        typer.Argument(help="The graph file, or a recording: its graph. With --live not needed."),
+    ] = None,
     overrides: Annotated[
         list[str] | None,
         typer.Option("--set", help=SET_HELP, autocompletion=parameter_names),
@@ -41,6 +44,13 @@ def graph(
     web: Annotated[
         bool, typer.Option("--web", help="As a block diagram in the browser, to click on.")
     ] = False,
+    live: Annotated[
+        bool,
+        typer.Option("--live", help="As --web, of a graph that is running: its values and times."),
+    ] = False,
+    running: Annotated[
+        str, typer.Option("--run", help="With --live: the name of the run, if there are several.")
+    ] = "",
     closed: Annotated[
         list[str] | None,
         typer.Option("--closed", help="A sub-graph whose box the diagram keeps closed, or 'all'."),
@@ -50,15 +60,24 @@ def graph(
 
     With --svg, --png or --web, draw the blocks with their ports and wires. The page of a recording
     (RUN.rrd --web) has a slider for the time, and shows the values that a chosen block reads and writes
-    then.
+    then. With --live the page shows a running graph: values, times of blocks and what is late, now.
     """
     from ..runtime.loading import load, picture
     from ..runtime.placement.picture import placement_json
     from ..runtime.placement.place import place
 
     with errors_reported(as_json):
-        if as_table + mermaid + flat + as_json + web > 1:
+        if as_table + mermaid + flat + as_json + (web or live) > 1:
             raise AloftError("choose one of --table, --mermaid, --flat, --json and --web")
+        if live:
+            serve_running(graph, running)
+            return
+        if graph is None or running:
+            raise AloftError(
+                "--run NAME is for --live"
+                if graph
+                else "give a graph file, or --live for one that runs"
+            )
         values: Values | None = None
         if graph.suffix == ".rrd":
             from ..logs.replay.opened_run import OpenedRun
@@ -117,7 +136,8 @@ def draw_files(
 
 def serve(graph: CheckedGraph, values: Values | None = None) -> None:
     """Show the diagram in a browser until Ctrl-C is pressed."""
-    from ..runtime.drawing.page_server import ADDRESS, page_server
+    from ..runtime.drawing.loopback import ADDRESS
+    from ..runtime.drawing.page_server import page_server
     from .view import open_page
 
     server = page_server(graph, values=values)
@@ -130,6 +150,15 @@ def serve(graph: CheckedGraph, values: Values | None = None) -> None:
         pass
     finally:
         server.server_close()
+
+
+def serve_running(graph: Path | None, name: str) -> None:
+    """Show a running graph in a browser until Ctrl-C is pressed. Raises ``AloftError``."""
+    from .live import open_live_run, serve_live
+
+    if graph is not None and graph.suffix not in (".yaml", ".yml"):
+        raise AloftError(f"--live is for a graph that is running; {graph} is none")
+    serve_live(open_live_run(name or (graph.stem if graph is not None else "")))
 
 
 def print_table(out: Console, graph: CheckedGraph) -> None:

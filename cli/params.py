@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from difflib import get_close_matches
+from pathlib import Path
 from typing import Annotated, Any
 
 import typer
@@ -12,7 +13,7 @@ from .output import console, errors_reported, print_json, table
 
 params = typer.Typer(
     name="params",
-    help="List, get or set the parameters of a running graph, at a tick boundary.",
+    help="List, get or set the parameters of a running graph, at a tick boundary; or in a browser.",
     no_args_is_help=True,
     rich_markup_mode=None,
 )
@@ -71,7 +72,7 @@ def set_(
     as_json: AsJson = False,
 ) -> None:
     """Change parameters, all in the same tick. If one of them is wrong, none is changed."""
-    from ..runtime.parameter_endpoint import set_parameters
+    from ..runtime.live.parameter_endpoint import set_parameters
     from .endpoints import find
 
     with errors_reported(as_json):
@@ -84,9 +85,24 @@ def set_(
         typer.echo(f"tick {change['tick']}: {change['path']} {old} -> {new}")
 
 
+@params.command("web")
+def web(
+    run: Run = "",
+    save: Annotated[
+        Path | None,
+        typer.Option(help="Where the page writes changed values; by default GRAPH-tuned.yaml."),
+    ] = None,
+) -> None:
+    """Change them in the browser, with sliders, beside the running graph's diagram."""
+    from .live import open_live_run, serve_live
+
+    with errors_reported(False):
+        serve_live(open_live_run(run), save, "parameters")
+
+
 def ask_list(run: str) -> tuple[str, list[dict[str, Any]]]:
     """The graph's name and all its parameters. Raises ``AloftError``."""
-    from ..runtime.parameter_endpoint import ask
+    from ..runtime.live.parameter_endpoint import ask
     from .endpoints import find
 
     answer = ask(find(run), {"verb": "list"})

@@ -95,12 +95,10 @@ def _panel(run: RecordedRun, name: str, places: Sequence[int], kept: Any) -> Pan
 
 def _draw(panels: Sequence[Panel], title: str, svg: Path | None, png: Path | None) -> None:
     """Write the panels one below the other. Raises ``AloftError`` if a file cannot be written."""
-    from ..plotting import draw_panels, image, new_figure, style, svg_text
+    from ..plotting import image, panels_figure, style, svg_text
 
     with style():
-        figure = new_figure(9.0, 0.6 + 2.4 * len(panels), title)
-        axes = figure.subplots(len(panels), 1, squeeze=False)[:, 0]
-        draw_panels(list(zip(axes, panels, strict=True)))
+        figure = panels_figure(panels, title)
         try:
             for path in (svg, png):
                 if path is None:

@@ -22,6 +22,12 @@ PERIOD = 0.5
 Keys = Annotated[
     Path | None, typer.Option(help="The folder of `aloft keys`, or the observer's own, for TLS.")
 ]
+Local = Annotated[
+    int,
+    typer.Option(
+        min=0, help="The process of `aloft run --local`, where several run this graph here."
+    ),
+]
 As = Annotated[str, typer.Option("--as", help="The observer's name, of `aloft keys --observer`.")]
 
 
@@ -31,16 +37,20 @@ def top(
     wait: Annotated[float, typer.Option(min=0.1, help="With --once: seconds to wait.")] = 5.0,
     keys: Keys = None,
     name: As = "viewer",
+    local: Local = 0,
     overrides: Annotated[list[str] | None, typer.Option("--set", help=SET_HELP)] = None,
     as_json: Annotated[
         bool, typer.Option("--json", help="With --once: print one JSON object.")
     ] = False,
 ) -> None:
-    """Show what runs on each machine. Nothing is sent; the graph does not notice."""
+    """Show what runs on each machine. Nothing is sent; the graph does not notice.
+
+    If the graph runs here with --local, its parts are found at the endpoints that they have there.
+    """
     with errors_reported(as_json):
         if as_json and not once:
             raise AloftError("--json is for --once")
-        with observer_of(graph, overrides or [], keys, name) as observer:
+        with observer_of(graph, overrides or [], keys, name, local) as observer:
             machines = tuple(spec.name for spec in observer.placed.machines)
             if not once:
                 _live(observer)
@@ -55,18 +65,25 @@ def top(
     raise typer.Exit(ExitCode.NOT_SUCCESSFUL if missing else ExitCode.SUCCESS)
 
 
-def observer_of(graph: Path, overrides: list[str], keys: Path | None, name: str) -> Observer:
+def observer_of(
+    graph: Path, overrides: list[str], keys: Path | None, name: str, process: int = 0
+) -> Observer:
     """An observer of a graph's machines, not yet connected.
 
+    Where ``aloft run --local`` runs the graph here, its settings and endpoints count, and
+    ``process`` says which run where there are several.
+
     Raises:
-        AloftError: the graph is wrong, names no machines, or does not fit the keys.
+        AloftError: the graph is wrong, names no machines, or does not fit the keys; or it is not
+            clear which run is meant.
     """
     from ..runtime.links.key_folder import secured
     from ..runtime.links.observer import Observer
     from ..runtime.loading import load
     from ..runtime.placement.place import place
+    from .local_runs import settings_of
 
-    placed = place(load(graph, overrides))
+    placed = place(load(graph, [*settings_of(graph, process), *overrides]))
     return Observer(placed, None if keys is None else secured(placed, keys, name))
 
 
@@ -117,6 +134,7 @@ def _tables(observer: Observer) -> Group:
                     link["name"],
                     str(link["received"]),
                     f"{link['age_ms']:.1f}" if "age_ms" in link else "",
+                    f"{link['jitter_ms']:.2f}" if "jitter_ms" in link else "",
                     str(link.get("late_ticks", "")),
                     str(link.get("lost", "")),
                     str(link["damaged"]),
@@ -126,7 +144,7 @@ def _tables(observer: Observer) -> Group:
     columns = ("machine", "state", ">tick", ">rate [Hz]", ">overruns", ">skipped", ">heard [s ago]")
     parts = [table(observer.placed.graph.name, columns, machines)]
     if links:
-        columns = ("link", ">messages", ">age [ms]", ">late ticks", ">lost", ">damaged",
+        columns = ("link", ">messages", ">age [ms]", ">jitter [ms]", ">late ticks", ">lost", ">damaged",
                    ">twice or late")  # fmt: skip
         parts.append(table("", columns, links))
     return Group(*parts)

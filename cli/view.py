@@ -83,6 +83,7 @@ def draw(recording: Path, layout: Path | None, path: Path) -> Path:
     from ..logs.file.reader import read
     from ..logs.recording.whole_view import write_view
     from ..logs.viewing.layout_file import blueprint_with, layout_beside, read_layout
+    from ..logs.viewing.robot_meshes import missing_meshes
 
     try:
         run = read(recording)
@@ -92,6 +93,8 @@ def draw(recording: Path, layout: Path | None, path: Path) -> Path:
         return recording
     if len(run.ticks) >= MANY_TICKS:
         typer.echo(f"drawing {len(run.ticks)} ticks ...", err=True)
+    for missing in missing_meshes(run.header.robot) if run.header.robot is not None else ():
+        typer.echo(f"warning: {missing}", err=True)
     chosen = layout or layout_beside(run.header)
     own = None
     if chosen is not None:

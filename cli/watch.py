@@ -11,7 +11,7 @@ import typer
 
 from ..runtime.language.errors import AloftError
 from .output import SET_HELP, errors_reported
-from .top import As, Keys, observer_of
+from .top import As, Keys, Local, observer_of
 
 
 def watch(
@@ -20,13 +20,17 @@ def watch(
     web: Annotated[bool, typer.Option("--web", help="In a browser.")] = False,
     keys: Keys = None,
     name: As = "viewer",
+    local: Local = 0,
     overrides: Annotated[list[str] | None, typer.Option("--set", help=SET_HELP)] = None,
 ) -> None:
     """Show a machine's signals live, 50 times a second, until Ctrl-C. Nothing is sent to it."""
     from ..logs.recording.watched_part import WatchedPart
     from ..logs.viewing.viewer import start_viewer
 
-    with errors_reported(False), observer_of(graph, overrides or [], keys, name) as observer:
+    with (
+        errors_reported(False),
+        observer_of(graph, overrides or [], keys, name, local) as observer,
+    ):
         observer.placed.machine(machine)
         if observer.wait_for((machine,), 10.0):
             raise AloftError(f"nothing was heard of {machine!r} for 10 s: does it run?")

@@ -6,6 +6,7 @@ velocity [rad/s], with one element for each joint (n,). No function here allocat
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -29,12 +30,12 @@ class SoftStops(NamedTuple):
     """Springs and dampers that begin ``margin`` [rad] inside joint limits (n, 2).
 
     The springs have ``gain`` times ``stiffness``. The damping grows linearly from zero at the
-    margin to ``gain`` times ``damping`` at the limit.
+    margin to ``gain`` times ``damping`` at the limit. ``margin`` and ``gain`` are (1,).
     """
 
     limits: Array
-    margin: float
-    gain: float
+    margin: Array
+    gain: Array
     stiffness: Array
     damping: Array
 
@@ -92,20 +93,21 @@ def blend_gain(
 @kernel
 def add_soft_stops(measured: Array, stops: SoftStops, out: Feedback) -> None:
     """Add soft stops to a feedback where a measured angle (n,) is near its joint's limit."""
+    margin, gain = float(stops.margin[0]), float(stops.gain[0])
     for i in range(measured.shape[0]):
-        angle, margin = float(measured[i]), stops.margin
+        angle = float(measured[i])
         edge = min(
             max(angle, float(stops.limits[i, 0]) + margin), float(stops.limits[i, 1]) - margin
         )
         depth = abs(angle - edge) / margin
         if depth > 0.0:
-            spring = stops.gain * float(stops.stiffness[i])
+            spring = gain * float(stops.stiffness[i])
             total = spring + float(out.stiffness[i])
             if total > 0.0:
                 pulled = spring * edge + float(out.stiffness[i]) * float(out.position[i])
                 out.position[i] = pulled / total
             out.stiffness[i] = total
-            damper = stops.gain * min(depth, 1.0) * float(stops.damping[i])
+            damper = gain * min(depth, 1.0) * float(stops.damping[i])
             total = damper + float(out.damping[i])
             if total > 0.0:
                 out.velocity[i] = float(out.damping[i]) * float(out.velocity[i]) / total
@@ -114,7 +116,7 @@ def add_soft_stops(measured: Array, stops: SoftStops, out: Feedback) -> None:
 
 @kernel
 def add_friction(
-    velocity: Array, friction: Array, damping: Array, speed: float, scratch: Array, torque: Array
+    velocity: Array, friction: Array, damping: Array, speed: float, torque: Array
 ) -> None:
     """Add the torque that compensates joint friction to ``torque`` [N m], (n,).
 
@@ -122,12 +124,10 @@ def add_friction(
     viscous ``damping`` [N m s/rad]. The first term is zero at rest and has three quarters of its
     full value at ``speed`` [rad/s].
     """
-    np.divide(velocity, speed, scratch)
-    np.tanh(scratch, scratch)
-    np.multiply(scratch, friction, scratch)
-    np.add(torque, scratch, torque)
-    np.multiply(velocity, damping, scratch)
-    np.add(torque, scratch, torque)
+    for i in range(torque.shape[0]):
+        share = math.tanh(float(velocity[i]) / speed)
+        torque[i] = float(torque[i]) + share * float(friction[i])
+        torque[i] = float(torque[i]) + float(velocity[i]) * float(damping[i])
 
 
 @kernel

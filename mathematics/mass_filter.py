@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 
 from .kernel import kernel
 from .least_squares import solve_positive_columns
+from .linear import multiply_vector
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -148,7 +149,7 @@ def fade(estimate: Array, covariance: Array, first: int, factor: float, variance
 @kernel
 def correct_row(
     estimate: Array, covariance: Array, row: Array, residual: float, noise: float, gate: float,
-    seen: Array, product: Array,
+    seen: Array,
 ) -> bool:  # fmt: skip
     """Correct the estimate by one measured number, unless it is an outlier; whether it was used.
 
@@ -158,9 +159,9 @@ def correct_row(
         residual: the measurement minus what the estimate gives.
         noise: its standard deviation.
         gate: a residual of more standard deviations than this is not used.
-        seen, product: scratch (n,) and (n, n).
+        seen: scratch (n,).
     """
-    np.dot(covariance, row, seen)
+    multiply_vector(covariance, row, seen)
     variance = noise * noise
     for i in range(row.shape[0]):
         variance += float(row[i]) * float(seen[i])
@@ -168,7 +169,8 @@ def correct_row(
         return False
     for i in range(row.shape[0]):
         estimate[i] += float(seen[i]) * residual / variance
-    np.multiply(seen.reshape(-1, 1), seen, product)
-    np.divide(product, variance, product)
-    np.subtract(covariance, product, covariance)
+    for i in range(row.shape[0]):
+        for k in range(row.shape[0]):
+            share = float(seen[i]) * float(seen[k]) / variance
+            covariance[i, k] = float(covariance[i, k]) - share
     return True

@@ -18,6 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..mathematics.directions import unit
 from ..mathematics.kernel import kernel
 from ..mathematics.rotations import wrap
 from .limb import FootKind, chain_to, foot_shape
@@ -218,7 +219,7 @@ def inverse(
     px = min(max(float(sole[0]) - float(hip[0]), -_FAR), _FAR)
     py = min(max(float(sole[1]) - float(hip[1]), -_FAR), _FAR)
     pz = min(max(float(sole[2]) - float(hip[2]), -_FAR), _FAR)
-    fx, fy, fz = _direction(float(line[0]), float(line[1]), float(line[2]), 1.0, 0.0, 0.0)
+    fx, fy, fz = unit(float(line[0]), float(line[1]), float(line[2]), 1.0, 0.0, 0.0)
     # The plane's normal, which becomes the thigh's y axis.
     nx, ny, nz = fy * pz - fz * py, fz * px - fx * pz, fx * py - fy * px
     size = math.sqrt(nx * nx + ny * ny + nz * nz)
@@ -227,7 +228,7 @@ def inverse(
     if not exact:
         fill = slant - size if size > 0.0 else 1.0
         nx, ny, nz = nx - fill * fy * fx, ny + fill * (1.0 - fy * fy), nz - fill * fy * fz
-    nx, ny, nz = _direction(nx, ny, nz, 0.0, 1.0, 0.0)
+    nx, ny, nz = unit(nx, ny, nz, 0.0, 1.0, 0.0)
     # The line's direction and this one, at right angles to it, span the plane.
     ux, uy, uz = fy * nz - fz * ny, fz * nx - fx * nz, fx * ny - fy * nx
     x, z = px * fx + py * fy + pz * fz, px * ux + py * uy + pz * uz
@@ -313,19 +314,6 @@ def _thigh_rotation(a: float, b: float, c: float, out: Array) -> None:
     out[0, 2] = sin_a * sin_c - cos_a * sin_b * cos_c
     out[1, 2] = -cos_a * sin_c - sin_a * sin_b * cos_c
     out[2, 2] = cos_b * cos_c
-
-
-@kernel
-def _direction(
-    x: float, y: float, z: float, default_x: float, default_y: float, default_z: float
-) -> tuple[float, float, float]:
-    """The unit vector along (x, y, z), or the default where there is no direction."""
-    largest = max(abs(x), abs(y), abs(z))
-    if largest < 1e-300:
-        return default_x, default_y, default_z
-    x, y, z = x / largest, y / largest, z / largest
-    size = math.sqrt(x * x + y * y + z * z)
-    return x / size, y / size, z / size
 
 
 @kernel

@@ -13,6 +13,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from ..mathematics.directions import unit
 from ..mathematics.kernel import kernel
 
 Array = NDArray[np.float64]
@@ -32,10 +33,10 @@ def aim(position: Array, rotation: Array, target: Array) -> None:
     """
     for k in range(3):
         target[0, k] = min(max(float(position[k]), -_FAR), _FAR)
-    x0, x1, x2 = _unit(
+    x0, x1, x2 = unit(
         float(rotation[0, 0]), float(rotation[1, 0]), float(rotation[2, 0]), 1.0, 0.0, 0.0
     )
-    y0, y1, y2 = _unit(
+    y0, y1, y2 = unit(
         float(rotation[0, 1]), float(rotation[1, 1]), float(rotation[2, 1]), 0.0, 1.0, 0.0
     )
     part = x0 * y0 + x1 * y1 + x2 * y2
@@ -49,7 +50,7 @@ def aim(position: Array, rotation: Array, target: Array) -> None:
         else:
             y0 = 1.0
         part = x0 * y0 + x1 * y1 + x2 * y2
-    y0, y1, y2 = _unit(y0 - part * x0, y1 - part * x1, y2 - part * x2, 0.0, 1.0, 0.0)
+    y0, y1, y2 = unit(y0 - part * x0, y1 - part * x1, y2 - part * x2, 0.0, 1.0, 0.0)
     target[1, 0], target[2, 0], target[3, 0] = x0, x1, x2
     target[1, 1], target[2, 1], target[3, 1] = y0, y1, y2
     target[1, 2] = x1 * y2 - x2 * y1
@@ -83,7 +84,7 @@ def foot_error(tip: Array, pose: Array, target: Array, weights: Array, error: Ar
         sine, cosine = math.sqrt(tx * tx + ty * ty + tz * tz), lx * wx + ly * wy + lz * wz
         if sine < 1e-7 and cosine < 0.0:
             # The line points the opposite way: turn about an axis at right angles to it.
-            tx, ty, tz = _unit(-ly * lx, 1.0 - ly * ly, -ly * lz, 0.0, 0.0, 1.0)
+            tx, ty, tz = unit(-ly * lx, 1.0 - ly * ly, -ly * lz, 0.0, 0.0, 1.0)
             sine = 1.0
             cosine = -1e9
     elif tip[6] == 2.0:
@@ -109,7 +110,7 @@ def foot_error(tip: Array, pose: Array, target: Array, weights: Array, error: Ar
                 ty += 1.0
             else:
                 tz += 1.0
-            tx, ty, tz = _unit(tx, ty, tz, 1.0, 0.0, 0.0)
+            tx, ty, tz = unit(tx, ty, tz, 1.0, 0.0, 0.0)
             sine = 1.0
             cosine = -1e9
     scale = length if sine < 1e-7 else length * math.atan2(sine, cosine) / sine
@@ -195,16 +196,3 @@ def _product(first: Array, second: Array, row: int, column: int) -> float:
         + float(first[row, 1]) * float(second[column, 1])
         + float(first[row, 2]) * float(second[column, 2])
     )
-
-
-@kernel
-def _unit(
-    x: float, y: float, z: float, default_x: float, default_y: float, default_z: float
-) -> tuple[float, float, float]:
-    """The unit vector along (x, y, z), or the default where there is no direction."""
-    largest = max(abs(x), abs(y), abs(z))
-    if largest < 1e-300:
-        return default_x, default_y, default_z
-    x, y, z = x / largest, y / largest, z / largest
-    size = math.sqrt(x * x + y * y + z * z)
-    return x / size, y / size, z / size

@@ -12,7 +12,13 @@ from typing import Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, SerializerFunctionWrapHandler, model_serializer
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    SerializationInfo,
+    SerializerFunctionWrapHandler,
+    model_serializer,
+)
 
 Vector3 = tuple[float, float, float]
 Array = NDArray[np.float64]
@@ -28,13 +34,22 @@ class Part(BaseModel):
     later: ClassVar[tuple[str, ...]] = ()
     """Fields that came after version 0.1. They are left out where they have their default, so that
     a description that does not use them keeps its content, and plans made for it their keys."""
+    seen_only: ClassVar[tuple[str, ...]] = ()
+    """Fields that say what the part looks like, on which nothing that is computed depends. They are
+    in a dump only with ``context={"looks": True}``: a robot keeps its content without its meshes."""
 
     @model_serializer(mode="wrap")
-    def _without_unused(self, serialize: SerializerFunctionWrapHandler) -> dict[str, Any]:
+    def _without_unused(
+        self, serialize: SerializerFunctionWrapHandler, info: SerializationInfo
+    ) -> dict[str, Any]:
         data: dict[str, Any] = serialize(self)
         fields = type(self).model_fields
+        looks = bool((info.context or {}).get("looks"))
         for name in self.later:
             if getattr(self, name) == fields[name].default:
+                data.pop(name, None)
+        for name in self.seen_only:
+            if not looks or getattr(self, name) == fields[name].default:
                 data.pop(name, None)
         return data
 
@@ -45,6 +60,27 @@ class Shape(Part):
     start: Vector3
     end: Vector3
     radius: float
+
+
+class Mesh(Part):
+    """A mesh that a link is drawn as, in place of its collision shapes.
+
+    ``file`` is a path, or ``package://NAME/PATH`` of an installed package. The file's corners times
+    ``scale``, turned by ``orientation`` (a quaternion x, y, z, w) and moved by ``position`` [m], are
+    in the link's frame.
+    """
+
+    file: str
+    position: Vector3 = (0.0, 0.0, 0.0)
+    orientation: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 1.0)
+    scale: Vector3 = (1.0, 1.0, 1.0)
+
+
+class Look(Part):
+    """What a link is drawn as: ``meshes``, and capsules for the rest."""
+
+    meshes: tuple[Mesh, ...]
+    shapes: tuple[Shape, ...] = ()
 
 
 class Link(Part):

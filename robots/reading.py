@@ -83,7 +83,7 @@ def read(path: Path) -> ReadRobot:
     faults = [*text.faults, *find_faults(data)]
     if faults:
         raise RobotError(str(path), [text.placed(fault) for fault in faults])
-    return ReadRobot(RobotDescription.model_validate(data), path)
+    return ReadRobot(_with_places(RobotDescription.model_validate(data), path.parent), path)
 
 
 def _named_file(path: Path, text: PlacedYaml) -> Path:
@@ -127,8 +127,29 @@ def _read_model(path: Path, added: Path | None, text: PlacedYaml | None) -> Read
         placed = [_placed(fault, imported, text) for fault in faults]
         raise RobotError(str(added or path), placed)
     robot = RobotDescription.model_validate(imported.data)
+    robot = _with_places(robot, (added or path).parent)
     robot, more = fit_to_ground(robot, "standing" in content, imported.model.pose)
     return ReadRobot(robot, added or path, path, (*imported.notes, *more))
+
+
+def _with_places(robot: RobotDescription, folder: Path) -> RobotDescription:
+    """The robot with meshes that are found from anywhere; a description in ``folder`` names them."""
+    if not robot.looks:
+        return robot
+    from .importing.looks import located
+
+    looks = {
+        link: look.model_copy(
+            update={
+                "meshes": tuple(
+                    mesh.model_copy(update={"file": located(mesh.file, folder)})
+                    for mesh in look.meshes
+                )
+            }
+        )
+        for link, look in robot.looks.items()
+    }
+    return robot.changed(looks=looks)
 
 
 def _placed(fault: RobotFault, imported: Imported, added: PlacedYaml | None) -> RobotFault:

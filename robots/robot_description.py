@@ -21,6 +21,7 @@ from .parts import (
     Foot,
     Joint,
     Link,
+    Look,
     Motors,
     Part,
     Sensors,
@@ -42,6 +43,7 @@ class RobotDescription(Part):
     """
 
     later = ("base_joint", "profile", "sensors", "held")
+    seen_only = ("looks",)
 
     name: str
     text: str = ""
@@ -63,6 +65,8 @@ class RobotDescription(Part):
     """Angles [rad] by name of joints that stand still while the robot is at work."""
     points: Mapping[str, tuple[str, Vector3]] = {}
     """Named points [m, link frame] where something may push: name -> (link, position)."""
+    looks: Mapping[str, Look] = {}
+    """What links are drawn as, by name; others are drawn as their collision shapes."""
 
     @property
     def dimensions(self) -> Mapping[str, int]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
@@ -54,7 +55,7 @@ class Publish(Ros2Block):
     message: Signal
 
     @classmethod
-    def fitted(cls, params: Parameters) -> type[Block]:
+    def fitted(cls, params: Parameters, folder: Path) -> type[Block]:
         """The class whose input has the fields of the message type."""
         assert isinstance(params, PublishParameters)
         return _class_for(message_type(params).signal)

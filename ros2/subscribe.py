@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
@@ -60,7 +61,7 @@ class Subscribe(Ros2Block):
     health = Output(TopicHealth, text="ages and counts")
 
     @classmethod
-    def fitted(cls, params: Parameters) -> type[Block]:
+    def fitted(cls, params: Parameters, folder: Path) -> type[Block]:
         """The class whose output has the fields of the message type."""
         assert isinstance(params, SubscribeParameters)
         return _class_for(message_type(params).signal)

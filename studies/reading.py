@@ -1,8 +1,8 @@
 """Reads a study's file and reports every mistake in it at once, as for graphs.
 
-The keys: ``graph`` or ``graphs``, ``include``, ``seeds``, ``title``, ``set``, ``arms``, ``grid``,
-``goals``, ``tune``, ``plots``; docs/studies.md explains them. What overrides mean to the graphs is
-checked by ``expansion``.
+The keys: ``graph``, ``graphs`` or ``graphs_of``, ``include``, ``seeds``, ``title``, ``set``, ``arms``,
+``grid``, ``goals``, ``tune``, ``plots``; docs/studies.md explains them. What overrides mean to the
+graphs is checked by ``expansion``.
 """
 
 from __future__ import annotations
@@ -21,8 +21,10 @@ from .sections import Labels, read_goals, read_plots, read_seeds, read_tuning
 from .study import Arm, Filter, Range, Study, Task
 
 KEYS = (
-    "graph", "graphs", "include", "seeds", "title", "set", "arms", "grid", "goals", "tune", "plots",
+    "graph", "graphs", "graphs_of", "include", "seeds", "title", "set", "arms", "grid", "goals",
+    "tune", "plots",
 )  # fmt: skip
+GRAPH_KEYS = ("graph", "graphs", "graphs_of")
 ARM_KEYS = ("set", "tune")
 TASK_KEYS = ("graph", "set")
 
@@ -129,25 +131,25 @@ def _read(tree: MapNode, path: Path, problems: Problems) -> Study:
 
 
 def _read_tasks(keys: dict[str, Entry], path: Path, problems: Problems) -> tuple[Task, ...]:
-    one, many = keys.get("graph"), keys.get("graphs")
-    if (one is None) == (many is None):
+    given = [keys[key] for key in GRAPH_KEYS if key in keys]
+    if len(given) != 1:
+        written = " and ".join(repr(entry.key) for entry in given)
         problems.add(
-            Code.MISSING_KEY if one is None else Code.DUPLICATE_KEY,
-            "the study names no graph" if one is None else "'graph' and 'graphs' are both there",
-            one.key_where if one else Position(str(path), 1, 1),
-            expected="graph: FILE, or graphs: {task: FILE}",
-            fix="" if one else "graph: ../jump.yaml",
+            Code.DUPLICATE_KEY if given else Code.MISSING_KEY,
+            f"{written} exclude each other" if given else "the study names no graph",
+            given[0].key_where if given else Position(str(path), 1, 1),
+            expected="graph: FILE, graphs: {task: FILE}, or graphs_of: STUDY",
+            fix="" if given else "graph: ../jump.yaml",
         )
         return ()
-    if one is not None:
-        return tuple(Task(p.stem, p, node.where) for node, p in _files(one, path, problems))
-    assert many is not None
-    if not isinstance(many.value, MapNode):
-        found = _files(many, path, problems)
-        tasks = [Task(p.stem, p, node.where) for node, p in found]
-    else:
-        named = [_read_task(entry, path, problems) for entry in many.value]
+    (entry,) = given
+    if entry.key == "graphs_of":
+        return _tasks_of(entry, path, problems)
+    if entry.key == "graphs" and isinstance(entry.value, MapNode):
+        named = [_read_task(item, path, problems) for item in entry.value]
         tasks = [task for task in named if task is not None]
+    else:
+        tasks = [Task(p.stem, p, node.where) for node, p in _files(entry, path, problems)]
     names: set[str] = set()
     for task in tasks:
         if task.name in names:
@@ -156,6 +158,30 @@ def _read_tasks(keys: dict[str, Entry], path: Path, problems: Problems) -> tuple
                 fix="name them: graphs: {first: FILE, second: FILE}",
             )  # fmt: skip
         names.add(task.name)
+    return tuple(tasks)
+
+
+def _tasks_of(entry: Entry, path: Path, problems: Problems) -> tuple[Task, ...]:
+    """The tasks of another study, which has to name them itself."""
+    if not isinstance(entry.value, ScalarNode):
+        wrong_kind(entry.value, "'graphs_of'", "a study's file, relative to this one", problems)
+        return ()
+    tasks: list[Task] = []
+    for node, file in _files(entry, path, problems):
+        tree = read_file(file, str(file), problems, ("a study file", "graph, seeds, grid"))
+        if tree is None:
+            continue
+        keys = {item.key: item for item in tree if item.key in GRAPH_KEYS}
+        if "graphs_of" in keys:
+            name = str(plain(node))
+            further = Path(name).parent / str(plain(keys["graphs_of"].value))
+            problems.add(
+                Code.BAD_VALUE, f"{file} has its graphs from another study itself", node.where,
+                at=entry.key, expected="a study with 'graph' or 'graphs'", found=name,
+                fix=f"graphs_of: {further.as_posix()}",
+            )  # fmt: skip
+            continue
+        tasks += _read_tasks(keys, file, problems)
     return tuple(tasks)
 
 

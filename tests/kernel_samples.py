@@ -70,12 +70,15 @@ UNUSED = {
     "aloft.mathematics.flight_prediction.solve_rows": (
         REGULAR + REGULAR.T, np.array([[0.3, -0.2, 0.5], [1.0, 0.4, -0.7]]),
     ),
-    "aloft.blocks.control.balance_target.pattern_turn": (
+    "aloft.blocks.control.balance_law.pattern_turn": (
         POSE, POSE[0], TARGET, np.array([0.01, 0.02, 0.0]),
     ),
     "aloft.mathematics.landing_law.landing_place": (
         POSE[0], 1.0, POSE[1], POSE[2], np.array([0.1, 0.2, 0.3]), np.array([0.3, 0.2, 0.1]), 0.05,
         np.array([0.1, 0.2]), POSE[3], np.zeros(3),
+    ),
+    "aloft.mathematics.landing_law.pull_to_place": (
+        np.array([0.01, -0.02, 0.0]), np.array([0.03, 0.01, 0.2]), 0.5, 0.04,
     ),
     "aloft.mathematics.landing_law.turn_places": (POSE, 0.3, np.zeros((4, 3))),
     "aloft.robots.limb.place_limb": (
@@ -100,7 +103,7 @@ UNUSED = {
     "aloft.robots.limb_inverse._stuck": (LIMB.limits, 1, 0.3, 1.0),
     "aloft.robots.limb_error._along": (POSE, LIMB.tip),
     "aloft.robots.limb_error._product": (POSE, TARGET, 1, 2),
-    "aloft.robots.limb_error._unit": (0.1, 0.2, 0.3, 1.0, 0.0, 0.0),
+    "aloft.mathematics.directions.unit": (0.1, 0.2, 0.3, 1.0, 0.0, 0.0),
     "aloft.robots.five_joint_reach.slide": (
         LEG.hip, LEG.plane, LEG.signs, LEG.limits, np.add(LEG.hip, [0.25, 0.02, -0.3]), np.eye(3), 0.005,
         0.1, 0.05, np.zeros(3), np.zeros(5),
@@ -108,7 +111,7 @@ UNUSED = {
     "aloft.mathematics.rotations.skew": (np.ones(3), np.zeros((3, 3))),
     "aloft.robots.five_joint_reach.pitched_line": (np.eye(3), 0.4, np.zeros(3)),
     "aloft.mathematics.rotations.yaw": (np.array([0.1, 0.2, 0.3, 0.9]),),
-    "aloft.blocks.control.balance_target.lengthen": (
+    "aloft.blocks.control.balance_law.lengthen": (
         np.array([0.01, -0.04, 0.0]), 0.7, 0.02, 0.25, 0.2, 0.6, *(np.ones(3) for _ in range(3)),
     ),
     "aloft.blocks.control.dynamics.lowest_point": (
@@ -120,12 +123,11 @@ UNUSED = {
         0.002, 0.02, np.ones(10), Motion(np.ones(10), np.ones(10)), Motion(np.ones(10), np.ones(10)),
     ),
     "aloft.mathematics.joint_feedback.add_friction": (
-        np.linspace(-1.0, 1.0, 10), np.full(10, 0.07), np.full(10, 0.01), 0.3, np.zeros(10),
-        np.ones(10),
+        np.linspace(-1.0, 1.0, 10), np.full(10, 0.07), np.full(10, 0.01), 0.3, np.ones(10),
     ),
     "aloft.mathematics.joint_feedback.add_soft_stops": (
         np.linspace(-1.0, 1.0, 5),
-        SoftStops(np.tile([-0.8, 0.7], (5, 1)), 0.1, 2.0, np.full(5, 60.0), np.full(5, 1.5)),
+        SoftStops(np.tile([-0.8, 0.7], (5, 1)), np.array([0.1]), np.array([2.0]), np.full(5, 60.0), np.full(5, 1.5)),
         Feedback(*(np.full(5, x) for x in (40.0, 0.2, 1.0, 0.3))),
     ),
     "aloft.robots.five_joint_reach.keep_along": (
@@ -148,7 +150,7 @@ UNUSED = {
         np.array([0.1, 0.2, 0.3, 0.92]), np.ones((3, 3)), np.array([0.6, 0.0, 0.0, 0.8]),
         np.ones((3, 3)), np.zeros(4), np.zeros((3, 3)), np.zeros(4),
     ),
-    "aloft.blocks.control.balance_target.add_quadratic_growth": (np.ones(3), 0.6, 0.25, np.zeros(3), np.zeros(3)),
+    "aloft.blocks.control.balance_law.add_quadratic_growth": (np.ones(3), 0.6, 0.25, np.zeros(3), np.zeros(3)),
     "aloft.blocks.general.periods.first_tick": (0.5, 0.002),
     "aloft.mathematics.linear.add_product": (POSE, POSE[0], np.ones(4)),
     "aloft.mathematics.linear.multiply_matrices": (POSE, TARGET[1:], np.zeros((4, 3))),

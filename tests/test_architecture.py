@@ -15,20 +15,25 @@ from aloft.runtime.language.registry import find_block, known_names
 
 ROOT = Path(__file__).parent.parent
 PACKAGES = (
-    "mathematics", "robots", "runtime", "planner", "blocks", "hal", "ros2", "logs", "studies",
+    "mathematics", "robots", "runtime", "planner", "blocks", "hal", "ros2", "fmi", "logs", "studies",
     "benchmarks", "cli", "graphs",
 )  # fmt: skip
 ALLOWED: dict[str, tuple[str, ...]] = {
     "mathematics": (),
     "robots": ("mathematics",),
-    "runtime/language": ("robots",),
-    "runtime/running": ("runtime/language", "robots", "mathematics/compiling"),
+    "runtime/language": ("robots", "mathematics/compiling"),
+    "runtime/running": (
+        "runtime/language", "runtime/loading/selection", "robots", "mathematics/compiling",
+    ),
     "runtime/loading": ("runtime/language", "runtime/placement", "robots"),
     "runtime/placement": ("runtime/language", "robots"),
     "runtime/links": (
         "runtime/language", "runtime/loading", "runtime/running", "runtime/placement", "robots",
     ),
     "runtime/drawing": ("runtime/language", "runtime/loading", "robots"),
+    "runtime/live": (
+        "runtime/language", "runtime/loading", "runtime/running", "runtime/drawing", "robots",
+    ),
     "runtime/testing": (
         "runtime/language", "runtime/loading", "runtime/running", "runtime/placement",
         "runtime/links", "robots", "mathematics/compiling",
@@ -66,6 +71,8 @@ ALLOWED: dict[str, tuple[str, ...]] = {
     "blocks/scoring": ("blocks/signals", "mathematics", "robots", "runtime/language"),
     "hal": ("blocks/signals", "mathematics", "robots", "runtime/language"),
     "ros2": ("robots", "runtime/language"),
+    "fmi": ("robots", "runtime/language"),
+    "fmi/exporting": ("robots", "runtime", "logs/file"),
     "logs/file": ("robots", "runtime/language", "runtime/running"),
     "logs/viewing": ("logs/file", "robots", "runtime/language"),
     "logs/recording": (
@@ -76,7 +83,9 @@ ALLOWED: dict[str, tuple[str, ...]] = {
     "logs/exporting": ("logs/file", "logs/viewing", "robots", "runtime/language"),
     "logs": ("logs/file",),
     "studies": ("mathematics", "robots", "runtime", "planner", "blocks", "hal", "logs"),
-    "benchmarks": ("robots", "runtime", "planner", "blocks", "hal", "logs", "studies"),
+    "benchmarks": (
+        "mathematics", "robots", "runtime", "planner", "blocks", "hal", "logs", "studies",
+    ),
     "cli": PACKAGES,
     "graphs": (),
 }  # fmt: skip
@@ -249,7 +258,7 @@ def block_files() -> dict[tuple[str, ...], Path]:
     found = {}
     for name in known_names():
         module = tuple(find_block(name).__module__.split(".")[1:])
-        if name.startswith(("blocks.", "hal.", "ros2.")):
+        if name.startswith(("blocks.", "hal.", "ros2.", "fmi.")):
             found[module] = ROOT.joinpath(*module).with_suffix(".py")
     return found
 

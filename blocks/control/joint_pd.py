@@ -6,31 +6,37 @@ from typing import Literal
 
 import numpy as np
 
-from ...mathematics.joint_feedback import (
-    Feedback,
-    Motion,
-    SoftStops,
-    add_friction,
-    add_soft_stops,
-    blend_feedback,
-    integrate_accelerations,
-)
-from ...runtime.language.block import Block, Input, Output, State
+from ...mathematics.compiling.kernel_call import KernelCall
+from ...mathematics.joint_feedback import Feedback, Motion, SoftStops
+from ...robots.description import RobotDescription
+from ...runtime.language.block import Input, Output, State
+from ...runtime.language.kernel_block import KernelBlock
 from ...runtime.language.parameters import Parameters, live_parameter, parameter
 from ...runtime.language.per_joint import PerJoint
 from ...runtime.language.signals import Field, Signal
 from ..signals import (
-    CommandMode,
     JointCommand,
     JointState,
     JointTarget,
     JumpReference,
-    Phase,
     PhaseState,
     WholeBodyCommand,
 )
+from .joint_command import (
+    ACCELERATION,
+    LEGS,
+    MEASURED,
+    Following,
+    Inputs,
+    Joints,
+    Legs,
+    Numbers,
+    command_joints,
+)
 from .joint_gains import default_gains
 from .tasks.foot_joints import leg_joints
+
+_KINDS = {"measured": MEASURED, "acceleration": ACCELERATION, "legs": LEGS}
 
 
 class JointFollower(Signal):
@@ -42,7 +48,7 @@ class JointFollower(Signal):
     started = Field(dtype="bool", text="whether the targets have begun at the measured joints")
 
 
-class JointPD(Block):
+class JointPD(KernelBlock):
     """The joint command of every tick: feedforward plus joint feedback (paper, V, first equation)::
 
         tau = tau_ff + Kp (q_d - q) + Kd (q_d' - q')
@@ -134,128 +140,75 @@ class JointPD(Block):
     follower = State(JointFollower, text="blending and stance targets")
 
     def setup(self) -> None:
-        robot = self.robot
-        n = len(robot.joints)
-        self._chains = [leg_joints(robot, foot) for foot in range(len(robot.feet))]
-        in_legs = {joint for chain in self._chains for joint in chain}
-        names = [joint.name for joint in robot.joints]
-        self._held = [(k, robot.held[name]) for k, name in enumerate(names) if name in robot.held]
-        self._free = [
-            k for k, name in enumerate(names) if k not in in_legs and name not in robot.held
-        ]
-        self._standing = robot.standing_position
-        self._planned = "reference" in self.context.wired
-        self._foot_of_point = robot.foot_of_contact()
+        robot, n = self.robot, len(self.robot.joints)
         self._default_gains = default_gains(robot)
-        self._airborne, self._grounded, self._part = np.zeros(n), np.zeros(n), np.zeros(n)
-        self._measured = Motion(self.joints.position, self.joints.velocity)
-        self._integrated = Motion(self.follower.position, self.follower.velocity)
-        self._flight = Feedback(*(np.zeros(n) for _ in range(4)))
-        self._stance = Feedback(*(np.zeros(n) for _ in range(4)))
-        command = self.command
-        self._out = Feedback(command.stiffness, command.position, command.damping, command.velocity)
+        self._legs = _legs(robot)
+        reference, command, follower = self.reference, self.command, self.follower
+        planned = Motion(reference.joint_position, reference.joint_velocity)
+        if "reference" not in self.context.wired:
+            planned = Motion(robot.standing_position.copy(), np.zeros(n))
+        self._joints = Joints(np.zeros(n), *(Feedback(*np.zeros((4, n))) for _ in range(2)))
+        one = [np.zeros(1) for _ in range(4)]
+        self._numbers = Numbers(*one[:3], np.zeros(n), np.zeros(n), one[3], np.zeros(1, np.bool_))
+        flight = self._joints.flight
+        self._stops = SoftStops(
+            robot.joint_limits, np.zeros(1), np.zeros(1), flight.stiffness, flight.damping
+        )
         self.on_parameters()
+        commanding = KernelCall(
+            command_joints,
+            self.period,
+            _KINDS[self.params.stance_targets],
+            self._legs,
+            Inputs(
+                self.phase.phase, self.phase.stance, self.phase.stepping, self.wbc.torque,
+                self.wbc.acceleration[-n:], Motion(self.joints.position, self.joints.velocity),
+                Motion(self.legs.position, self.legs.velocity), planned, reference.phase,
+                reference.joint_torque,
+            ),
+            self._numbers,
+            self._stops,
+            Following(
+                follower.airborne, Motion(follower.position, follower.velocity), follower.started
+            ),
+            self._joints,
+            command.mode,
+            command.torque,
+            Feedback(command.stiffness, command.position, command.damping, command.velocity),
+        )  # fmt: skip
+        self.kernel_calls = (commanding,)
 
     def on_parameters(self) -> None:
-        p, robot = self.params, self.robot
+        p, robot, numbers = self.params, self.robot, self._numbers
         stiffness, damping = self._default_gains
-        flight, stance = self._flight, self._stance
+        flight, stance = self._joints.flight, self._joints.stance
         given = p.flight_stiffness, p.flight_damping
         flight.stiffness[:] = stiffness if given[0] is None else given[0].resolve(robot)
         flight.damping[:] = damping if given[1] is None else given[1].resolve(robot)
-        stance.stiffness[:] = p.stance_stiffness.resolve(robot)
-        stance.damping[:] = p.stance_damping.resolve(robot)
-        for joint, _ in self._held:
-            stance.stiffness[joint] = flight.stiffness[joint]
-            stance.damping[joint] = flight.damping[joint]
+        held = self._legs.held
+        stance.stiffness[:] = np.where(held, flight.stiffness, p.stance_stiffness.resolve(robot))
+        stance.damping[:] = np.where(held, flight.damping, p.stance_damping.resolve(robot))
         motors = robot.motors
-        self._friction = p.friction.resolve(robot) + p.friction_share * motors.friction
-        self._damping = p.friction_share * motors.damping
-        self._has_friction = bool(self._friction.any() or self._damping.any())
-        self._stops = SoftStops(
-            robot.joint_limits, p.stop_margin, p.stop_gain, flight.stiffness, flight.damping
-        )
+        numbers.friction[:] = p.friction.resolve(robot) + p.friction_share * motors.friction
+        numbers.damping[:] = p.friction_share * motors.damping
+        numbers.compensates[0] = bool(numbers.friction.any() or numbers.damping.any())
+        numbers.speed[0] = p.friction_speed
+        numbers.rate[0] = self.period / p.blend if p.blend > self.period else 1.0
+        numbers.feedforward[0], numbers.leak[0] = p.flight_feedforward, p.leak
+        self._stops.margin[0], self._stops.gain[0] = p.stop_margin, p.stop_gain
 
-    def step(self) -> None:
-        self._blend()
-        self._find_stance_targets()
-        self._find_flight_targets()
-        p, command = self.params, self.command
-        command.mode[()] = CommandMode.ACTIVE
-        np.multiply(self._grounded, self.wbc.torque, out=command.torque)
-        if int(self.phase.phase[()]) == int(self.reference.phase[()]) == Phase.FLIGHT:
-            np.multiply(self._airborne, self.reference.joint_torque, out=self._part)
-            self._part *= p.flight_feedforward
-            command.torque += self._part
-        if self._has_friction:
-            add_friction(
-                self.joints.velocity, self._friction, self._damping, p.friction_speed, self._part,
-                command.torque,
-            )  # fmt: skip
-        blend_feedback(self._airborne, self._flight, self._stance, self._measured, self._out)
-        if p.stop_gain > 0.0:
-            add_soft_stops(self.joints.position, self._stops, self._out)
 
-    def _blend(self) -> None:
-        """Change the weight of each leg's flight gains: up where no point of it is in stance."""
-        airborne, phase = self.follower.airborne, int(self.phase.phase[()])
-        rate = self.period / self.params.blend if self.params.blend > self.period else 1.0
-        least = 1.0 if self._chains else 0.0
-        for foot, chain in enumerate(self._chains):
-            swings = phase in (Phase.FLIGHT, Phase.LANDING)
-            for point, owner in enumerate(self._foot_of_point):
-                held = self.phase.stance[point] or self.phase.stepping[point]
-                if owner == foot and held:
-                    swings = False
-            weight = float(airborne[foot]) + (rate if swings else -rate)
-            airborne[foot] = weight = min(max(weight, 0.0), 1.0)
-            least = min(least, weight)
-            for joint in chain:
-                self._airborne[joint] = weight
-        for joint, _ in self._held:
-            self._airborne[joint] = least
-        for joint in self._free:
-            self._airborne[joint] = least
-        np.subtract(1.0, self._airborne, out=self._grounded)
-
-    def _find_stance_targets(self) -> None:
-        """The measured joints at rest, the legs' targets, or integrated accelerations."""
-        follower, joints, kind = self.follower, self.joints, self.params.stance_targets
-        stance = self._stance
-        if kind == "measured":
-            stance.position[...] = joints.position
-            stance.velocity[...] = 0.0
-        elif kind == "legs":
-            stance.position[...] = self.legs.position
-            stance.velocity[...] = self.legs.velocity
-        else:
-            if not follower.started[()]:
-                follower.position[...] = joints.position
-                follower.velocity[...] = joints.velocity
-                follower.started[()] = True
-            n = joints.position.shape[0]
-            integrate_accelerations(
-                self.period, self.params.leak, self.wbc.acceleration[-n:], self._measured,
-                self._integrated,
-            )  # fmt: skip
-            stance.position[...] = follower.position
-            stance.velocity[...] = follower.velocity
-        for joint, angle in self._held:
-            stance.position[joint] = angle
-            stance.velocity[joint] = 0.0
-
-    def _find_flight_targets(self) -> None:
-        """The legs' targets, the held angles, and the plan for joints that belong to no leg."""
-        flight, reference = self._flight, self.reference
-        flight.position[...] = self.legs.position
-        flight.velocity[...] = self.legs.velocity
-        for joint, angle in self._held:
-            flight.position[joint] = angle
-            flight.velocity[joint] = 0.0
-        for joint in self._free:
-            if self._planned:
-                flight.position[joint] = reference.joint_position[joint]
-                flight.velocity[joint] = reference.joint_velocity[joint]
-            else:
-                flight.position[joint] = self._standing[joint]
-                flight.velocity[joint] = 0.0
+def _legs(robot: RobotDescription) -> Legs:
+    """Which joint belongs to which leg, is held, or is free."""
+    n = len(robot.joints)
+    foot_of_joint, in_leg = np.full(n, -1), np.zeros(n, np.bool_)
+    held, angle = np.zeros(n, np.bool_), np.zeros(n)
+    for k, joint in enumerate(robot.joints):
+        if joint.name in robot.held:
+            held[k], angle[k] = True, robot.held[joint.name]
+    for foot in range(len(robot.feet)):
+        for k in leg_joints(robot, foot):
+            in_leg[k] = True
+            foot_of_joint[k] = -1 if held[k] else foot
+    foot_of_point = np.array(robot.foot_of_contact(), np.int64)
+    return Legs(foot_of_point, foot_of_joint, held, angle, ~in_leg & ~held)

@@ -5,8 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.kernel import kernel
-from ...runtime.language.block import Block, Input, Output, State
+from ...runtime.language.block import Input, Output, State
+from ...runtime.language.kernel_block import KernelBlock
 from ...runtime.language.parameters import Parameters, live_parameter
 from ...runtime.language.signals import Field, Signal
 from ..signals import ContactState, ContactSwitches, SwitchHealth
@@ -20,7 +22,7 @@ class ContactTimers(Signal):
     active = Field("n_contacts", dtype="bool", text="whether the point is in contact")
 
 
-class ContactDetector(Block):
+class ContactDetector(KernelBlock):
     """Debounces the switch of every contact point separately (paper, II-A).
 
     A point becomes active once its switch has been closed for ``close_samples`` ticks in a row, and
@@ -49,42 +51,46 @@ class ContactDetector(Block):
     state = Output(ContactState, text="which points carry load")
     timers = State(ContactTimers, text="one timer a point")
 
-    def step(self) -> None:
+    def setup(self) -> None:
         timers = self.timers
-        latch(
-            self.switches.closed,
-            self.faults.fault,
-            self.params.close_samples,
-            round(self.params.hold / self.period),
-            timers.closed,
-            timers.opened,
-            timers.active,
-        )
-        self.state.active[...] = timers.active
+        self._close_samples, self._hold_samples = np.zeros(1, np.int64), np.zeros(1, np.int64)
+        self.on_parameters()
+        latching = KernelCall(
+            latch, self.switches.closed, self.faults.fault, self._close_samples,
+            self._hold_samples, timers.closed, timers.opened, timers.active, self.state.active,
+        )  # fmt: skip
+        self.kernel_calls = (latching,)
+
+    def on_parameters(self) -> None:
+        self._close_samples[0] = self.params.close_samples
+        self._hold_samples[0] = round(self.params.hold / self.period)
 
 
 @kernel
 def latch(
     switches: NDArray[np.bool_],
     faults: NDArray[np.int64],
-    close_samples: int,
-    hold_samples: int,
+    close_samples: NDArray[np.int64],
+    hold_samples: NDArray[np.int64],
     closed: NDArray[np.int64],
     opened: NDArray[np.int64],
     active: NDArray[np.bool_],
+    out: NDArray[np.bool_],
 ) -> None:
     """Update ``closed``, ``opened`` and ``active`` (n_contacts,) by the switches of one tick.
 
-    A switch with a fault counts as open.
+    A switch with a fault counts as open. ``close_samples`` and ``hold_samples`` have one element;
+    ``out`` becomes a copy of ``active``.
     """
     for point in range(switches.shape[0]):
         if switches[point] and faults[point] == 0:
             closed[point] += 1
             opened[point] = 0
-            if closed[point] >= close_samples:
+            if closed[point] >= close_samples[0]:
                 active[point] = True
         else:
             closed[point] = 0
             opened[point] += 1
-            if opened[point] > hold_samples:
+            if opened[point] > hold_samples[0]:
                 active[point] = False
+        out[point] = active[point]

@@ -5,15 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Literal
 
-import numpy as np
-
+from ...mathematics.compiling.kernel_call import KernelCall
 from ...runtime.language.block import Block, Input, Metric, Output, State
 from ...runtime.language.parameters import Parameters, parameter
 from ...runtime.language.signals import Field, Signal
 from ..signals import DelayEstimate, JointCommand, JointState
-
-LAGS = 12
-"""Delays up to this many periods less one can be measured."""
+from .delay_sums import LAGS, Memory, follow_delay, give_delay
 
 
 class DelayMemory(Signal):
@@ -86,71 +83,26 @@ class DelayEstimator(Block):
     memory = State(DelayMemory, text="sums over the run so far")
 
     def setup(self) -> None:
-        n = len(self.robot.joints)
-        self._change, self._product = np.zeros(n), np.zeros(LAGS)
-        self._square = np.zeros((LAGS, LAGS))
-        self._last = round(self.params.duration / self.period)
-        self._least = round(self.params.least_time / self.period)
+        p, estimate = self.params, self.estimate
+        memory = Memory(*(getattr(self.memory, name) for name in Memory._fields))
+        self._give = KernelCall(
+            give_delay, p.told, p.usual, p.follow == "measured", memory, estimate.measured,
+            estimate.known, estimate.delay,
+        )  # fmt: skip
+        self._follow = KernelCall(
+            follow_delay, self.command.torque, self.joints.torque,
+            round(p.least_time / self.period), round(p.duration / self.period), p.least_match,
+            self.period, memory,
+        )  # fmt: skip
 
     def start(self) -> None:
         self.memory.delay[()] = -1.0
 
     def emit(self) -> None:
-        p, measured = self.params, float(self.memory.delay)
-        counts = measured >= 0.0
-        self.estimate.measured[()] = max(measured, 0.0)
-        self.estimate.known[()] = counts
-        follows = counts and p.follow == "measured"
-        self.estimate.delay[()] = max(measured - p.usual, 0.0) if follows else p.told
+        self._give.run()
 
     def update(self) -> None:
-        memory = self.memory
-        if memory.ticks > self._last:
-            return
-        ticks = int(memory.ticks)
-        if ticks > LAGS + 1:  # before, some changes are those from nothing to the first command
-            self._add()
-        for lag in range(LAGS - 1, 0, -1):
-            memory.changes[lag] = memory.changes[lag - 1]
-        np.subtract(self.command.torque, memory.command, out=memory.changes[0])
-        memory.command[...] = self.command.torque
-        memory.torque[...] = self.joints.torque
-        memory.ticks[()] = ticks + 1
-        if ticks >= self._least and (ticks % 25 == 0 or ticks == self._last):
-            self._solve()
-
-    def _add(self) -> None:
-        """Add the changes of this tick to the sums."""
-        memory = self.memory
-        np.subtract(self.joints.torque, memory.torque, out=self._change)
-        np.dot(memory.changes, memory.changes.T, out=self._square)
-        memory.square += self._square
-        np.dot(memory.changes, self._change, out=self._product)
-        memory.product += self._product
-        memory.energy += float(np.dot(self._change, self._change))
-
-    def _solve(self) -> None:
-        """The number of periods and the share of one that leave the least unexplained."""
-        memory, square, product = self.memory, self.memory.square, self.memory.product
-        energy = float(memory.energy)
-        if energy <= 0.0:
-            return
-        best, delay = energy, -1.0
-        for j in range(LAGS - 1):
-            own, cross, other = square.item(j, j), square.item(j, j + 1), square.item(j + 1, j + 1)
-            length = own - 2.0 * cross + other
-            if length <= 0.0:
-                continue
-            here, there = product.item(j), product.item(j + 1)
-            share = min(max((there - here - cross + own) / length, 0.0), 1.0)
-            error = energy - 2.0 * ((1.0 - share) * here + share * there)
-            error += (1.0 - share) ** 2 * own + 2.0 * share * (1.0 - share) * cross
-            error += share * share * other
-            if error < best:
-                best, delay = error, (j + share) * self.period
-        matched = 1.0 - best / energy
-        memory.matched[()] = matched
-        memory.delay[()] = delay if matched >= self.params.least_match else -1.0
+        self._follow.run()
 
     def metrics(self) -> Mapping[str, Metric]:
         """What was told and measured."""

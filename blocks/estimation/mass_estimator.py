@@ -6,29 +6,29 @@ import math
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.constants import GRAVITY
-from ...mathematics.mass_filter import (
-    LegScratch,
-    base_force_map,
-    correct_row,
-    fade,
-    split_friction,
-    torso_moment,
-)
+from ...mathematics.mass_filter import LegScratch
 from ...robots.description import RobotDescription
 from ...robots.limb import chain_to
 from ...runtime.language.block import Block, Input, Metric, Output, State
 from ...runtime.language.parameters import Parameters, parameter
 from ...runtime.language.signals import Field, Signal
-from ..signals import DynamicsTerms, JointState, MassEstimate, Phase, PhaseState
-
-Array = NDArray[np.float64]
-
-SCALE, COM, TILT, FRICTION = 0, 1, 4, 6
-"""Where the unknowns begin: the factor on all masses; the offset of the torso's CoM [m] (3); the
-error of the estimated tilt [rad] (2); by joint its unknown friction, as a share of its friction."""
+from ..signals import DynamicsTerms, JointState, MassEstimate, PhaseState
+from .mass_equations import (
+    COM,
+    FRICTION,
+    SCALE,
+    TILT,
+    Measured,
+    Memory,
+    Model,
+    Scratch,
+    Settings,
+    follow_mass,
+    publish_mass,
+)
 
 
 class MassMemory(Signal):
@@ -144,32 +144,34 @@ class MassEstimator(Block):
         return {"n_unknowns": FRICTION + len(robot.joints)}
 
     def setup(self) -> None:
-        robot, p = self.robot, self.params
-        n = len(robot.joints)
-        legs = [chain_to(robot, foot.link) for foot in robot.feet]
-        self._chains = np.full((len(legs), max(map(len, legs))), -1)
-        for foot, leg in enumerate(legs):
-            self._chains[foot, : len(leg)] = leg
-        self._foot_of_point = np.array(robot.foot_of_contact())
-        longest = self._chains.shape[1]
-        self._leg = LegScratch(np.zeros((longest, longest)), np.zeros((longest, 6)))
+        robot, p, n = self.robot, self.params, len(self.robot.joints)
         self._mass = robot.total_mass
-        self._torso = next(link.mass for link in robot.links if link.name == robot.base)
-        self._friction, self._damping = robot.motors.friction, robot.motors.damping
-        self._every = max(1, round(p.interval / self.period))
-        self._filter = min(1.0, self.period / p.filter_time)
-        self._follow = min(1.0, self.period / p.smoothing) if p.smoothing else 1.0
-        self._kept = math.exp(-self._every * self.period / p.friction_time)
+        memory = Memory(*(getattr(self.memory, name) for name in Memory._fields))
+        every = max(1, round(p.interval / self.period))
         weight = self._mass * GRAVITY
-        self._noise = [p.force_noise * weight] * 3 + [p.moment_noise * weight] * 3
-        size = FRICTION + n
-        self._map, self._rows = np.zeros((6, n)), np.zeros((6, size))
-        self._acceleration, self._force = np.zeros(6 + n), np.zeros(6 + n)
-        self._known, self._unknown, self._joint = np.zeros(n), np.zeros(n), np.zeros(n)
-        self._base, self._residual = np.zeros(6), np.zeros(6)
-        self._seen, self._product = np.zeros(size), np.zeros((size, size))
-        self._expected = np.zeros(size)
-        self._step, self._change = np.zeros(4), np.zeros(n)
+        settings = Settings(
+            self.period, every, math.ceil(p.settle_time / self.period - 1e-9),
+            min(1.0, self.period / p.filter_time),
+            min(1.0, self.period / p.smoothing) if p.smoothing else 1.0,
+            math.exp(-every * self.period / p.friction_time), float(p.friction_share),
+            p.friction_speed, float(p.friction_left), p.gate,
+            np.array([p.force_noise * weight] * 3 + [p.moment_noise * weight] * 3),
+        )  # fmt: skip
+        terms, phase, out = self.terms, self.phase, self.estimate
+        measured = Measured(
+            phase.phase, phase.stance, terms.velocity, self.joints.torque, terms.mass_matrix,
+            terms.nonlinear_effects, terms.contact_jacobian, terms.base_rotation, terms.com,
+            terms.foot_position,
+        )  # fmt: skip
+        legs = [chain_to(robot, foot.link) for foot in robot.feet]
+        self._follow = KernelCall(
+            follow_mass, measured, memory, _model(robot, legs), settings,
+            _scratch(n, FRICTION + n, max(map(len, legs))),
+        )  # fmt: skip
+        self._publish = KernelCall(
+            publish_mass, self._mass, memory, out.mass, out.mass_std, out.com_offset,
+            out.com_offset_std,
+        )  # fmt: skip
 
     def start(self) -> None:
         """Begin with what was known before, and its uncertainty."""
@@ -183,88 +185,10 @@ class MassEstimator(Block):
         memory.unknowns[COM:TILT] = memory.published[1:] = p.com_offset
 
     def emit(self) -> None:
-        memory, out = self.memory, self.estimate
-        out.mass[()] = self._mass * float(memory.published[0])
-        out.mass_std[()] = self._mass * math.sqrt(memory.covariance.item(SCALE, SCALE))
-        out.com_offset[...] = memory.published[1:]
-        for k in range(3):
-            out.com_offset_std[k] = math.sqrt(memory.covariance.item(COM + k, COM + k))
+        self._publish.run()
 
     def update(self) -> None:
-        memory, phase = self.memory, int(self.phase.phase)
-        if memory.ticks == 0:
-            memory.velocity[...] = self.terms.velocity
-            memory.torque[...] = self.joints.torque
-        if phase > Phase.SQUAT:
-            memory.over[()] = True
-        if not memory.over:
-            memory.ticks += 1
-            np.subtract(self.terms.velocity, memory.velocity, out=self._acceleration)
-            self._acceleration *= self._filter
-            memory.velocity += self._acceleration
-            self._acceleration /= self.period
-            np.subtract(self.joints.torque, memory.torque, out=self._change)
-            self._change *= self._filter
-            memory.torque += self._change
-            due = int(memory.ticks) % self._every == 0
-            if due and int(memory.ticks) * self.period >= self.params.settle_time:
-                self._measure()
-        np.subtract(memory.unknowns[:4], memory.published, out=self._step)
-        self._step *= self._follow
-        memory.published += self._step
-
-    def _measure(self) -> None:
-        """Correct the estimate by the equations of this instant."""
-        p, memory = self.params, self.memory
-        if not self.phase.stance.any():
-            return
-        fade(memory.unknowns, memory.covariance, FRICTION, self._kept, p.friction_share**2)
-        self._form_rows()
-        for k in range(6):
-            self._expected[...] = memory.unknowns
-            self._expected[:TILT] -= memory.published
-            self._expected *= self._rows[k]
-            error = -float(self._residual[k]) - float(self._expected.sum())
-            correct_row(
-                memory.unknowns, memory.covariance, self._rows[k], error, self._noise[k], p.gate,
-                self._seen, self._product,
-            )  # fmt: skip
-
-    def _form_rows(self) -> None:
-        """The equations' residual at the published estimate without the unknown parts of tilt and
-        friction, and its derivative by the unknowns."""
-        p, terms, memory, rows, force = (
-            self.params,
-            self.terms,
-            self.memory,
-            self._rows,
-            self._force,
-        )
-        base_force_map(
-            terms.contact_jacobian, self.phase.stance, self._foot_of_point, self._chains,
-            self._leg, self._map,
-        )  # fmt: skip
-        split_friction(
-            memory.velocity[6:], self._friction, self._damping, p.friction_speed, p.friction_left,
-            self._known, self._unknown,
-        )  # fmt: skip
-        np.dot(terms.mass_matrix, self._acceleration, out=force)
-        force += terms.nonlinear_effects
-        np.subtract(memory.torque, self._known, out=self._joint)
-        self._joint -= force[6:]
-        np.dot(self._map, self._joint, out=self._residual)
-        self._residual += force[:6]
-        # The derivatives are those at rest: noise of the acceleration in them would bias the result.
-        scale = float(memory.published[0])
-        np.dot(self._map, terms.nonlinear_effects[6:], out=self._base)
-        np.subtract(terms.nonlinear_effects[:6], self._base, out=self._base)
-        np.divide(self._base, scale, out=rows[:, SCALE])
-        torso_moment(terms.base_rotation, scale * self._torso * GRAVITY, rows[3:, COM:TILT])
-        lever = float(terms.com[2]) - float(terms.foot_position[:, 2].min())
-        rows[3, TILT] = rows[4, TILT + 1] = scale * self._mass * GRAVITY * lever
-        np.multiply(self._unknown, self._friction, out=self._joint)
-        np.multiply(self._map, self._joint, out=rows[:, FRICTION:])
-        np.negative(rows[:, FRICTION:], out=rows[:, FRICTION:])
+        self._follow.run()
 
     def metrics(self) -> Mapping[str, Metric]:
         """The estimate at the end."""
@@ -277,3 +201,22 @@ class MassEstimator(Block):
             "felt_com_offset_y_mm": y,
             "felt_com_offset_z_mm": z,
         }
+
+
+def _model(robot: RobotDescription, legs: list[tuple[int, ...]]) -> Model:
+    """What the equations take from the robot's description; ``legs`` are the joints of each foot's."""
+    chains = np.full((len(legs), max(map(len, legs))), -1)
+    for foot, leg in enumerate(legs):
+        chains[foot, : len(leg)] = leg
+    torso = next(link.mass for link in robot.links if link.name == robot.base)
+    return Model(
+        robot.total_mass, torso, robot.motors.friction, robot.motors.damping,
+        np.array(robot.foot_of_contact(), np.int64), chains,
+    )  # fmt: skip
+
+
+def _scratch(n: int, size: int, longest: int) -> Scratch:
+    """Memory for ``n`` joints, ``size`` unknowns and legs of up to ``longest`` joints."""
+    leg = LegScratch(np.zeros((longest, longest)), np.zeros((longest, 6)))
+    shapes = (6, n), (6, size), 6 + n, 6 + n, n, n, n, 6, 6, size
+    return Scratch(leg, *(np.zeros(shape) for shape in shapes))

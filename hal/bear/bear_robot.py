@@ -15,6 +15,7 @@ from .bus import BusError, open_port
 from .command_queue import CommandQueue
 from .configuration import Hardware, HardwareError
 from .dead_man import AlwaysHeld, DeadMansSwitch, open_switch, wait_until_held
+from .drive_law import DriveLaw
 from .driven_robot import DrivenRobot, DriveParameters, read_hardware
 from .driver import Driver
 from .motor_thread import MotorThread
@@ -100,6 +101,8 @@ class BearRobot(DrivenRobot):
         """Read the file of the hardware; nothing is opened."""
         super().setup()
         self._hardware: Hardware = read_hardware(self.params.hardware, self.context, self.robot)
+        gains = joint_gains(self.params, self.robot)
+        self._law = DriveLaw(self.robot, *gains, self._hardware.bus.lead)
         self._thread: MotorThread | None = None
         self._watchdog: Watchdog | None = None
         self._switch: DeadMansSwitch = AlwaysHeld()
@@ -116,8 +119,7 @@ class BearRobot(DrivenRobot):
         except BusError:
             bus_port.close()
             raise
-        stiffness, damping = joint_gains(params, self.robot)
-        driver = Driver(self.robot, hardware, bus_port, board_port, stiffness, damping)
+        driver = Driver(self.robot, hardware, bus_port, board_port, self._law)
         self.driver = driver
         self._opened_at = time.monotonic()
         driver.loop.clock = self.now

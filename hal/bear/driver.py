@@ -9,19 +9,16 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...blocks.signals import DrivePhase
 from ...robots.robot_description import RobotDescription
-from ...robots.transmission import Transmission, motor_gains
-from ..drive_goals import DriveGoals
+from ...robots.transmission import Transmission
 from . import arming
 from .bus import BearBus, SerialPort
 from .configuration import Hardware
+from .drive_law import DriveLaw
 from .motor_loop import MotorLoop
 from .sense_board import BoardMode, SenseBoard
-
-Array = NDArray[np.float64]
 
 STOP_CYCLES = 5
 """How often damping is commanded at least, since an instruction may be lost."""
@@ -36,28 +33,22 @@ class Driver:
         robot: the description.
         hardware: how they are connected and what they may do.
         bus_port, board_port: open serial ports.
-        stiffness, damping: the joints' gains that run in the drives [N m/rad, N m s/rad],
-            (n_joints,); where no motor gains give them, the nearest do.
+        law: the drives' gains, and how commands become their goals.
     """
 
     def __init__(
         self, robot: RobotDescription, hardware: Hardware, bus_port: SerialPort,
-        board_port: SerialPort, stiffness: Array, damping: Array,
+        board_port: SerialPort, law: DriveLaw,
     ) -> None:  # fmt: skip
         names = self._names = robot.transmission.motors
         self.hardware = hardware
         self.bus = BearBus(bus_port, reply_time=hardware.bus.reply_time)
         self.board = SenseBoard(board_port)
-        motor_stiffness = motor_gains(robot, stiffness, "N m/rad").motor
-        motor_damping = motor_gains(robot, damping, "N m s/rad").motor
         self._gains = (
-            dict(zip(names, motor_stiffness.tolist(), strict=True)),
-            dict(zip(names, motor_damping.tolist(), strict=True)),
+            dict(zip(names, law.motor_stiffness.tolist(), strict=True)),
+            dict(zip(names, law.motor_damping.tolist(), strict=True)),
         )
-        goals = DriveGoals(
-            robot, stiffness, damping, motor_stiffness, motor_damping, hardware.bus.lead
-        )
-        self.loop = MotorLoop(robot, hardware, self.bus, self.board, goals, motor_stiffness)
+        self.loop = MotorLoop(robot, hardware, self.bus, self.board, law.goals, law.motor_stiffness)
         self._standing = np.zeros(len(names))
         Transmission(robot).motor_motion(robot.standing_position, self._standing)
 
@@ -93,6 +84,7 @@ class Driver:
             arming.check_ready(self.loop, self._standing, self._names)
             arming.enable(self.loop, self._names)
             arming.soft_start(self.loop, self._standing, next_cycle)
+            self.loop.measured.forget_torques()  # those of the way to the standing pose
         except BaseException:
             self.loop.phase = DrivePhase.DAMPED
             self.damp(STOP_CYCLES)

@@ -36,7 +36,10 @@ class Measurement:
     Attributes:
         position, velocity, current: of every motor [rad, rad/s, A], (n_joints,).
         voltage, temperature: of every drive [V, deg C], (n_joints,).
-        joint_position, joint_velocity, joint_torque: of every joint, (n_joints,).
+        joint_position, joint_velocity: of every joint [rad, rad/s], (n_joints,).
+        joint_torque: of every joint [N m], (n_joints,): the mean over the exchanges since
+            ``next_tick``, as a simulator gives the mean over a tick. From the newest alone the
+            delay of the commands would seem up to half a tick too short.
         specific_force: the mean over the packets since ``next_tick`` [m/s^2], (3,).
         angular_velocity: of the newest packet [rad/s], (3,).
         closed: the switches in the order of the robot's contact points, (n_contacts,).
@@ -56,11 +59,27 @@ class Measurement:
         self.closed = np.zeros(len(robot.contacts), dtype=np.bool_)
         self._transmission = Transmission(robot)
         self.sum, self.count = np.zeros(3), 0
+        self.current_sum, self.exchanges = np.zeros(n), 0
         points = [contact.name for contact in robot.contacts]
         self._switches = [points.index(name) for name in hardware.board.switches]
 
     def take_drives(self, bulk: BulkExchange) -> None:
         """Take over the values of an exchange that reads ``READ``."""
+        self.show(bulk)
+        if self.exchanges == 0:
+            self.current_sum.fill(0.0)
+        np.add(self.current_sum, self.current, out=self.current_sum)
+        self.exchanges += 1
+        self._mean_torque()
+
+    def restored(self, bulk: BulkExchange) -> None:
+        """Show what was measured before the driver's memory was restored."""
+        self.show(bulk)
+        if self.exchanges:
+            self._mean_torque()
+
+    def show(self, bulk: BulkExchange) -> None:
+        """The newest values in the units and directions of the description."""
         values = bulk.values
         np.multiply(values[:, 0], self.sign, out=self.position)
         np.subtract(self.position, self.offset, out=self.position)
@@ -70,7 +89,9 @@ class Measurement:
         self.temperature[:] = values[:, 4]
         self._transmission.joint_motion(self.position, self.joint_position)
         self._transmission.joint_motion(self.velocity, self.joint_velocity)
-        np.multiply(self.current, self.torque_constant, out=self._torque)
+
+    def _mean_torque(self) -> None:
+        np.multiply(self.current_sum, self.torque_constant / self.exchanges, out=self._torque)
         self._transmission.joint_torque(self._torque, self.joint_torque)
 
     def take_board(self, board: SenseBoard) -> None:
@@ -85,8 +106,13 @@ class Measurement:
             self.closed[point] = board.closed[bit]
 
     def next_tick(self) -> None:
-        """The mean of the specific force begins anew with the next packet."""
+        """The means of specific force and torques begin anew with what comes next."""
         self.count = 0
+        self.forget_torques()
+
+    def forget_torques(self) -> None:
+        """The mean of the torques begins anew with the next exchange."""
+        self.exchanges = 0
 
     def publish(self, imu: ImuReading, joints: JointState, contacts: ContactSwitches) -> None:
         """Write the measurements to a robot's ports."""

@@ -188,7 +188,8 @@ class MotorLoop:
                     "link_lost", "stamp", "exchange_in_use")),
             (self.supervision, ("low", "hot", "still", "last", "moved", "numbers", "frozen",
                                 "saturated", "imu_silent", "imu_valid")),
-            (self.measured, ("sum", "count", "specific_force", "angular_velocity", "closed")),
+            (self.measured, ("sum", "count", "current_sum", "exchanges", "specific_force",
+                             "angular_velocity", "closed")),
             (self.board, ("specific_force", "angular_velocity", "closed", "packets")),
             (self.command, tuple(self.command.views())),
         ]  # fmt: skip
@@ -199,7 +200,7 @@ class MotorLoop:
 
     def restored(self) -> None:
         """Take over what was set from outside."""
-        self.measured.take_drives(self._last)
+        self.measured.restored(self._last)
         if self.phase is not DrivePhase.DAMPED:
             self.fault = ""
 

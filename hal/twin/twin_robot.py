@@ -13,6 +13,7 @@ from ...runtime.language.signals import Field, Signal
 from ...runtime.language.terrain import Terrain
 from ..bear.command_queue import CommandQueue
 from ..bear.configuration import Hardware
+from ..bear.drive_law import DriveLaw
 from ..bear.driven_robot import DrivenRobot, DriveParameters, read_hardware
 from ..bear.driver import Driver
 from ..drive_gains import joint_gains
@@ -237,8 +238,8 @@ class TwinRobot(DrivenRobot):
 def _driver(
     robot: RobotDescription, params: TwinParameters, hardware: Hardware, twin: Twin
 ) -> Driver:
-    stiffness, damping = joint_gains(params, robot)
-    return Driver(robot, hardware, VirtualBusPort(twin), VirtualBoardPort(twin), stiffness, damping)
+    law = DriveLaw(robot, *joint_gains(params, robot), hardware.bus.lead)
+    return Driver(robot, hardware, VirtualBusPort(twin), VirtualBoardPort(twin), law)
 
 
 def _parts(twin: Twin, driver: Driver, queue: CommandQueue) -> list[Part]:

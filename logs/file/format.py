@@ -215,7 +215,7 @@ class Header:
     def to_json(self) -> str:
         """The header as JSON text."""
         data = asdict(self) | {"schema_hashes": self.schema_hashes}
-        data["robot"] = self.robot and self.robot.model_dump(mode="json")
+        data["robot"] = self.robot and self.robot.model_dump(mode="json", context={"looks": True})
         data["bus_start"] = b64encode(self.bus_start).decode()
         return json.dumps(data)
 

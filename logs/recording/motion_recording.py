@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 
 from ...robots.description import RobotDescription
 from ...robots.kinematics import link_poses
-from ..viewing.robot_shapes import capsules, eye_controls, scale_of, shapes_of
+from ..viewing.robot_meshes import drawn_link, read_meshes
+from ..viewing.robot_shapes import eye_controls, scale_of
 from ..viewing.scene_contacts import ARROW_RADIUS, force_arrows
 from ..viewing.scene_part import Colors
 
@@ -128,9 +129,11 @@ def _write_world(stream: Any, motion: RecordedMotion) -> None:
     poses = link_poses(
         robot, motion.base_position, motion.base_orientation, motion.joint_position
     )  # fmt: skip
+    meshes = read_meshes(robot)
     for link in robot.links:
         entity = f"world/robot/{link.name}"
-        stream.log(entity, capsules(shapes_of(robot, link), COLORS.robot), static=True)
+        for below, drawn in drawn_link(robot, link, meshes, COLORS.robot).items():
+            stream.log(f"{entity}{below}", drawn, static=True)
         position, rotation = poses.of(link.name)
         transforms = rr.Transform3D.columns(translation=position, mat3x3=rotation)
         stream.send_columns(entity, times, transforms)

@@ -27,6 +27,7 @@ from ...runtime.running.notes import Note, parameter_note
 from ...runtime.running.run_result import RunResult
 from ..file.header import header_of
 from ..file.reader import read
+from ..viewing.robot_meshes import missing_meshes
 from . import recorder_link
 from .place import part_of, replaced, take_place
 from .recorder_link import RecorderLink
@@ -123,6 +124,9 @@ class Recorder:
         if self.link is None:
             self._warn(f"no recording: {problem}")
             return
+        if bound.graph.robot is not None:
+            for missing in missing_meshes(bound.graph.robot):
+                self._warn(missing)
         self._write = self.link.ring.write
         bound.parameters.listeners.append(self._note_change)
         if not free and not self.link.wait_until_ready():

@@ -11,19 +11,19 @@ that nobody contends for is taken and given back in between, which POSIX says sy
 reading the counter and reading records, and besides believes no record whose two sequence numbers
 are not the one that is due.
 
-The memory has no name: on Linux it is a ``memfd``, elsewhere a file that is deleted at once. So a
-process that is killed leaves nothing behind, and the reader keeps what the writer had written.
+The memory has no name, see ``runtime.running.shared_memory``: the reader keeps what a writer that
+is killed had written.
 """
 
 from __future__ import annotations
 
 import mmap
-import os
-import tempfile
 from collections.abc import Iterator
 from dataclasses import dataclass
 from struct import Struct
 from threading import Lock
+
+from ...runtime.running.shared_memory import nameless_memory
 
 ALIGNMENT = 64
 CONTROL = 256
@@ -36,13 +36,7 @@ _SKIP = 0
 
 def make_memory(capacity: int) -> int:
     """A file descriptor of nameless memory for a ring of ``capacity`` bytes."""
-    if hasattr(os, "memfd_create"):
-        descriptor = os.memfd_create("aloft-ring")
-    else:
-        with tempfile.TemporaryFile() as file:
-            descriptor = os.dup(file.fileno())
-    os.ftruncate(descriptor, CONTROL + capacity)
-    return descriptor
+    return nameless_memory(CONTROL + capacity, "aloft-ring")
 
 
 class _Ring:

@@ -1,8 +1,14 @@
-"""The robot in the scene: the true one solid, the estimated one as wires around it."""
+"""The robot in the scene: the true one solid, as meshes where its description has them, and the
+estimated one as wires around it, which are always those of the collision shapes."""
 
 from __future__ import annotations
 
+import numpy as np
+
 from ...robots.kinematics import quaternions_of_matrices
+from ..file.format import EVENTS, WORLD
+from ..file.time_columns import time_columns
+from .robot_meshes import drawn_link, read_meshes
 from .robot_shapes import capsules, eye_height, shapes_of
 from .scene_part import Moments, ScenePart
 from .scene_ports import PoseSource
@@ -38,18 +44,29 @@ class RobotPart(ScenePart):
                 self.send(EYE, moments, rr.Transform3D.columns(translation=beside))
         if not self._shown:
             self._shown = True
-            self._write_shapes()
+            self._write_shapes(moments)
 
-    def _write_shapes(self) -> None:
+    def _write_shapes(self, moments: Moments) -> None:
         import rerun as rr
 
+        meshes = read_meshes(self.robot)
+
         self.log(EYE, rr.Points3D([[0.0, 0.0, 0.0]], radii=[0.0], colors=[0x00000000]))
+        width = 0.0006 * self.scale
         for name, _, color in self._robots():
             for link in self.robot.links:
-                shapes = shapes_of(self.robot, link)
-                width = 0.0006 * self.scale
-                drawn = capsules(shapes, color, wires=name == "estimate", line_radius=width)
-                self.log(f"{name}/{link.name}", drawn)
+                entity = f"{name}/{link.name}"
+                if name == "estimate":
+                    shapes = shapes_of(self.robot, link)
+                    self.log(entity, capsules(shapes, color, wires=True, line_radius=width))
+                    continue
+                for below, drawn in drawn_link(self.robot, link, meshes, color, width).items():
+                    self.log(f"{entity}{below}", drawn)
+        if meshes.problems:
+            texts = rr.TextLog.columns(text=meshes.problems, level=["WARN"] * len(meshes.problems))
+            ticks = np.full(len(meshes.problems), moments.batch.ticks[moments.due[0]])
+            root = self.world.removesuffix(WORLD)
+            self.stream.send_columns(f"{root}{EVENTS}", time_columns(self.header, ticks), texts)
 
     def _robots(self) -> list[tuple[str, PoseSource, int]]:
         robots = [("robot", self.ports.pose, self.colors.robot)]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import subprocess
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from functools import partial
@@ -13,13 +14,18 @@ from .arguments import ArgumentType, pack, type_of
 from .fingerprint import fingerprint
 from .kernel_call import KernelCall
 from .machine_code import MachineCode, tools
+from .sharing import Job, divide, helpers, processors
 from .translate import CompileError, Translator
 
 Watcher = Callable[[int, int], None]
 
 watchers: list[Watcher] = []
-"""Called with the number of kernels that are compiled and with how many there are, before each one;
+"""Called with the number of kernels that are compiled and with how many there are, again and again;
 not called where everything comes from the cache."""
+
+LONGEST_WAIT = 300.0
+"""How long [s] another process may take; what it has not done then is done here."""
+_BETWEEN_LOOKS = 0.2
 
 _loaded: dict[str, MachineCode] = {}
 _names: dict[tuple[Callable[..., None], tuple[ArgumentType, ...]], str] = {}
@@ -78,19 +84,48 @@ class _Compilation:
         refused: list[str] = []
         if not missing:
             return refused
+        jobs = [Job(name, self._calls[k].kernel, self._types[k]) for name, k in missing.items()]
+        own, *shares = divide(jobs, processors())
+        others = [job for share in shares for job in share]
         translator = Translator()
-        for count, (name, k) in enumerate(missing.items()):
-            for watch in watchers:
-                watch(count, len(missing))
-            try:
-                code = translator.object_code(self._calls[k].kernel, self._types[k])
-                _loaded[name] = MachineCode(code)
-                store.save(name, code)
-            except CompileError as error:
-                refused.append(str(error))
-        for watch in watchers:
-            watch(len(missing), len(missing))
+        with helpers(shares) as processes:
+            for done, job in enumerate(own):
+                _tell(done + _finished(others), len(jobs))
+                self._translate(job, translator, refused)
+            for process in processes:
+                _wait(process, len(own), others)
+        for job in others:
+            if not self._load_from_cache(job.name):
+                self._translate(job, translator, refused)
+        _tell(len(jobs), len(jobs))
         return refused
+
+    def _translate(self, job: Job, translator: Translator, refused: list[str]) -> None:
+        try:
+            code = translator.object_code(job.kernel, job.signature)
+            _loaded[job.name] = MachineCode(code)
+            store.save(job.name, code)
+        except CompileError as error:
+            refused.append(str(error))
+
+
+def _tell(done: int, total: int) -> None:
+    for watch in watchers:
+        watch(done, total)
+
+
+def _finished(jobs: Sequence[Job]) -> int:
+    """How many kernels other processes have finished."""
+    return sum(store.holds(job.name) for job in jobs)
+
+
+def _wait(process: subprocess.Popen[bytes], own: int, others: Sequence[Job]) -> None:
+    """Wait for another process, and tell how far it is."""
+    for _ in range(int(LONGEST_WAIT / _BETWEEN_LOOKS)):
+        with suppress(subprocess.TimeoutExpired):
+            process.wait(_BETWEEN_LOOKS)
+            return
+        _tell(own + _finished(others), own + len(others))
 
 
 def _name(call: KernelCall, types: tuple[ArgumentType, ...]) -> str:

@@ -26,14 +26,14 @@ def fingerprint(kernel: Callable[..., Any], signature: tuple[ArgumentType, ...],
     for part in signature:
         digest.update(f"|{part}".encode())
     marked = {id(function) for function in kernels().values()}
-    for function in _closure(kernel, marked):
+    for function in closure(kernel, marked):
         digest.update(f"|{function.__qualname__}".encode())
         for text in _texts(function, marked):
             digest.update(text.encode())
     return digest.hexdigest()
 
 
-def _closure(kernel: Any, marked: set[int]) -> list[Any]:
+def closure(kernel: Any, marked: set[int]) -> list[Any]:
     """The kernel and all that it calls, each once, in the order in which they are met."""
     found: list[Any] = []
     pending = [kernel]

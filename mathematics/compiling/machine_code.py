@@ -14,7 +14,7 @@ from typing import Any
 
 ENTRY = "aloft_entry"
 """The name of the only function that the object file of a kernel exports."""
-OPTIONS = "strict floating point, errors as in Python, no allocation, 2"
+OPTIONS = "strict floating point, errors as in Python, no allocation, 3"
 """What is asked of the compiler; the number at the end counts changes of the calling convention."""
 
 

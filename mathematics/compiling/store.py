@@ -31,6 +31,11 @@ def load(name: str) -> bytes | None:
     return code if _checksum(code) == checksum else None
 
 
+def holds(name: str) -> bool:
+    """Whether there is a file for the machine code called ``name``."""
+    return _place(name).is_file()
+
+
 def save(name: str, code: bytes) -> None:
     """Keep machine code; where the folder cannot be written it is simply not kept."""
     place = _place(name)

@@ -8,16 +8,14 @@ Memory management is off, so that a kernel that would allocate an array does not
 from __future__ import annotations
 
 import types as python_types
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from typing import Any
 
 from ..kernel import kernels
 from .arguments import HEADER, ArgumentType, ArrayType, NumberType
+from .linking import LIBRARY, linked_once
 from .machine_code import ENTRY, assemble
-
-_LIBRARY = "aloft kernel "
-"""How the names of numba's libraries with an entry point begin."""
+from .pipeline import kernel_pipeline
 
 
 class CompileError(Exception):
@@ -46,7 +44,7 @@ class Translator:
         """
         name = f"{kernel.__module__}.{kernel.__qualname__}"
         try:
-            with _optimised_once():
+            with linked_once():
                 return self._compile(self._prepare(kernel), name, signature)
         except Exception as error:
             raise CompileError(f"kernel {name} does not compile: {_reason(error)}") from error
@@ -68,6 +66,7 @@ class Translator:
                 _nrt=False,
                 no_cpython_wrapper=True,
                 no_cfunc_wrapper=True,
+                pipeline_class=kernel_pipeline(),
             )
         return self._dispatchers[name]
 
@@ -99,32 +98,6 @@ class Translator:
             return numba.types.Array(dtype, part.dimensions, part.order)
         parts = [self._numba_type(inner) for inner in part.parts]
         return numba.types.BaseTuple.from_types(parts, part.kind)
-
-
-@contextmanager
-def _optimised_once() -> Iterator[None]:
-    """Let LLVM optimise a kernel once, together with all kernels that it calls.
-
-    By itself numba optimises every function when it is compiled, and again in everything that calls
-    it. Where a version of numba does it in another way, that stays as it is.
-    """
-    from numba.core import codegen
-
-    kind: Any = getattr(codegen, "CPUCodeLibrary", None)
-    optimise = getattr(kind, "_optimize_final_module", None)
-    if optimise is None:
-        yield
-        return
-
-    def only_entries(library: Any) -> None:
-        if library.name.startswith(_LIBRARY):
-            optimise(library)
-
-    kind._optimize_final_module = only_entries
-    try:
-        yield
-    finally:
-        kind._optimize_final_module = optimise
 
 
 def _reason(error: Exception) -> str:
@@ -195,7 +168,7 @@ def _with_entry_point(result: Any, name: str) -> Any:
     from numba.core.compiler_lock import global_compiler_lock
 
     context, codegen = result.target_context, result.library.codegen
-    library = codegen.create_library(f"{_LIBRARY}{name}")
+    library = codegen.create_library(f"{LIBRARY}{name}")
     module = library.create_ir_module(f"aloft.{name}")
     byte, word = ir.IntType(8).as_pointer(), ir.IntType(64)
     entry = ir.Function(module, ir.FunctionType(ir.VoidType(), [word]), ENTRY)

@@ -11,6 +11,7 @@ from ..parts import Joint, Link
 from ..robot_description import RobotDescription
 from ..validation import RobotFault
 from .build import Built, build
+from .looks import link_looks
 from .overlay import Overlay
 from .rated_profile import rated_profile
 from .raw_model import RawModel
@@ -63,10 +64,12 @@ def import_robot(path: Path, added: Mapping[str, Any]) -> Imported:
     if "points" not in added and data["base_joint"] == "floating":
         base = next(link for link in built.links if link["name"] == built.base)
         data["points"] = {"torso_com": [built.base, list(base["com"])]}
+    bodies = {name: body.look for name, body in model.bodies.items()}
+    data["looks"] = link_looks(bodies, built.frames, path.parent)
     known = {name: angle for name, angle in model.pose.items() if name in names}
     data["standing"] = known
     data["sensors"] = {"imu": data["base_joint"] != "fixed", "switches": bool(contacts)}
-    for key in ("profile", "sensors", "standing", "held"):
+    for key in ("profile", "sensors", "standing", "held", "looks"):
         if key in added:
             data[key] = added[key]
     _stand_within_limits(data)

@@ -22,7 +22,7 @@ def mesh_corners(path: Path) -> Array:
         rows = [line.split()[1:4] for line in path.read_text().splitlines() if line[:2] == "v "]
         corners = np.array(rows, dtype=float).reshape(-1, 3)
     elif path.suffix.lower() == ".stl":
-        corners = _stl_corners(path.read_bytes())
+        corners = stl_corners(path.read_bytes())
     else:
         raise ValueError(f"{path}: no mesh of the formats {', '.join(READABLE)}")
     if len(corners) < 4:
@@ -30,7 +30,7 @@ def mesh_corners(path: Path) -> Array:
     return corners
 
 
-def _stl_corners(content: bytes) -> Array:
+def stl_corners(content: bytes) -> Array:
     """The corners in binary STL (header, count, 50 bytes a triangle), or in its text form."""
     count = int(np.frombuffer(content[80:84], "<u4")[0]) if len(content) >= 84 else 0
     if len(content) == 84 + 50 * count:

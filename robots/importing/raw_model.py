@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from .bodies import Inertial
 from .capsules import Capsule
+from .looks import NOTHING_SEEN, RawLook
 
 Array = NDArray[np.float64]
 
@@ -39,7 +40,7 @@ class RawJoint:
 @dataclass(frozen=True)
 class RawBody:
     """A body of the file: ``rotation`` and ``position`` [m] in the world at the zero of all joints,
-    its own ``inertial`` and ``capsules`` in its own frame, and the joints that carry it."""
+    its own ``inertial``, ``capsules`` and ``look`` in its own frame, and the joints that carry it."""
 
     name: str
     parent: str
@@ -48,6 +49,7 @@ class RawBody:
     inertial: Inertial
     joints: tuple[RawJoint, ...] = ()
     capsules: tuple[Capsule, ...] = ()
+    look: RawLook = NOTHING_SEEN
 
 
 @dataclass(frozen=True)

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from . import capsules as fit
 from .bodies import NOTHING, Inertial, full_tensor
+from .looks import NOTHING_SEEN, RawLook, RawMesh, urdf_looks
 from .mesh_files import READABLE, mesh_corners
 from .packages import find_file
 from .raw_model import RawBody, RawJoint, RawModel
@@ -58,6 +59,7 @@ def read_model(path: Path) -> RawModel:
             data.qpos[start + (3 if kind == free else 0)] = 1.0
     mujoco.mj_kinematics(model, data)
     limits = urdf_joints(file) if file.is_urdf else {}
+    looks = urdf_looks(file) if file.is_urdf else {}
     mimics = tuple(name for name, joint in limits.items() if joint.mimics)
     for name in mimics:
         notes.append(f"joint {name} mimics {limits[name].mimics} in the URDF and is fixed here")
@@ -76,6 +78,7 @@ def read_model(path: Path) -> RawModel:
                 if model.jnt_bodyid[j] == k
             ),
             tuple(_capsules(model, k, meshes, notes)),
+            looks.get(names[k], NOTHING_SEEN) if file.is_urdf else _look(model, k, meshes),
         )
     name = spec.modelname or path.stem
     pose = _key_frame(model)
@@ -277,6 +280,25 @@ def _capsules(
         rotation, position = turn.reshape(3, 3), np.array(model.geom_pos[g])
         found += [shape.moved(rotation, position) for shape in shapes]
     return found
+
+
+def _look(model: Any, k: int, meshes: dict[str, tuple[str, Path | None, Array]]) -> RawLook:
+    """The meshes that an MJCF body is drawn as: those that touch nothing, if it has such."""
+    import mujoco
+
+    found: dict[bool, list[RawMesh]] = {True: [], False: []}
+    for g in range(model.ngeom):
+        name = model.geom(g).name
+        if model.geom_bodyid[g] != k or name not in meshes:
+            continue
+        written, path, scale = meshes[name]
+        turn = np.zeros(9)
+        mujoco.mju_quat2Mat(turn, model.geom_quat[g])
+        file = written if path is None else str(path.resolve())
+        touches = bool(model.geom_contype[g] or model.geom_conaffinity[g])
+        mesh = RawMesh(file, turn.reshape(3, 3), np.array(model.geom_pos[g]), scale)
+        found[touches].append(mesh)
+    return RawLook(found[False] or found[True])
 
 
 def _key_frame(model: Any) -> dict[str, float]:

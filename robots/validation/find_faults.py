@@ -10,6 +10,7 @@ from .bodies import check_bodies
 from .draft import Draft
 from .faults import RobotFault
 from .joints import check_joints
+from .looks import check_looks
 from .names import check_names
 from .stance import check_feet, check_poses
 from .tree import check_tree
@@ -35,4 +36,5 @@ def find_faults(data: Any) -> tuple[RobotFault, ...]:
     check_actuation(draft)
     check_feet(draft)
     check_poses(draft)
+    check_looks(draft)
     return tuple(draft.faults)

@@ -5,8 +5,10 @@ from __future__ import annotations
 import base64
 import hashlib
 import json
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
 from html import escape
+from typing import Any
 
 from ..language.stages import CheckedGraph
 from .details import details
@@ -25,34 +27,51 @@ h1{font-size:17px;margin:0 0 2px} h2{font-size:13px;margin:14px 0 4px} p,pre{mar
 pre{white-space:pre-wrap;font:inherit} table{border-collapse:collapse;width:100%}
 td{vertical-align:top;padding:2px 8px 2px 0;overflow-wrap:anywhere} td:first-child{font-weight:bold;white-space:nowrap} p{overflow-wrap:anywhere}
 .soft{opacity:.72} button{font:inherit} header{display:flex;gap:.8em;align-items:baseline}
-@media print{aside,header{display:none} body{display:block;height:auto}}
+.wide{flex-direction:column} .wide main{flex:none;max-height:72vh} .wide aside{flex:1;width:auto;
+border-left:0;border-top:1px solid GrayText} .wide #panel{columns:25em;column-gap:2em}
+#panel>h1{column-span:all} #panel h2{break-after:avoid} tr,.whole{break-inside:avoid}
+@page{size:landscape;margin:8mm}
+@media print{aside,header{display:none} body{display:block!important;height:auto} main{overflow:visible;
+max-height:none!important;padding:0} svg{width:100%!important;height:auto!important}}
 @media (max-width:60em){body{flex-direction:column} aside{width:auto;max-height:45%;border:0;
 border-top:1px solid GrayText}}
 """
 _SCRIPT = """
 "use strict";
 const data = JSON.parse(document.getElementById("data").textContent);
-const panel = document.querySelector("aside"), drawing = document.querySelector("svg");
+const panel = document.getElementById("panel"), drawing = document.querySelector("svg");
 const make = (tag, text, kind) => { const e = document.createElement(tag);
   e.textContent = text; if (kind) e.className = kind; return e; };
-function rows(title, found) {
+function rows(into, title, found) {
   if (!found.length) return;
-  panel.append(make("h2", title));
+  into.append(make("h2", title));
   const table = document.createElement("table");
   for (const row of found) { const tr = document.createElement("tr");
     row.forEach((cell, k) => tr.append(make("td", cell, k > 2 ? "soft" : ""))); table.append(tr); }
-  panel.append(table);
+  into.append(table);
 }
 function toggle(path) {
   const closed = new Set(data.closed);
   if (!closed.delete(path)) closed.add(path);
-  location.search = [...closed].map(p => "closed=" + encodeURIComponent(p)).join("&");
+  const asked = new URLSearchParams(location.search);
+  asked.delete("closed");
+  closed.forEach(p => asked.append("closed", p));
+  location.search = asked;
 }
-let chosen = "", now = {};
-function values(title, ports) {
-  rows(title, ports.flatMap(([name, port]) => Object.keys(now).filter(
+let chosen = "", now = {}, times = data.recorded ? data.recorded.times : {};
+const at = data.recorded ? "at this tick" : "now", shown = [];
+function values(into, title, ports) {
+  rows(into, title, ports.flatMap(([name, port]) => Object.keys(now).filter(
     key => key.slice(0, key.lastIndexOf(".")) === port).map(
     key => [name + "." + key.slice(key.lastIndexOf(".") + 1), now[key]])));
+}
+function moment() {
+  const place = panel.querySelector(".moment"), block = data.blocks[chosen];
+  if (!place || !block) return;
+  place.replaceChildren();
+  values(place, "Inputs " + at, Object.entries(block.sources));
+  values(place, "Outputs " + at, block.outputs.map(row => [row[0], chosen + "." + row[0]]));
+  if (times[chosen]) rows(place, "Time", [["took", times[chosen]]]);
 }
 function show(path) {
   chosen = path;
@@ -69,14 +88,12 @@ function show(path) {
   panel.append(make("p", block.use + ", " + block.rate + ", number " + block.order +
     " in a tick" + on, "soft"));
   if (block.place) panel.append(make("p", block.place));
-  if (data.recorded) {
-    values("Inputs at this tick", Object.entries(block.sources));
-    values("Outputs at this tick", block.outputs.map(row => [row[0], path + "." + row[0]]));
-    if (data.recorded.times[path]) rows("Time", [["took", data.recorded.times[path]]]);
-  }
-  rows("Parameters", block.parameters);
-  rows("Inputs", block.inputs);
-  rows("Outputs", block.outputs);
+  panel.append(make("div", "", "moment"));
+  moment();
+  shown.forEach(also => also(path));
+  rows(panel, "Parameters", block.parameters);
+  rows(panel, "Inputs", block.inputs);
+  rows(panel, "Outputs", block.outputs);
   panel.append(make("h2", "Contract"), make("pre", block.text));
 }
 if (data.recorded) {
@@ -86,7 +103,7 @@ if (data.recorded) {
     said.textContent = (slider.value * data.recorded.period).toFixed(4) + " s, tick " + slider.value;
     if (asking || asked === slider.value) return;
     asking = true; asked = slider.value;
-    try { now = await (await fetch("at?tick=" + asked)).json(); if (chosen) show(chosen); }
+    try { now = await (await fetch("at?tick=" + asked)).json(); moment(); }
     finally { asking = false; if (asked !== slider.value) ask(); }
   };
   slider.oninput = ask; ask();
@@ -99,6 +116,8 @@ drawing.addEventListener("keydown", e => { const n = nodeOf(e);
   if (n && e.key === "Enter") show(n.dataset.path); });
 const width = drawing.viewBox.baseVal.width;
 let scale = 1;
+// a drawing that is wide has the whole width of the screen, and what is chosen stands below it
+document.body.classList.toggle("wide", width > 2 * drawing.viewBox.baseVal.height);
 function zoom(to) { scale = Math.min(4, Math.max(0.2, to));
   drawing.setAttribute("width", width * scale);
   drawing.setAttribute("height", drawing.viewBox.baseVal.height * scale); }
@@ -110,11 +129,27 @@ fit();
 """
 
 
-def page(graph: CheckedGraph, closed: Collection[str] = (), values: Values | None = None) -> str:
+@dataclass(frozen=True)
+class Addition:
+    """What a page has besides the diagram: data, controls, and the style and script for them."""
+
+    name: str
+    data: Mapping[str, Any]
+    controls: str
+    style: str
+    script: str
+
+
+def page(
+    graph: CheckedGraph,
+    closed: Collection[str] = (),
+    values: Values | None = None,
+    addition: Addition | None = None,
+) -> str:
     """The page's text. It asks no other machine for anything.
 
     With ``values`` it has a slider over the ticks of a run, and shows what a chosen block reads and
-    writes there, and the time it took.
+    writes there, and the time it took. The script of an ``addition`` runs after the page's own.
     """
     known = subgraphs(graph)
     shut = [path for path in known if path in closed]
@@ -126,27 +161,40 @@ def page(graph: CheckedGraph, closed: Collection[str] = (), values: Values | Non
             f'<label>time <input type="range" id="tick" min="{first}" max="{last}" value="{first}">'
             '</label><output id="time"></output>'
         )
-    data = json.dumps({"blocks": details(graph), "closed": shut, "recorded": recorded})
+    about: dict[str, Any] = {"blocks": details(graph), "closed": shut, "recorded": recorded}
+    style, controls, also = _STYLE, slider, ""
+    if addition is not None:
+        about[addition.name] = dict(addition.data)
+        style += addition.style
+        controls += addition.controls
+        also = f"<script>{addition.script}</script>"
+    data = json.dumps(about)
     name = escape(graph.name)
     body = data.replace("<", "\\u003c")
     return (
         f'<!doctype html><html lang="en"><head><meta charset="utf-8"><title>{name}</title>'
-        f"<style>{_STYLE}</style></head><body><main><header><h1>{name}</h1>"
+        f"<style>{style}</style></head><body><main><header><h1>{name}</h1>"
         '<button id="fit">fit</button><button id="in">+</button><button id="out">−</button>'
-        f"{slider}"
+        f"{controls}"
         '<span class="soft">a click on a block shows what it does</span></header>'
         f"{svg(draw(diagram(graph, shut)), graph.name)}</main>"
-        '<aside><p class="soft">Nothing is chosen.</p></aside>'
+        '<aside><div id="panel"><p class="soft">Nothing is chosen.</p></div></aside>'
         f'<script type="application/json" id="data">{body}</script>'
-        f"<script>{_SCRIPT}</script></body></html>\n"
+        f"<script>{_SCRIPT}</script>{also}</body></html>\n"
     )
 
 
-def policy() -> str:
-    """The Content-Security-Policy of the page: its own script and style, and nothing else."""
-    digest = base64.b64encode(hashlib.sha256(_SCRIPT.encode()).digest()).decode()
+def policy(addition: str = "") -> str:
+    """The Content-Security-Policy of the page: its own script and style, that of an addition, and
+    nothing else."""
+    digests = [
+        base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
+        for script in (_SCRIPT, addition)
+        if script
+    ]
+    scripts = " ".join(f"'sha256-{digest}'" for digest in digests)
     return (
-        f"default-src 'none'; script-src 'sha256-{digest}'; style-src 'unsafe-inline'; "
+        f"default-src 'none'; script-src {scripts}; style-src 'unsafe-inline'; "
         "connect-src 'self'; "
         "base-uri 'none'; form-action 'self'; frame-ancestors 'none'"
     )

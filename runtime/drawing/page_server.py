@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import json
 import threading
-from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from http.server import ThreadingHTTPServer
 from urllib.parse import parse_qs, urlsplit
 
 from ..language.stages import CheckedGraph
+from .loopback import ADDRESS, LoopbackHandler
 from .page import page, policy
 from .values import Values
-
-ADDRESS = "127.0.0.1"
 
 
 def page_server(
@@ -27,11 +26,11 @@ def page_server(
 
     one_at_a_time = threading.Lock()
 
-    class Handler(BaseHTTPRequestHandler):
+    class Handler(LoopbackHandler):
+        content_policy = policy()
+
         def do_GET(self) -> None:
-            host = (self.headers.get("Host") or "").rpartition(":")[0]
-            if host not in (ADDRESS, "localhost"):
-                self.send_error(403, "this page is for this machine only")
+            if not self.is_ours():
                 return
             address = urlsplit(self.path)
             asked = parse_qs(address.query)
@@ -44,19 +43,5 @@ def page_server(
                 self.answer(page(graph, asked.get("closed", []), values), "text/html")
             else:
                 self.send_error(404)
-
-        def answer(self, text: str, kind: str) -> None:
-            body = text.encode()
-            self.send_response(200)
-            self.send_header("Content-Type", f"{kind}; charset=utf-8")
-            self.send_header("Content-Length", str(len(body)))
-            self.send_header("Content-Security-Policy", policy())
-            self.send_header("Referrer-Policy", "no-referrer")
-            self.send_header("X-Content-Type-Options", "nosniff")
-            self.end_headers()
-            self.wfile.write(body)
-
-        def log_message(self, format: str, *args: object) -> None:
-            """Say nothing about requests."""
 
     return ThreadingHTTPServer((ADDRESS, port), Handler)

@@ -60,7 +60,12 @@ class Style:
 
 def owner(end: tuple[str, str]) -> str:
     """The block that writes; a border's port is named by it."""
-    return end[1].rpartition(".")[0] if "." in end[1] else end[0]
+    return port_of(end).rpartition(".")[0]
+
+
+def port_of(end: tuple[str, str]) -> str:
+    """The output ``block.port`` at an end of a wire that carries it."""
+    return end[1] if "." in end[1] else f"{end[0]}.{end[1]}"
 
 
 def style_of(diagram: Diagram) -> Style:

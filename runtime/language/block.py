@@ -28,6 +28,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, ClassVar, Generic, Literal, Self, TypeVar, overload
 
 import numpy as np
@@ -216,11 +217,11 @@ class Block:
         return {n: v for n, v in values.items() if isinstance(v, int) and not isinstance(v, bool)}
 
     @classmethod
-    def fitted(cls, params: Parameters) -> type[Block]:
+    def fitted(cls, params: Parameters, folder: Path) -> type[Block]:
         """The class whose ports are those that the parameters ask for; by default the class itself.
 
-        Another class is derived from this one and has its name. A ``BlockError`` that this raises
-        should be a misfit of ``requires`` as well.
+        Another class has the name of this one. Files that parameters name are relative to
+        ``folder``. A ``BlockError`` that this raises should be a misfit of ``requires`` as well.
         """
         return cls
 

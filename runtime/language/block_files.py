@@ -22,6 +22,7 @@ class WrittenClass:
     bases: tuple[str, ...]
     """The base classes, each by the last part of its name: ``Block`` for ``aloft.Block``."""
     has_ports: bool
+    """Whether it declares a port, or says by ``fitted`` which ports it has."""
     has_machine: bool
     """Whether it defines ``step`` or ``emit``."""
     is_abstract: bool
@@ -43,9 +44,9 @@ def classes_in(path: Path) -> tuple[WrittenClass, ...]:
 def blocks_in_packages(root: Path, packages: Iterable[str]) -> Mapping[str, Path]:
     """The blocks that graphs can use as ``package.Class``, with their files, sorted by name.
 
-    A class is a block if it derives from ``Block``, also through other classes. It can be used if
-    it has or inherits a port and one of the methods ``step`` and ``emit``, it has no abstract
-    method, and its name does not begin with an underscore.
+    A class is a block if it derives from ``Block`` or ``KernelBlock``, also through other classes.
+    It can be used if it has or inherits a port and one of the methods ``step`` and ``emit``, it has
+    no abstract method, and its name does not begin with an underscore.
     """
     classes = [
         (package, path, written)
@@ -54,7 +55,8 @@ def blocks_in_packages(root: Path, packages: Iterable[str]) -> Mapping[str, Path
         for written in classes_in(path)
     ]
     found: dict[str, Path] = {}
-    known: dict[str, tuple[bool, bool]] = {"Block": (False, False)}  # with ports, with a machine
+    # with ports, with a machine
+    known: dict[str, tuple[bool, bool]] = {"Block": (False, False), "KernelBlock": (False, True)}
     while True:
         new = [
             each
@@ -111,7 +113,8 @@ def _written(node: ast.ClassDef) -> WrittenClass:
     return WrittenClass(
         node.name,
         tuple(filter(None, map(_last_name, node.bases))),
-        any(isinstance(value, ast.Call) and _last_name(value.func) in _PORTS for value in values),
+        any(isinstance(value, ast.Call) and _last_name(value.func) in _PORTS for value in values)
+        or any(function.name == "fitted" for function in functions),
         any(function.name in _MACHINE for function in functions),
         any(
             _last_name(decorator) == "abstractmethod"

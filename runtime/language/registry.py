@@ -26,7 +26,7 @@ from .block_files import blocks_in_folder, blocks_in_packages, files_of
 from .errors import DeclarationError, UnknownBlockError
 from .importing import BlockImportError, import_module, user_module
 
-PACKAGES = ("blocks", "hal", "ros2")
+PACKAGES = ("blocks", "hal", "ros2", "fmi")
 """The packages of aloft that hold blocks."""
 ENTRY_POINTS = "aloft.blocks"
 """The group in which other packages announce blocks."""

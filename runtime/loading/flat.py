@@ -165,6 +165,8 @@ class FlatGraph:
     broken: tuple[str, ...] = ()
     subgraphs: Mapping[str, Mapping[str, FlatWire]] = field(default_factory=dict)
     """The sub-graph blocks that were expanded, and where their outputs come from."""
+    subgraph_inputs: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
+    """The same for their inputs, ``block.port``, as far as each is one whole output."""
 
     def plain(self) -> dict[str, dict[str, Any]]:
         """The entries of all blocks as plain data, by their paths."""

@@ -122,7 +122,6 @@ class _Flattener:
             return graph[key][0] if key in graph else None
 
         blocks = placed(blocks, self._mapping(written("place")), self.instances, self.problems)
-
         return FlatGraph(
             name=path.stem,
             file=shown,
@@ -142,6 +141,7 @@ class _Flattener:
             incomplete=self.files.incomplete,
             broken=tuple(p for p, instance in self.instances.items() if instance.broken),
             subgraphs=resolver.outputs(),
+            subgraph_inputs=Resolver(self.instances, Problems()).inputs(),
         )
 
     def _mapping(self, entry: Entry | None) -> MapNode | None:

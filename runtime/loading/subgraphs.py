@@ -223,6 +223,19 @@ class Resolver:
             found[path] = {n: wire for n, wire in wires.items() if isinstance(wire, FlatWire)}
         return found
 
+    def inputs(self) -> dict[str, dict[str, str]]:
+        """For every sub-graph block, the output ``block.port`` that each of its inputs is wired to;
+        those that are put together, selected or constant are left out."""
+        found: dict[str, dict[str, str]] = {}
+        for path, instance in self.instances.items():
+            wires = {n: self.resolve(link, f"{path}.{n}") for n, link in instance.links.items()}
+            found[path] = {
+                name: wire.source
+                for name, wire in wires.items()
+                if isinstance(wire, FlatWire) and wire.source
+            }
+        return found
+
     def _input(self, link: Link, at: str) -> Link | str | None:
         assert link.instance is not None
         instance = self.instances[link.instance]

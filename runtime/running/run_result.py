@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from difflib import get_close_matches
 from html import escape
-from typing import Any, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +18,9 @@ from ..language.parameter_change import ParameterChange
 from ..language.stages import CheckedGraph
 from .sinks import MemoryLog
 from .timing import BlockTimes
+
+if TYPE_CHECKING:
+    from .plots import SignalPlot
 
 
 @dataclass(frozen=True, repr=False)
@@ -101,6 +104,26 @@ class RunResult:
             near = get_close_matches(name, log.layout.slots, 1, 0.0)
             raise KeyError(f"no signal {name!r}; the nearest is {', '.join(near)}")
         return log.layout.view(log.rows(), name)
+
+    def plot(
+        self, *signals: str, start: float | None = None, end: float | None = None
+    ) -> SignalPlot:
+        """Plot signals over time; a notebook shows it, ``save`` writes it into a file.
+
+        Args:
+            signals: ``block.output.field``, all fields of ``block.output``, or elements, such as
+                ``robot.joints.position[left_knee]``. Each field gets a panel.
+            start: from this time [s].
+            end: up to this time [s].
+
+        Raises:
+            KeyError: there is no such signal; the message has the nearest name.
+            ValueError: no signal or no such element is named, or nothing was recorded in that time.
+            RuntimeError: the run kept no log.
+        """
+        from .plots import plot_signals
+
+        return plot_signals(self, signals, start, end)
 
     def signals(self) -> tuple[str, ...]:
         """The names that ``signal`` knows."""

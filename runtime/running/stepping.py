@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...mathematics.compiling.compile_calls import compile_calls
+from ..language.block import Block
 from ..language.errors import AloftError, RunError
 from ..language.signals import Signal
 from ..language.stages import CheckedGraph, ClockSpec
@@ -45,6 +46,7 @@ class SteppedRun:
         self._ticker = Ticker(self._bound, ClockSpec(), WallTime(), timing=False)
         if not plain:
             compile_calls(self._bound.kernel_calls)
+            self._ticker.fuse()
         try:
             self._life.start()
         except BaseException:
@@ -126,6 +128,10 @@ class SteppedRun:
         """
         self._must_be_open()
         self._bound.restore(snapshot)
+
+    def block(self, path: str) -> Block:
+        """The block at that path, for tools that know what it is. Raises ``KeyError``."""
+        return self._bound.blocks[path]
 
     def __getitem__(self, name: str) -> Any:
         """A copy of a signal (``"pd.command"``) or of one of its fields (``"pd.command.torque"``).

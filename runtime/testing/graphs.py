@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Any
 
 from ...robots.description import RobotDescription
@@ -75,7 +76,7 @@ def _spec(
     dimensions: Mapping[str, int] | None,
 ) -> BlockSpec:
     params = use.block_type.Params.model_validate(dict(use.params))
-    use = replace(use, block_type=use.block_type.fitted(params))
+    use = replace(use, block_type=use.block_type.fitted(params, Path()))
     sizes = {
         **(robot.dimensions if robot else {}),
         **(dimensions or {}),

@@ -1,9 +1,11 @@
 """``aloft params``: a running graph's parameters, from another process."""
 
 import json
+import re
 import signal
 import subprocess
 import time
+import urllib.request
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -94,3 +96,40 @@ def test_nothing_runs(sockets: Path, call: Call, call_json: CallJson) -> None:
     result = call_json("run", "count.yaml", "--no-record", "--params", "dead")
     assert result["success"] and not (sockets / "aloft" / "dead.sock").exists()
     assert "cannot name a run" in call("run", "count.yaml", "--params", "a/b", code=2).stderr
+
+
+@pytest.mark.parametrize(
+    ("words", "shown"),
+    [
+        (("params", "web", "--save", "fast.yaml"), '"opened": "parameters"'),
+        (("graph", "--live"), '"opened": "diagram"'),
+        (("graph", "tune.yaml", "--live"), "tune-tuned.yaml"),
+    ],
+)
+def test_a_page_of_it(
+    running: subprocess.Popen[str], start: Start, words: tuple[str, ...], shown: str
+) -> None:
+    page = start(*words)
+    assert page.stdout is not None
+    try:
+        address = page.stdout.readline().strip()
+        assert re.fullmatch(r"http://127\.0\.0\.1:[0-9]+/\?token=[\w-]{32,}", address)
+        with urllib.request.urlopen(address, timeout=60) as answer:
+            assert shown in answer.read().decode()
+    finally:
+        page.send_signal(signal.SIGINT)
+        _, errors = page.communicate(timeout=60)
+    assert (page.returncode, errors) == (0, "")
+
+
+def test_pages_of_what_does_not_run(sockets: Path, call: Call) -> None:
+    nothing = "no graph is running whose parameters can be changed"
+    assert nothing in call("params", "web", code=2).stderr
+    assert nothing in call("graph", "--live", code=2).stderr
+    assert nothing in call("graph", "tune.yaml", "--live", code=2).stderr
+    assert (
+        "--live is for a graph that is running" in call("graph", "a.rrd", "--live", code=2).stderr
+    )
+    assert "--run NAME is for --live" in call("graph", "tune.yaml", "--run", "a", code=2).stderr
+    assert "give a graph file, or --live for one that runs" in call("graph", code=2).stderr
+    assert "choose one of" in call("graph", "--live", "--json", code=2).stdout

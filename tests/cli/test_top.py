@@ -1,5 +1,7 @@
 """``aloft top`` shows parts that run in other processes; ``aloft watch`` shows their signals."""
 
+import os
+import signal
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -7,25 +9,31 @@ from pathlib import Path
 
 import pytest
 
+from aloft.cli.local_runs import local_runs, registered, settings_of
 from aloft.logs.recording.watched_part import WatchedPart
 from aloft.logs.viewing.viewer import ViewerError, start_viewer
+from aloft.runtime.language.errors import AloftError
 from aloft.runtime.links.observer import Observer
 from aloft.runtime.loading import load
 from aloft.runtime.placement.place import place
 
 from ..runtime.links.test_zenoh_transport import wait_for
-from .conftest import run_for_json, run_here
+from .conftest import run_elsewhere, run_for_json, run_here
 from .test_run_local import BLOCKS, GRAPH, free_port
+
+
+def write_graph(folder: Path) -> None:
+    text = GRAPH.replace("300 ms", "1000 s").replace("200 Hz", "100 Hz")
+    text = text.replace(":7450", f":{free_port()}").replace(":7451", f":{free_port()}")
+    text += "clock: {kind: paced}\nlinks: {mode: free, max_age: 60 s, late: hold}\n"
+    (folder / "graph.yaml").write_text(text)
 
 
 @pytest.fixture
 def running(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     """A graph of two machines, free-running for long."""
     (tmp_path / "pieces.py").write_text(BLOCKS)
-    text = GRAPH.replace("300 ms", "1000 s").replace("200 Hz", "100 Hz")
-    text = text.replace(":7450", f":{free_port()}").replace(":7451", f":{free_port()}")
-    text += "clock: {kind: paced}\nlinks: {mode: free, max_age: 60 s, late: hold}\n"
-    (tmp_path / "graph.yaml").write_text(text)
+    write_graph(tmp_path)
     monkeypatch.chdir(tmp_path)
     command = [sys.executable, "-m", "aloft", "run", "graph.yaml", "--no-record", "--machine"]
     parts = [
@@ -63,11 +71,69 @@ def test_machines_and_links_are_shown(running: Path) -> None:
     try:
         with Observer(placed) as observer:
             watched = WatchedPart(observer, "onboard", viewer.source)
-            assert wait_for(lambda: watched.taken > 5, 30.0)
+            assert wait_for(lambda: watched.taken > 5)
             watched.close()
             assert watched.problem == ""
     finally:
         viewer.stop()
+
+
+def test_the_parts_of_a_local_run_are_found(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """At the ports that were free, with the settings that it was started with."""
+    (tmp_path / "pieces.py").write_text(BLOCKS)
+    write_graph(tmp_path)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    run = run_elsewhere(
+        "run", "graph.yaml", "--local", "--no-record", "--set", "controller.stop_at=99999"
+    )
+    try:
+        assert wait_for(lambda: local_runs(Path("graph.yaml")) != [], 120.0), run.poll()
+        found = run_for_json("top", "graph.yaml", "--once", "--wait", "120")
+        assert found["success"] and list(found["machines"]) == ["onboard", "ground"]
+        states = {machine["state"] for machine in found["machines"].values()}
+        assert "another graph" not in states, "its settings count, too"
+        number = str(run.pid)
+        assert run_for_json("top", "graph.yaml", "--once", "--wait", "120", "--local", number)
+        wrong = run_for_json("top", "graph.yaml", "--once", "--local", "1", code=2)["reason"]
+        assert wrong.endswith(f"graph.yaml --local` has the process 1; there is {run.pid}")
+    finally:
+        run.send_signal(signal.SIGINT)
+        run.communicate(timeout=120)
+    assert local_runs(Path("graph.yaml")) == []
+
+
+def test_local_runs_end_with_their_process(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    graph = Path("graph.yaml")
+    assert settings_of(graph) == ()
+    with registered(graph, ["a.b=1"]):
+        assert settings_of(tmp_path / "graph.yaml") == ("a.b=1",)
+        assert settings_of(graph, os.getpid()) == ("a.b=1",)
+        assert local_runs(Path("other.yaml")) == []
+        code = (
+            "import os, signal\nfrom pathlib import Path\nfrom aloft.cli.local_runs import *\n"
+            "with registered(Path('graph.yaml'), ['a.b=2']):\n"
+            "    print(flush=True)\n    input()\n    os.kill(os.getpid(), signal.SIGKILL)\n"
+        )
+        with subprocess.Popen(
+            [sys.executable, "-c", code], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+        ) as other:
+            assert other.stdout is not None
+            other.stdout.readline()
+            runs = local_runs(graph)
+            assert {run.settings for run in runs} == {("a.b=1",), ("a.b=2",)}
+            with pytest.raises(AloftError, match="runs here 2 times with --local, as the proc"):
+                settings_of(graph)
+            assert settings_of(graph, other.pid) == ("a.b=2",)
+            other.communicate("\n", timeout=120)
+        assert [run.process for run in local_runs(graph)] == [os.getpid()], "it was killed"
+    assert local_runs(graph) == [] and not list((tmp_path / "aloft").glob("*.local"))
+    with pytest.raises(AloftError, match="has the process 7; there is none"):
+        settings_of(graph, 7)
 
 
 def test_who_is_not_there_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

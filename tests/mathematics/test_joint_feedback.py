@@ -41,7 +41,7 @@ def test_a_blend_is_the_weighted_sum_of_both_torques():
 def test_friction_has_the_sign_of_the_velocity():
     out = np.ones(3)
     friction, damping = np.array([0.1, 0.2, 0.3]), np.array([0.0, 0.1, 0.01])
-    add_friction(np.array([10.0, 0.0, -10.0]), friction, damping, 0.3, np.zeros(3), out)
+    add_friction(np.array([10.0, 0.0, -10.0]), friction, damping, 0.3, out)
     assert out == pytest.approx([1.1, 1.0, 0.6])
 
 
@@ -65,7 +65,11 @@ def test_a_soft_stop_adds_its_own_torque_to_any_feedback(angle, rate, gains, tar
     before = gains[0] * (targets[0] - angle) + gains[1] * (targets[1] - rate)
     limits, springs, dampers = np.array([[-1.0, 0.5]]), np.array([gains[2]]), np.array([gains[3]])
     feedback = Feedback(stiffness, position, damping, velocity)
-    add_soft_stops(np.array([angle]), SoftStops(limits, 0.1, 2.0, springs, dampers), feedback)
+    add_soft_stops(
+        np.array([angle]),
+        SoftStops(limits, np.array([0.1]), np.array([2.0]), springs, dampers),
+        feedback,
+    )
     after = stiffness[0] * (position[0] - angle) + damping[0] * (velocity[0] - rate)
     edge = min(max(angle, -0.9), 0.4)
     depth = abs(angle - edge) / 0.1

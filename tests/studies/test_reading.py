@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 
 from aloft.runtime.loading import LoadError
+from aloft.studies.expansion import cells, checked_cells
 from aloft.studies.reading import read_study
 
 
@@ -84,10 +85,39 @@ def test_two_axes_may_not_set_one_parameter(folder: Path) -> None:
         ("seeds: 1\ngraphs: [count.yaml, ./count.yaml]\n", "two tasks are called 'count'"),
         ("seeds: 1\ngraphs: {a: {set: {}}}\n", "wrong.yaml:2:10: missing-key: task 'a' names no"),
         ("seeds: 1\ngraph: count.yaml\ntune: {seeds: 1, draws: 2}\n", "there is nothing to tune"),
+        ("seeds: 1\ngraph: count.yaml\ngraphs_of: wrong.yaml\n", "'graph' and 'graphs_of' exclude each"),
+        ("seeds: 1\ngraphs_of: [wrong.yaml]\n", "wrong.yaml:2:12: wrong-kind: 'graphs_of' cannot be"),
+        ("seeds: 1\ngraphs_of: other.yaml\n", "wrong.yaml:2:12: file: there is no file other.yaml"),
+        ("seeds: 1\ngraphs_of: wrong.yaml\n", "wrong.yaml:2:12: bad-value: wrong.yaml has its graphs"),
+        ("seeds: 1\ngraphs_of: count.yaml\n", "count.yaml:1:1: missing-key: the study names no graph"),
     ],
 )  # fmt: skip
 def test_one_mistake(folder: Path, text: str, expected: str) -> None:
     assert expected in report(folder, text)
+
+
+def test_the_graphs_of_another_study(folder: Path) -> None:
+    (folder / "inner").mkdir()
+    (folder / "inner" / "tasks.yaml").write_text(
+        "seeds: 1000\ntitle: others\nset: {counter.seed: 3}\n"
+        "graphs: {to two: {graph: ../count.yaml, set: {counter.goal: 2}}, as it is: ../count.yaml}\n"
+    )
+    (folder / "right.yaml").write_text(
+        "graphs_of: inner/tasks.yaml\nseeds: 4\narms: {a: {}, b: {counter.goal: 5}}\n"
+    )
+    found = read_study(Path("right.yaml"))
+    assert [task.name for task in found.tasks] == ["to two", "as it is"]
+    assert [(e.key, e.key_where.file) for e in found.tasks[0].sets] == [
+        ("counter.goal", "inner/tasks.yaml")
+    ]
+    assert (found.title, found.seeds, found.sets) == ("right", (4,), ()), "only graphs are taken"
+    expanded = checked_cells(cells(found), found, "")
+    assert [(cell.task, cell.arm, dict(cell.overrides)) for cell in expanded] == [
+        ("to two", "a", {"counter.goal": 2}),
+        ("to two", "b", {"counter.goal": 5}),
+        ("as it is", "a", {}),
+        ("as it is", "b", {"counter.goal": 5}),
+    ]
 
 
 def test_goals_may_name_values_in_other_units(folder: Path) -> None:

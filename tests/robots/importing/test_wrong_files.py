@@ -105,7 +105,7 @@ YAMLS = [
     ("feets: []", [
         "x.yaml:1:8: the robot has no key 'feets'",
         ("    expected   file, weld, name, text, base, base_joint, links, joints, feet, contacts, "
-        "transmission, profiles, profile, sensors, standing, held, points"),
+        "transmission, profiles, profile, sensors, standing, held, points, looks"),
         "    found      'feets'",
         "    fix        feet: []",
     ]),

@@ -38,7 +38,7 @@ def inbox_of(part: BoundPart) -> LatestInbox:
 
 
 def test_values_go_round_and_nothing_is_lost() -> None:
-    run = run_spread(free())
+    run = run_spread(free(ticks=150))  # long enough for a machine that is busy otherwise
     for machine, result in run.results.items():
         assert result.success, result.reason
         inbox = inbox_of(run.parts[machine])
@@ -76,9 +76,8 @@ class Quiet:
 def test_a_link_that_goes_quiet_stops_all_in_order() -> None:
     Counter.LOG.clear()
     graph = free(of={"last": LinkPolicy(0.1, "stop")}, ticks=1000)
-    began = time.monotonic()
     run = run_spread(graph, interfere=Quiet("data/far/onboard/last", 60))
-    assert time.monotonic() - began < 9.0
+    assert run.results["onboard"].ticks < 1000
     reason = run.results["onboard"].reason
     assert reason.startswith("link last@far -> onboard: nothing has come for ")
     assert reason.endswith("at most 100 ms are allowed")
@@ -87,8 +86,8 @@ def test_a_link_that_goes_quiet_stops_all_in_order() -> None:
 
 
 def test_a_link_that_goes_quiet_reads_zeros_where_that_is_safe() -> None:
-    graph = free(of={"last": LinkPolicy(0.05, "safe")}, ticks=100)
-    run = run_spread(graph, interfere=Quiet("data/far/onboard/last", 40))
+    graph = free(of={"last": LinkPolicy(0.05, "safe")}, ticks=200)
+    run = run_spread(graph, interfere=Quiet("data/far/onboard/last", 20))
     log = run.results["onboard"].log
     assert run.results["onboard"].success and log is not None and log.layout is not None
     values = log.layout.view(log.rows(), "last.y.value")
@@ -120,7 +119,7 @@ def in_a_thread(part: BoundPart, results: dict[str, RunResult], name: str) -> th
     return thread
 
 
-def wait_for(condition: Callable[[], bool], seconds: float = 10.0) -> bool:
+def wait_for(condition: Callable[[], bool], seconds: float = 60.0) -> bool:
     end = time.monotonic() + seconds
     while not condition() and time.monotonic() < end:
         time.sleep(0.01)
@@ -129,7 +128,7 @@ def wait_for(condition: Callable[[], bool], seconds: float = 10.0) -> bool:
 
 def test_a_part_that_is_started_again_joins_without_the_others_starting_again() -> None:
     Counter.LOG.clear()
-    placed = place(free(LinkPolicy(None, "hold"), ticks=2000))
+    placed = place(free(LinkPolicy(None, "hold"), ticks=20_000))
     hub = Hub()
     parts = {m.name: BoundPart(placed, m.name, hub.transport()) for m in placed.machines}
     results: dict[str, RunResult] = {}
@@ -149,7 +148,7 @@ def test_a_part_that_is_started_again_joins_without_the_others_starting_again() 
     assert Counter.LOG == ["robot starts"]  # nothing was enabled again
     again.clock.stop_reason = "enough"
     for thread in threads.values():
-        thread.join(20.0)
+        thread.join(60.0)
         assert not thread.is_alive()
     assert results["onboard"].reason == "machine 'near' has ended its run"
     assert far.lost == 0
@@ -157,7 +156,7 @@ def test_a_part_that_is_started_again_joins_without_the_others_starting_again() 
 
 def test_a_part_with_actuators_does_not_join_by_itself() -> None:
     Counter.LOG.clear()
-    placed = place(free(LinkPolicy(None, "hold"), ticks=2000))
+    placed = place(free(LinkPolicy(None, "hold"), ticks=20_000))
     hub = Hub()
     parts = {m.name: BoundPart(placed, m.name, hub.transport()) for m in placed.machines}
     results: dict[str, RunResult] = {}
@@ -165,15 +164,15 @@ def test_a_part_with_actuators_does_not_join_by_itself() -> None:
     assert wait_for(lambda: inbox_of(parts["far"]).received > 10)
     parts["onboard"].others._transport.close()
     parts["onboard"].clock.stop_reason = "its process is gone"
-    threads[0].join(20.0)
+    threads[0].join(60.0)
     Counter.LOG.clear()
     again = in_a_thread(BoundPart(placed, "onboard", hub.transport()), results, "again")
-    again.join(20.0)
+    again.join(60.0)
     assert "this part moves actuators, which it never enables by itself" in results["again"].reason
     assert results["again"].exit_code is ExitCode.RUN_FAILED
     assert "robot starts" not in Counter.LOG
     for thread in threads:
-        thread.join(20.0)
+        thread.join(60.0)
         assert not thread.is_alive()
 
 
@@ -182,7 +181,7 @@ def test_parameters_change_where_their_block_runs() -> None:
 
     def submit(part: BoundPart) -> None:
         try:
-            part.parameters.submit(adjust(part.blocks, {"first.factor": 2.0}), 10.0)
+            part.parameters.submit(adjust(part.blocks, {"first.factor": 2.0}), 60.0)
             answers.append("")
         except AloftError as error:
             answers.append(str(error))
@@ -192,10 +191,11 @@ def test_parameters_change_where_their_block_runs() -> None:
             for name in ("onboard", "near"):
                 wait_for(lambda: parts["far"].clock.tick > 5)
                 submit(parts[name])
+            parts["far"].clock.stop_reason = "enough"
 
         threading.Thread(target=both, daemon=True).start()
 
-    run = run_spread(free(ticks=100), prepare=prepare)
+    run = run_spread(free(ticks=20_000), prepare=prepare)
     assert answers == [
         (
             "block 'first' runs on near, and parts that run free change only their own parameters; "
@@ -217,7 +217,7 @@ def test_the_clocks_of_the_others_are_estimated() -> None:
 
 @pytest.mark.parametrize("policy", ["hold", "safe"])
 def test_a_part_that_is_gone_does_not_end_the_others(policy: str) -> None:
-    graph = free(LinkPolicy(0.05, policy), ticks=80)  # type: ignore[arg-type]
+    graph = free(LinkPolicy(0.05, policy), ticks=250)  # type: ignore[arg-type]
 
     def prepare(parts: Mapping[str, BoundPart], hub: Hub) -> None:
         def kill() -> None:

@@ -266,11 +266,11 @@ def test_a_message_that_is_lost_for_good_ends_the_run_in_order(
 ) -> None:
     Counter.LOG.clear()
     interfere = FromMessage("data/near/far/first", 20, what)
-    spread_out = run_spread(ring(), interfere=interfere, patience=0.5)
+    spread_out = run_spread(ring(), interfere=interfere, patience=2.0)
     reasons = [r.reason for r in spread_out.results.values()]
     # the robot waits for its command, and the machine that sends it for the message that is lost
     lost = r"link (first@near -> far|last@far -> onboard): the message of tick (\d+) has not come"
-    matches = [re.search(lost + r" in 0.5 s. \d+ came before", reason) for reason in reasons]
+    matches = [re.search(lost + r" in 2 s. \d+ came before", reason) for reason in reasons]
     assert all(matches), reasons
     (tick,) = {int(match[2]) for match in matches if match}
     assert 10 <= tick <= 20
@@ -297,8 +297,8 @@ def test_a_machine_that_is_gone_ends_the_run_at_once() -> None:
 
     Counter.LOG.clear()
     began = time.monotonic()
-    spread_out = run_spread(ring(), prepare=prepare, patience=20.0)
-    assert time.monotonic() - began < 15.0
+    spread_out = run_spread(ring(), prepare=prepare, patience=120.0)
+    assert time.monotonic() - began < 60.0
     for name in ("onboard", "far"):
         assert "machine 'near' is gone" in spread_out.results[name].reason
         assert spread_out.results[name].exit_code is ExitCode.RUN_FAILED

@@ -27,7 +27,7 @@ def test_waiting_ends() -> None:
     began = time.monotonic()
     with pytest.raises(MailTimeoutError):
         box.take(0, 0.2)
-    assert 0.15 < time.monotonic() - began < 5.0
+    assert 0.15 < time.monotonic() - began < 30.0
 
 
 def test_a_check_ends_the_wait_but_not_before_what_has_come_is_looked_at() -> None:

@@ -18,7 +18,7 @@ from aloft.runtime.testing.spread import run_spread
 from .example_graphs import Counter, ring
 
 
-def run_parts(graphs: Mapping[str, CheckedGraph], patience: float = 5.0) -> dict[str, RunResult]:
+def run_parts(graphs: Mapping[str, CheckedGraph], patience: float = 60.0) -> dict[str, RunResult]:
     """Run each machine with a graph of its own."""
     hub = Hub()
     results: dict[str, RunResult] = {}
@@ -31,7 +31,7 @@ def run_parts(graphs: Mapping[str, CheckedGraph], patience: float = 5.0) -> dict
     for thread in threads:
         thread.start()
     for thread in threads:
-        thread.join(30.0)
+        thread.join(90.0)
     return results
 
 
@@ -56,9 +56,9 @@ def test_parts_of_different_graphs_refuse_to_start() -> None:
 
 def test_a_part_that_does_not_come_is_named_with_its_endpoint() -> None:
     Counter.LOG.clear()
-    results = run_parts({"onboard": ring(), "near": ring()}, patience=0.5)
+    results = run_parts({"onboard": ring(), "near": ring()}, patience=2.0)
     for result in results.values():
-        assert "nothing was heard of far (tcp/127.0.0.1:7452) for 0.5 s" in result.reason
+        assert "nothing was heard of far (tcp/127.0.0.1:7452) for 2 s" in result.reason
         assert "aloft run GRAPH --machine NAME" in result.reason
     assert Counter.LOG == []
 
@@ -69,10 +69,10 @@ def test_a_link_that_carries_nothing_keeps_all_motors_off(key: str) -> None:
         return () if sent == key else (data,)
 
     Counter.LOG.clear()
-    results = run_spread(ring(), interfere=interfere, patience=0.7).results
+    results = run_spread(ring(), interfere=interfere, patience=2.0).results
     assert all(result.exit_code is ExitCode.RUN_FAILED for result in results.values())
     assert all(result.ticks == 0 for result in results.values())
-    assert "did not become linked in 0.7 s" in " ".join(r.reason for r in results.values())
+    assert "did not become linked in 2 s" in " ".join(r.reason for r in results.values())
     assert Counter.LOG == []
 
 

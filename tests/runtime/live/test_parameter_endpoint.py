@@ -11,7 +11,12 @@ import pytest
 
 from aloft.blocks.general.gain import Gain
 from aloft.blocks.general.sine_wave import SineWave
-from aloft.runtime.parameter_endpoint import EndpointError, ParameterEndpoint, ask, set_parameters
+from aloft.runtime.live.parameter_endpoint import (
+    EndpointError,
+    ParameterEndpoint,
+    ask,
+    set_parameters,
+)
 from aloft.runtime.running.executor import Executor
 from aloft.runtime.running.memory import BoundGraph
 from aloft.runtime.testing import Use, checked_graph

@@ -1,38 +1,45 @@
-"""The endpoint at which a running graph lists its parameters and accepts changes of them.
+"""The endpoint at which a running graph is watched, lists its parameters and accepts changes of them.
 
 It is a Unix-domain socket that only its owner can read; nothing listens on a network. A request is
 one line of JSON, and so is its answer::
 
     {"verb": "list"}                                  {"graph": ..., "parameters": [...]}
     {"verb": "set", "settings": ["landing.w_c=0.1"]}  {"changes": [{"tick": 812, "path": ...}]}
+    {"verb": "watch"}                                 {"graph": ..., "text": ..., "shape": {...}}
 
 Where something is wrong the answer is ``{"error": text}``, with the report of a ``LoadError`` under
-``report``. A thread of its own answers; the control thread only looks into the slot of
+``report``. With the answer to ``watch`` comes the descriptor of a window; see ``live.window``. A thread of its own answers; the control thread only looks into the slot of
 ``LiveParameters`` once a tick.
 """
 
 from __future__ import annotations
 
 import json
+import os
 import socket
 import threading
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from .language.errors import AloftError
-from .loading.adjust import adjust, entries
-from .loading.problems import LoadError
-from .running.live_parameters import LiveParameters
-from .running.memory import BoundGraph
+from ..language.errors import AloftError
+from ..loading.adjust import adjust, entries
+from ..loading.problems import LoadError
+from ..running.live_parameters import LiveParameters
+from ..running.memory import BoundGraph
+from ..running.run_result import RunResult
+from ..running.ticker import Ticker
+from .window import Window, digest
 
 LONGEST_REQUEST = 1 << 16
 """Bytes of one request."""
 PATIENCE = 5.0
 """The time that either side waits for the other [s]."""
+START_TIME = 60.0
+"""The time that somebody who watches waits for a run to start [s]."""
 _LONGEST_PATH = 100  # bytes; the address of a Unix-domain socket has room for little more
 
 
@@ -41,7 +48,7 @@ class EndpointError(AloftError):
 
 
 class ParameterEndpoint:
-    """Answers requests about a graph's parameters while it runs; give it to a run as a sink.
+    """Answers requests about a graph while it runs; give it to a run as a sink.
 
     Args:
         path: of the socket; one that nobody answers any more is replaced.
@@ -68,26 +75,39 @@ class ParameterEndpoint:
             raise EndpointError(f"no socket at {path}: {error.strerror or error}") from error
         self._thread: threading.Thread | None = None
         self._closing = False
+        self._window = Window()
 
     def open(self, bound: BoundGraph) -> None:
         """Begin to answer."""
+        self._window.open(bound)
+        self._about = _about(bound)
         self._thread = threading.Thread(
             target=self._serve, args=(bound.parameters, bound.graph.name), daemon=True
         )
         self._thread.start()
 
+    def watch_ticker(self, ticker: Ticker) -> None:
+        """Let the run be watched."""
+        self._window.watch_ticker(ticker)
+
     def record(self, tick: int) -> None:
-        """Do nothing: changes of parameters are recorded elsewhere."""
+        """Renew the window; changes of parameters are recorded elsewhere."""
+        self._window.record(tick)
 
     def close(self) -> None:
         """Answer no more."""
         self._closing = True
+        self._window.close()
         self.path.unlink(missing_ok=True)
         with suppress(OSError):
             self._socket.shutdown(socket.SHUT_RDWR)  # wakes the thread
         self._socket.close()
         if self._thread is not None:
             self._thread.join(PATIENCE)
+
+    def finish(self, result: RunResult) -> list[str]:
+        """Tell those who watch why the run has ended."""
+        return self._window.finish(result)
 
     def _serve(self, parameters: LiveParameters, graph: str) -> None:
         while not self._closing:
@@ -97,11 +117,38 @@ class ParameterEndpoint:
                 return
             with connection, suppress(OSError):  # the client may have closed the connection
                 connection.settimeout(PATIENCE)
-                answer = _answer(_read_line(connection), parameters, graph)
+                request = _read_line(connection)
+                answer = _answer(request, parameters, graph, self._watch)
+                if "shape" in answer:
+                    socket.send_fds(connection, [b" "], [self._window.descriptor])
                 connection.sendall(json.dumps(answer).encode() + b"\n")
 
+    def _watch(self) -> dict[str, Any]:
+        if self._window.shape is None:
+            return {"starting": True}
+        return {**self._about, "shape": asdict(self._window.shape)}
 
-def _answer(request: bytes, parameters: LiveParameters, graph: str) -> dict[str, Any]:
+
+def _about(bound: BoundGraph) -> dict[str, Any]:
+    """What somebody who watches must know to load the same graph."""
+    graph = bound.graph
+    return {
+        "graph": graph.name,
+        "file": str(Path(graph.file).absolute()) if graph.file else "",
+        "text": graph.text,
+        "overrides": dict(graph.overrides),
+        "clock": bound.clock.kind,
+        "process": os.getpid(),
+        "digest": digest(bound.memory.bus.layout, graph),
+    }
+
+
+def _answer(
+    request: bytes,
+    parameters: LiveParameters,
+    graph: str,
+    watch: Callable[[], dict[str, Any]],
+) -> dict[str, Any]:
     """The answer to one request; a request that makes no sense gets an error as its answer."""
     try:
         message = json.loads(request)
@@ -116,6 +163,8 @@ def _answer(request: bytes, parameters: LiveParameters, graph: str) -> dict[str,
             adjustment = adjust(parameters.blocks, [str(text) for text in message["settings"]])
             parameters.submit(adjustment)
             return {"changes": [asdict(change) for change in adjustment.changes()]}
+        if verb == "watch":
+            return watch()
         return {"error": f"there is no verb {verb!r}"}
     except LoadError as error:
         return {"error": str(error), "report": error.report.as_json()}
@@ -144,18 +193,53 @@ def ask(path: Path, request: Mapping[str, Any]) -> dict[str, Any]:
     Raises:
         EndpointError: nobody answers there, or the request was refused; the text says why.
     """
+    answer, descriptors = _exchange(path, request)
+    for descriptor in descriptors:
+        os.close(descriptor)
+    return answer
+
+
+def ask_to_watch(path: Path) -> tuple[dict[str, Any], int]:
+    """What the graph that listens at ``path`` says of itself, and the descriptor of its window.
+
+    Waits for a graph that is only starting.
+
+    Raises:
+        EndpointError: nobody answers there, or it cannot be watched; the text says why.
+    """
+    end = time.monotonic() + START_TIME
+    while True:
+        try:
+            answer, descriptors = _exchange(path, {"verb": "watch"})
+        except EndpointError as error:  # one that compiles its kernels may be slow to answer
+            if not isinstance(error.__cause__, TimeoutError) or time.monotonic() > end:
+                raise
+            continue
+        if len(descriptors) == 1:
+            return answer, descriptors[0]
+        if time.monotonic() > end:
+            raise EndpointError(f"the run at {path} does not start, or cannot share its memory")
+        time.sleep(0.1)
+
+
+def _exchange(path: Path, request: Mapping[str, Any]) -> tuple[dict[str, Any], list[int]]:
+    descriptors: list[int] = []
     try:
         with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as connection:
             connection.settimeout(PATIENCE)
             connection.connect(str(path))
             connection.sendall(json.dumps(request).encode() + b"\n")
+            begun, descriptors, _, _ = socket.recv_fds(connection, 4096, 1)
             with connection.makefile("rb") as file:
-                answer: dict[str, Any] = json.loads(file.readline())
+                line = begun if begun.endswith(b"\n") else begun + file.readline()
+                answer: dict[str, Any] = json.loads(line)
     except (OSError, ValueError) as error:
+        for descriptor in descriptors:
+            os.close(descriptor)
         raise EndpointError(f"no running graph answers at {path} ({error})") from error
     if "error" in answer:
         raise EndpointError(str(answer["error"]))
-    return answer
+    return answer, descriptors
 
 
 def answers(path: Path) -> bool:

@@ -1,0 +1,293 @@
+"""One tick of the controller of a jump: block by block, whole, and beside other solvers.
+
+All cases run the same recorded jump of ``graphs/jump.yaml`` in turns of ``CHUNK`` ticks, so whatever
+else the machine does hits them alike. A ratio is the median over the ratios of single ticks.
+"""
+
+from __future__ import annotations
+
+import gc
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..blocks.control.whole_body_controller import WholeBodyController
+from ..blocks.control.whole_body_program import WholeBodyProgram
+from ..mathematics.whole_body_qp import joint_torque
+from ..runtime.running.timing import block_times
+from .rows import Row, compare, take_turns
+from .tick_controller import HandWrittenLoop, RecordedController, RecordedJump, record_jump
+from .tick_process import busy_wait_row, process_row
+from .tick_programs import DaqpProgram, OsqpController, OsqpProgram, PeerProgram
+
+PLAIN = "controller, plain Python"
+COMPILED = "controller, kernels one by one"
+FUSED = "controller, fused"
+OSQP = "controller, kernels one by one, whole-body program by OSQP"
+BARE = "controller, no times, checks or record"
+HAND = "hand-written loop of the same bodies"
+QP, QP_OSQP, QP_DAQP = "whole-body program", "the same by OSQP", "the same by DAQP"
+WHOLE_BODY = "state to torque"
+WHOLE_BODY_OSQP = "state to torque, OSQP"
+STATE_TO_TORQUE = ("dynamics", "wbc")
+"""The blocks from the estimated state to torques."""
+
+CHUNK = 50
+EVERY = 10
+"""One in so many ticks in stance is a state for the solvers by themselves."""
+TORQUE_ERROR = 1e-6
+"""How much the torques of two exact methods may differ [N m]."""
+Times = dict[str, NDArray[np.float64]]
+
+
+def tick(rounds: int = 3, ticks: int | None = None, process: bool = True) -> list[Row]:
+    """The rows.
+
+    Args:
+        rounds: how often the jump is run again; plain Python takes part in the first round only.
+        ticks: how much of the jump is used; by default all.
+        process: whether the whole process and the loop in real time are measured as well.
+
+    Raises:
+        AssertionError: the controller computes something else than in the recorded jump, or the
+            methods that are exact do not agree.
+    """
+    jump = record_jump(ticks)
+    own, plain = RecordedController(jump, fuse=False), RecordedController(jump, plain=True)
+    fused = RecordedController(jump)
+    bare = RecordedController(jump, fuse=False, timing=False, checks=False, record=False)
+    cases = {COMPILED: own, FUSED: fused, BARE: bare, HAND: HandWrittenLoop(jump)}
+    missing = _missing("osqp")
+    programs = _programs(own, with_osqp=not missing)
+    if not missing:
+        cases[OSQP] = _osqp_controller(jump)
+    for case in cases.values():  # warm, and what OSQP must know beforehand
+        case.run(jump.ticks, programs.learn if case is own else None)
+    with _quiet():
+        for number in range(rounds):
+            running = {PLAIN: plain, **cases} if number == 0 else cases
+            _one_round(jump, running, programs if number == 0 else None)
+    times = {name: np.array(case.times[-rounds * jump.ticks :]) for name, case in cases.items()}
+    of_first = {PLAIN: np.array(plain.times), COMPILED: times[COMPILED][: jump.ticks]}
+    rows = [
+        *_block_rows(own, "block "),
+        *_block_rows(fused, "fused block "),
+        *_controller_rows(times, of_first, missing),
+    ]
+    rows += _program_rows(programs.times, missing)
+    rows += _state_to_torque_rows(own, cases.get(OSQP), missing)
+    rows.append(Row("the controller in TSID", None, "us/tick", COMPILED, note="not measured here"))
+    if process:
+        rows += [process_row(jump), busy_wait_row(jump)]
+    return rows
+
+
+def _one_round(
+    jump: RecordedJump, cases: Mapping[str, RecordedController], programs: _Programs | None
+) -> None:
+    """Run the jump once, all cases in turns; the order shifts from turn to turn."""
+    for case in cases.values():
+        case.again()
+    names = list(cases)
+    for turn in range(-(-jump.ticks // CHUNK)):
+        shift = turn % len(names)
+        for name in (*names[shift:], *names[:shift]):
+            cases[name].run(CHUNK)
+    for name in (PLAIN, COMPILED, FUSED, BARE, HAND):
+        if name in cases:
+            cases[name].check()
+    if programs is not None:
+        cases[COMPILED].again()
+        cases[COMPILED].run(jump.ticks, programs.measure)
+
+
+class _Programs:
+    """The whole-body program of one controller's present state, solved in several ways."""
+
+    def __init__(self, block: WholeBodyController, *, with_osqp: bool) -> None:
+        self._block = block
+        self._acceleration = np.zeros_like(block.command.acceleration)
+        self._force = np.zeros_like(block.command.force)
+        self._torque, self._product = np.zeros((2, block.command.torque.shape[0]))
+        self._daqp = DaqpProgram(block)
+        self._osqp = OsqpProgram(block) if with_osqp else None
+        self.times: Times = {}
+        self._found: list[dict[str, float]] = []
+
+    def learn(self, tick: int) -> None:
+        """Show a state to OSQP."""
+        active = np.flatnonzero(self._block.phase.stance)
+        if self._osqp is not None and active.size:
+            self._osqp.learn(active)
+
+    def measure(self, tick: int) -> None:
+        """Solve the program of the present state in all ways, in turns."""
+        active = np.flatnonzero(self._block.phase.stance)
+        if tick % EVERY or not active.size:
+            return
+        prepared = self._daqp.assemble(active)
+        cases: dict[str, Callable[[int], object]] = {
+            QP: _repeated(self._block._solve.run),
+            QP_DAQP: _repeated(lambda: self._solve(self._daqp, active, prepared)),
+        }
+        if self._osqp is not None:
+            osqp = self._osqp
+            ready = osqp.assemble(active)
+            cases[QP_OSQP] = _repeated(lambda: self._solve(osqp, active, ready))
+        taken = take_turns(cases, 5, 1)
+        self._found.append({name: float(np.median(found)) for name, found in taken.items()})
+        self.times = {name: np.array([each[name] for each in self._found]) for name in cases}
+        self._solve(self._daqp, active, prepared)
+        apart = float(np.abs(self._torque - self._block.command.torque).max())
+        if self._block.command.solved and apart > TORQUE_ERROR:
+            raise AssertionError(f"tick {tick}: DAQP's torque is {apart:.2g} N m from the own one")
+
+    def _solve(
+        self, peer: PeerProgram, active: NDArray[np.int64], program: WholeBodyProgram
+    ) -> None:
+        """From the program's matrices, which are ready, to accelerations, forces and torques."""
+        answer, n = peer.solve_assembled(program, len(active)), self._acceleration.shape[0]
+        if answer is not None:
+            self._acceleration[...] = answer[:n]
+            self._force.fill(0.0)
+            self._force[active] = answer[n:].reshape(-1, 3)
+            joint_torque(
+                self._block._model, self._acceleration, self._force, self._product, self._torque
+            )
+
+
+def _programs(own: RecordedController, *, with_osqp: bool) -> _Programs:
+    block = own.bound.blocks["wbc"]
+    assert isinstance(block, WholeBodyController)
+    return _Programs(block, with_osqp=with_osqp)
+
+
+def _osqp_controller(jump: RecordedJump) -> RecordedController:
+    """The controller with OSQP, which has seen every state of the jump once."""
+    controller = RecordedController(jump, fuse=False, instead={"wbc": OsqpController})
+    controller.run(jump.ticks)
+    block = controller.bound.blocks["wbc"]
+    assert isinstance(block, OsqpController)
+    block.learning = False
+    controller.again()
+    return controller
+
+
+def _repeated(body: Callable[[], object]) -> Callable[[int], object]:
+    def run(count: int) -> None:
+        for _ in range(count):
+            body()
+
+    return run
+
+
+def _block_rows(controller: RecordedController, prefix: str) -> list[Row]:
+    """The median time of every block, in the order in which they run."""
+    programs = controller.ticker.programs
+    for program in programs:
+        program.fold()
+    order = controller.bound.graph.order
+    return [Row(f"{prefix}{p}", block_times(programs, p).p50_us, "us/tick") for p in order]
+
+
+def _controller_rows(times: Times, of_first: Times, missing: str) -> list[Row]:
+    rows = [
+        compare(PLAIN, of_first, COMPILED),
+        Row(COMPILED, float(np.median(times[COMPILED])), "us/tick"),
+        compare(FUSED, times, COMPILED),
+        Row(HAND, float(np.median(times[HAND])), "us/tick"),
+        compare(BARE, times, HAND, floor=1.05, goal=1.02, note="the scheduler's share"),
+    ]
+    if missing:
+        return [*rows, Row(OSQP, None, "us/tick", COMPILED, note=missing)]
+    limits = {COMPILED: (1 / 8, 1 / 12), FUSED: (1 / 20, 1 / 30)}
+    return [
+        *rows,
+        Row(OSQP, float(np.median(times[OSQP])), "us/tick"),
+        *(
+            compare(
+                f"{name}, beside OSQP",
+                {**times, f"{name}, beside OSQP": times[name]},
+                OSQP,
+                floor=floor,
+                goal=goal,
+            )
+            for name, (floor, goal) in limits.items()
+        ),
+    ]
+
+
+def _program_rows(times: Times, missing: str) -> list[Row]:
+    """From model terms to accelerations, forces and torques."""
+    if QP not in times:
+        return []
+    rows = [compare(f"{QP}, beside DAQP", {**times, f"{QP}, beside DAQP": times[QP]}, QP_DAQP,
+                    floor=1 / 1.8, goal=1 / 2.5, note="DAQP without its assembly, from its own answer")]  # fmt: skip
+    rows.append(Row(QP_DAQP, float(np.median(times[QP_DAQP])), "us/tick"))
+    if missing:
+        return [*rows, Row(QP_OSQP, None, "us/tick", QP, note=missing)]
+    name = f"{QP}, beside OSQP"
+    return [
+        *rows,
+        compare(
+            name,
+            {**times, name: times[QP]},
+            QP_OSQP,
+            floor=1 / 25,
+            goal=1 / 40,
+            note="OSQP at 1e-3 as in BRUCE's code, without its assembly, from its own answer",
+        ),
+        Row(QP_OSQP, float(np.median(times[QP_OSQP])), "us/tick"),
+    ]
+
+
+def _state_to_torque_rows(
+    own: RecordedController, osqp: RecordedController | None, missing: str
+) -> list[Row]:
+    """The dynamics and the whole-body controller, tasks included."""
+    value = _sum_of(own)
+    if osqp is None:
+        return [Row(WHOLE_BODY, value, "us/tick", WHOLE_BODY_OSQP, note=missing)]
+    other = _sum_of(osqp)
+    return [
+        Row(
+            WHOLE_BODY,
+            value,
+            "us/tick",
+            WHOLE_BODY_OSQP,
+            value / other,
+            1 / 55,
+            floor=1 / 30,
+            note="dynamics compiled in both",
+        ),
+        Row(WHOLE_BODY_OSQP, other, "us/tick"),
+    ]
+
+
+def _sum_of(controller: RecordedController) -> float:
+    programs = controller.ticker.programs
+    for program in programs:
+        program.fold()
+    return sum(block_times(programs, path).p50_us for path in STATE_TO_TORQUE)
+
+
+def _missing(package: str) -> str:
+    """Why a peer cannot be measured; empty where it is installed."""
+    from importlib.util import find_spec
+
+    return "" if find_spec(package) else f"not installed: pip install aloft[peers] has {package}"
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """No garbage is collected within."""
+    gc.collect()
+    gc.freeze()
+    gc.disable()
+    try:
+        yield
+    finally:
+        gc.enable()
+        gc.unfreeze()

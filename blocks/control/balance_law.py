@@ -1,0 +1,378 @@
+"""What ``BalanceTarget`` does in every tick, as kernels: following the plan, and balancing."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...mathematics.kernel import kernel
+from ...mathematics.polynomials import minimum_jerk
+from ...mathematics.rotations import (
+    conjugate,
+    exponential,
+    from_matrix,
+    logarithm,
+    mean_heading,
+    multiply,
+)
+from ..signals import Phase
+
+Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+Indices = NDArray[np.int64]
+
+BY_FEET, BY_PATTERN, BY_BASE = 0, 1, 2
+"""What tells the heading: the feet's own directions, the pattern in which they stand, the base."""
+
+_THRUST, _LANDING, _RECOVER = int(Phase.THRUST), int(Phase.LANDING), int(Phase.RECOVER)
+
+
+class Plan(NamedTuple):
+    """The fields of ``JumpReference`` that are followed."""
+
+    time: Array
+    lift_off_time: Array
+    touchdown_time: Array
+    com: Array
+    com_velocity: Array
+    com_acceleration: Array
+    angular_momentum: Array
+    angular_momentum_rate: Array
+    orientation: Array
+    angular_velocity: Array
+    foot_position: Array
+    foot_yaw: Array
+    joint_position: Array
+    joint_velocity: Array
+    joint_acceleration: Array
+
+
+class Present(NamedTuple):
+    """The fields of ``PhaseState`` and ``DynamicsTerms`` that say how the robot stands."""
+
+    phase: Indices
+    time_in_phase: Array
+    foot_position: Array
+    foot_rotation: Array
+    base_rotation: Array
+    mass_matrix: Array
+
+
+class Aim(NamedTuple):
+    """The fields of ``WholeBodyTarget``."""
+
+    com: Array
+    com_velocity: Array
+    com_acceleration: Array
+    angular_momentum: Array
+    angular_momentum_rate: Array
+    orientation: Array
+    angular_velocity: Array
+    joint_position: Array
+    joint_velocity: Array
+    joint_acceleration: Array
+
+
+class Memory(NamedTuple):
+    """The fields of ``BalanceMemory``."""
+
+    standing_height: Array
+    started: Flags
+    trim: Array
+    origin: Array
+    heading: Array
+    off_place: Array
+
+
+class Gains(NamedTuple):
+    """Parameters that may change during a run, each an array of one element but for ``corrections``
+    (2, 3), of velocity [m/s] and angular momentum [N m s]."""
+
+    landing_depth: Array
+    rise_time: Array
+    trim_rate: Array
+    trim_limit: Array
+    place_gain: Array
+    place_limit: Array
+    place_time: Array
+    corrections: Array
+
+
+class Stand(NamedTuple):
+    """Of the robot and its clock: what tells the heading, which feet count in it (n_feet,), the mass of
+    the description [kg], and the period [s]."""
+
+    kind: int
+    counted: Flags
+    mass: float
+    period: float
+
+
+class Scratch(NamedTuple):
+    """``turn`` and ``quaternion`` (4,); ``vector``, the ``middle`` of the feet and their planned one (3,)."""
+
+    turn: Array
+    quaternion: Array
+    vector: Array
+    middle: Array
+    planned_middle: Array
+
+
+@kernel
+def aim(
+    plan: Plan, present: Present, stand: Stand, gains: Gains, memory: Memory, out: Aim,
+    scratch: Scratch,
+) -> None:  # fmt: skip
+    """One tick of ``BalanceTarget``."""
+    phase = int(present.phase[()])
+    middle_point(present.foot_position, scratch.middle)
+    middle_point(plan.foot_position, scratch.planned_middle)
+    planned = planned_heading(plan.foot_yaw, stand.counted)
+    heading = measured_heading(plan, present, stand, planned, scratch)
+    if not memory.started[()]:
+        memory.standing_height[()] = plan.com[2]
+        memory.heading[()] = heading - planned
+        turn_about_vertical(scratch.planned_middle, float(memory.heading[()]), scratch.vector)
+        np.subtract(scratch.middle, scratch.vector, memory.origin)
+        memory.started[()] = True
+    goes_on = float(plan.lift_off_time[()]) > float(plan.time[()])
+    if phase < _LANDING or (phase == _LANDING and goes_on):
+        turn = heading - planned
+        follow(plan, present, stand, turn, out, scratch)
+        if gains.place_gain[0] > 0.0:
+            correct_place(plan, gains, memory, out, scratch)
+        if phase == _THRUST:
+            correct_lift_off(plan, present, stand, turn, gains, out, scratch.vector)
+    else:
+        balance(present, stand, heading, gains, memory, out, scratch)
+    for joint in range(plan.joint_position.shape[0]):
+        out.joint_position[joint] = plan.joint_position[joint]
+        out.joint_velocity[joint] = plan.joint_velocity[joint]
+        out.joint_acceleration[joint] = plan.joint_acceleration[joint]
+
+
+@kernel
+def planned_heading(foot_yaw: Array, counted: Flags) -> float:
+    """The mean of the planned headings [rad] of the feet that count."""
+    count, planned = 0, 0.0
+    for foot in range(counted.shape[0]):
+        count += 1 if counted[foot] else 0
+    for foot in range(counted.shape[0]):
+        if counted[foot]:
+            planned += float(foot_yaw[foot]) / count
+    return planned
+
+
+@kernel
+def measured_heading(
+    plan: Plan, present: Present, stand: Stand, planned: float, scratch: Scratch
+) -> float:
+    """The feet's heading [rad], by their own directions or by the pattern they stand in."""
+    if stand.kind == BY_FEET:
+        return mean_heading(present.foot_rotation, stand.counted)
+    if stand.kind == BY_BASE:
+        rotation = present.base_rotation
+        return math.atan2(float(rotation[1, 0]), float(rotation[0, 0]))
+    return planned + pattern_turn(
+        plan.foot_position, scratch.planned_middle, present.foot_position, scratch.middle
+    )
+
+
+@kernel
+def set_heading(angle: float, quaternion: Array) -> None:
+    """The unit quaternion of a rotation about the vertical by ``angle`` [rad]."""
+    quaternion[0], quaternion[1] = 0.0, 0.0
+    quaternion[2], quaternion[3] = math.sin(0.5 * angle), math.cos(0.5 * angle)
+
+
+@kernel
+def follow(
+    plan: Plan, present: Present, stand: Stand, turn: float, out: Aim, scratch: Scratch
+) -> None:
+    """Write the plan relative to the measured feet; ``turn`` is the angle of its rotation [rad].
+
+    The plan's momenta are those of the description's mass.
+    """
+    np.subtract(plan.com, scratch.planned_middle, scratch.vector)
+    turn_about_vertical(scratch.vector, turn, out.com)
+    np.add(out.com, scratch.middle, out.com)
+    turn_about_vertical(plan.com_velocity, turn, out.com_velocity)
+    turn_about_vertical(plan.com_acceleration, turn, out.com_acceleration)
+    turn_about_vertical(plan.angular_momentum, turn, out.angular_momentum)
+    turn_about_vertical(plan.angular_momentum_rate, turn, out.angular_momentum_rate)
+    mass = float(present.mass_matrix[0, 0])
+    heavier = (mass if mass != 0.0 else stand.mass) / stand.mass
+    for k in range(3):
+        out.angular_momentum[k] = float(out.angular_momentum[k]) * heavier
+        out.angular_momentum_rate[k] = float(out.angular_momentum_rate[k]) * heavier
+        out.angular_velocity[k] = plan.angular_velocity[k]
+    set_heading(turn, scratch.turn)
+    multiply(scratch.turn, plan.orientation, out.orientation)
+
+
+@kernel
+def correct_place(plan: Plan, gains: Gains, memory: Memory, out: Aim, scratch: Scratch) -> None:
+    """Change the length of the next jump to correct the feet's position error."""
+    lift_off, duration = float(plan.lift_off_time[()]), float(gains.place_time[0])
+    flight = float(plan.touchdown_time[()]) - lift_off
+    share = 1.0 - (lift_off - float(plan.time[()])) / duration
+    if share <= 0.0:
+        turn_about_vertical(scratch.planned_middle, float(memory.heading[()]), scratch.vector)
+        np.add(memory.origin, scratch.vector, scratch.vector)
+        np.subtract(scratch.middle, scratch.vector, memory.off_place)
+        return
+    lengthen(
+        memory.off_place, float(gains.place_gain[0]), float(gains.place_limit[0]), flight,
+        duration, share, out.com, out.com_velocity, out.com_acceleration,
+    )  # fmt: skip
+
+
+@kernel
+def correct_lift_off(
+    plan: Plan, present: Present, stand: Stand, turn: float, gains: Gains, out: Aim, vector: Array
+) -> None:
+    """Add the known corrections of velocity and momentum during the thrust."""
+    largest = 0.0
+    for i in range(2):
+        for k in range(3):
+            largest = max(largest, abs(float(gains.corrections[i, k])))
+    if largest == 0.0:
+        return
+    elapsed = float(present.time_in_phase[()])
+    left = float(plan.lift_off_time[()]) - float(plan.time[()])
+    duration = max(elapsed + left, stand.period)
+    share = min(elapsed / duration, 1.0)
+    turn_about_vertical(gains.corrections[1], turn, vector)
+    add_quadratic_growth(vector, share, duration, out.angular_momentum, out.angular_momentum_rate)
+    turn_about_vertical(gains.corrections[0], turn, vector)
+    add_quadratic_growth(vector, share, duration, out.com_velocity, out.com_acceleration)
+    for k in range(3):
+        way = duration * share * share * share / 3.0
+        out.com[k] = float(out.com[k]) + float(vector[k]) * way
+
+
+@kernel
+def balance(
+    present: Present, stand: Stand, heading: float, gains: Gains, memory: Memory, out: Aim,
+    scratch: Scratch,
+) -> None:  # fmt: skip
+    """Aim at the middle of the feet and a level base, and rise when the phase is RECOVER."""
+    depth, duration = float(gains.landing_depth[0]), float(gains.rise_time[0])
+    share, rate, bend = 0.0, 0.0, 0.0
+    if int(present.phase[()]) == _RECOVER:
+        share, rate, bend = minimum_jerk(float(present.time_in_phase[()]) / duration)
+    for k in range(3):
+        out.com[k] = scratch.middle[k]
+        out.com_velocity[k], out.com_acceleration[k] = 0.0, 0.0
+        out.angular_velocity[k], out.angular_momentum[k] = 0.0, 0.0
+        out.angular_momentum_rate[k] = 0.0
+    low = float(memory.standing_height[()]) - depth
+    out.com[2] = float(out.com[2]) + (low + share * depth)
+    out.com_velocity[2] = rate * depth / duration
+    out.com_acceleration[2] = bend * depth / (duration * duration)
+    set_heading(heading, scratch.turn)
+    quaternion, trim = scratch.quaternion, memory.trim
+    from_matrix(present.base_rotation, quaternion)
+    conjugate(quaternion, quaternion)
+    multiply(quaternion, scratch.turn, quaternion)
+    logarithm(quaternion, scratch.vector)
+    gain = float(gains.trim_rate[0]) * stand.period
+    integrate_trim(scratch.vector, gain, float(gains.trim_limit[0]), trim)
+    exponential(trim, quaternion)
+    multiply(scratch.turn, quaternion, out.orientation)
+
+
+@kernel
+def middle_point(points: Array, out: Array) -> None:
+    """The mean of points (n, 3)."""
+    out[:] = 0.0
+    for i in range(points.shape[0]):
+        for k in range(3):
+            out[k] += float(points[i, k]) / points.shape[0]
+
+
+@kernel
+def pattern_turn(planned: Array, planned_middle: Array, points: Array, middle: Array) -> float:
+    """The rotation [rad] of a pattern of points (n, 3) about the vertical, by least squares.
+
+    Args:
+        planned, planned_middle: the pattern before the rotation, and its middle (3,).
+        points, middle: the same points now, and their middle.
+    """
+    sine = cosine = 0.0
+    for i in range(planned.shape[0]):
+        ax, ay = float(planned[i, 0] - planned_middle[0]), float(planned[i, 1] - planned_middle[1])
+        bx, by = float(points[i, 0] - middle[0]), float(points[i, 1] - middle[1])
+        sine += ax * by - ay * bx
+        cosine += ax * bx + ay * by
+    return math.atan2(sine, cosine)
+
+
+@kernel
+def turn_about_vertical(vector: Array, angle: float, out: Array) -> None:
+    """Rotate a vector (3,) about the world's z axis by ``angle`` [rad]."""
+    cosine, sine = math.cos(angle), math.sin(angle)
+    x, y = float(vector[0]), float(vector[1])
+    out[0], out[1], out[2] = cosine * x - sine * y, sine * x + cosine * y, vector[2]
+
+
+@kernel
+def lengthen(
+    off_place: Array,
+    gain: float,
+    limit: float,
+    flight: float,
+    duration: float,
+    share: float,
+    place: Array,
+    velocity: Array,
+    acceleration: Array,
+) -> None:
+    """Add the correction of the feet's position error to a jump's motion; see ``BalanceTarget``.
+
+    Args:
+        off_place: the horizontal position error of the feet, (3,) [m].
+        gain: the share of the error that is corrected.
+        limit: the largest change of the jump's length [m].
+        flight: the duration of the planned flight [s].
+        duration, share: how long before lift-off the correction begins [s], and the share of that
+            time which is over, 0 to 1.
+        place, velocity, acceleration: of the centre of mass, (3,) each; they are changed.
+    """
+    u = min(max(share, 0.0), 1.0)
+    grown, rate, _ = minimum_jerk(u)
+    square = float(off_place[0]) ** 2 + float(off_place[1]) ** 2
+    size = gain * math.sqrt(square)
+    kept = 1.0 if size <= limit else limit / size
+    for k in range(2):
+        speed = -kept * gain * float(off_place[k]) / (flight + 0.5 * duration)
+        place[k] += speed * duration * u * u * u * u * (2.5 + u * (u - 3.0))
+        velocity[k] += speed * grown
+        acceleration[k] += speed * rate / duration
+
+
+@kernel
+def add_quadratic_growth(
+    goal: Array, share: float, duration: float, value: Array, rate: Array
+) -> None:
+    """Add to ``value`` (3,) a term that grows with the square of time to ``goal`` (3,).
+
+    Args:
+        share: the share of ``duration`` [s] that is over, 0 to 1.
+        value, rate: a quantity and its time derivative; share^2 goal is added to the one, and the
+            derivative of that to the other.
+    """
+    for k in range(3):
+        value[k] += share * share * float(goal[k])
+        rate[k] += 2.0 * share / duration * float(goal[k])
+
+
+@kernel
+def integrate_trim(error: Array, gain: float, limit: float, trim: Array) -> None:
+    """One step of the integral of the tilt about x and y, within the limit; z stays zero."""
+    for k in range(2):
+        trim[k] = min(max(float(trim[k]) + gain * float(error[k]), -limit), limit)
+    trim[2] = 0.0

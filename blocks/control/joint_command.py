@@ -1,0 +1,210 @@
+"""What ``JointPD`` does in every tick, as one kernel: the command of all joints."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...mathematics.joint_feedback import (
+    Feedback,
+    Motion,
+    SoftStops,
+    add_friction,
+    add_soft_stops,
+    blend_feedback,
+    integrate_accelerations,
+)
+from ...mathematics.kernel import kernel
+from ..signals import CommandMode, Phase
+
+Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+Indices = NDArray[np.int64]
+
+MEASURED, ACCELERATION, LEGS = 0, 1, 2
+"""Kinds of targets of the stance gains."""
+
+# What a compiled kernel can read.
+_ACTIVE, _FLIGHT, _LANDING = int(CommandMode.ACTIVE), int(Phase.FLIGHT), int(Phase.LANDING)
+
+
+class Legs(NamedTuple):
+    """Which joints belong to which leg.
+
+    ``foot_of_point`` (n_contacts,) and ``foot_of_joint`` (n_joints,), where -1 stands for a joint that
+    is held or belongs to no leg; ``held`` (n_joints,) and its ``angle`` (n_joints,) [rad]; and
+    ``free`` (n_joints,), the joints that are neither held nor in a leg.
+    """
+
+    foot_of_point: Indices
+    foot_of_joint: Indices
+    held: Flags
+    angle: Array
+    free: Flags
+
+
+class Inputs(NamedTuple):
+    """What the command follows: fields of ``PhaseState``, ``WholeBodyCommand`` and ``JumpReference``.
+
+    ``measured`` are the joints, ``legs`` and ``planned`` the targets of the joints in a leg and of the
+    free ones, and ``acceleration`` (n_joints,) those of the whole-body controller [rad/s^2].
+    """
+
+    phase: Indices
+    stance: Flags
+    stepping: Flags
+    torque: Array
+    acceleration: Array
+    measured: Motion
+    legs: Motion
+    planned: Motion
+    planned_phase: Indices
+    planned_torque: Array
+
+
+class Numbers(NamedTuple):
+    """Parameters that may change during a run.
+
+    Each is an array of one element, but for ``friction`` [N m] and ``damping`` [N m s/rad] of all
+    joints (n_joints,). ``rate`` is the change of a weight in a tick, ``compensates`` says whether there
+    is any friction to compensate.
+    """
+
+    rate: Array
+    feedforward: Array
+    leak: Array
+    friction: Array
+    damping: Array
+    speed: Array
+    compensates: Flags
+
+
+class Following(NamedTuple):
+    """The fields of ``JointFollower``."""
+
+    airborne: Array
+    targets: Motion
+    started: Flags
+
+
+class Joints(NamedTuple):
+    """Memory: the weight of the flight gains of every joint (n_joints,), and both sets of gains."""
+
+    airborne: Array
+    flight: Feedback
+    stance: Feedback
+
+
+@kernel
+def command_joints(
+    period: float,
+    kind: int,
+    legs: Legs,
+    inputs: Inputs,
+    numbers: Numbers,
+    stops: SoftStops,
+    following: Following,
+    joints: Joints,
+    mode: Indices,
+    torque: Array,
+    out: Feedback,
+) -> None:
+    """Write the command: ``mode`` (), ``torque`` (n_joints,) [N m] and the feedback ``out``.
+
+    Args:
+        period: of a tick [s].
+        kind: of the stance gains' targets.
+    """
+    blend_legs(legs, inputs, numbers, following, joints.airborne)
+    find_stance_targets(period, kind, legs, inputs, numbers, following, joints.stance)
+    find_flight_targets(legs, inputs, joints.flight)
+    mode[()] = _ACTIVE
+    flies = int(inputs.phase[()]) == _FLIGHT and int(inputs.planned_phase[()]) == _FLIGHT
+    for i in range(torque.shape[0]):
+        airborne = float(joints.airborne[i])
+        torque[i] = (1.0 - airborne) * float(inputs.torque[i])
+        if flies:
+            planned = airborne * float(inputs.planned_torque[i]) * float(numbers.feedforward[0])
+            torque[i] = float(torque[i]) + planned
+    if numbers.compensates[0]:
+        add_friction(
+            inputs.measured.velocity, numbers.friction, numbers.damping, float(numbers.speed[0]),
+            torque,
+        )  # fmt: skip
+    blend_feedback(joints.airborne, joints.flight, joints.stance, inputs.measured, out)
+    if stops.gain[0] > 0.0:
+        add_soft_stops(inputs.measured.position, stops, out)
+
+
+@kernel
+def blend_legs(
+    legs: Legs, inputs: Inputs, numbers: Numbers, following: Following, airborne: Array
+) -> None:
+    """Change the weight of each leg's flight gains: up where no point of it is in stance.
+
+    A joint of no leg, or one that is held, has the least weight of all legs.
+    """
+    phase, rate = int(inputs.phase[()]), float(numbers.rate[0])
+    least = 1.0 if following.airborne.shape[0] > 0 else 0.0
+    for foot in range(following.airborne.shape[0]):
+        swings = phase in (_FLIGHT, _LANDING)
+        for point in range(legs.foot_of_point.shape[0]):
+            held = inputs.stance[point] or inputs.stepping[point]
+            if legs.foot_of_point[point] == foot and held:
+                swings = False
+        weight = float(following.airborne[foot]) + (rate if swings else -rate)
+        weight = min(max(weight, 0.0), 1.0)
+        following.airborne[foot] = weight
+        least = min(least, weight)
+    for joint in range(airborne.shape[0]):
+        foot = int(legs.foot_of_joint[joint])
+        airborne[joint] = least if foot < 0 else following.airborne[foot]
+
+
+@kernel
+def find_stance_targets(
+    period: float,
+    kind: int,
+    legs: Legs,
+    inputs: Inputs,
+    numbers: Numbers,
+    following: Following,
+    stance: Feedback,
+) -> None:
+    """The measured joints at rest, the legs' targets, or integrated accelerations."""
+    measured, targets = inputs.measured, following.targets
+    if kind == ACCELERATION:
+        if not following.started[()]:
+            for i in range(legs.held.shape[0]):
+                targets.position[i] = measured.position[i]
+                targets.velocity[i] = measured.velocity[i]
+            following.started[()] = True
+        integrate_accelerations(
+            period, float(numbers.leak[0]), inputs.acceleration, measured, targets
+        )
+    for i in range(legs.held.shape[0]):
+        if legs.held[i]:
+            stance.position[i], stance.velocity[i] = legs.angle[i], 0.0
+        elif kind == MEASURED:
+            stance.position[i], stance.velocity[i] = measured.position[i], 0.0
+        elif kind == LEGS:
+            stance.position[i] = inputs.legs.position[i]
+            stance.velocity[i] = inputs.legs.velocity[i]
+        else:
+            stance.position[i], stance.velocity[i] = targets.position[i], targets.velocity[i]
+
+
+@kernel
+def find_flight_targets(legs: Legs, inputs: Inputs, flight: Feedback) -> None:
+    """The legs' targets, the held angles, and the plan for joints that belong to no leg."""
+    for i in range(legs.held.shape[0]):
+        if legs.held[i]:
+            flight.position[i], flight.velocity[i] = legs.angle[i], 0.0
+        elif legs.free[i]:
+            flight.position[i] = inputs.planned.position[i]
+            flight.velocity[i] = inputs.planned.velocity[i]
+        else:
+            flight.position[i] = inputs.legs.position[i]
+            flight.velocity[i] = inputs.legs.velocity[i]

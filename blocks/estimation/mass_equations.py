@@ -1,0 +1,217 @@
+"""What ``MassEstimator`` does in every tick, as kernels: filters, and the equations' corrections."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...mathematics.constants import GRAVITY
+from ...mathematics.kernel import kernel
+from ...mathematics.linear import multiply_vector
+from ...mathematics.mass_filter import (
+    LegScratch,
+    base_force_map,
+    correct_row,
+    fade,
+    split_friction,
+    torso_moment,
+)
+from ..signals import Phase
+
+Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+Indices = NDArray[np.int64]
+
+SCALE, COM, TILT, FRICTION = 0, 1, 4, 6
+"""Where the unknowns begin: the factor on all masses; the offset of the torso's CoM [m] (3); the
+error of the estimated tilt [rad] (2); by joint its unknown friction, as a share of its friction."""
+
+_SQUAT = int(Phase.SQUAT)
+
+
+class Measured(NamedTuple):
+    """The fields of ``DynamicsTerms``, ``JointState`` and ``PhaseState`` that the equations take."""
+
+    phase: Indices
+    stance: Flags
+    velocity: Array
+    torque: Array
+    mass_matrix: Array
+    nonlinear: Array
+    jacobian: Array
+    base_rotation: Array
+    com: Array
+    foot_position: Array
+
+
+class Memory(NamedTuple):
+    """The fields of ``MassMemory``."""
+
+    velocity: Array
+    torque: Array
+    unknowns: Array
+    covariance: Array
+    published: Array
+    ticks: Indices
+    over: Flags
+
+
+class Model(NamedTuple):
+    """Of the robot: masses of all links and of the torso [kg], the joints' friction [N m] and damping
+    [N m s/rad], the foot of each contact point, and the joints of each foot's leg."""
+
+    mass: float
+    torso: float
+    friction: Array
+    damping: Array
+    foot_of_point: Indices
+    chains: Indices
+
+
+class Settings(NamedTuple):
+    """Numbers of the filter.
+
+    ``every`` and ``settled`` are ticks, ``filter`` and ``follow`` shares in a tick, ``kept`` the share of
+    the unknown friction that stays between two measurements; ``noise`` (6,) [N, N m].
+    """
+
+    period: float
+    every: int
+    settled: int
+    filter: float
+    follow: float
+    kept: float
+    friction_share: float
+    friction_speed: float
+    friction_left: float
+    gate: float
+    noise: Array
+
+
+class Scratch(NamedTuple):
+    """For n joints and s unknowns: ``map`` (6, n), ``rows`` (6, s), ``acceleration`` and ``force``
+    (6 + n,), ``known``, ``unknown`` and ``joint`` (n,), ``base`` and ``residual`` (6,), ``seen`` (s,)."""
+
+    leg: LegScratch
+    map: Array
+    rows: Array
+    acceleration: Array
+    force: Array
+    known: Array
+    unknown: Array
+    joint: Array
+    base: Array
+    residual: Array
+    seen: Array
+
+
+@kernel
+def publish_mass(
+    mass: float, memory: Memory, out: Array, deviation: Array, offset: Array, offset_std: Array
+) -> None:
+    """Write the estimate's ``mass`` and ``deviation`` () [kg], and the torso's offset (3,) [m]."""
+    out[()] = mass * float(memory.published[0])
+    deviation[()] = mass * math.sqrt(float(memory.covariance[SCALE, SCALE]))
+    for k in range(3):
+        offset[k] = memory.published[1 + k]
+        offset_std[k] = math.sqrt(float(memory.covariance[COM + k, COM + k]))
+
+
+@kernel
+def follow_mass(
+    measured: Measured, memory: Memory, model: Model, settings: Settings, scratch: Scratch
+) -> None:
+    """One tick: filter velocity and torque, correct the estimate where it is due, publish it."""
+    joints, ticks = memory.torque.shape[0], int(memory.ticks[()])
+    if ticks == 0:
+        for i in range(memory.velocity.shape[0]):
+            memory.velocity[i] = measured.velocity[i]
+        for i in range(joints):
+            memory.torque[i] = measured.torque[i]
+    if int(measured.phase[()]) > _SQUAT:
+        memory.over[()] = True
+    if not memory.over[()]:
+        ticks += 1
+        memory.ticks[()] = ticks
+        for i in range(memory.velocity.shape[0]):
+            change = (float(measured.velocity[i]) - float(memory.velocity[i])) * settings.filter
+            memory.velocity[i] = float(memory.velocity[i]) + change
+            scratch.acceleration[i] = change / settings.period
+        for i in range(joints):
+            change = (float(measured.torque[i]) - float(memory.torque[i])) * settings.filter
+            memory.torque[i] = float(memory.torque[i]) + change
+        stands = False
+        for point in range(measured.stance.shape[0]):
+            stands = stands or bool(measured.stance[point])
+        if stands and ticks % settings.every == 0 and ticks >= settings.settled:
+            correct_mass(measured, memory, model, settings, scratch)
+    for k in range(4):
+        change = (float(memory.unknowns[k]) - float(memory.published[k])) * settings.follow
+        memory.published[k] = float(memory.published[k]) + change
+
+
+@kernel
+def correct_mass(
+    measured: Measured, memory: Memory, model: Model, settings: Settings, scratch: Scratch
+) -> None:
+    """Correct the estimate by the six equations of this instant."""
+    share = settings.friction_share
+    fade(memory.unknowns, memory.covariance, FRICTION, settings.kept, share * share)
+    form_rows(measured, memory, model, settings, scratch)
+    for k in range(6):
+        expected = 0.0
+        for i in range(memory.unknowns.shape[0]):
+            value = float(memory.unknowns[i])
+            if i < TILT:
+                value -= float(memory.published[i])
+            expected += value * float(scratch.rows[k, i])
+        correct_row(
+            memory.unknowns, memory.covariance, scratch.rows[k],
+            -float(scratch.residual[k]) - expected, float(settings.noise[k]), settings.gate,
+            scratch.seen,
+        )  # fmt: skip
+
+
+@kernel
+def form_rows(
+    measured: Measured, memory: Memory, model: Model, settings: Settings, scratch: Scratch
+) -> None:
+    """The equations' residual at the published estimate without the unknown parts of tilt and
+    friction, and its derivative by the unknowns.
+
+    The derivatives are those at rest: noise of the acceleration in them would bias the result.
+    """
+    joints, rows, force = memory.torque.shape[0], scratch.rows, scratch.force
+    base_force_map(
+        measured.jacobian, measured.stance, model.foot_of_point, model.chains, scratch.leg,
+        scratch.map,
+    )  # fmt: skip
+    split_friction(
+        memory.velocity[6:], model.friction, model.damping, settings.friction_speed,
+        settings.friction_left, scratch.known, scratch.unknown,
+    )  # fmt: skip
+    multiply_vector(measured.mass_matrix, scratch.acceleration, force)
+    for i in range(force.shape[0]):
+        force[i] = float(force[i]) + float(measured.nonlinear[i])
+    for j in range(joints):
+        left = float(memory.torque[j]) - float(scratch.known[j])
+        scratch.joint[j] = left - float(force[6 + j])
+    multiply_vector(scratch.map, scratch.joint, scratch.residual)
+    multiply_vector(scratch.map, measured.nonlinear[6:], scratch.base)
+    scale = float(memory.published[0])
+    for k in range(6):
+        scratch.residual[k] = float(scratch.residual[k]) + float(force[k])
+        rows[k, SCALE] = (float(measured.nonlinear[k]) - float(scratch.base[k])) / scale
+    torso_moment(measured.base_rotation, scale * model.torso * GRAVITY, rows[3:, COM:TILT])
+    lowest = float(measured.foot_position[0, 2])
+    for foot in range(1, measured.foot_position.shape[0]):
+        lowest = min(lowest, float(measured.foot_position[foot, 2]))
+    moment = scale * model.mass * GRAVITY * (float(measured.com[2]) - lowest)
+    rows[3, TILT], rows[4, TILT + 1] = moment, moment
+    for k in range(6):
+        for j in range(joints):
+            friction = float(scratch.unknown[j]) * float(model.friction[j])
+            rows[k, FRICTION + j] = -(float(scratch.map[k, j]) * friction)

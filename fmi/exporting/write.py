@@ -1,0 +1,192 @@
+"""Writes an FMU: the cut graph, the files and modules it needs, and PythonFMU3's library."""
+
+from __future__ import annotations
+
+import ast
+import hashlib
+import json
+import re
+import shutil
+import sys
+import tempfile
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from ... import __version__
+from ...logs.file.surroundings import named_file
+from ...runtime.language.errors import AloftError
+from ...runtime.loading.flat import ROBOT_FILES
+from .cut import Cut, Terminal, cut, start_of
+from .running_graph import GRAPH, INTERFACE
+
+_OURS = Path(__file__).parents[2]
+_ROBOT = re.compile(r"^robot: (?P<name>.*)$", re.MULTILINE)
+_SCRIPT = '''\
+"""A graph of aloft as an FMU; the graph is in the folder ``graph``."""
+from aloft.fmi.exporting.slave import GraphSlave
+from pythonfmu3 import Fmi3Slave
+
+
+class {name}(GraphSlave, Fmi3Slave):
+    pass
+'''
+
+
+@dataclass(frozen=True)
+class Exported:
+    """What was written: the file, its terminals, and what FMPy's validator says, if it is here."""
+
+    file: Path
+    period: float
+    inputs: tuple[Terminal, ...]
+    outputs: tuple[Terminal, ...]
+    problems: tuple[str, ...] | None
+
+
+def export(
+    path: str,
+    to: Path,
+    part: str = "",
+    overrides: Sequence[str] = (),
+    outputs: Sequence[str] = (),
+) -> Exported:
+    """Write a graph, or a sub-graph, as an FMU of FMI 3.0 for co-simulation.
+
+    Args:
+        path: the graph file.
+        to: the FMU to write.
+        part: the path of the sub-graph; empty for the whole graph.
+        overrides: parameters to change.
+        outputs: what the outputs are, ``block.port``; by default as ``cut`` says.
+
+    Raises:
+        LoadError: the graph may not run.
+        AloftError: PythonFMU3 is missing, the part cannot be cut out, or does not run alone.
+    """
+    try:
+        from pythonfmu3.builder import FmuBuilder
+    except ImportError:
+        raise AloftError("an FMU is made with PythonFMU3: pip install 'aloft[fmi]'") from None
+    name = to.stem
+    if to.suffix != ".fmu" or not name.isidentifier():
+        raise AloftError(f"{to} cannot be the name of an FMU; write it as my_controller.fmu")
+    cut_out = cut(path, part, overrides, outputs)
+    with tempfile.TemporaryDirectory(prefix="aloft-export-") as made:
+        folder = Path(made) / "graph"
+        folder.mkdir()
+        _write_graph(cut_out, folder, f"{Path(path).stem}{f', {part}' if part else ''}")
+        script = Path(made) / f"aloft_fmu_{_hash(folder)}.py"
+        script.write_text(_SCRIPT.format(name=name), encoding="utf-8")
+        try:
+            written = FmuBuilder.build_FMU(
+                script,
+                Path(made) / "fmu",
+                project_files=[folder],
+                canGetAndSetFMUState=True,
+                canSerializeFMUState=True,
+                canHandleVariableCommunicationStepSize=True,
+            )
+        except (AloftError, OSError) as error:
+            raise AloftError(f"the part does not run alone: {error}") from error
+        finally:
+            sys.modules.pop(script.stem, None)
+        to.parent.mkdir(parents=True, exist_ok=True)
+        shutil.move(written, to)
+    return Exported(to, cut_out.graph.base_period, cut_out.inputs, cut_out.outputs, _validated(to))
+
+
+def _write_graph(cut_out: Cut, folder: Path, title: str) -> None:
+    """Write the graph, its interface, and the files and modules that it names."""
+    graph, text = cut_out.graph, cut_out.text
+    found = _ROBOT.search(text)
+    if (
+        found
+        and graph.robot is not None
+        and str(yaml.safe_load(found["name"])).endswith(ROBOT_FILES)
+    ):
+        data = yaml.safe_dump(graph.robot.model_dump(mode="json"), sort_keys=False)
+        (folder / "robot.yaml").write_text(data, encoding="utf-8")
+        text = _ROBOT.sub("robot: robot.yaml", text, count=1)
+    overrides: dict[str, Any] = {}
+    for block in cut_out.inside:
+        spec = graph.block(block.path)
+        for name, value in spec.params:
+            file = named_file(value, Path(spec.folder))
+            if file is not None:
+                copy = Path("files") / f"{len(overrides)}" / file.name
+                (folder / copy).parent.mkdir(parents=True)
+                shutil.copyfile(file, folder / copy)
+                overrides[f"{block.path}.{name}"] = copy.as_posix()
+        if ":" in block.use:
+            _copy_module(block.use.partition(":")[0], spec.block_type.__module__, folder)
+    (folder / GRAPH).write_text(text, encoding="utf-8")
+    inputs = [{**t.plain(), "start": list(start_of(t))} for t in cut_out.inputs]
+    outputs = [t.plain() for t in cut_out.outputs]
+    interface = {
+        "description": f"{title}, by aloft {__version__}",
+        "stop_time": None if graph.ticks is None else graph.ticks * graph.base_period,
+        "overrides": overrides,
+        "inputs": inputs,
+        "outputs": outputs,
+    }
+    content = json.dumps([interface, text], sort_keys=True).encode()
+    interface["token"] = hashlib.sha256(content).hexdigest()[:32]
+    (folder / INTERFACE).write_text(json.dumps(interface, indent=1), encoding="utf-8")
+
+
+def _copy_module(name: str, imported: str, folder: Path) -> None:
+    """Copy a user's module, and the modules beside it that it imports, as they are below its root;
+    an installed module is not copied."""
+    file = Path(getattr(sys.modules.get(imported), "__file__", None) or "")
+    if not file.is_file() or "site-packages" in file.parts:
+        return
+    root = file.resolve().parents[len(name.split(".")) - (0 if file.name == "__init__.py" else 1)]
+    pending = [file.resolve()]
+    while pending:
+        each = pending.pop()
+        copy = folder / each.relative_to(root)
+        if copy.exists():
+            continue
+        copy.parent.mkdir(parents=True, exist_ok=True)
+        shutil.copyfile(each, copy)
+        pending += [p for p in _imported(each, root) if not (folder / p.relative_to(root)).exists()]
+
+
+def _imported(file: Path, root: Path) -> Iterator[Path]:
+    """The files below ``root`` that a module imports, with the packages they are in."""
+    for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+        names: list[str] = []
+        base = root
+        if isinstance(node, ast.Import):
+            names = [alias.name for alias in node.names]
+        elif isinstance(node, ast.ImportFrom):
+            base = file.parents[node.level - 1] if node.level else root
+            module = node.module or ""
+            names = [module, *(f"{module}.{alias.name}".strip(".") for alias in node.names)]
+        for name in filter(None, names):
+            parts = name.split(".")
+            places = [base.joinpath(*parts[:k], "__init__.py") for k in range(1, len(parts) + 1)]
+            for place in (*places, base.joinpath(*parts).with_suffix(".py")):
+                if place.is_file() and place.is_relative_to(root) and _OURS not in place.parents:
+                    yield place
+
+
+def _hash(folder: Path) -> str:
+    """The hash of what the FMU is made of, for the name of its module, which Python knows once."""
+    digest = hashlib.sha256()
+    for file in sorted(folder.rglob("*")):
+        if file.is_file():
+            digest.update(str(file.relative_to(folder)).encode() + file.read_bytes())
+    return digest.hexdigest()[:12]
+
+
+def _validated(file: Path) -> tuple[str, ...] | None:
+    try:
+        from fmpy.validation import validate_fmu
+    except ImportError:
+        return None
+    return tuple(" ".join(problem.split()) for problem in validate_fmu(str(file)))

@@ -1,0 +1,116 @@
+"""Other processes that compile a part of many kernels, one process for each further processor.
+
+They leave the machine code in the cache, where whoever asked for it finds it. What they leave out,
+for whatever reason, is simply still missing.
+"""
+
+from __future__ import annotations
+
+import os
+import pickle
+import subprocess
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from typing import Any, NamedTuple
+
+from ..kernel import kernels
+from . import store
+from .arguments import ArgumentType
+from .fingerprint import closure
+
+WORTH_A_PROCESS = 15_000
+"""Bytes of Python's code that take longer to compile than another process takes to begin."""
+MOST_PROCESSES = 4
+"""More would mostly compile the same functions again."""
+
+_START = "import sys; sys.path[:] = {path!r}; from {module} import main; main()"
+
+
+class Job(NamedTuple):
+    """A kernel to compile: the name of its machine code, the kernel, and the types for it."""
+
+    name: str
+    kernel: Callable[..., Any]
+    signature: tuple[ArgumentType, ...]
+
+
+def divide(jobs: Sequence[Job], processors: int) -> list[list[Job]]:
+    """Share out jobs so that all processes take about as long; the first share is never empty.
+
+    A job costs the bytes of Python's code of the functions that its process does not have yet. There
+    are no more shares than are worth a process.
+    """
+    marked = {id(function) for function in kernels().values()}
+    below = {job.name: _code_below(job.kernel, marked) for job in jobs}
+    everything: dict[int, int] = {}
+    for sizes in below.values():
+        everything |= sizes
+    worth = sum(everything.values()) // WORTH_A_PROCESS
+    shares: list[list[Job]] = [[] for _ in range(max(1, min(processors, worth, MOST_PROCESSES)))]
+    known: list[dict[int, int]] = [{} for _ in shares]
+    for job in sorted(jobs, key=lambda job: -sum(below[job.name].values())):
+        totals = [sum((have | below[job.name]).values()) for have in known]
+        least = totals.index(min(totals))
+        known[least] |= below[job.name]
+        shares[least].append(job)
+    return shares
+
+
+def _code_below(kernel: Any, marked: set[int]) -> dict[int, int]:
+    """The sizes of the code of a kernel and of all that it calls."""
+    return {id(function): len(function.__code__.co_code) for function in closure(kernel, marked)}
+
+
+def processors() -> int:
+    """How many processors this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+@contextmanager
+def helpers(shares: Sequence[Sequence[Job]]) -> Iterator[list[subprocess.Popen[bytes]]]:
+    """A process for each share, whose end the caller waits for; none is left behind."""
+    started: list[subprocess.Popen[bytes]] = []
+    try:
+        for share in shares:
+            with suppress(OSError):
+                started.append(_start(share))
+        yield started
+    finally:
+        for process in started:
+            process.kill()
+            process.wait()
+
+
+def _start(share: Sequence[Job]) -> subprocess.Popen[bytes]:
+    words = pickle.dumps([_packed(job) for job in share])
+    code = _START.format(path=sys.path, module=__name__)
+    process = subprocess.Popen(
+        [sys.executable, "-c", code],
+        stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+    )  # fmt: skip
+    assert process.stdin is not None
+    with suppress(BrokenPipeError), process.stdin as pipe:
+        pipe.write(words)
+    return process
+
+
+def _packed(job: Job) -> bytes:
+    """A job for another process; empty where that could not find the kernel by its name."""
+    try:
+        return pickle.dumps(job)
+    except (pickle.PicklingError, AttributeError):
+        return b""
+
+
+def main() -> None:
+    """Compile the jobs on standard input, and keep their machine code in the cache."""
+    from .translate import CompileError, Translator
+
+    translator = Translator()
+    for words in pickle.load(sys.stdin.buffer):
+        with suppress(CompileError, ImportError, AttributeError, EOFError):
+            job: Job = pickle.loads(words)
+            store.save(job.name, translator.object_code(job.kernel, job.signature))

@@ -1,0 +1,152 @@
+"""What the links of a URDF or MJCF file look like: the meshes that it draws them as."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..kinematics import quaternions_of_matrices, rotations_about
+from . import capsules as fit
+from .packages import SCHEME, find_file
+from .urdf_text import XmlFile
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class RawMesh:
+    """A mesh as the file names it, in its body's frame; ``scale`` (3,) comes before the pose."""
+
+    file: str
+    rotation: Array
+    position: Array
+    scale: Array
+
+
+@dataclass(frozen=True)
+class RawLook:
+    """What a body is drawn as: meshes, and capsules for simple shapes."""
+
+    meshes: Sequence[RawMesh] = ()
+    capsules: Sequence[fit.Capsule] = ()
+
+
+NOTHING_SEEN = RawLook()
+
+
+@dataclass
+class LinkLook:
+    """What is drawn for one link of a description, as plain data."""
+
+    meshes: list[dict[str, Any]] = field(default_factory=list)
+    shapes: list[dict[str, Any]] = field(default_factory=list)
+
+
+def urdf_looks(file: XmlFile) -> dict[str, RawLook]:
+    """What each link of a URDF is drawn as, by name; what cannot be read is left out."""
+    found = {}
+    for link in file.root.findall("link"):
+        meshes: list[RawMesh] = []
+        shapes: list[fit.Capsule] = []
+        for visual in link.findall("visual"):
+            geometry = visual.find("geometry")
+            shape = geometry[0] if geometry is not None and len(geometry) else None
+            rotation, position = _origin(visual.find("origin"))
+            if shape is None:
+                continue
+            if shape.tag == "mesh":
+                scale = _numbers(shape.get("scale"), (1.0, 1.0, 1.0))
+                meshes.append(RawMesh(shape.get("filename", ""), rotation, position, scale))
+            else:
+                shapes += [each.moved(rotation, position) for each in _simple(shape)]
+        found[link.get("name", "")] = RawLook(meshes, shapes)
+    return found
+
+
+def _simple(shape: ElementTree.Element) -> list[fit.Capsule]:
+    radius, length = (_numbers(shape.get(key), (0.0,))[0] for key in ("radius", "length"))
+    size = 0.5 * _numbers(shape.get("size"), (0.0, 0.0, 0.0))
+    if shape.tag == "sphere" and radius > 0.0:
+        return fit.of_sphere(float(radius))
+    if shape.tag == "cylinder" and radius > 0.0:
+        return fit.of_cylinder(float(radius), 0.5 * float(length))
+    return fit.of_box(size) if shape.tag == "box" and bool((size > 0.0).all()) else []
+
+
+def _origin(element: ElementTree.Element | None) -> tuple[Array, Array]:
+    """The rotation and position of an ``origin``: about fixed x, then y, then z."""
+    zero = (0.0, 0.0, 0.0)
+    if element is None:
+        return np.eye(3), np.zeros(3)
+    angles = _numbers(element.get("rpy"), zero)
+    about_x, about_y, about_z = (
+        rotations_about((float(k == 0), float(k == 1), float(k == 2)), angles[k : k + 1])[0]
+        for k in range(3)
+    )
+    return about_z @ about_y @ about_x, _numbers(element.get("xyz"), zero)
+
+
+def _numbers(text: str | None, usual: Sequence[float]) -> Array:
+    """The numbers of an attribute, as many as usual; the usual ones where it has not those."""
+    try:
+        values = np.array([float(part) for part in (text or "").split()])
+    except ValueError:
+        values = np.zeros(0)
+    good = len(values) == len(usual) and bool(np.isfinite(values).all())
+    return values if good else np.array(usual, dtype=float)
+
+
+def located(name: str, folder: Path) -> str:
+    """How a description names a mesh, so that it is found from any folder.
+
+    A package that Python has installed keeps its name, which serves other machines too.
+    """
+    if name.startswith(SCHEME) and find_file(name, Path(folder.root or "/")) is not None:
+        return name
+    path = find_file(name, folder)
+    if path is None:
+        return name if name.startswith(SCHEME) else str((folder / name).absolute())
+    return str(path.resolve())
+
+
+def link_looks(
+    looks: Mapping[str, RawLook], frames: Mapping[str, Any], folder: Path
+) -> dict[str, dict[str, Any]]:
+    """What the links of a description are drawn as, as plain data, from the looks of the bodies of a
+    file and the ``frames`` in which they are put together (``build.Frame``).
+
+    Links without a mesh are left out: their collision shapes look better than nothing.
+    """
+    found: dict[str, LinkLook] = {}
+    for name, raw in looks.items():
+        frame = frames.get(name)
+        if frame is None:
+            continue
+        look = found.setdefault(frame.link, LinkLook())
+        for mesh in raw.meshes:
+            look.meshes.append({
+                "file": located(mesh.file, folder),
+                "position": _tidy(frame.rotation @ mesh.position + frame.position),
+                "orientation": _tidy(quaternions_of_matrices(frame.rotation @ mesh.rotation)),
+                "scale": _tidy(mesh.scale),
+            })  # fmt: skip
+        for capsule in raw.capsules:
+            moved = capsule.moved(frame.rotation, frame.position)
+            look.shapes.append({
+                "start": _tidy(moved.start), "end": _tidy(moved.end), "radius": float(moved.radius),
+            })  # fmt: skip
+    return {
+        name: {"meshes": look.meshes, "shapes": look.shapes}
+        for name, look in found.items()
+        if look.meshes
+    }
+
+
+def _tidy(values: Array) -> list[float]:
+    return [float(value) for value in np.round(values, 9) + 0.0]

@@ -1,0 +1,200 @@
+"use strict";
+// The part of the page that belongs to a running graph; the page's own script has run before it.
+const PERIOD = 250, SLOWER = 1000;
+const badge = document.getElementById("state"), line = document.getElementById("line");
+const svgName = "http://www.w3.org/2000/svg";
+
+async function call(path, body) {
+  const headers = {"X-Aloft-Token": data.live.token};
+  if (body !== undefined) headers["Content-Type"] = "application/json";
+  const answer = await fetch(path, {method: body === undefined ? "GET" : "POST", headers,
+    body: body === undefined ? undefined : JSON.stringify(body)});
+  const found = await answer.json();
+  if (!answer.ok) throw new Error(found.error);
+  return found;
+}
+
+// Numbers beside the outputs, times in the blocks, and wires that can be hit.
+const beside = new Map(), took = new Map(), nodes = new Map();
+function write(parent, x, y, kind, anchor) {
+  const text = document.createElementNS(svgName, "text");
+  text.setAttribute("x", x); text.setAttribute("y", y); text.setAttribute("class", kind);
+  if (anchor) text.setAttribute("text-anchor", anchor);
+  parent.append(text);
+  return text;
+}
+for (const port of drawing.querySelectorAll(".port")) {
+  const text = write(port.parentNode, +port.getAttribute("x") + 6, +port.getAttribute("y") - 1, "now");
+  const name = port.dataset.port;
+  beside.set(name, [...(beside.get(name) || []), text]);
+}
+for (const node of drawing.querySelectorAll(".node")) {
+  nodes.set(node.dataset.path, node);
+  if (!data.blocks[node.dataset.path]) continue;
+  const box = node.querySelector("rect"), at = name => +box.getAttribute(name);
+  took.set(node.dataset.path,
+    write(node, at("x") + at("width") / 2, at("y") + at("height") - 2.5, "took", "middle"));
+}
+for (const wire of [...drawing.querySelectorAll(".wire[data-source]")]) {
+  const hit = wire.cloneNode();
+  hit.setAttribute("class", "hit");
+  const title = document.createElementNS(svgName, "title");
+  hit.append(title);
+  const port = hit.dataset.source;
+  hit.addEventListener("mouseenter", () => { title.textContent = [port, ...fieldsOf(port)].join("\n"); });
+  hit.addEventListener("click", () => show(port.slice(0, port.lastIndexOf("."))));
+  wire.after(hit);
+}
+function fieldsOf(port) {
+  return Object.keys(now).filter(key => key.slice(0, key.lastIndexOf(".")) === port)
+    .map(key => key.slice(port.length + 1) + ": " + now[key]);
+}
+
+// What the run is doing, a few times a second.
+const words = {running: "running", starting: "starting", still: "stands still", ended: "has ended",
+  gone: "is gone", other: "another graph", lost: "this page's program has ended"};
+function say(state, said) {
+  badge.className = state; badge.textContent = words[state] || state;
+  line.textContent = said;
+}
+let changes = -1;
+const counted = new Map(), RECENT = 3000;
+function lateLately(late) {
+  const moment = performance.now();
+  return Object.keys(late).filter(path => {
+    const before = counted.get(path);
+    if (!before || before.count !== late[path]) counted.set(path, {count: late[path], at: moment});
+    return moment - counted.get(path).at < RECENT;
+  });
+}
+function draw(found) {
+  now = found.values; times = {};
+  for (const [path, text] of took) {
+    const time = found.times[path];
+    text.textContent = time ? time[0] + (found.late[path] ? ", late " + found.late[path] + "×" : "") : "";
+    if (time) times[path] = time[1];
+  }
+  const late = lateLately(found.late);
+  for (const [path, node] of nodes)
+    node.classList.toggle("late", late.some(name => name === path || name.startsWith(path + "/")));
+  for (const [port, texts] of beside) for (const text of texts) text.textContent = found.brief[port] || "";
+  moment();
+  if (found.changes !== changes) { changes = found.changes; refresh(); }
+}
+async function look() {
+  let wait = PERIOD;
+  try {
+    const found = await call("now");
+    if (found.state === "other") { location.reload(); return; }
+    if (found.values) draw(found);
+    say(found.state, [found.said, found.line].filter(Boolean).join("; "));
+    if (found.state === "ended" || found.state === "gone") wait = SLOWER;
+  } catch (error) { say("lost", String(error.message)); wait = SLOWER; }
+  setTimeout(look, document.hidden ? SLOWER : wait);
+}
+
+// Parameters that can be changed.
+let tunables = [], all = false;
+const boxes = new Map();
+async function refresh() {
+  if (!data.live.tuning) return;
+  try { tunables = (await call("parameters")).parameters; } catch (error) { return; }
+  for (const row of tunables) for (const box of boxes.get(row.path) || []) box(row);
+}
+function input(kind, value) {
+  const made = document.createElement("input");
+  if (kind) made.type = kind;
+  made.value = value;
+  return made;
+}
+const written = value => typeof value === "string" ? value : JSON.stringify(value);
+function tunable(row) {
+  const box = make("div", "", "tunable whole"), error = make("div", "", "error");
+  box.dataset.path = row.path;
+  const heading = document.createElement("div");
+  heading.append(make("b", all ? row.path : row.name));
+  const about = [row.unit, row.bounds].filter(Boolean).join(", ");
+  if (about) heading.append(" [" + about + "]");
+  box.append(heading, make("div", row.text, "soft"));
+  let busy = false, waiting = null;
+  async function set(text) {
+    if (busy) { waiting = text; return; }
+    busy = true;
+    try { await call("set", {settings: [row.path + "=" + text]}); error.textContent = ""; }
+    catch (refused) { error.textContent = refused.message; }
+    busy = false;
+    if (waiting !== null) { const next = waiting; waiting = null; set(next); }
+  }
+  const fields = [], sliders = [];
+  const parts = row.kind === "numbers" ? row.value.map((_, k) => k) : [null];
+  const send = () => set(row.kind === "numbers" ? "[" + fields.map(f => f.value).join(", ") + "]" : fields[0].value);
+  for (const k of parts) {
+    const value = k === null ? row.value : row.value[k];
+    const cell = make("div", "", "number");
+    if (row.kind === "choice") {
+      const select = document.createElement("select");
+      for (const choice of row.choices) select.append(new Option(choice, choice));
+      select.value = written(value); select.onchange = send; fields.push(select); cell.append(select);
+    } else {
+      const field = input("", written(value));
+      field.setAttribute("aria-label", row.path);
+      field.onchange = send; fields.push(field); cell.append(field);
+      if (row.kind === "text") field.className = "long";
+      else {
+        const slider = input("range", value);
+        slider.setAttribute("aria-label", row.path + ", slider");
+        slider.min = row.low; slider.max = row.high;
+        slider.step = row.integer ? 1 : "any";
+        slider.value = value;
+        slider.oninput = () => { field.value = row.integer ? slider.value : String(+(+slider.value).toPrecision(4)); send(); };
+        sliders.push(slider); cell.prepend(slider);
+      }
+    }
+    box.append(cell);
+  }
+  const foot = make("div", "", "soft");
+  const back = make("button", "back to " + written(row.start));
+  back.onclick = () => set(written(row.start));
+  foot.append(row.place + " ", back);
+  box.append(error, foot);
+  function update(next) {
+    box.classList.toggle("changed", written(next.value) !== written(next.start));
+    back.hidden = written(next.value) === written(next.start);
+    parts.forEach((k, index) => {
+      const value = k === null ? next.value : next.value[k];
+      if (document.activeElement !== fields[index]) fields[index].value = written(value);
+      if (sliders[index] && document.activeElement !== sliders[index]) sliders[index].value = value;
+    });
+  }
+  boxes.set(row.path, [...(boxes.get(row.path) || []), update]);
+  update(row);
+  return box;
+}
+shown.push(path => {
+  all = false; boxes.clear();
+  const mine = tunables.filter(row => row.block === path);
+  if (!mine.length) return;
+  panel.append(make("h2", "Tune"), ...mine.map(tunable));
+});
+function tuneAll() {
+  all = true; chosen = ""; boxes.clear();
+  panel.replaceChildren(make("h1", "Parameters"));
+  const seek = input("search", "");
+  seek.placeholder = "part of a name";
+  const save = make("button", "write changed values to " + data.live.save), said = make("p", "");
+  save.id = "save"; said.id = "saved";
+  save.onclick = async () => {
+    try { const done = await call("save", {}); said.textContent = done.count + " values are in " + done.file; }
+    catch (refused) { said.textContent = refused.message; }
+  };
+  const found = tunables.map(tunable);
+  seek.oninput = () => found.forEach(box => { box.hidden = !box.dataset.path.includes(seek.value); });
+  panel.append(seek, save, said, ...found);
+  if (!found.length) panel.append(make("p", "This graph has no parameter that can be changed while it runs."));
+}
+const numbers = document.getElementById("numbers");
+numbers.onchange = () => drawing.classList.toggle("plain", !numbers.checked);
+const tune = document.getElementById("tune");
+if (tune) tune.onclick = async () => { await refresh(); tuneAll(); };
+look();
+if (data.live.opened === "parameters") tune.click();

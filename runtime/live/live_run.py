@@ -1,0 +1,174 @@
+"""A running graph as another process of this machine sees it."""
+
+from __future__ import annotations
+
+import os
+import threading
+import time
+from pathlib import Path
+from typing import Any
+
+from ..language.errors import AloftError
+from ..language.stages import CheckedGraph
+from ..loading import LoadError, load, load_text
+from ..running.memory import Memory
+from .parameter_endpoint import EndpointError, answers, ask, ask_to_watch, set_parameters
+from .texts import ValueTexts, tick_text, time_texts
+from .window import ENDED, RATE, STARTING, Shape, digest
+from .window_reader import Look, WindowReader
+
+STILL = 1.0
+"""Seconds without a new tick after which it is said that the graph stands still."""
+
+
+class LiveRun:
+    """Looks at the run that answers at a socket, and changes its parameters.
+
+    Where that run has ended and another one of the same graph answers there, it looks at the new one.
+
+    Args:
+        path: of the socket; see ``parameter_endpoint``.
+
+    Attributes:
+        graph: the graph that runs, loaded from its file, or, where that has changed since, from the
+            text that the run has.
+
+    Raises:
+        EndpointError: nobody answers there.
+        AloftError: the graph or its blocks have changed since the run began.
+    """
+
+    has_parameters = True
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._lock = threading.Lock()
+        self._reader: WindowReader | None = None
+        self._attach()
+
+    def _attach(self) -> None:
+        about, descriptor = ask_to_watch(self._path)
+        try:
+            graph = _load(about)
+            layout = Memory(graph.blocks, graph.robot).bus.layout
+            if digest(layout, graph) != about["digest"]:
+                raise AloftError(
+                    f"{about['graph']} cannot be watched: its blocks have changed since the run "
+                    "began; start it again"
+                )
+            shape = Shape(**about["shape"])
+        except BaseException:
+            os.close(descriptor)
+            raise
+        self.close()
+        self.graph = graph
+        self.clock = str(about["clock"])
+        self._about = about
+        self._texts = ValueTexts(graph, layout)
+        self._reader = WindowReader(descriptor, shape)
+        self._seen, self._since = -1, time.monotonic()
+        self._tried = time.monotonic()
+
+    def close(self) -> None:
+        """Look no more."""
+        if self._reader is not None:
+            self._reader.close()
+            self._reader = None
+
+    def refresh(self) -> None:
+        """Look at the run that answers at the socket now, if another one does."""
+        with self._lock:
+            if self._other() is not None:
+                self._attach()
+
+    def now(self) -> dict[str, Any]:
+        """What there is to say of this moment, as plain data."""
+        with self._lock:
+            assert self._reader is not None
+            look = self._reader.look()
+            state, said = self._state(look)
+            if state in ("ended", "gone") and time.monotonic() - self._tried > STILL:
+                self._tried = time.monotonic()
+                other = self._other()
+                if other is not None:
+                    if other["text"] != self._about["text"]:
+                        return {"state": "other", "said": "another graph runs there now"}
+                    self._attach()
+                    look = self._reader.look()
+                    state, said = self._state(look)
+            if look is None:
+                return {"state": state, "said": said}
+            return {"state": state, "said": said, **self._moment(look)}
+
+    def _moment(self, look: Look) -> dict[str, Any]:
+        assert self._reader is not None
+        period = self.graph.base_period
+        lines = [f"tick {look.tick}, {look.tick * period:.3f} s"]
+        lines.append(tick_text(look.stamps, period))
+        if self.clock == "free":
+            lines.append("as fast as it can, so there are no deadlines")
+        else:
+            lines.append(f"{look.overruns} ticks began late, {look.skipped} periods left out")
+        return {
+            "tick": look.tick,
+            "line": "; ".join(line for line in lines if line),
+            "values": self._texts.all(look.bus),
+            "brief": self._texts.brief(look.bus),
+            "times": time_texts(self._reader.shape.programs, look.stamps, look.late),
+            "late": {path: count for path, count in look.late.items() if count},
+            "changes": look.changes,
+        }
+
+    def _state(self, look: Look | None) -> tuple[str, str]:
+        """What the run is doing, and what is said of it."""
+        if look is None:
+            return "gone", "the process was stopped in the midst of a tick"
+        if look.state == ENDED:
+            return "ended", f"the run has ended: {look.said}" if look.said else "the run has ended"
+        if look.tick != self._seen or look.state == STARTING:
+            self._seen, self._since = look.tick, time.monotonic()
+        silent = time.monotonic() - self._since
+        # a window is renewed RATE times a second of the graph's time, or with every tick
+        if silent > max(STILL, 3.0 * max(self.graph.base_period, 1.0 / RATE)):
+            if not answers(self._path):
+                return "gone", "the process has gone, and did not say why"
+            return "still", f"no tick has come for {silent:.1f} s"
+        if look.state == STARTING:
+            if not answers(self._path):
+                return "gone", "the process has gone, and did not say why"
+            return "starting", "the blocks are being started"
+        return "running", ""
+
+    def _other(self) -> dict[str, Any] | None:
+        """What another run at the same socket says of itself."""
+        try:
+            about, descriptor = ask_to_watch(self._path)
+        except EndpointError:
+            return None
+        os.close(descriptor)
+        return about if about["process"] != self._about["process"] else None
+
+    def parameters(self) -> list[dict[str, Any]]:
+        """All parameters that can be changed, as they are now. Raises ``EndpointError``."""
+        listed = ask(self._path, {"verb": "list"})["parameters"]
+        return [entry for entry in listed if entry["live"]]
+
+    def set(self, settings: list[str]) -> list[dict[str, Any]]:
+        """Change parameters, all in one tick. Raises ``EndpointError``."""
+        return set_parameters(self._path, settings)
+
+
+def _load(about: dict[str, Any]) -> CheckedGraph:
+    """The graph that runs. Raises ``LoadError`` where its code or files have gone since."""
+    file, text = Path(about["file"] or f"{about['graph']}.yaml"), about["text"]
+    if file.is_relative_to(Path.cwd()):
+        file = file.relative_to(Path.cwd())  # so that places in it are short
+    if file.is_file():
+        try:
+            graph = load(file, about["overrides"])
+        except LoadError:
+            pass
+        else:
+            if graph.text == text:
+                return graph
+    return load_text(text, file)

@@ -1,0 +1,186 @@
+"""What a running graph shows of itself, in shared memory: its signals, and when its blocks ran.
+
+The control thread copies its bus and the last time stamps there, ``RATE`` times a second of the
+graph's time; it asks and waits for nobody. Another process that was given the memory's descriptor reads
+it whenever it likes, and computes and writes texts on its own time.
+
+The memory is 64-bit words: a head, the missed deadlines of each block, a cursor for each program, the
+bus, and the stamps of each program. The first word is odd while the writer writes, so a reader knows
+when to read again. About memory order see ``logs.recording.ring``; the same holds here.
+"""
+
+from __future__ import annotations
+
+import mmap
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from threading import Lock
+
+from ..language.layout import Layout
+from ..language.stages import CheckedGraph
+from ..running.memory import BoundGraph
+from ..running.run_result import RunResult
+from ..running.shared_memory import nameless_memory
+from ..running.ticker import Ticker
+from ..running.timing import STAMPED_TICKS
+
+RATE = 25.0
+"""How often the window is renewed [per second of the graph's time]."""
+SEQUENCE, TICK, STATE, OVERRUNS, SKIPPED, CHANGES, SAID = range(7)
+"""The words of the head; ``SAID`` is the length of the text about the end [bytes]."""
+HEAD = 8
+STARTING, RUNNING, ENDED = range(3)
+"""What ``STATE`` can be."""
+TEXT = 4096
+"""Room for the text about the end [bytes]."""
+MOST_STAMPS = 1 << 20
+"""Bytes of stamps that are shown at most; a graph with so many phases shows times of some only."""
+
+
+@dataclass(frozen=True)
+class Shape:
+    """Where what lies in a window.
+
+    Attributes:
+        blocks: the paths of all blocks, whose missed deadlines are counted.
+        programs: for each phase of the hyperperiod, the block of each call; see ``Program``.
+        orders: for each phase, the places of a tick's stamps in the order of time.
+        bus: the size of the bus [bytes].
+    """
+
+    blocks: Sequence[str]
+    programs: Sequence[Sequence[str]]
+    orders: Sequence[Sequence[int]]
+    bus: int
+
+    @property
+    def cursors(self) -> int:
+        """The word at which the cursors begin."""
+        return HEAD + len(self.blocks)
+
+    @property
+    def text_start(self) -> int:
+        """The byte at which the text about the end begins."""
+        return 8 * (self.cursors + 2 * len(self.programs))
+
+    @property
+    def bus_start(self) -> int:
+        """The byte at which the bus begins."""
+        return self.text_start + TEXT
+
+    def stamps(self, number: int) -> tuple[int, int]:
+        """The bytes of a program's stamps: the first, and the one after the last."""
+        sizes = [8 * STAMPED_TICKS * (len(owners) + 1) for owners in self.programs]
+        first = self.bus_start + -(-self.bus // 8) * 8 + sum(sizes[:number])
+        return first, first + sizes[number]
+
+    @property
+    def size(self) -> int:
+        """Bytes of the whole."""
+        last = len(self.programs) - 1
+        return self.stamps(last)[1] if last >= 0 else self.bus_start + -(-self.bus // 8) * 8
+
+
+class Window:
+    """The side of the running graph; a sink for the executor."""
+
+    def __init__(self) -> None:
+        self.shape: Shape | None = None
+        self.descriptor = -1
+        self._map: mmap.mmap | None = None
+        self._next = self._tick = 0
+        self._fence = Lock()
+
+    def open(self, bound: BoundGraph) -> None:
+        """Remember what is shown."""
+        self._bound = bound
+        self._bus = bound.memory.bus.buffer.data
+        self._every = max(1, round(bound.graph.base_rate / RATE))
+        self._next = self._tick = bound.clock.tick
+
+    def watch_ticker(self, ticker: Ticker) -> None:
+        """Make the memory. Without memory nothing is shown, and the run goes on."""
+        self._ticker = ticker
+        programs, room = [], MOST_STAMPS
+        for program in ticker.programs:
+            room -= program.last_stamps[0].nbytes
+            if room >= 0:
+                programs.append(program)
+        shape = Shape(
+            tuple(ticker.overruns_by_block),
+            tuple(program.owners for program in programs),
+            tuple(program.stamp_order for program in programs),
+            len(self._bus),
+        )
+        try:
+            self.descriptor = nameless_memory(shape.size, "aloft-window")
+            self._map = mmap.mmap(self.descriptor, shape.size)
+        except OSError:
+            return
+        self._map[:] = bytes(shape.size)  # touch every page now, not while the robot moves
+        view = memoryview(self._map)
+        self._words = view[: shape.text_start].cast("q")
+        self._text = view[shape.text_start : shape.bus_start]
+        self._bus_out = view[shape.bus_start : shape.bus_start + shape.bus]
+        self._programs = [
+            (shape.cursors + 2 * number, program, view[slice(*shape.stamps(number))],
+             program.last_stamps[0].data.cast("B"))
+            for number, program in enumerate(programs)
+        ]  # fmt: skip
+        self.shape = shape
+
+    def record(self, tick: int) -> None:
+        """Renew the window if it is time."""
+        self._tick = tick
+        if tick >= self._next:
+            self._next = tick + self._every
+            self._renew(RUNNING)
+
+    def _renew(self, state: int) -> None:
+        if self.shape is None:
+            return
+        words, ticker, pacer = self._words, self._ticker, self._ticker.pacer
+        words[SEQUENCE] += 1
+        with self._fence:
+            pass
+        words[TICK], words[STATE] = self._tick, state
+        if pacer is not None:
+            words[OVERRUNS], words[SKIPPED] = pacer.overruns, pacer.skipped_periods
+        words[CHANGES] = len(self._bound.parameters.changes)
+        place = HEAD
+        for count in ticker.overruns_by_block.values():
+            words[place] = count
+            place += 1
+        self._bus_out[:] = self._bus
+        for place, program, out, stamps in self._programs:
+            words[place], words[place + 1] = program.ticks, program.last_stamps[1]
+            out[:] = stamps
+        with self._fence:
+            pass
+        words[SEQUENCE] += 1
+
+    def close(self) -> None:
+        """Show the last tick."""
+        self._renew(ENDED)
+
+    def finish(self, result: RunResult) -> list[str]:
+        """Say why the run has ended, and let the memory go; whoever watches keeps it."""
+        if self.shape is not None:
+            said = result.reason.encode()[:TEXT]
+            self._text[: len(said)] = said
+            self._words[SAID] = len(said)
+            self.shape = None
+        if self.descriptor >= 0:
+            os.close(self.descriptor)
+            self.descriptor = -1
+        return []
+
+
+def digest(layout: Layout, graph: CheckedGraph) -> str:
+    """What two processes compare to know that they mean the same by the bytes of a bus."""
+    from hashlib import blake2b
+
+    slots = [(name, slot.section, slot.start, slot.shape) for name, slot in layout.slots.items()]
+    text = repr((graph.name, layout.size, layout.offsets, slots))
+    return blake2b(text.encode(), digest_size=16).hexdigest()
