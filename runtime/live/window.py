@@ -182,5 +182,6 @@ def digest(layout: Layout, graph: CheckedGraph) -> str:
     from hashlib import blake2b
 
     slots = [(name, slot.section, slot.start, slot.shape) for name, slot in layout.slots.items()]
-    text = repr((graph.name, layout.size, layout.offsets, slots))
+    paths = [spec.path for spec in graph.blocks]  # those of one machine's part are others
+    text = repr((graph.name, paths, layout.size, layout.offsets, slots))
     return blake2b(text.encode(), digest_size=16).hexdigest()
