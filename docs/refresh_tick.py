@@ -67,7 +67,10 @@ def _line(row: Mapping[str, Any]) -> str:
             cells.append("")
         else:
             cells.append(f"{1.0 / number:.3g}" if row["peer"] else f"{number:g} {row['unit']}")
-    met = {True: "reached", False: "missed", None: ""}[row["met"]]
+    measured = row["ratio"] if row["peer"] else row["value"]
+    met = {True: "goal reached", False: "missed", None: ""}[row["met"]]
+    if row["met"] is False and row["floor"] is not None and measured <= row["floor"]:
+        met = "floor reached"
     return f"| {' | '.join([*cells, '; '.join(filter(None, (met, row['note'])))])} |"
 
 

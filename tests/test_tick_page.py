@@ -43,9 +43,9 @@ def test_the_tables(script: ModuleType) -> None:
     assert page.endswith("<!-- end of tick -->\nb") and "old" not in page
     assert "| median [us] | fused | kernels one by one |" in page  # without OSQP
     assert "| `wbc` | 19.0 | 20.0 |" in page
-    assert "| controller, fused | 30 us | OSQP | 25 | 20 | 30 | missed |" in page
+    assert "| controller, fused | 30 us | OSQP | 25 | 20 | 30 | floor reached |" in page
     assert "| TSID | - | x |  |  |  | not installed |" in page
-    assert "| period | 100 us |  |  | 250 us | 50 us | missed |" in page
+    assert "| period | 100 us |  |  | 250 us | 50 us | floor reached |" in page
     with pytest.raises(ValueError, match="<!-- tick -->"):
         script.refreshed("", FOUND)
 
