@@ -20,6 +20,8 @@ RATE = 0.95
 """The share of a rung's runs that have to land."""
 LEAST_RUNS = 4
 """So many runs a rung gets at least; then it ends once it can no longer reach ``RATE``."""
+FIRST_LOOK = 10
+"""With fewer runs wanted than these a rung ends at once when it can no longer reach ``RATE``."""
 
 
 @dataclass(frozen=True)
@@ -47,7 +49,7 @@ class RunJob:
 def enough(done: int, failed: int, of: int) -> bool:
     """Whether a rung needs no more runs: all are done, or too many of them failed."""
     allowed = of - required(of)
-    return done >= of or (failed > allowed and done >= min(LEAST_RUNS, of))
+    return done >= of or (failed > allowed and (of < FIRST_LOOK or done >= LEAST_RUNS))
 
 
 def required(runs: int) -> int:

@@ -8,11 +8,12 @@ from dataclasses import dataclass, field
 from ..planner.task.task import JumpTask
 from ..studies.journal import Outcome
 from .directions import Direction
-from .frontier_jobs import required
+from .frontier_jobs import FIRST_LOOK, required
 from .ladders import furthest, outward
 
-MOST_CPU = 90.0
-"""s; after so much processor time no further solve is begun in a search along one direction."""
+MOST_CPU, FIRST_LOOK_CPU = 90.0, 15.0
+"""s; after so much processor time no further solve is begun in a search along one direction; the
+second with fewer runs a rung than ``FIRST_LOOK``."""
 
 
 @dataclass(frozen=True)
@@ -45,10 +46,11 @@ def explore(tries: Tries, runs: int) -> Generator[Ask, None, None]:
     """The tries along one direction, one after the other; what each found is in ``tries`` before
     the next is asked for."""
     way = tries.direction
+    most = MOST_CPU if runs >= FIRST_LOOK else FIRST_LOOK_CPU
     search = furthest(way.start, way.most)
     rung = next(search)
     try:
-        while _spent(tries.recipe) < MOST_CPU:
+        while _spent(tries.recipe) < most:
             yield Ask("recipe", rung)
             tries.planned = max([k for k, v in tries.recipe.items() if v.success], default=0)
             rung = search.send(tries.recipe[rung].success)
@@ -75,7 +77,7 @@ def explore(tries: Tries, runs: int) -> Generator[Ask, None, None]:
     search = furthest(tries.planned + 1, way.most, tries.planned)
     try:
         rung = next(search)
-        while _spent(tries.loosest) < MOST_CPU:
+        while _spent(tries.loosest) < most:
             yield Ask("loosest", rung, near)
             if tries.loosest[rung].success:
                 tries.theory, near = rung, way.loosest(rung)

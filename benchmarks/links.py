@@ -25,6 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..runtime.language.stages import LinkPolicy
+from ..runtime.links.clock_offset import ClockOffset
 from ..runtime.links.inbox import Inbox
 from ..runtime.links.latest import LatestInbox, LinkHealth
 from ..runtime.links.message import HEADER, MessageReader, MessageWriter
@@ -73,8 +74,8 @@ class _Known:
     def run_of(self, name: str) -> bytes:
         return RUN
 
-    def offset_of(self, name: str) -> int:
-        return 0
+    def clock_of(self, name: str) -> ClockOffset:
+        return ClockOffset()
 
     def note_checked(self, link: str) -> None:
         pass

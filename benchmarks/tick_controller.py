@@ -62,6 +62,7 @@ class RecordedController:
     Args:
         jump: the recorded jump.
         plain: whether kernels run as plain Python.
+        fuse: whether blocks of kernels that follow each other are one call.
         timing: whether every block is timed, as in a usual run.
         checks: whether values that are not finite end the run, as in a usual run.
         record: whether every tick is kept in memory.
@@ -76,6 +77,7 @@ class RecordedController:
         jump: RecordedJump,
         *,
         plain: bool = False,
+        fuse: bool = True,
         timing: bool = True,
         checks: bool = True,
         record: bool = True,
@@ -95,6 +97,8 @@ class RecordedController:
         self.ticker = Ticker(
             self.bound, ClockSpec(), WallTime(), timing=timing, finite_check=checks
         )
+        if fuse and not plain:
+            self.ticker.fuse()
         for path in order:
             self.bound.blocks[path].start()
         if record:
@@ -153,7 +157,7 @@ class HandWrittenLoop(RecordedController):
     """The same bodies, called one after the other by a loop that does nothing else."""
 
     def __init__(self, jump: RecordedJump) -> None:
-        super().__init__(jump, timing=False, checks=False, record=False)
+        super().__init__(jump, fuse=False, timing=False, checks=False, record=False)
         (program,) = self.ticker.programs
         self._bodies = program.calls
 

@@ -104,6 +104,9 @@ def run(
         bool,
         typer.Option("--plain", help="Compile nothing: slower, with the same bytes."),
     ] = False,
+    fuse: Annotated[
+        bool, typer.Option(help="Run blocks of kernels that follow each other as one call.")
+    ] = True,
     cpu: Annotated[
         int | None, typer.Option(min=0, help="Pin the control thread to this processor.")
     ] = None,
@@ -138,10 +141,14 @@ def run(
             from .run_local import Wishes, run_local
 
             place = None if no_record else record
-            wishes = Wishes(settings, place, not no_record, params, as_json, traceback, plain, keys)
+            wishes = Wishes(
+                settings, place, not no_record, params, as_json, traceback, plain, keys, fuse
+            )
             code = run_local(graph, wishes, out)
         elif seeds:
-            code = run_many(graph, settings, parse_seeds(seeds), out, as_json, plain=plain)
+            code = run_many(
+                graph, settings, parse_seeds(seeds), out, as_json, plain=plain, fuse=fuse
+            )
         else:
             loaded: Runs = load(graph, settings)
             name = loaded.checked.name
@@ -158,7 +165,7 @@ def run(
             code = run_once(
                 loaded, place, out, as_json, sinks, viewer,
                 keep=keep, split=split_time(split), said=said, traceback=traceback, plain=plain,
-                real_time=wishes_of_thread,
+                fuse=fuse, real_time=wishes_of_thread,
             )  # fmt: skip
             if viewer is not None:
                 leave_viewer(viewer, wait=not as_json and sys.stdin.isatty())
@@ -236,7 +243,7 @@ class Runs(Protocol):
         """The graph that runs."""
 
     def run(
-        self, *, sinks: Sequence[Sink], log: bool, plain: bool, real_time: RealTime
+        self, *, sinks: Sequence[Sink], log: bool, plain: bool, fuse: bool, real_time: RealTime
     ) -> RunResult:
         """Run it once."""
 
@@ -259,6 +266,7 @@ def run_once(
     times: bool = True,
     traceback: bool = False,
     plain: bool = False,
+    fuse: bool = True,
     real_time: RealTime | None = None,
 ) -> ExitCode:
     """Run the graph, record and show it, and print the result; ``said`` are warnings so far,
@@ -286,7 +294,7 @@ def run_once(
         with FreezeGuard(graph.checked, as_json=as_json) as guard:
             result = graph.run(
                 sinks=[*recorders, counter, last_words, *sinks, guard], log=False, plain=plain,
-                real_time=real_time or NO_WISHES,
+                fuse=fuse, real_time=real_time or NO_WISHES,
             )  # fmt: skip
     recording = recorder.recording if recorder is not None else None
     print_result(out, name, result, times=times)
@@ -324,6 +332,7 @@ def run_many(
     as_json: bool,
     *,
     plain: bool = False,
+    fuse: bool = True,
 ) -> ExitCode:
     """Run the graph once with each seed; print a row for each, and how many succeeded."""
     from ..studies.batch.seeds import run_seeds
@@ -333,7 +342,7 @@ def run_many(
     with (
         stopped_by_signals() as received,
         progress_bar(out, f"running {len(seeds)} seeds", len(seeds)) as (progress, task),
-        closing(run_seeds(path, overrides, seeds, plain=plain)) as results,
+        closing(run_seeds(path, overrides, seeds, plain=plain, fuse=fuse)) as results,
     ):
         for row in results:
             rows.append(row)

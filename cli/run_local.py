@@ -43,7 +43,8 @@ GRACE = 15.0
 class Wishes:
     """What the command line asks for: settings, where the recording goes (by default where one of
     the graph goes) and whether it is kept, the name for ``aloft params``, how to print,
-    whether nothing is compiled, and the folder of keys, for links over TLS."""
+    whether nothing is compiled, the folder of keys, for links over TLS, and whether blocks of kernels
+    are fused."""
 
     settings: Sequence[str]
     record: Path | None
@@ -53,6 +54,7 @@ class Wishes:
     traceback: bool
     plain: bool
     keys: Path | None = None
+    fuse: bool = True
 
 
 def run_local(path: Path, wishes: Wishes, out: Console) -> ExitCode:
@@ -118,7 +120,7 @@ def _run_processes(
             command = [
                 sys.executable, "-m", "aloft", "run", str(path), *sets, "--machine", machine,
                 "--record", str(file), "--params", params, "--json", "--quiet",
-                *(["--plain"] if wishes.plain else []),
+                *(["--plain"] if wishes.plain else []), *([] if wishes.fuse else ["--no-fuse"]),
                 *(["--keys", str(wishes.keys)] if wishes.keys is not None else []),
             ]  # fmt: skip
             # in a group of its own, so that Ctrl-C reaches it once, from here
@@ -282,11 +284,11 @@ def _print_links(out: Console, said: Mapping[str, Mapping[str, Any]]) -> None:
     if any("age_p50_ms" in link for link in links):
         columns: tuple[str, ...] = (
             "link", ">messages", ">lost", ">damaged", ">late ticks", ">median age [ms]",
-            ">99 % [ms]", ">oldest [ms]",
+            ">99 % [ms]", ">oldest [ms]", ">jitter [ms]",
         )  # fmt: skip
         keys: tuple[str, ...] = (
             "name", "received", "lost", "damaged", "late_ticks", "age_p50_ms", "age_p99_ms",
-            "age_max_ms",
+            "age_max_ms", "jitter_ms",
         )  # fmt: skip
     else:
         columns = ("link", ">messages", ">damaged", ">twice or late")

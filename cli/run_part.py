@@ -61,14 +61,16 @@ class Part:
         sinks: Sequence[Sink],
         log: bool,
         plain: bool = False,
+        fuse: bool = True,
         real_time: RealTime = NO_WISHES,
     ) -> RunResult:
         """Run the part once."""
         bound = self.bound
         showing = Showing(bound.machine, bound.transport, bound.others, bound.inboxes)
         self._result = run_part(
-            bound, sinks=[*sinks, showing], log=log, plain=plain, real_time=real_time
-        )
+            bound, sinks=[*sinks, showing], log=log, plain=plain, fuse=fuse,
+            real_time=real_time,
+        )  # fmt: skip
         return self._result
 
     def about(self) -> Mapping[str, Any]:

@@ -134,6 +134,7 @@ def _tables(observer: Observer) -> Group:
                     link["name"],
                     str(link["received"]),
                     f"{link['age_ms']:.1f}" if "age_ms" in link else "",
+                    f"{link['jitter_ms']:.2f}" if "jitter_ms" in link else "",
                     str(link.get("late_ticks", "")),
                     str(link.get("lost", "")),
                     str(link["damaged"]),
@@ -143,7 +144,7 @@ def _tables(observer: Observer) -> Group:
     columns = ("machine", "state", ">tick", ">rate [Hz]", ">overruns", ">skipped", ">heard [s ago]")
     parts = [table(observer.placed.graph.name, columns, machines)]
     if links:
-        columns = ("link", ">messages", ">age [ms]", ">late ticks", ">lost", ">damaged",
+        columns = ("link", ">messages", ">age [ms]", ">jitter [ms]", ">late ticks", ">lost", ">damaged",
                    ">twice or late")  # fmt: skip
         parts.append(table("", columns, links))
     return Group(*parts)

@@ -1,18 +1,24 @@
 """Makes the pictures of the README: ``python docs/make_pictures.py`` from the root.
 
-That of the viewer needs software Vulkan (Debian's mesa-vulkan-drivers), or a graphics card.
+That of the viewer needs software Vulkan (Debian's mesa-vulkan-drivers), or a graphics card; that of
+the page of a running graph, which ``python docs/make_pictures.py live`` makes alone, needs Chromium.
 """
 
 from __future__ import annotations
 
 import io
+import shutil
+import subprocess
+import sys
 import tempfile
+import threading
 import time
 from pathlib import Path
 
 from rich.console import Console
 
 from aloft import LoadError, load
+from aloft.cli.endpoints import path_of
 from aloft.cli.output import say
 from aloft.cli.run_output import print_result
 from aloft.logs.file.reader import read
@@ -22,9 +28,13 @@ from aloft.logs.viewing.viewer import ViewerError, start_viewer
 from aloft.runtime.drawing.diagram import diagram
 from aloft.runtime.drawing.placing import draw
 from aloft.runtime.drawing.svg import svg
+from aloft.runtime.live.live_run import LiveRun
+from aloft.runtime.live.live_server import LiveServer
+from aloft.runtime.live.parameter_endpoint import EndpointError
 
 FOLDER = Path(__file__).parent
 JUMP = FOLDER.parent / "graphs" / "jump.yaml"
+HOPS = FOLDER.parent / "graphs" / "hops.yaml"
 THRUST = 0.98
 """An instant [s] late in the thrust, when the forces are large."""
 PATIENCE = 300.0
@@ -86,6 +96,7 @@ def main() -> None:
     drawing = draw(diagram(graph.checked))
     (FOLDER / "graph.svg").write_text(svg(drawing, "the graph of graphs/jump.yaml"))
 
+    save_live_page(FOLDER / "live.png")
     wrong = Path("wrong.yaml")
     wrong.write_text(MISTAKES)
     try:
@@ -98,5 +109,45 @@ def main() -> None:
         wrong.unlink()
 
 
+def save_live_page(picture: Path) -> None:
+    """A photograph of the page of a graph while it runs, with its parameters."""
+    program = shutil.which("chromium") or shutil.which("google-chrome")
+    if program is None:
+        print(f"warning: {picture} is the old one: there is no Chromium")
+        return
+    name = "live-picture"
+    command = [sys.executable, "-m", "aloft", "run", str(HOPS), "--no-record", "--params", name]
+    run = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    try:
+        server = LiveServer(_live(name), Path("hops-tuned.yaml"), "parameters")
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        with server, tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as profile:
+            subprocess.run(
+                [program, "--headless=new", "--no-sandbox", f"--user-data-dir={profile}",
+                 "--window-size=1600,900", "--virtual-time-budget=4000", "--hide-scrollbars",
+                 f"--screenshot={picture}", server.page],
+                check=True, capture_output=True, timeout=PATIENCE,
+            )  # fmt: skip
+            server.shutdown()
+    finally:
+        run.terminate()
+        run.wait()
+
+
+def _live(name: str) -> LiveRun:
+    """The run of that name, once it has begun."""
+    end = time.monotonic() + PATIENCE
+    while True:
+        try:
+            return LiveRun(path_of(name))
+        except EndpointError:
+            if time.monotonic() > end:
+                raise
+            time.sleep(0.5)
+
+
 if __name__ == "__main__":
-    main()
+    if sys.argv[1:] == ["live"]:
+        save_live_page(FOLDER / "live.png")
+    else:
+        main()

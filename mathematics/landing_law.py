@@ -51,6 +51,26 @@ def keep_within(p_max: Array, centre: Array, place: Array) -> None:
 
 
 @kernel
+def pull_to_place(goal: Array, miss: Array, gain: float, width: float) -> None:
+    """Move the landing place with regard to balance towards the planned place in the world.
+
+    The way from the planned place to the ``goal`` is d = goal + miss. Of this way the share
+    gain / (1 + (|d| / width)^4) is taken back: nearly ``gain`` of a way that the standing feet can
+    balance, and next to nothing where the robot would fall.
+
+    Args:
+        goal: the shift of the feet ahead and to the left [m], (2 or more,), which is changed.
+        miss: by how much the feet miss their planned place without a shift [m], (2 or more,).
+        width: the length of d at which half of ``gain`` is left [m].
+    """
+    x, y = float(goal[0]) + float(miss[0]), float(goal[1]) + float(miss[1])
+    far = (x * x + y * y) / (width * width)
+    share = gain / (1.0 + far * far)
+    goal[0] -= share * x
+    goal[1] -= share * y
+
+
+@kernel
 def turn_places(places: Array, angle: float, out: Array) -> None:
     """Rotate places (n, 3) about the vertical by ``angle`` [rad]."""
     cosine, sine = math.cos(angle), math.sin(angle)
@@ -87,6 +107,21 @@ def swing(
         start = float(offset[k])
         out[k] = float(planned[k]) + start + share * (goal - start)
         speed[k] += rate * (goal - start)
+
+
+@kernel
+def hasten(swing_velocity: Array, lead: float, rate: float, place: Array, speed: Array) -> None:
+    """Bring a foot forward on its planned way by the time ``lead``, ahead and aside.
+
+    Args:
+        swing_velocity: planned, of the foot as seen from the centre of mass [m/s, world], (3,).
+        lead, rate: how far ahead of the plan the foot should be [s], and the derivative of that.
+        place, speed: the foot's position from the centre of mass [m] and its velocity [m/s], (3,),
+            which are changed.
+    """
+    for k in range(2):
+        place[k] += lead * float(swing_velocity[k])
+        speed[k] += rate * float(swing_velocity[k])
 
 
 @kernel

@@ -60,6 +60,7 @@ class Graph:
         sinks: Sequence[Sink] = (),
         log: bool = True,
         plain: bool = False,
+        fuse: bool = True,
         real_time: RealTime = NO_WISHES,
     ) -> RunResult:
         """Run the graph from start to close.
@@ -70,6 +71,7 @@ class Graph:
             sinks: what else records the run.
             log: whether to keep every signal of every tick.
             plain: whether to run all kernels as plain Python: slower, with the same bytes.
+            fuse: whether blocks of kernels that follow each other are one compiled call.
             real_time: what the control thread asks of the operating system while it ticks.
 
         Returns:
@@ -86,7 +88,13 @@ class Graph:
                 raise AloftError(f"a run of {duration} s is shorter than one tick")
         sinks = [*path_sinks(self.checked, clock.kind if clock is not None else ""), *sinks]
         return Executor(
-            self.checked, clock=clock, sinks=sinks, log=log, plain=plain, real_time=real_time
+            self.checked,
+            clock=clock,
+            sinks=sinks,
+            log=log,
+            plain=plain,
+            fuse=fuse,
+            real_time=real_time,
         ).run(ticks)
 
     def open(self, *, seed: int | None = None, plain: bool = False) -> SteppedRun:

@@ -133,10 +133,10 @@ def _read(tree: MapNode, path: Path, problems: Problems) -> Study:
 def _read_tasks(keys: dict[str, Entry], path: Path, problems: Problems) -> tuple[Task, ...]:
     given = [keys[key] for key in GRAPH_KEYS if key in keys]
     if len(given) != 1:
-        names = " and ".join(repr(entry.key) for entry in given)
+        written = " and ".join(repr(entry.key) for entry in given)
         problems.add(
             Code.DUPLICATE_KEY if given else Code.MISSING_KEY,
-            f"{names} exclude each other" if given else "the study names no graph",
+            f"{written} exclude each other" if given else "the study names no graph",
             given[0].key_where if given else Position(str(path), 1, 1),
             expected="graph: FILE, graphs: {task: FILE}, or graphs_of: STUDY",
             fix="" if given else "graph: ../jump.yaml",

@@ -21,7 +21,7 @@ PACKAGES = (
 ALLOWED: dict[str, tuple[str, ...]] = {
     "mathematics": (),
     "robots": ("mathematics",),
-    "runtime/language": ("robots",),
+    "runtime/language": ("robots", "mathematics/compiling"),
     "runtime/running": (
         "runtime/language", "runtime/loading/selection", "robots", "mathematics/compiling",
     ),
@@ -32,7 +32,8 @@ ALLOWED: dict[str, tuple[str, ...]] = {
     ),
     "runtime/drawing": ("runtime/language", "runtime/loading", "robots"),
     "runtime/live": (
-        "runtime/language", "runtime/loading", "runtime/running", "runtime/drawing", "robots",
+        "runtime/language", "runtime/loading", "runtime/running", "runtime/drawing",
+        "runtime/placement", "runtime/links", "robots",
     ),
     "runtime/testing": (
         "runtime/language", "runtime/loading", "runtime/running", "runtime/placement",

@@ -6,7 +6,8 @@ import numpy as np
 
 from ...mathematics.compiling.kernel_call import KernelCall
 from ...robots.limb import FootKind, foot_shape
-from ...runtime.language.block import Block, Input, Output, State
+from ...runtime.language.block import Input, Output, State
+from ...runtime.language.kernel_block import KernelBlock
 from ...runtime.language.parameters import Parameters, live_parameter
 from ...runtime.language.signals import Field, Signal
 from ..signals import DynamicsTerms, JumpReference, PhaseState, WholeBodyTarget
@@ -38,7 +39,7 @@ class BalanceMemory(Signal):
     off_place = Field(3, unit="m", frame="world", text="the feet's offset from their planned place")
 
 
-class BalanceTarget(Block):
+class BalanceTarget(KernelBlock):
     """Follows the plan until its last touchdown, then balances over the middle of the feet.
 
     It serves any number of feet. Their middle is the mean of the sole centres, and their heading
@@ -141,7 +142,7 @@ class BalanceTarget(Block):
             phase.phase, phase.time_in_phase, terms.foot_position, terms.foot_rotation,
             terms.base_rotation, terms.mass_matrix,
         )  # fmt: skip
-        self._aim = KernelCall(
+        aiming = KernelCall(
             aim,
             Plan(*(getattr(self.reference, name) for name in Plan._fields)),
             present,
@@ -151,12 +152,10 @@ class BalanceTarget(Block):
             Aim(*(getattr(self.target, name) for name in Aim._fields)),
             Scratch(np.zeros(4), np.zeros(4), np.zeros(3), np.zeros(3), np.zeros(3)),
         )
+        self.kernel_calls = (aiming,)
 
     def on_parameters(self) -> None:
         p, gains = self.params, self._gains
         for name in Gains._fields[:-1]:
             getattr(gains, name)[0] = getattr(p, name)
         gains.corrections[:] = p.velocity_correction, p.momentum_correction
-
-    def step(self) -> None:
-        self._aim.run()

@@ -28,7 +28,8 @@ from ...mathematics.kernel import kernel
 from ...mathematics.rotations import normalise, rotate_back, to_matrix
 from ...robots.ball_feet import ball_feet
 from ...robots.body_tree import body_tree
-from ...runtime.language.block import Block, Input, Output
+from ...runtime.language.block import Input, Output
+from ...runtime.language.kernel_block import KernelBlock
 from ..signals import BaseState, DynamicsTerms, JointState, MassEstimate
 
 Array = NDArray[np.float64]
@@ -38,7 +39,7 @@ LEAST_SCALE, LEAST_OFFSET = 1e-4, 2e-5
 """The steps in which the model's mass (as a share) and its torso's CoM [m] change."""
 
 
-class Dynamics(Block):
+class Dynamics(KernelBlock):
     """Inertia, contact Jacobians, momentum and their drifts (paper, II-B and V).
 
     With generalised velocity v (base linear and angular in the body frame, then joints), contact
@@ -92,7 +93,7 @@ class Dynamics(Block):
                 [balls[k].centre if k in balls else np.zeros(3) for k in range(len(owners))]
             ).reshape(-1, 3),
         )
-        self._evaluate = KernelCall(
+        evaluation = KernelCall(
             evaluate,
             BaseAndJoints(
                 base.position, base.orientation, base.linear_velocity, base.angular_velocity,
@@ -108,9 +109,7 @@ class Dynamics(Block):
             MotionTerms(*(getattr(terms, name) for name in MotionTerms._fields)),
             FootTerms(*(getattr(terms, name) for name in FootTerms._fields)),
         )  # fmt: skip
-
-    def step(self) -> None:
-        self._evaluate.run()
+        self.kernel_calls = (evaluation,)
 
 
 class BaseAndJoints(NamedTuple):

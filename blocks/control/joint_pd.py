@@ -9,7 +9,8 @@ import numpy as np
 from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.joint_feedback import Feedback, Motion, SoftStops
 from ...robots.description import RobotDescription
-from ...runtime.language.block import Block, Input, Output, State
+from ...runtime.language.block import Input, Output, State
+from ...runtime.language.kernel_block import KernelBlock
 from ...runtime.language.parameters import Parameters, live_parameter, parameter
 from ...runtime.language.per_joint import PerJoint
 from ...runtime.language.signals import Field, Signal
@@ -47,7 +48,7 @@ class JointFollower(Signal):
     started = Field(dtype="bool", text="whether the targets have begun at the measured joints")
 
 
-class JointPD(Block):
+class JointPD(KernelBlock):
     """The joint command of every tick: feedforward plus joint feedback (paper, V, first equation)::
 
         tau = tau_ff + Kp (q_d - q) + Kd (q_d' - q')
@@ -156,7 +157,7 @@ class JointPD(Block):
             robot.joint_limits, np.zeros(1), np.zeros(1), flight.stiffness, flight.damping
         )
         self.on_parameters()
-        self._command = KernelCall(
+        commanding = KernelCall(
             command_joints,
             self.period,
             _KINDS[self.params.stance_targets],
@@ -177,6 +178,7 @@ class JointPD(Block):
             command.torque,
             Feedback(command.stiffness, command.position, command.damping, command.velocity),
         )  # fmt: skip
+        self.kernel_calls = (commanding,)
 
     def on_parameters(self) -> None:
         p, robot, numbers = self.params, self.robot, self._numbers
@@ -196,9 +198,6 @@ class JointPD(Block):
         numbers.rate[0] = self.period / p.blend if p.blend > self.period else 1.0
         numbers.feedforward[0], numbers.leak[0] = p.flight_feedforward, p.leak
         self._stops.margin[0], self._stops.gain[0] = p.stop_margin, p.stop_gain
-
-    def step(self) -> None:
-        self._command.run()
 
 
 def _legs(robot: RobotDescription) -> Legs:

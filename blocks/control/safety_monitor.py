@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...mathematics.compiling.kernel_call import KernelCall
-from ...runtime.language.block import Block, Input, Metric, Output, State
+from ...runtime.language.block import Input, Metric, Output, State
+from ...runtime.language.kernel_block import KernelBlock
 from ...runtime.language.parameters import live_parameter, parameter
 from ...runtime.language.per_joint import PerJoint
 from ...runtime.language.signals import Field, Signal
@@ -60,7 +61,7 @@ class SafetyState(Signal):
     fault_value = Field(text="what it measured, in the unit of its signal")
 
 
-class SafetyMonitor(Block):
+class SafetyMonitor(KernelBlock):
     """Passes the joint command on until something is wrong, and from then on only damps.
 
     A fault lasts to the end of the run. The first fault is kept in the state and in the metrics
@@ -158,7 +159,7 @@ class SafetyMonitor(Block):
         )  # fmt: skip
         base, joints, state = self.base, self.joints, self.state
         self._verdict = Verdict(np.zeros(2, np.int64), np.zeros(1))
-        self._watch = KernelCall(
+        watching = KernelCall(
             watch, Command(*(getattr(self.desired, name) for name in Command._fields)),
             RobotState(
                 base.position, base.orientation, base.linear_velocity, base.angular_velocity,
@@ -171,6 +172,8 @@ class SafetyMonitor(Block):
             self._damping, state.fault,
             Command(*(getattr(self.command, name) for name in Command._fields)), self._verdict,
         )  # fmt: skip
+        self.kernel_calls = (watching,)
+        self.attention = self._verdict.fault[:1]
 
     def on_parameters(self) -> None:
         given = self.params.damping
@@ -178,10 +181,9 @@ class SafetyMonitor(Block):
             self._peak / _DAMPED_SPEED if given is None else given.resolve(self.robot)
         )
 
-    def step(self) -> None:
-        self._watch.run()
+    def attend(self) -> None:
         state, verdict = self.state, self._verdict
-        if verdict.fault[0] != Fault.NONE and state.fault[()] == Fault.NONE:
+        if state.fault[()] == Fault.NONE:
             fault = Fault(int(verdict.fault[0]))
             state.fault[()] = fault
             state.fault_tick[()] = self.tick

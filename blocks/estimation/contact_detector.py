@@ -7,7 +7,8 @@ from numpy.typing import NDArray
 
 from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.kernel import kernel
-from ...runtime.language.block import Block, Input, Output, State
+from ...runtime.language.block import Input, Output, State
+from ...runtime.language.kernel_block import KernelBlock
 from ...runtime.language.parameters import Parameters, live_parameter
 from ...runtime.language.signals import Field, Signal
 from ..signals import ContactState, ContactSwitches, SwitchHealth
@@ -21,7 +22,7 @@ class ContactTimers(Signal):
     active = Field("n_contacts", dtype="bool", text="whether the point is in contact")
 
 
-class ContactDetector(Block):
+class ContactDetector(KernelBlock):
     """Debounces the switch of every contact point separately (paper, II-A).
 
     A point becomes active once its switch has been closed for ``close_samples`` ticks in a row, and
@@ -54,17 +55,15 @@ class ContactDetector(Block):
         timers = self.timers
         self._close_samples, self._hold_samples = np.zeros(1, np.int64), np.zeros(1, np.int64)
         self.on_parameters()
-        self._latch = KernelCall(
+        latching = KernelCall(
             latch, self.switches.closed, self.faults.fault, self._close_samples,
             self._hold_samples, timers.closed, timers.opened, timers.active, self.state.active,
         )  # fmt: skip
+        self.kernel_calls = (latching,)
 
     def on_parameters(self) -> None:
         self._close_samples[0] = self.params.close_samples
         self._hold_samples[0] = round(self.params.hold / self.period)
-
-    def step(self) -> None:
-        self._latch.run()
 
 
 @kernel

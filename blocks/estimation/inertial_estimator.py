@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.inertial_filter import StandingPoints
 from ...robots.contact_kinematics import ContactKinematics, Measured
-from ...runtime.language.block import Block, Input, Output, State
+from ...runtime.language.block import Input, Output, State
+from ...runtime.language.kernel_block import KernelBlock
 from ...runtime.language.parameters import Parameters, live_parameter, parameter
 from ...runtime.language.signals import Field, Signal
 from ..signals import BaseState, ContactState, ImuReading, JointState
@@ -83,7 +84,7 @@ class InertialParameters(Parameters):
     )
 
 
-class InertialEstimator(Block):
+class InertialEstimator(KernelBlock):
     """The base of estimators that integrate the IMU and are corrected by the legs (paper, II-B).
 
     **Prediction.** The angular velocity w, which is the gyroscope minus its bias, is integrated to
@@ -145,7 +146,7 @@ class InertialEstimator(Block):
         )  # fmt: skip
         self.settings = Settings(*(np.zeros(1) for _ in Settings._fields))
         period = self.period
-        self._tick = self.make_call(
+        tick = self.make_call(
             Estimator(
                 sample,
                 Filter(*(getattr(estimate, name) for name in Filter._fields)),
@@ -160,11 +161,9 @@ class InertialEstimator(Block):
                 Base(*(getattr(base, name) for name in Base._fields)),
             )
         )  # fmt: skip
+        self.kernel_calls = (tick,)
         self.on_parameters()
 
     def on_parameters(self) -> None:
         for name, value in zip(Settings._fields, self.settings, strict=True):
             value[0] = getattr(self.params, name)
-
-    def step(self) -> None:
-        self._tick.run()

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.constants import GRAVITY
 from ...mathematics.kernel import kernel
-from ...runtime.language.block import Block, Input, Output, State
+from ...runtime.language.block import Input, Output, State
+from ...runtime.language.kernel_block import KernelBlock
 from ...runtime.language.parameters import Parameters, live_parameter
 from ...runtime.language.signals import Field, Signal
 from ..signals import ContactState, DynamicsTerms, JumpReference, Phase, PhaseState
@@ -46,7 +47,7 @@ class PhaseMemory(Signal):
     stance = Field("n_contacts", dtype="bool", text="the points in stance after touchdown")
 
 
-class JumpPhase(Block):
+class JumpPhase(KernelBlock):
     """The phase by plan time and measured contact, the stance points, and the time to touchdown.
 
     ============  =====================================================================
@@ -123,7 +124,7 @@ class JumpPhase(Block):
         reference, terms = self.reference, self.terms
         self._limits, self._stance_limits = np.zeros(5), np.zeros(2)
         self.on_parameters()
-        self._follow = KernelCall(
+        following = KernelCall(
             follow_phases,
             self.period,
             Planned(*(getattr(reference, name) for name in Planned._fields)),
@@ -137,6 +138,7 @@ class JumpPhase(Block):
             Memory(*(getattr(self.memory, name) for name in Memory._fields)),
             PhaseFields(*(getattr(self.phase, name) for name in PhaseFields._fields)),
         )  # fmt: skip
+        self.kernel_calls = (following,)
 
     def on_parameters(self) -> None:
         p = self.params
@@ -147,9 +149,6 @@ class JumpPhase(Block):
 
     def start(self) -> None:
         self.memory.touchdown[()] = -1.0
-
-    def step(self) -> None:
-        self._follow.run()
 
 
 class Planned(NamedTuple):

@@ -194,7 +194,7 @@ class JumpPlan(Block):
         except TaskError as error:
             scene = Misfit(str(error), fix="robot.scene: flat, or a floor and boxes")
         end, hops = task.places()[-1], task.hops()
-        velocity, momentum = cls._corrections(params, context)
+        velocity, momentum = cls._corrections(task, params, context)
         return {
             "scene": scene,
             "jumps": len(hops),
@@ -207,7 +207,7 @@ class JumpPlan(Block):
         }
 
     @classmethod
-    def _corrections(cls, params: Params, context: Context) -> tuple[Any, Any]:
+    def _corrections(cls, task: JumpTask, params: Params, context: Context) -> tuple[Any, Any]:
         """What a rehearsal has learnt; for both the same ``Misfit`` where its file is damaged."""
         from ...planner.library.rehearsed import (
             ZERO,
@@ -222,7 +222,7 @@ class JumpPlan(Block):
         rate = 1.0 / context.clock.base_period
         controller = controller_hash(context.graph, rate, context.path)
         try:
-            task = planned_task(params, context)
+            task = _as_planned(task, params.formulation)
             found = find_rehearsed(plan_library(params, context.robot), task, controller)
         except RehearsalFileError as error:
             damaged = Misfit(str(error), fix=f"{context.path}.rehearsed: false")
@@ -331,7 +331,11 @@ def planned_task(params: JumpPlan.Params, context: Context) -> JumpTask:
     Raises:
         LookupError, TaskError: as ``read_or_make_task``.
     """
-    task, chosen = read_or_make_task(params.task, context), params.formulation
+    return _as_planned(read_or_make_task(params.task, context), params.formulation)
+
+
+def _as_planned(task: JumpTask, chosen: Literal["full", "paper", "srbm"] | None) -> JumpTask:
+    """The task in the formulation ``chosen``, if there is one."""
     if chosen is None:
         return task
     impact = task.impact and chosen == "full"

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ...mathematics.constants import GRAVITY
 from ...mathematics.landing_law import (
+    hasten,
     heading_matrix,
     keep_within,
     landing_place,
@@ -61,10 +62,15 @@ class LandingMemory(Signal):
     )
     goal = Field(("n_feet", 3), unit="m", frame="world", text="where the feet last aimed")
     planned = Field(("n_feet", 3), unit="m", frame="world", text="planned feet from the com")
+    swing = Field(("n_feet", 3), unit="m/s", frame="world", text="their planned speed from the com")
     linear = Field(3, unit="kg m/s", frame="world", text="planned linear momentum")
     angular = Field(3, unit="N m s", frame="world", text="planned angular momentum")
     orientation = Field(4, unit="", text="planned base quaternion x, y, z, w")
     shift = Field(4, unit="m", frame="world", text="chosen: ahead, to the left, apart, upwards")
+    started = Field(dtype="bool", text="whether the plan's place in the world is known")
+    origin = Field(3, unit="m", frame="world", text="position of the plan's origin")
+    lift_off_time = Field(unit="s", text="planned lift-off of the flight under way or next")
+    wished = Field(3, unit="m", frame="world", text="planned place of the com at touchdown")
 
 
 class LandingHeuristic(Block):
@@ -106,6 +112,17 @@ class LandingHeuristic(Block):
         g_y = capture l^y / (m w) - capture_turn k^x w / (m g),    g_a = clearance |l^y| / (m w)
 
     These gains have no unit, so they are the same for robots of any size. p_max applies as above.
+
+    A robot that lifts off with a slightly wrong velocity lands beside its place, and feet that go to
+    the capture point land even further off. Let e be by how much unshifted feet would miss their
+    planned place in the world, by the measured motion, and d = g + e the way from that place to the
+    capture point, both horizontal. Then g is replaced by
+
+        g - place_gain / (1 + (|d| / (place_range h))^4) d
+
+    so a small miss, within which standing feet keep the balance, is partly made good; after a push
+    the feet go to the capture point. Touchdown comes some milliseconds before its prediction, and in
+    a long jump the feet still swing then. So they are ahead of their planned way by ``lead_time``.
 
     The foot moves there from its position at lift-off, along x and y with minimum jerk over
     ``reach_share`` of the predicted flight. Its height follows the plan (paper, V), and near
@@ -200,7 +217,7 @@ class LandingHeuristic(Block):
         self._quaternion, self._other = np.zeros(4), np.zeros(4)
         self._rotation, self._heading = np.zeros((3, 3)), np.zeros((3, 3))
         self._vector, self._com_body, self._rate = np.zeros(3), np.zeros(3), np.zeros(3)
-        self._scratch = np.zeros(3)
+        self._scratch, self._miss = np.zeros(3), np.zeros(3)
 
     def on_parameters(self) -> None:
         p = self.params
@@ -214,6 +231,9 @@ class LandingHeuristic(Block):
         p, reference, terms, memory = self.params, self.reference, self.terms, self.memory
         phase = int(self.phase.phase)
         flying, landing = phase == Phase.FLIGHT, phase == Phase.LANDING
+        if not memory.started:
+            self._find_origin()
+        self._remember_landing(flying)
         overdue = flying and int(reference.phase) > Phase.FLIGHT
         if not overdue:
             self._remember_plan()
@@ -239,11 +259,18 @@ class LandingHeuristic(Block):
             np.subtract(reference.foot_velocity[foot], reference.com_velocity, out=self._speed)
             if overdue:
                 self._speed[:] = 0.0
+            else:
+                memory.swing[foot] = self._speed
             if flying:
                 swing(
                     planned, place, memory.offset[foot], share, rate / reach,
                     self._place[foot], self._speed,
                 )  # fmt: skip
+                if self._predicts:
+                    hasten(
+                        memory.swing[foot], p.lead_time * share, p.lead_time * rate / reach,
+                        self._place[foot], self._speed,
+                    )  # fmt: skip
                 self._place[foot, 2] += lift
                 self._speed[2] += lift_rate
                 np.add(terms.com, place, out=memory.goal[foot])
@@ -264,12 +291,40 @@ class LandingHeuristic(Block):
         np.multiply(reference.angular_momentum, mass / self._mass, out=memory.angular)
         memory.orientation[...] = reference.orientation
 
+    def _find_origin(self) -> None:
+        """Note the place of the plan in the world, by the middle of the feet."""
+        memory, n = self.memory, len(self._sides)
+        for k in range(3):
+            for foot in range(n):
+                memory.origin[k] += (
+                    float(self.terms.foot_position[foot, k])
+                    - float(self.reference.foot_position[foot, k])
+                ) / n
+        memory.started[()] = True
+
+    def _remember_landing(self, flying: bool) -> None:
+        """Keep where the centre of mass should touch down, before the plan names the next jump."""
+        reference, memory = self.reference, self.memory
+        if not flying:
+            memory.lift_off_time[()] = reference.lift_off_time
+        elif reference.lift_off_time != memory.lift_off_time:
+            return
+        fall = float(reference.touchdown_time) - float(reference.time)
+        if flying and fall < 0.0:
+            return
+        np.multiply(reference.com_velocity, fall, out=memory.wished)
+        memory.wished += reference.com
+        memory.wished += memory.origin
+
     def _predict(self, left: float) -> float:
         """Choose the shift; returns the time [s] to a touchdown with the legs that much shorter."""
-        memory, terms = self.memory, self.terms
+        memory, terms, miss = self.memory, self.terms, self._miss
+        np.multiply(terms.com_velocity, left, out=miss)
+        miss += terms.com
+        miss -= memory.wished
         self._prediction.choose(
             terms, self.reference, memory.planned, memory.orientation, self._linear, self._angular,
-            left, memory.shift,
+            miss, left, memory.shift,
         )  # fmt: skip
         speed = max(GRAVITY * left - float(terms.com_velocity[2]), _SLOWEST)
         return max(left + float(memory.shift[3]) / speed, 0.0)

@@ -15,7 +15,7 @@ from ...mathematics.flight_prediction import (
     map_flight,
     predict_tilt,
 )
-from ...mathematics.landing_law import heading_matrix
+from ...mathematics.landing_law import heading_matrix, pull_to_place
 from ...mathematics.rotations import conjugate, from_matrix, logarithm, multiply
 from ...robots.description import RobotDescription
 from ...runtime.language.parameters import Parameters, live_parameter
@@ -59,6 +59,22 @@ class PredictionGains(Parameters):
     )
     apart_cost: float = live_parameter(
         1.0, gt=0.0, text="cost of another distance between the feet, per way off the place"
+    )
+    place_gain: float = live_parameter(
+        0.5, ge=0.0, le=1.0, text="share of a small miss of the planned place that is corrected"
+    )
+    place_range: float = live_parameter(
+        0.12,
+        gt=0.0,
+        text="way from the planned place to the capture point at which half of that is corrected, "
+        "in standing heights",
+    )
+    lead_time: float = live_parameter(
+        0.01,
+        unit="s",
+        ge=0.0,
+        le=0.05,
+        text="by how much the feet are ahead of their planned way, ahead and aside",
     )
     stretch_damping: float = live_parameter(
         0.06, gt=0.0, text="damping where a leg is nearly stretched, in standing heights"
@@ -116,6 +132,7 @@ class LandingPrediction:
             self._capture_turn * p.capture_turn[1],
         )
         self._clearance = self._capture * p.clearance
+        self._place_gain, self._place_range = p.place_gain, height * p.place_range
 
     def choose(
         self,
@@ -125,6 +142,7 @@ class LandingPrediction:
         orientation: Array,
         linear: Array,
         angular: Array,
+        miss: Array,
         left: float,
         shift: Array,
     ) -> None:
@@ -134,6 +152,7 @@ class LandingPrediction:
             planned: places of the feet from the centre of mass, (n_feet, 3).
             orientation: the planned one, quaternion x, y, z, w.
             linear, angular: the momenta that were not planned.
+            miss: by how much unshifted feet will miss their planned place in the world [m], (3,).
             left: time until touchdown [s].
         """
         if left < LAST:
@@ -156,6 +175,7 @@ class LandingPrediction:
         cost.goal[0] = self._per_linear[0] * linear[0] + self._per_angular[0] * angular[1]
         cost.goal[1] = self._per_linear[1] * linear[1] - self._per_angular[1] * angular[0]
         cost.goal[2] = self._clearance * abs(linear[1])
+        pull_to_place(cost.goal, miss, self._place_gain, self._place_range)
         choose_shift(self._tilt, self._turn, cost, self._matrix, shift)
 
     def _find_ways(self, terms: DynamicsTerms, reference: JumpReference, planned: Array) -> None:

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.kernel import kernel
-from ...runtime.language.block import Block, Input, Output, State
+from ...runtime.language.block import Input, Output, State
+from ...runtime.language.kernel_block import KernelBlock
 from ...runtime.language.parameters import Parameters, parameter
 from ...runtime.language.signals import Field, Signal
 from ..signals import ContactSwitches, Phase, PhaseState, SwitchFault, SwitchHealth
@@ -57,7 +58,7 @@ class Watched(NamedTuple):
     fault: Counts
 
 
-class SwitchMonitor(Block):
+class SwitchMonitor(KernelBlock):
     """Compares each foot switch with the phase of the jump, and with itself.
 
     * **Stuck closed**: in the air, it was closed for ``air_time`` in a row, all of it more than
@@ -110,13 +111,11 @@ class SwitchMonitor(Block):
             p.bounce_changes,
         )
         watched = Watched(*(getattr(memory, name) for name in Watched._fields))
-        self._watch = KernelCall(
+        watching = KernelCall(
             watch_switches, self.switches.closed, self.phase.phase, self.phase.time_to_touchdown,
             limits, watched, self.health.fault, self.health.stop,
         )  # fmt: skip
-
-    def step(self) -> None:
-        self._watch.run()
+        self.kernel_calls = (watching,)
 
 
 @kernel

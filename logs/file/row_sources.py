@@ -95,11 +95,22 @@ class PackedRows:
 
     def rows(self) -> NDArray[np.uint8]:
         """The rows of all ticks, (ticks, bytes), unpacked by several threads."""
+        return self._all()
+
+    def signal(self, field: RecordedField) -> NDArray[Any]:
+        """One field at every tick, (ticks, ...), unpacked by several threads."""
+        found = self._all(self._header.bus.layout().byte_range(field.name))
+        return found.view(field.dtype).reshape(len(found), *field.shape)
+
+    def _all(self, part: tuple[int, int] | None = None) -> NDArray[np.uint8]:
+        """The rows of all ticks, (ticks, bytes), or of each row the bytes ``part`` only."""
         ticks = self.ticks
-        rows = np.empty((len(ticks), self._header.bus.size), np.uint8)
+        size = self._header.bus.size if part is None else part[1] - part[0]
+        rows = np.empty((len(ticks), size), np.uint8)
 
         def unpack_one(message: Message) -> None:
-            first, some = self._unpacked(message, tables_at(self._found, message)[1])
+            _, batch = tables_at(self._found, message)
+            first, some = self._unpacked(message, batch, part)
             place = bisect_left(ticks, first)
             rows[place : place + len(some)] = some
 
@@ -107,18 +118,6 @@ class PackedRows:
             for _ in pool.map(unpack_one, self._messages):
                 pass
         return rows
-
-    def signal(self, field: RecordedField) -> NDArray[Any]:
-        """One field at every tick, (ticks, ...)."""
-        part = self._header.bus.layout().byte_range(field.name)
-        ticks = self.ticks
-        found = np.empty((len(ticks), part[1] - part[0]), np.uint8)
-        for message in self._messages:
-            _, batch = tables_at(self._found, message)
-            first, some = self._unpacked(message, batch, part)
-            place = bisect_left(ticks, first)
-            found[place : place + len(some)] = some
-        return found.view(field.dtype).reshape(len(ticks), *field.shape)
 
 
 class SeriesRows:

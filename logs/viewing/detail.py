@@ -36,9 +36,9 @@ class Detail:
         return ChangedRows() if self.tolerance is None else ThinnedRows(self.tolerance)
 
 
-RECORDED = Detail(main_only=True, tolerance=1.0 / 400.0, picture_rate=50.0, extras=False)
+RECORDED = Detail(main_only=True, tolerance=1.0 / 250.0, picture_rate=50.0, extras=False)
 """What a recording has beside its numbers: enough for a first look with any Rerun. The tolerance is
-less than half a pixel of a plot."""
+less than a pixel of a plot."""
 WHOLE = Detail()
 """What ``aloft view`` shows, which is drawn from the numbers."""
 LIVE = Detail(row_rate=100.0)

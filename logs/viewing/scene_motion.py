@@ -74,12 +74,16 @@ class PlanPart(ScenePart):
         com, feet = moments[f"{plan}.com"], moments[f"{plan}.foot_position"]
         start = self._stood(moments)
         self.send("plan/com", moments, rr.Points3D.columns(positions=com + start))
-        half = 0.5 * moments[f"{plan}.foot_yaw"]
+        yaw = moments[f"{plan}.foot_yaw"]
         for k, foot in enumerate(self.robot.feet):
-            nothing = np.zeros(len(moments))
-            turn = np.column_stack([nothing, nothing, np.sin(half[:, k]), np.cos(half[:, k])])
-            poses = rr.Transform3D.columns(translation=feet[:, k] + start, quaternion=turn)
-            self.send(f"plan/{foot.name}", moments, poses)
+            some = self.changing(f"plan/{foot.name}", moments, feet[:, k], yaw[:, k])
+            if not len(some):
+                continue
+            half, nothing = 0.5 * some[f"{plan}.foot_yaw"][:, k], np.zeros(len(some))
+            turn = np.column_stack([nothing, nothing, np.sin(half), np.cos(half)])
+            places = some[f"{plan}.foot_position"][:, k] + start
+            poses = rr.Transform3D.columns(translation=places, quaternion=turn)
+            self.send(f"plan/{foot.name}", some, poses)
 
     def _stood(self, moments: Moments) -> Array:
         if self._start is None:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ...robots.description import RobotDescription
 from ...robots.kinematics import LinkPoses, link_poses
 from ..file.format import Header, RecordedRows
+from ..file.time_columns import time_columns
 from .detail import Detail
 from .robot_shapes import scale_of
 from .scene_ports import PoseSource, ScenePorts
@@ -86,6 +87,7 @@ class ScenePart:
         self.robot: RobotDescription = header.robot
         self.world, self.colors, self.detail = world, colors, detail
         self.scale = scale_of(self.robot)
+        self._last: dict[str, NDArray[Any]] = {}
 
     def write_static(self) -> None:
         """Write what does not change: shapes, colours, sizes."""
@@ -97,6 +99,23 @@ class ScenePart:
     def log(self, name: str, what: Any) -> None:
         """Write something that does not change to an entity below ``world``."""
         self.stream.log(f"{self.world}/{name}", what, static=True)
+
+    def changing(self, name: str, moments: Moments, *values: NDArray[Any]) -> Moments:
+        """The instants at which some of ``values``, each (n, ...), differ from the instant before.
+
+        A viewer keeps what it has, so what stands still for long, as a plan's feet, is written once.
+        ``name`` tells apart what is drawn.
+        """
+        count = len(moments)
+        rows = np.column_stack([value.reshape(count, -1) for value in values])
+        before = self._last.get(name)
+        new = np.ones(count, np.bool_)
+        new[1:] = (rows[1:] != rows[:-1]).any(axis=1)
+        if before is not None:
+            new[0] = bool((rows[0] != before).any())
+        self._last[name] = rows[-1].copy()
+        due = moments.due[new]
+        return Moments(moments.batch, due, time_columns(self.header, moments.batch.ticks[due]))
 
     def send(self, name: str, moments: Moments, columns: Any) -> None:
         """Write columns with one row for each instant to an entity below ``world``."""

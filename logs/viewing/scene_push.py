@@ -26,6 +26,9 @@ class PushPart(ScenePart):
         names = list(self.robot.points)
         if self.ports.push is None or not names:
             return
+        moments = self._acting(moments)
+        if not len(moments):
+            return
         force = force_arrows(self.robot, moments[f"{self.ports.push}.force"])
         point = np.clip(moments[f"{self.ports.push}.point"], 0, len(names) - 1)
         poses = moments.poses(self.robot, self.ports.pose)
@@ -36,3 +39,8 @@ class PushPart(ScenePart):
         there = ends[point, np.arange(len(moments))]
         arrows = rr.Arrows3D.columns(origins=there - force, vectors=force)
         self.send("push", moments, arrows)
+
+    def _acting(self, moments: Moments) -> Moments:
+        """The instants at which it acts, and the first one and those at which it has just ended."""
+        acts = (moments[f"{self.ports.push}.force"] != 0.0).any(axis=1)
+        return self.changing("push", moments, acts * moments.batch.ticks[moments.due])

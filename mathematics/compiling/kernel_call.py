@@ -15,7 +15,13 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from .machine_code import MachineCode
 
 
 class KernelCall:
@@ -39,10 +45,22 @@ class KernelCall:
         self.kernel = kernel
         self.arguments = arguments
         self.run: Callable[[], Any] = partial(kernel, *arguments)
-        self.compiled: object = None
-        """What keeps the machine code and the packed arguments alive; none for plain Python."""
+        self.compiled: tuple[MachineCode, NDArray[np.int64]] | None = None
+        """The machine code and the packed arguments, kept alive here; none for plain Python."""
         for calls in _collecting:
             calls.append(self)
+
+    @property
+    def addresses(self) -> tuple[int, int]:
+        """The addresses of the machine code and of its packed arguments.
+
+        Raises:
+            ValueError: the call runs as plain Python.
+        """
+        if self.compiled is None:
+            raise ValueError(f"{self.name} is not compiled")
+        code, words = self.compiled
+        return code.address, int(words.ctypes.data)
 
     @property
     def name(self) -> str:

@@ -12,12 +12,9 @@ from typing import Any
 import numpy as np
 
 from ...robots.description import RobotDescription
-from ..checking.validity import InvalidPlanError, checked, require_valid
-from ..solving.refinement import ROUNDS, curable
 from ..task.errors import PlanError
 from ..task.plan import JumpPlan, PlanFileError, read_plan, task_of_header, write_plan
 from ..task.task import JumpTask, TaskError
-from .once import require_valid_once
 from .shipped import shipped_graphs
 
 SHIPPED = shipped_graphs() / "plans"
@@ -117,6 +114,8 @@ class PlanLibrary:
         Raises:
             TaskError, PlanFileError, PlanError: as ``plan``.
         """
+        from ..checking.validity import InvalidPlanError, checked  # a graph is checked without it
+
         invalid = PlanLibrary(self.robot, self.folder / INVALID, ())
         found = self.find(task) or invalid.find(task)
         if found is not None:
@@ -224,6 +223,8 @@ class PlanLibrary:
             PlanError: the task cannot be planned.
             InvalidPlanError: it can, but the plan fails the validity check; it is not kept.
         """
+        from .once import require_valid_once
+
         kept = None if anew else self.find(task)
         if kept is not None:
             require_valid_once(kept, self.robot)
@@ -255,6 +256,8 @@ def solve_and_check(
     Raises:
         TaskError, PlanError, InvalidPlanError: as ``PlanLibrary.plan``.
     """
+    from ..checking.validity import checked, require_valid
+    from ..solving.refinement import ROUNDS, curable
     from ..task.task_checks import require_consistent
 
     require_consistent(task, robot)
@@ -287,4 +290,4 @@ def solve_task(task: JumpTask, robot: RobotDescription, warm_start: JumpPlan | N
     return solve_jump(task, robot, warm_start=warm_start)
 
 
-__all__ = ["InvalidPlanError", "PlanLibrary", "solve_and_check", "task_distance"]
+__all__ = ["PlanLibrary", "solve_and_check", "task_distance"]

@@ -57,6 +57,7 @@ class ContactRows:
         self._axes = coordinates.axes
         self._each = len(coordinates.axes)
         self._errors = self._each * len(self._foot)
+        self._chosen: dict[tuple[frozenset[int], frozenset[int]], Indices] = {}
 
     def velocities(self, points: set[int]) -> Indices:
         """Rows of the velocities of points on the ground."""
@@ -73,7 +74,14 @@ class ContactRows:
         return self._rows(points - held, points & held) + self._errors
 
     def _rows(self, points: set[int], others: set[int]) -> Indices:
-        """The rows of points that say what no row before them does, nor those of the others."""
+        """The rows of points that say what no row before them does, nor those of the others.
+        Few sets occur, but at every knot of a problem; each is worked out once."""
+        key = frozenset(points), frozenset(others)
+        if key not in self._chosen:
+            self._chosen[key] = self._independent(points, others)
+        return self._chosen[key].copy()
+
+    def _independent(self, points: set[int], others: set[int]) -> Indices:
         rows = []
         for foot in dict.fromkeys(self._foot):
             here = [i for i in range(len(self._foot)) if self._foot[i] == foot]

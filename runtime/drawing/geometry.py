@@ -6,15 +6,15 @@ from dataclasses import dataclass, field
 
 from .diagram import INTO, OUT, Diagram, Node, Wire
 
-ROW = 17.0
+ROW = 18.0
 """From one port to the next."""
-HEAD = 40.0
+HEAD = 42.0
 """Height of a block's title and of what it uses."""
 FOOT = 9.0
-PAD = 9.0
-TITLE, USE, PORT = 13.0, 10.5, 11.0
+PAD = 7.0
+TITLE, USE, PORT = 15.0, 11.0, 13.0
 """Sizes of texts."""
-NOTE = 9.5
+NOTE = 10.0
 _RAISED = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
 _NARROW = frozenset("fijlrtI.,:;|!'()[] /-")
 _WIDE = frozenset("mwMWABCDGHNOQRUVXYZ%@_")

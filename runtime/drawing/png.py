@@ -111,19 +111,19 @@ class _Painter:
             x, y, box.width, box.height, fill, self.colours["edge"], 12 if node.moore else 3
         )
         if node.moore:
-            bar = [x + 8, x + box.width - 8], [y + HEAD - 6] * 2
+            bar = [x + 8, x + box.width - 8], [y + HEAD - 5] * 2
             self.axes.plot(*bar, color=self.colours["edge"], lw=2.0, zorder=4)
         middle = x + 0.5 * box.width
-        self.text(middle, y + 17, node.title, TITLE, side="center", bold=True)
-        self.text(middle, y + 31, node.use.removeprefix("blocks."), USE, "soft", "center")
+        self.text(middle, y + 18, node.title, TITLE, side="center", bold=True)
+        self.text(middle, y + 32, node.use.removeprefix("blocks."), USE, "soft", "center")
         if node.machine:
             self.text(middle, y - 4, f"on {node.machine}", 9.5, "soft", "center")
         for name in node.inputs:
-            self.text(x + PAD, y + box.port(name, False) + 4, node.labels.get(name, name), PORT)
+            self.text(x + PAD, y + box.port(name, False) + 4.5, node.labels.get(name, name), PORT)
         for name in node.outputs:
             height = y + box.port(name, True)
             label = node.labels.get(name, name)
-            self.text(x + box.width - PAD, height + 4, label, PORT, side="right")
+            self.text(x + box.width - PAD, height + 4.5, label, PORT, side="right")
             self.rectangle(
                 x + box.width - 1.5,
                 height - 2.5,

@@ -8,7 +8,7 @@ from .diagram import OUT, Wire
 from .geometry import NOTE, Box, Drawing, Line, note_of, width_of
 from .layers import Layers, Pass
 
-_TRACK = 8.0
+_TRACK = 6.5
 """From one vertical line to the next."""
 _LANE = 9.0
 """From one line that leads back to the next."""

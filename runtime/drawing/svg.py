@@ -141,24 +141,24 @@ def _block(box: Box, style: Style) -> Iterator[str]:
         )
         if node.moore:
             yield (
-                f'<path class="bar" d="M{x + 8:g} {y + HEAD - 6:g} H{x + w - 8:g}" '
+                f'<path class="bar" d="M{x + 8:g} {y + HEAD - 5:g} H{x + w - 8:g}" '
                 'stroke-width="2.2"/>'
             )
     middle = x + 0.5 * w
-    yield _text(middle, y + 17, node.title, TITLE, "title", "middle")
-    yield _text(middle, y + 31, node.use.removeprefix("blocks."), USE, "soft", "middle")
+    yield _text(middle, y + 18, node.title, TITLE, "title", "middle")
+    yield _text(middle, y + 32, node.use.removeprefix("blocks."), USE, "soft", "middle")
     if node.machine:
         yield _text(middle, y - 4, f"on {node.machine}", 9.5, "soft", "middle")
     for name in node.inputs:
         height = y + box.port(name, False)
-        yield _text(x + PAD, height + 4, node.labels.get(name, name), PORT)
+        yield _text(x + PAD, height + 4.5, node.labels.get(name, name), PORT)
     for name in node.outputs:
         height = y + box.port(name, True)
         yield (
             f'<rect class="port" data-port="{escape(port_of((node.path, name)))}" '
             f'x="{x + w - 1.5:g}" y="{height - 2.5:g}" width="4" height="5"/>'
         )
-        yield _text(x + w - PAD, height + 4, node.labels.get(name, name), PORT, anchor="end")
+        yield _text(x + w - PAD, height + 4.5, node.labels.get(name, name), PORT, anchor="end")
     yield "</g>"
 
 

@@ -44,9 +44,9 @@ def classes_in(path: Path) -> tuple[WrittenClass, ...]:
 def blocks_in_packages(root: Path, packages: Iterable[str]) -> Mapping[str, Path]:
     """The blocks that graphs can use as ``package.Class``, with their files, sorted by name.
 
-    A class is a block if it derives from ``Block``, also through other classes. It can be used if
-    it has or inherits a port and one of the methods ``step`` and ``emit``, it has no abstract
-    method, and its name does not begin with an underscore.
+    A class is a block if it derives from ``Block`` or ``KernelBlock``, also through other classes.
+    It can be used if it has or inherits a port and one of the methods ``step`` and ``emit``, it has
+    no abstract method, and its name does not begin with an underscore.
     """
     classes = [
         (package, path, written)
@@ -55,7 +55,8 @@ def blocks_in_packages(root: Path, packages: Iterable[str]) -> Mapping[str, Path
         for written in classes_in(path)
     ]
     found: dict[str, Path] = {}
-    known: dict[str, tuple[bool, bool]] = {"Block": (False, False)}  # with ports, with a machine
+    # with ports, with a machine
+    known: dict[str, tuple[bool, bool]] = {"Block": (False, False), "KernelBlock": (False, True)}
     while True:
         new = [
             each

@@ -19,6 +19,8 @@ from .others import Others
 
 TICK_TIME = "~tick"
 """The path of the block that keeps when ticks began."""
+JITTER_SHARE = 1.0 / 16.0
+"""How much of the jitter each message renews, as in RFC 3550, section 6.4.1."""
 KEPT = 4096
 """The number of last ages from which the percentiles are computed."""
 
@@ -27,6 +29,11 @@ class LinkHealth(Signal):
     """How a free-running link does, at each tick of its reader."""
 
     age = Field(unit="s", text="since the source ran, by the estimated clock of its machine")
+    jitter = Field(
+        unit="s", text="how unevenly messages come: mean deviation of their time on the way"
+    )
+    clock_offset = Field(unit="s", text="how far the sender's clock is ahead, as estimated")
+    clock_uncertainty = Field(unit="s", text="the largest error of that; negative: not known yet")
     late = Field(dtype="bool", text="whether the age exceeds what is allowed")
     tick = Field(dtype="int64", text="the tick in which the source ran, on its machine; -1: none")
     sent = Field(dtype="int64", text="when it was sent, by the clock of the sender [ns]")
@@ -85,6 +92,8 @@ class LatestInbox:
     Attributes:
         heard_at: when the newest message came, by ``clock``; zero before the first.
         age: of the message at the last tick of the reader [ns].
+        jitter: the mean absolute difference [ns] between the times on the way of a message and of the
+            one before it (RFC 3550, section 6.4.1); the clocks' offset drops out.
     """
 
     def __init__(
@@ -101,6 +110,8 @@ class LatestInbox:
         self.policy = policy
         self.received = self.lost = self.surplus = self.damaged = self.late_ticks = 0
         self.heard_at = self.age = 0
+        self.jitter = 0.0
+        self._transit: int | None = None
         self._reader = reader
         self._others = others
         self._health = health
@@ -130,6 +141,7 @@ class LatestInbox:
         self._others.note_checked(self.link.name)
         if run != self._run:  # the first message of a part that was started, perhaps again
             self._run, self._sequence = run, message.sequence - 1
+            self._transit = None
         if message.sequence <= self._sequence:
             self.surplus += 1
             return
@@ -140,7 +152,10 @@ class LatestInbox:
         self.lost += gap
         self.received += 1
         self.heard_at = self._clock()
-        self._latest = message
+        transit = self.heard_at - message.time
+        if self._transit is not None:
+            self.jitter += JITTER_SHARE * (abs(transit - self._transit) - self.jitter)
+        self._transit, self._latest = transit, message
 
     def show(self, tick: int) -> None:
         """Write the latest fields into the bus, or what the policy says where they are too old."""
@@ -151,7 +166,7 @@ class LatestInbox:
         if message is None:
             age = now - self._since
         else:
-            age = now + self._others.offset_of(self.link.sender) - message.time
+            age = now + self._others.clock_of(self.link.sender).offset - message.time
         late = self._limit is not None and age > self._limit
         if late:
             self.late_ticks += 1
@@ -176,7 +191,11 @@ class LatestInbox:
         health.tick[()] = -1 if message is None else message.tick
         health.sent[()] = 0 if message is None else message.time
         health.read[()] = now
+        clock = self._others.clock_of(self.link.sender)
         health.age[()] = age * 1e-9
+        health.jitter[()] = self.jitter * 1e-9
+        health.clock_offset[()] = clock.offset * 1e-9
+        health.clock_uncertainty[()] = clock.uncertainty * 1e-9
         health.late[()] = late
         health.received[()] = self.received
         health.lost[()] = self.lost
@@ -191,4 +210,5 @@ class LatestInbox:
             "name": self.link.name, "received": self.received, "lost": self.lost,
             "surplus": self.surplus, "damaged": self.damaged, "late_ticks": self.late_ticks,
             "age_p50_ms": float(median), "age_p99_ms": float(high), "age_max_ms": float(longest),
+            "jitter_ms": self.jitter * 1e-6,
         }  # fmt: skip

@@ -150,10 +150,6 @@ class Others:
             return str(error)
         return ""
 
-    def offset_of(self, name: str) -> int:
-        """How far another machine's clock is ahead of the one here [ns], as estimated."""
-        return self._clocks[name].offset
-
     def clock_of(self, name: str) -> ClockOffset:
         """The estimate of another machine's clock."""
         return self._clocks[name]

@@ -142,7 +142,8 @@ def link_status(box: Inbox | LatestInbox) -> dict[str, Any]:
         "surplus": box.surplus,
     }
     if isinstance(box, LatestInbox):
-        found |= {"lost": box.lost, "late_ticks": box.late_ticks, "age_ms": box.age * 1e-6}
+        found |= {"lost": box.lost, "late_ticks": box.late_ticks, "age_ms": box.age * 1e-6,
+                  "jitter_ms": box.jitter * 1e-6}  # fmt: skip
     return found
 
 

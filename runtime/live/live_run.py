@@ -5,10 +5,12 @@ from __future__ import annotations
 import os
 import threading
 import time
+from collections.abc import Collection
 from pathlib import Path
 from typing import Any
 
 from ..language.errors import AloftError
+from ..language.layout import Layout
 from ..language.stages import CheckedGraph
 from ..loading import LoadError, load, load_text
 from ..running.memory import Memory
@@ -32,6 +34,8 @@ class LiveRun:
     Attributes:
         graph: the graph that runs, loaded from its file, or, where that has changed since, from the
             text that the run has.
+        clock: how the run is paced.
+        machine: whose part of the graph runs there; empty for the whole graph.
 
     Raises:
         EndpointError: nobody answers there.
@@ -50,12 +54,7 @@ class LiveRun:
         about, descriptor = ask_to_watch(self._path)
         try:
             graph = _load(about)
-            layout = Memory(graph.blocks, graph.robot).bus.layout
-            if digest(layout, graph) != about["digest"]:
-                raise AloftError(
-                    f"{about['graph']} cannot be watched: its blocks have changed since the run "
-                    "began; start it again"
-                )
+            layout, machine, paths = _bus_of(graph, about["digest"])
             shape = Shape(**about["shape"])
         except BaseException:
             os.close(descriptor)
@@ -63,8 +62,12 @@ class LiveRun:
         self.close()
         self.graph = graph
         self.clock = str(about["clock"])
+        self.machine = machine
+        self._own = [
+            spec.path for spec in graph.blocks if not machine or spec.machine == machine
+        ]  # others are received, and that takes another time than they do
         self._about = about
-        self._texts = ValueTexts(graph, layout)
+        self._texts = ValueTexts(graph, layout, paths)
         self._reader = WindowReader(descriptor, shape)
         self._seen, self._since = -1, time.monotonic()
         self._tried = time.monotonic()
@@ -103,7 +106,8 @@ class LiveRun:
     def _moment(self, look: Look) -> dict[str, Any]:
         assert self._reader is not None
         period = self.graph.base_period
-        lines = [f"tick {look.tick}, {look.tick * period:.3f} s"]
+        lines = [f"the part on {self.machine}"] if self.machine else []
+        lines.append(f"tick {look.tick}, {look.tick * period:.3f} s")
         lines.append(tick_text(look.stamps, period))
         if self.clock == "free":
             lines.append("as fast as it can, so there are no deadlines")
@@ -114,7 +118,13 @@ class LiveRun:
             "line": "; ".join(line for line in lines if line),
             "values": self._texts.all(look.bus),
             "brief": self._texts.brief(look.bus),
-            "times": time_texts(self._reader.shape.programs, look.stamps, look.late),
+            "times": {
+                path: text
+                for path, text in time_texts(
+                    self._reader.shape.programs, look.stamps, look.late
+                ).items()
+                if path in self._own
+            },
             "late": {path: count for path, count in look.late.items() if count},
             "changes": look.changes,
         }
@@ -156,6 +166,33 @@ class LiveRun:
     def set(self, settings: list[str]) -> list[dict[str, Any]]:
         """Change parameters, all in one tick. Raises ``EndpointError``."""
         return set_parameters(self._path, settings)
+
+
+def _bus_of(graph: CheckedGraph, wanted: str) -> tuple[Layout, str, Collection[str]]:
+    """The layout of the bus of the graph or of one machine's part of it, the machine, and the blocks
+    whose outputs are known there.
+
+    Raises:
+        AloftError: none of them has the digest that is ``wanted``.
+    """
+    layout = Memory(graph.blocks, graph.robot).bus.layout
+    if digest(layout, graph) == wanted:
+        return layout, "", [spec.path for spec in graph.blocks]
+    if graph.machines:
+        from ..links.part import part_graph
+        from ..placement.place import place
+
+        placed = place(graph)
+        for machine in placed.machines:
+            part = part_graph(placed, machine.name)
+            layout = Memory(part.blocks, part.robot).bus.layout
+            if digest(layout, part) == wanted:
+                own = [spec.path for spec in graph.blocks if spec.machine == machine.name]
+                received = [link.source for link in placed.received_by(machine.name)]
+                return layout, machine.name, [*own, *received]
+    raise AloftError(
+        f"{graph.name} cannot be watched: its blocks have changed since the run began; start it again"
+    )
 
 
 def _load(about: dict[str, Any]) -> CheckedGraph:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -23,12 +23,17 @@ class ValueTexts:
     Args:
         graph: whose bus it is.
         layout: of the bus.
+        paths: the blocks whose outputs are known there; by default all.
     """
 
-    def __init__(self, graph: CheckedGraph, layout: Layout) -> None:
+    def __init__(
+        self, graph: CheckedGraph, layout: Layout, paths: Collection[str] | None = None
+    ) -> None:
         self._layout = layout
         self._fields: list[_Field] = []
         for spec in graph.blocks:
+            if paths is not None and spec.path not in paths:
+                continue
             for port, output in spec.block_type.outputs.items():
                 for name, field in output.signal.fields.items():
                     carried = spec.quantities.get(f"{port}.{name}")

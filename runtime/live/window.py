@@ -45,11 +45,13 @@ class Shape:
     Attributes:
         blocks: the paths of all blocks, whose missed deadlines are counted.
         programs: for each phase of the hyperperiod, the block of each call; see ``Program``.
+        orders: for each phase, the places of a tick's stamps in the order of time.
         bus: the size of the bus [bytes].
     """
 
     blocks: Sequence[str]
     programs: Sequence[Sequence[str]]
+    orders: Sequence[Sequence[int]]
     bus: int
 
     @property
@@ -108,6 +110,7 @@ class Window:
         shape = Shape(
             tuple(ticker.overruns_by_block),
             tuple(program.owners for program in programs),
+            tuple(program.stamp_order for program in programs),
             len(self._bus),
         )
         try:
@@ -179,5 +182,6 @@ def digest(layout: Layout, graph: CheckedGraph) -> str:
     from hashlib import blake2b
 
     slots = [(name, slot.section, slot.start, slot.shape) for name, slot in layout.slots.items()]
-    text = repr((graph.name, layout.size, layout.offsets, slots))
+    paths = [spec.path for spec in graph.blocks]  # those of one machine's part are others
+    text = repr((graph.name, paths, layout.size, layout.offsets, slots))
     return blake2b(text.encode(), digest_size=16).hexdigest()

@@ -95,8 +95,9 @@ class WindowReader:
         )
 
     def _stamps(self, copy: bytes, words: NDArray[np.int64], number: int) -> NDArray[np.int64]:
-        """The rows of a program that hold stamps, the oldest first."""
+        """The rows of a program that hold stamps, the oldest first, each in the order of time."""
         ticks, newest = words[self.shape.cursors + 2 * number :][:2].tolist()
         first, last = self.shape.stamps(number)
         rows = np.frombuffer(copy[first:last], np.int64).reshape(STAMPED_TICKS, -1)
+        rows = rows[:, self.shape.orders[number]]
         return np.concatenate([rows[newest:], rows[:newest]]) if ticks else rows[:newest]

@@ -47,6 +47,7 @@ class Executor:
         on_ready: called once all blocks have started, before the first tick; a replay restores a
             keyframe here.
         plain: whether to run all kernels as plain Python, which is slower and gives the same bytes.
+        fuse: whether blocks of kernels that follow each other are one compiled call.
         real_time: what the control thread asks of the operating system while it ticks.
 
     Raises:
@@ -68,6 +69,7 @@ class Executor:
         time_source: TimeSource | None = None,
         on_ready: Callable[[], None] | None = None,
         plain: bool = False,
+        fuse: bool = True,
         real_time: RealTime = NO_WISHES,
     ) -> None:
         real_time.check()
@@ -92,6 +94,7 @@ class Executor:
         self._opened: list[Sink] = []
         self._on_ready = on_ready
         self._plain = plain
+        self._fuse = fuse and not plain
         self._cautions: list[str] = []
 
     def run(self, ticks: int | None = None) -> RunResult:
@@ -205,10 +208,13 @@ class Executor:
             self._opened.append(sink)  # before the call, as a failed open may have opened a file
             sink.open(self.bound)
             self.ticker.records.append(sink.record)
-            if isinstance(sink, TakesTicker):
-                sink.watch_ticker(self.ticker)
             if isinstance(sink, TakesNotes):
                 self.ticker.notes.append(sink.note)
+        if self._fuse:  # once the freeze guard has said where the block that runs is written
+            self.ticker.fuse()
+        for sink in self._sinks:
+            if isinstance(sink, TakesTicker):
+                sink.watch_ticker(self.ticker)
 
     def _close_sinks(self) -> list[str]:
         problems = []

@@ -10,13 +10,18 @@ import subprocess
 import sys
 import threading
 from contextlib import suppress
+from mmap import mmap
 from pathlib import Path
 from types import TracebackType
 from typing import Self
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ..language.stages import CheckedGraph
 from .failures import INSTALLED
 from .memory import BoundGraph
+from .shared_memory import nameless_memory
 
 BEATS = 4
 """Beats in every limit of time."""
@@ -37,7 +42,13 @@ class FreezeGuard:
         limit = graph.clock.hangs_after
         program = Path(__file__).with_name("freeze_process.py")
         command = [sys.executable, "-I", "-S", str(program), str(os.getpid()), str(limit)]
-        self._process = subprocess.Popen([*command, str(int(as_json))], stdin=subprocess.PIPE)
+        shared, self._running = _shared_number()
+        self._process = subprocess.Popen(
+            [*command, str(int(as_json)), str(shared)], stdin=subprocess.PIPE,
+            pass_fds=[shared] if shared >= 0 else [],
+        )  # fmt: skip
+        if shared >= 0:
+            os.close(shared)
         assert self._process.stdin is not None
         self._pipe = self._process.stdin
         self._over = threading.Event()
@@ -59,7 +70,10 @@ class FreezeGuard:
         self._process.wait()
 
     def open(self, bound: BoundGraph) -> None:
-        """Let the process begin to watch: setting blocks up may have taken any time."""
+        """Let the process begin to watch: setting blocks up may have taken any time. From now on it
+        sees which block of a chain runs."""
+        self._running[:] = bound.running
+        bound.running = self._running
         with suppress(OSError):  # it could not start; the run goes on without it
             self._pipe.write(json.dumps(_told(self._graph)).encode() + b"\n")
             self._pipe.flush()
@@ -83,10 +97,21 @@ class FreezeGuard:
                 os.write(self._pipe.fileno(), b".")
 
 
+def _shared_number() -> tuple[int, NDArray[np.int64]]:
+    """An integer in memory that another process can read, (1,), and the file of that memory; where
+    the system has none, memory of this process, and -1."""
+    try:
+        file = nameless_memory(8, "aloft-running")
+        return file, np.frombuffer(mmap(file, 8), np.int64)
+    except OSError:
+        return -1, np.full(1, -1)
+
+
 def _told(graph: CheckedGraph) -> dict[str, object]:
-    """What names a block from a stack: the file and the class of each."""
+    """What names a block: the file and the class of each, for stacks, and their order."""
     blocks = []
     for spec in graph.blocks:
         module = sys.modules.get(spec.block_type.__module__)
         blocks.append((spec.path, getattr(module, "__file__", "") or "", spec.block_type.__name__))
-    return {"graph": graph.name, "blocks": blocks, "installed": list(INSTALLED)}
+    about = {"graph": graph.name, "blocks": blocks, "installed": list(INSTALLED)}
+    return {**about, "order": list(graph.order)}

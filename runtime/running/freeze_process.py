@@ -8,9 +8,11 @@ counts its own looks instead of reading a clock, so that a suspended process doe
 
 It knows nothing of aloft, so it starts fast, and nothing that the graph imports can fail in it::
 
-    python freeze_process.py PID LIMIT_IN_SECONDS AS_JSON
+    python freeze_process.py PID LIMIT_IN_SECONDS AS_JSON FILE_NUMBER
 
 The pipe on its standard input brings first the blocks, as a line of JSON, and then beats and stacks.
+A file in memory has the place in the order of the block that a chain runs: the stack shows only the
+chain.
 """
 
 from __future__ import annotations
@@ -84,7 +86,7 @@ def _say(told: dict[str, object], stacks: str, limit: float, as_json: bool) -> N
     frames = _run_frames(stacks)
     own = [f for f in frames if not _is_installed(f[0], told)]
     file, line, _ = (own or frames or [("", 0, "")])[0]
-    blocks = _blocks(told, frames)
+    blocks = _blocks(told, frames) or _in_chain(told, frames)
     who = "block " + " or ".join(f"'{path}'" for path in blocks) if blocks else "the run"
     reason = (
         f"{who} hangs in compiled code that lets nothing else run: no sign of life for {limit:g} s "
@@ -126,6 +128,16 @@ def _blocks(told: dict[str, object], frames: list[tuple[str, int, str]]) -> list
         if found:
             return found
     return []
+
+
+def _in_chain(told: dict[str, object], frames: list[tuple[str, int, str]]) -> list[str]:
+    """The path of the block that a chain runs, if the innermost frame is a chain's."""
+    order, shared = told["order"], int(sys.argv[4])
+    assert isinstance(order, list)
+    if shared < 0 or not frames or frames[0][2] != "run" or "chain.py" not in frames[0][0]:
+        return []
+    place = int.from_bytes(os.pread(shared, 8, 0), sys.byteorder, signed=True)
+    return order[place : place + 1] if place >= 0 else []
 
 
 def _class_at(file: str, line: int) -> str:

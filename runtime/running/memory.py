@@ -174,6 +174,8 @@ class BoundGraph:
         self.graph = graph
         self.clock = self.clock_type(graph.base_period)
         self.memory = Memory(graph.blocks, graph.robot)
+        self.running: NDArray[np.int64] = np.full(1, -1)
+        """The place in the order of the block that runs in a chain, (1,); see ``chain``."""
         self.blocks: dict[str, Block] = {}
         with collect_calls() as calls:
             for spec in graph.blocks:

@@ -46,6 +46,7 @@ class SteppedRun:
         self._ticker = Ticker(self._bound, ClockSpec(), WallTime(), timing=False)
         if not plain:
             compile_calls(self._bound.kernel_calls)
+            self._ticker.fuse()
         try:
             self._life.start()
         except BaseException:

@@ -2,20 +2,24 @@
 
 A tick calls ``emit`` and ``step`` of the blocks in the computed order, checks once that the whole
 bus is finite, calls every ``update``, and then each recorder. For every phase of the hyperperiod
-these calls are one flat list that is made beforehand. Changed parameters are taken over between two
-ticks.
+these calls are one flat list that is made beforehand, in which ``fuse`` makes one call of blocks of
+kernels that follow each other. Changed parameters are taken over between two ticks.
 """
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Sequence
 from contextlib import suppress
+from itertools import groupby
 from typing import Any, Protocol, runtime_checkable
 
+from ...mathematics.compiling.chain_code import clock_address
 from ..language.block import Block
 from ..language.errors import RunError
 from ..language.schedule import phases
 from ..language.stages import ClockSpec
+from .chain import Chain, can_be_chained
 from .failures import Hang, describe
 from .finite import FiniteCheck, NotFiniteError
 from .memory import BoundGraph
@@ -58,6 +62,7 @@ class Ticker:
         self._policy = clock
         self._now = time_source.now
         self._timing = timing
+        self._fused = False
         self._finite = FiniteCheck(bound.memory.bus) if finite_check else None
         self.programs, self._table = self._make_programs()
         self._previous: Program | None = None
@@ -74,12 +79,30 @@ class Ticker:
             table.append(programs[active])
         return list(programs.values()), table
 
+    def fuse(self) -> bool:
+        """Run consecutive blocks of compiled kernels as one call each, from the next tick on.
+
+        Call it before the first tick, when the kernels are compiled. Returns whether there is
+        anything to fuse. Where times are taken by another clock than the system's, or the system
+        offers no clock to machine code, everything stays as it is.
+        """
+        blocks = self.bound.blocks.values()
+        own_clock = self._now is time.perf_counter_ns and clock_address() != 0
+        self._fused = (own_clock or not self._timing) and any(map(can_be_chained, blocks))
+        if self._fused:
+            self.programs, self._table = self._make_programs()
+        return self._fused
+
     def _make_program(self, active: Sequence[str]) -> Program:
         calls: list[Callable[[], Any]] = []
-        owners: list[str] = []
+        owners: list[str | Chain] = []
         updates: list[tuple[str, Callable[[], Any]]] = []
-        for path in active:
+        for path, chain in self._in_chains(active):
             block: Any = self.bound.blocks[path]
+            if chain is not None:
+                calls.append(chain.run)
+                owners.append(chain)
+                continue
             if type(block).is_moore():
                 calls.append(block.emit)
                 updates.append((path, block.update))
@@ -92,7 +115,22 @@ class Ticker:
         for path, update in updates:
             calls.append(update)
             owners.append(path)
-        return Program(calls, owners)
+        return Program(calls, owners, self._now if self._timing else None)
+
+    def _in_chains(self, active: Sequence[str]) -> list[tuple[str, Chain | None]]:
+        """The blocks, those that follow each other in a chain only once, with their chain."""
+        blocks, numbers = self.bound.blocks, {p: k for k, p in enumerate(self.bound.graph.order)}
+        found: list[tuple[str, Chain | None]] = []
+        pieces = groupby(active, lambda path: self._fused and can_be_chained(blocks[path]))
+        for chained, group in pieces:
+            paths = list(group)
+            if not chained:
+                found += [(path, None) for path in paths]
+                continue
+            members = [blocks[path] for path in paths]
+            chain = Chain(members, [numbers[path] for path in paths], self.bound.running)
+            found.append((paths[0], chain))
+        return found
 
     def advance(self, ticks: int | None = None) -> int:
         """Run up to ``ticks`` ticks, or without a limit until stopped. Returns how many were run.
@@ -117,6 +155,7 @@ class Ticker:
                 if requests:
                     call = parameters.answer
                     parameters.answer(tick)
+                    self._refresh_chains()
                 if wait is not None:
                     call = wait
                     late = wait(tick)
@@ -150,6 +189,11 @@ class Ticker:
             raise self._run_error(call, tick, error) from error
         return tick - first
 
+    def _refresh_chains(self) -> None:
+        for program in self.programs:
+            for chain in program.chains:
+                chain.refresh()
+
     def _record_last(self, tick: int) -> None:
         """Record the tick whose values are wrong, because it is the one to be looked at."""
         for record in self.records:
@@ -158,9 +202,7 @@ class Ticker:
     def _run_error(
         self, call: Callable[..., Any] | None, tick: int, error: BaseException
     ) -> RunError:
-        owner = getattr(call, "__self__", None)
-        if isinstance(owner, RobotDriven):
-            owner = owner.block
+        owner = owner_of(call)
         block = owner.context.path if isinstance(owner, Block) else ""
         if isinstance(owner, Block) or not isinstance(error, NotFiniteError):
             who = f"block '{block}'" if block else f"the runtime ({type(owner).__name__})"
@@ -211,6 +253,14 @@ class Ticker:
                 block=block,
                 tick=tick,
             )
+
+
+def owner_of(call: Callable[..., Any] | None) -> object:
+    """The block that makes a call, or the part of the runtime; of a chain the block that runs."""
+    owner: object = getattr(call, "__self__", None)
+    if isinstance(owner, RobotDriven):
+        return owner.block
+    return owner.current if isinstance(owner, Chain) else owner
 
 
 @runtime_checkable

@@ -2,7 +2,8 @@
 folded into statistics every ``STAMPED_TICKS`` ticks.
 
 The executor takes one stamp before the first call of a tick and one after each call, so the time of
-a call is the difference of two neighbouring stamps. Nothing here allocates an array during a run.
+a call is the difference of two neighbouring stamps. A chain of blocks takes one more after each of
+its blocks but the last. Nothing here allocates an array during a run.
 """
 
 from __future__ import annotations
@@ -14,6 +15,8 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from .chain import Chain
 
 STAMPED_TICKS = 128
 """Ticks that are stamped before they are folded; folding takes tens of microseconds."""
@@ -41,54 +44,88 @@ class Program:
     """The calls of one phase of the hyperperiod, in order, and the times they took.
 
     ``owners`` gives the path of the block that each call belongs to; it is empty for a call of the
-    runtime. A block that is called twice in a tick (``emit`` and ``update``) counts as one run.
+    runtime, and for a ``Chain`` it is the chain. A block that is called twice in a tick (``emit`` and
+    ``update``) counts as one run.
+
+    Args:
+        now: the clock, which chains need where times are taken.
     """
 
-    def __init__(self, calls: Sequence[Callable[[], Any]], owners: Sequence[str]) -> None:
+    def __init__(
+        self,
+        calls: Sequence[Callable[[], Any]],
+        owners: Sequence[str | Chain],
+        now: Callable[[], int] | None = None,
+    ) -> None:
         self.calls = tuple(calls)
-        self.owners = tuple(owners)
-        self.width = len(self.calls) + 1
+        starts, ends, names = _columns(owners)
+        self.owners = tuple(names)
+        self.chains = tuple(owner for owner in owners if isinstance(owner, Chain))
         self.ticks = 0
-        self._stamps = np.zeros((STAMPED_TICKS, self.width), np.int64)
+        own, columns = len(self.calls) + 1, len(names)
+        self._starts, self._ends = np.array(starts, np.intp), np.array(ends, np.intp)
+        self._stamps = np.zeros((STAMPED_TICKS, max([own, *(end + 1 for end in ends)])), np.int64)
+        self._before = np.zeros((STAMPED_TICKS, columns), np.int64)
+        self._after = np.zeros((STAMPED_TICKS, columns), np.int64)
+        self._row = 8 * self._stamps.shape[1]
         self._bytes = self._stamps.data.cast("B")
-        self._pack = Struct(f"{self.width}q").pack_into
+        self._pack = Struct(f"{own}q").pack_into
         self._cursor = 0
-        self._kept: NDArray[np.int64] = np.zeros((KEPT_TICKS, len(self.calls)), np.int64)
-        self._total = np.zeros(len(self.calls), np.int64)
-        self._maximum = np.zeros(len(self.calls), np.int64)
-        self._scratch = np.zeros(len(self.calls), np.int64)
-        first: dict[str, int] = {}
+        self._base = self._stamps.ctypes.data
+        self._place = np.array([self._base], np.int64)
+        self._place_value = self._place.data
+        first = own
+        for chain in self.chains:
+            if now is not None:
+                chain.stamp(self._place, first, now)
+            first += len(chain.owners) - 1
+        self._kept: NDArray[np.int64] = np.zeros((KEPT_TICKS, columns), np.int64)
+        self._total = np.zeros(columns, np.int64)
+        self._maximum = np.zeros(columns, np.int64)
+        self._scratch = np.zeros(columns, np.int64)
+        met: dict[str, int] = {}
         self._again: list[tuple[int, int]] = []
         for column, owner in enumerate(self.owners):
-            if owner and owner in first:
-                self._again.append((first[owner], column))
-            first.setdefault(owner, column)
-        self.columns = {owner: column for owner, column in first.items() if owner}
+            if owner and owner in met:
+                self._again.append((met[owner], column))
+            met.setdefault(owner, column)
+        self.columns = {owner: column for owner, column in met.items() if owner}
 
     def keep(self, stamps: Sequence[int]) -> None:
         """Keep the stamps [ns] of one tick: one before the first call and one after each call."""
         self._pack(self._bytes, self._cursor, *stamps)
-        self._cursor += 8 * self.width
+        self._cursor += self._row
         if self._cursor == len(self._bytes):
             self.fold()
+        self._place_value[0] = self._base + self._cursor
 
     @property
     def last_stamps(self) -> tuple[NDArray[np.int64], int]:
-        """The buffer of stamps, (STAMPED_TICKS, calls + 1), and how many of its rows are newer than
-        the rest. The other rows are those of the ticks before, if as many have run."""
-        return self._stamps, self._cursor // (8 * self.width)
+        """The buffer of stamps, (STAMPED_TICKS, owners + 1), in the order ``stamp_order``, and how
+        many of its rows are newer than the rest. The other rows are those of the ticks before, if
+        as many have run."""
+        return self._stamps, self._cursor // self._row
+
+    @property
+    def stamp_order(self) -> tuple[int, ...]:
+        """The places of a tick's stamps in their row, in the order of time: the one before the
+        first owner, and the one after each."""
+        return (0, *self._ends.tolist())
 
     def fold(self) -> None:
         """Add the kept stamps to the statistics and empty their buffer."""
-        rows = self._cursor // (8 * self.width)
+        rows = self._cursor // self._row
         self._cursor = 0
+        self._place_value[0] = self._base
         if rows == 0 or not self.calls:
             self.ticks += rows
             return
         place = min(self.ticks % KEPT_TICKS, KEPT_TICKS - rows)
         kept = self._kept[place : place + rows]
-        stamps = self._stamps[:rows]
-        np.subtract(stamps[:, 1:], stamps[:, :-1], out=kept)
+        stamps, before, after = self._stamps[:rows], self._before[:rows], self._after[:rows]
+        np.take(stamps, self._starts, axis=1, out=before, mode="clip")
+        np.take(stamps, self._ends, axis=1, out=after, mode="clip")
+        np.subtract(after, before, out=kept)
         for column, again in self._again:
             np.add(kept[:, column], kept[:, again], out=kept[:, column])
         np.sum(kept, axis=0, out=self._scratch)
@@ -99,7 +136,7 @@ class Program:
 
     def running_at(self, instant: int) -> str:
         """The owner of the call that ran at ``instant`` [ns] of the last stamped tick."""
-        ends = self._stamps[self._cursor // (8 * self.width) - 1, 1:].tolist()
+        ends = self._stamps[self._cursor // self._row - 1, self._ends].tolist()
         return next((o for o, end in zip(self.owners, ends, strict=True) if end > instant), "")
 
     def times(self, block: str) -> tuple[int, int, int, NDArray[np.int64]]:
@@ -107,6 +144,25 @@ class Program:
         column = self.columns[block]
         kept = self._kept[: min(self.ticks, KEPT_TICKS), column]
         return self.ticks, int(self._total[column]), int(self._maximum[column]), kept
+
+
+def _columns(owners: Sequence[str | Chain]) -> tuple[list[int], list[int], list[str]]:
+    """For every block's run in a tick the places of the stamps before and after it, and its path.
+
+    The places before ``len(owners) + 1`` are those of the stamps that the executor takes.
+    """
+    starts: list[int] = []
+    ends: list[int] = []
+    names: list[str] = []
+    free = len(owners) + 1
+    for place, owner in enumerate(owners):
+        paths = owner.owners if isinstance(owner, Chain) else (owner,)
+        inner = range(free, free + len(paths) - 1)
+        free += len(inner)
+        starts += [place, *inner]
+        ends += [*inner, place + 1]
+        names += paths
+    return starts, ends, names
 
 
 def block_times(programs: Sequence[Program], block: str, overruns: int = 0) -> BlockTimes:

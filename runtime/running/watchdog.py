@@ -17,15 +17,15 @@ import threading
 import traceback
 from collections.abc import Callable
 from types import FrameType, TracebackType
-from typing import Any, Self
+from typing import Self
 
 from ..language.block import Block
 from ..language.errors import RunError
 from .failures import Hang, place_of_frames
 from .interrupts import Interrupts
 from .life_cycle import STOP_CYCLES, LifeCycle, LifeState
-from .pacing import Paced, RobotDriven
-from .ticker import Ticker, hang_text
+from .pacing import Paced
+from .ticker import Ticker, hang_text, owner_of
 
 LOOKS = 8
 """How often the watchdog looks at the run in every limit of time."""
@@ -131,9 +131,7 @@ class Watchdog:
             path = str(frame.f_locals["path"])
             waits = path not in blocks or blocks[path].waits_for_others
             return None if waits else (-self._life.calls, path)
-        owner: Any = getattr(frame.f_locals["call"], "__self__", None)
-        if isinstance(owner, RobotDriven):
-            owner = owner.block
+        owner = owner_of(frame.f_locals["call"])
         tick = self._ticker.bound.clock.tick
         if isinstance(owner, Block):
             return None if owner.waits_for_others else (tick, owner.context.path)

@@ -58,18 +58,23 @@ def overrides_for(graph: Graph, overrides: Sequence[str], seed: int) -> list[str
 
 
 def run_seeds(
-    path: Path, overrides: Sequence[str], seeds: Sequence[int], *, plain: bool = False
+    path: Path,
+    overrides: Sequence[str],
+    seeds: Sequence[int],
+    *,
+    plain: bool = False,
+    fuse: bool = True,
 ) -> Generator[SeedRow, None, None]:
     """Run the graph once with each seed. A run does not depend on the others beside it.
 
-    With ``plain`` the kernels run as plain Python.
+    With ``plain`` the kernels run as plain Python; without ``fuse`` one by one.
 
     Raises:
         LoadError: the graph may not run.
         AloftError: the graph has no parameter called ``seed``.
     """
     graph = load(path, overrides)
-    jobs = [(path, overrides_for(graph, overrides, seed), seed, plain) for seed in seeds]
+    jobs = [(path, overrides_for(graph, overrides, seed), seed, plain, fuse) for seed in seeds]
     rows: dict[int, SeedRow] = {}
     done = 0
     # When this generator is closed, the robots of runs under way come to rest first.
@@ -82,8 +87,8 @@ def run_seeds(
                 done += 1
 
 
-def _run_one(job: tuple[Path, Sequence[str], int, bool]) -> SeedRow:
-    path, overrides, seed, plain = job
-    result = load(path, overrides).run(log=False, plain=plain)
+def _run_one(job: tuple[Path, Sequence[str], int, bool, bool]) -> SeedRow:
+    path, overrides, seed, plain, fuse = job
+    result = load(path, overrides).run(log=False, plain=plain, fuse=fuse)
     data = result.to_json()
     return SeedRow(seed, result.success, result.reason, data["metrics"], result.run_hash)

@@ -72,7 +72,7 @@ def test_the_ends_and_why(stand_in: StandIn, tmp_path: Path) -> None:
     found = told(tmp_path, UP)
     assert (found["planned"], found["refused"]) == (26.0, "motor speed")
     assert (found["theory"], found["theory_ended"]) == (31.0, True)
-    assert found["fails_landed"] == [3, 4]
+    assert found["fails_landed"] == [1, 2], "a first look stops at the first run that fails"
     assert [each["value"] for each in found["rungs"]] == [22.0, 23.0, 24.0, 25.0]
     assert (back.value, back.ratio) == (0.0, None)
     assert back.note.endswith("2.5 fails: no plan: motor speed")
@@ -107,11 +107,22 @@ def test_what_is_kept_is_not_done_again(stand_in: StandIn, tmp_path: Path) -> No
 def test_a_search_ends_when_its_time_is_spent(
     stand_in: StandIn, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("aloft.benchmarks.frontier_search.MOST_CPU", 2.0)
+    monkeypatch.setattr("aloft.benchmarks.frontier_search.FIRST_LOOK_CPU", 2.0)
     frontier([9000], tmp_path, [UP])
     found = told(tmp_path, UP)
     assert (found["planned"], found["planned_ended"]) == (23.0, False)
     assert (found["theory"], found["theory_ended"]) == (25.0, False)
+
+
+def test_more_seeds_search_longer(
+    stand_in: StandIn, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("aloft.benchmarks.frontier_search.FIRST_LOOK_CPU", 2.0)
+    frontier(range(9000, 9004), tmp_path, [UP])
+    assert told(tmp_path, UP)["planned_ended"] is False
+    frontier(range(9000, 9020), tmp_path, [UP])
+    found = told(tmp_path, UP)
+    assert (found["planned"], found["planned_ended"]) == (26.0, True)
 
 
 def test_what_breaks_is_a_failure_with_its_error(

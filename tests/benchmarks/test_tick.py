@@ -9,6 +9,7 @@ import pytest
 from aloft.benchmarks.tick import (
     BARE,
     COMPILED,
+    FUSED,
     HAND,
     OSQP,
     PLAIN,
@@ -34,7 +35,7 @@ def jump() -> RecordedJump:
 
 def test_rows_are_complete_and_say_what_is_missing() -> None:
     rows = {row.name: row for row in tick(rounds=1, ticks=60, process=False)}
-    for name in (PLAIN, COMPILED, HAND, BARE, OSQP, WHOLE_BODY, "block wbc", "block legs"):
+    for name in (PLAIN, COMPILED, FUSED, HAND, BARE, OSQP, WHOLE_BODY, "block wbc", "block legs"):
         assert name in rows
         assert rows[name].value or "not installed" in rows[name].note
     assert not {f"block {path}" for path in OUTSIDE} & set(rows)

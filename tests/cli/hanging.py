@@ -1,9 +1,14 @@
-"""A block that hangs in tick 3: in Python, or in compiled code that keeps the interpreter."""
+"""Blocks that hang in tick 3: in Python, in compiled code that keeps the interpreter, in a kernel."""
 
 import ctypes
 
+import numpy as np
+
 from aloft.blocks.general.vector import Vector
+from aloft.mathematics.compiling.kernel_call import KernelCall
+from aloft.mathematics.kernel import kernel
 from aloft.runtime.language.block import Block, Output
+from aloft.runtime.language.kernel_block import KernelBlock
 from aloft.runtime.language.parameters import Parameters, parameter
 
 
@@ -25,3 +30,25 @@ class Hanging(Block):
                 pass
         while True:
             pass
+
+
+@kernel
+def turn(count, at, y):
+    count[0] += 1
+    rounds = 10**13 if count[0] == at else 1
+    for _ in range(rounds):  # no compiler may leave out what rounds differently every time
+        y[0] = 0.75 * y[0] + 1.0
+
+
+class Turning(KernelBlock):
+    """Turns for hours in step ``at``."""
+
+    y = Output(Vector, text="a number")
+
+    class Params(Parameters):
+        n: int = parameter(1, text="the number of elements")
+        at: int = parameter(-1, text="the step that hangs")
+
+    def setup(self) -> None:
+        count = np.zeros(1, np.int64)
+        self.kernel_calls = (KernelCall(turn, count, self.params.at, self.y.value),)

@@ -45,3 +45,19 @@ def test_boxes_can_be_closed(folder: Path, call: Call) -> None:
 def test_a_file_that_cannot_be_written_is_an_error(folder: Path, call: Call) -> None:
     done = call("graph", "graph.yaml", "--svg", "no/such/a.svg", code=2)
     assert "cannot write the diagram" in done.stderr
+
+
+def test_machines_are_drawn(folder: Path, call: Call) -> None:
+    """In the table, in both kinds of diagram, and with the links between them."""
+    machines = (
+        "machines: {here: tcp/127.0.0.1:7450, there: tcp/127.0.0.1:7451}\nplace: {inner: there}\n"
+    )
+    (folder / "graph.yaml").write_text(GRAPH + machines)
+    shown = call("graph", "graph.yaml").stdout
+    assert "tcp/127.0.0.1:7451" in shown and "here -> there" in shown
+    mermaid = call("graph", "graph.yaml", "--mermaid").stdout
+    assert "classDef on_here " in mermaid and "classDef on_there " in mermaid
+    assert " on_here\n" in mermaid and mermaid.rstrip().endswith("on_there")
+    call("graph", "graph.yaml", "--svg", "graph.svg")
+    drawn = (folder / "graph.svg").read_text()
+    assert "there" in drawn and "here" in drawn.replace("there", "")

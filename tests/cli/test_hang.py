@@ -1,6 +1,7 @@
 """``aloft run`` of a graph with a block that hangs: the end is bounded, named and recorded."""
 
 import json
+import re
 import shutil
 import signal
 from collections.abc import Callable
@@ -69,6 +70,24 @@ def test_code_that_keeps_the_interpreter(
     assert result["exit_code"] == 128 + signal.SIGKILL
     assert (result["success"], result["error"]["block"]) == (False, "arm")
     assert result["error"]["where"] == f"{Path.cwd()}/hanging.py:{line_of('PyDLL(None)')}"
+
+
+@pytest.mark.parametrize("options", [[], ["--no-fuse"]])
+def test_a_kernel_that_does_not_end(
+    graph: Callable[[bool], str], start: Start, options: list[str]
+) -> None:
+    graph(False)
+    use = '{use: "hanging:Turning"'
+    blocks = f"  leg: {use}}}\n  arm: {use}, with: {{at: 4}}}}\n  hand: {use}}}\n"
+    text = GRAPH[: GRAPH.index("  arm")] + blocks
+    Path("turn.yaml").write_text(text)
+    output, _ = start("run", "turn.yaml", "--json", *options).communicate(timeout=240)
+    result = json.loads(output.splitlines()[-1])
+    assert result["exit_code"] == 128 + signal.SIGKILL
+    found = re.match(r"block (.*) hangs in compiled code", result["reason"])
+    assert found is not None, result["reason"]
+    # one by one the stack shows the class alone, which three blocks have
+    assert found[1] == ("'arm'" if not options else "'leg' or 'arm' or 'hand'")
 
 
 def test_a_run_that_is_slow_to_close_is_not_killed(

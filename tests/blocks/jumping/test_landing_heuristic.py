@@ -9,11 +9,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from aloft.blocks.control.dynamics import Dynamics
 from aloft.blocks.jumping.landing_heuristic import LandingHeuristic
 from aloft.blocks.signals import Phase
-from aloft.mathematics.constants import GRAVITY
-from aloft.mathematics.landing_law import landing_place, retraction, swing
+from aloft.mathematics.landing_law import (
+    hasten,
+    landing_place,
+    retraction,
+    swing,
+)
 from aloft.mathematics.rotations import exponential, multiply, rotate, to_matrix
 from aloft.robots.description import find_robot
 from aloft.robots.standing_feet import foot_sides, standing_feet
@@ -306,87 +309,23 @@ def test_swing_blends_the_offset_out_and_the_correction_in():
         assert speed[0] == pytest.approx(1.0 + 2.0 * 0.08)
 
 
+def test_hastened_feet_are_ahead_of_their_planned_way():
+    """The lead itself grows from 0 to 20 ms."""
+    swings, step = np.array([1.0, 0.3, 0.3]), 1e-6
+
+    def at(time):
+        out, speed = time * swings, swings.copy()
+        hasten(swings, 0.02 * time / 0.1, 0.02 / 0.1, out, speed)
+        return out, speed
+
+    place, speed = at(0.1)
+    assert place == pytest.approx([0.12 * 1.0, 0.12 * 0.3, 0.1 * 0.3], abs=1e-12)
+    assert speed == pytest.approx((at(0.1 + step)[0] - place) / step, abs=1e-8)
+
+
 def test_on_the_ground_the_target_is_the_plan():
     bench = make(**GAINS)
     bench.set("phase", phase=Phase.SQUAT)
     bench.set("terms", linear_momentum=[1.0, 1.0, 0.0])
     bench.step()
     assert bench.get("feet").position == pytest.approx(FEET - [0.0, 0.0, 0.37], abs=1e-12)
-
-
-# The law that predicts.
-
-
-def predicting(**params):
-    """In flight on the plan, 0.3 s before touchdown, with the true dynamics of the standing robot."""
-    standing = BlockBench(Dynamics, robot=ROBOT)
-    standing.set("base", position=[0.0, 0.0, 0.37], orientation=LEVEL)
-    standing.set("joints", position=ROBOT.standing_position)
-    standing.step()
-    terms = standing.get("terms")
-    bench = BlockBench(LandingHeuristic, {"law": "predicted", **params}, robot=ROBOT)
-    bench.set("terms", **{name: getattr(terms, name) for name in type(terms).fields})
-    bench.set(
-        "reference",
-        phase=Phase.FLIGHT,
-        com=terms.com,
-        orientation=LEVEL,
-        foot_position=terms.foot_position,
-    )
-    bench.set("phase", phase=Phase.FLIGHT, time_in_phase=0.0, time_to_touchdown=0.3)
-    return bench, terms.foot_position - terms.com
-
-
-def pushed(bench, linear, angular, tilt=(0.0, 0.0, 0.0)):
-    """The landing places after an impulse; the momenta are as measured."""
-    turn = np.zeros((3, 3))
-    to_matrix(rotation_vector(tilt), turn)
-    bench.set("terms", linear_momentum=linear, angular_momentum=angular, base_rotation=turn)
-    return fly(bench, 0.0, 0.2).landing
-
-
-def test_predicted_without_a_push_lands_where_planned():
-    bench, planned = predicting()
-    assert pushed(bench, np.zeros(3), np.zeros(3)) == pytest.approx(planned, abs=1e-4)
-
-
-def test_predicted_without_a_price_on_tilt_is_the_capture_point():
-    bench, planned = predicting(tilt_cost=[0.0, 0.0], clearance=0.0)
-    moved = pushed(bench, [0.5, -0.3, 0.0], [0.03, 0.05, 0.0]) - planned
-    rate = math.sqrt(GRAVITY / -float(standing_feet(ROBOT)[:, 2].mean()))
-    linear, angular = 1.0 / (MASS * rate), rate / (MASS * GRAVITY)
-    expected = [linear * 0.5 + angular * 0.05, -linear * 0.3 - angular * 0.03, 0.0]
-    assert moved == pytest.approx(np.tile(expected, (2, 1)), abs=1e-12)
-
-
-def test_predicted_tucks_the_legs_where_the_torso_falls_back_and_stretches_them_where_forward():
-    params = {
-        "tilt_cost": [0.0, 0.3],
-        "free_tilt": [0.0, 0.0, 0.0],
-        "height_range": [-0.05, 0.2],
-        "stop_acceleration": 100.0,
-    }
-    for way in (1.0, -1.0):
-        bench, planned = predicting(**params)
-        moved = pushed(bench, [0.4 * way, 0.0, 0.0], [0.0, 0.05 * way, 0.0]) - planned
-        assert (moved[:, 2] * way < -1e-3).all()
-    height = -float(standing_feet(ROBOT)[:, 2].mean())
-    bench, planned = predicting(**params)
-    moved = pushed(bench, [-3.0, 0.0, 0.0], [0.0, -0.5, 0.0]) - planned
-    stroke = (GRAVITY * 0.2) ** 2 / (2.0 * 100.0 * GRAVITY)  # from rest 0.2 s before touchdown
-    assert moved[:, 2] == pytest.approx([0.2 * height - stroke] * 2, abs=1e-6)
-
-
-def test_predicted_is_mirror_symmetric():
-    bench, planned = predicting()
-    left = pushed(bench, [0.1, 0.4, 0.0], [-0.05, 0.02, 0.0], (-0.1, 0.05, 0.0)) - planned
-    bench, _ = predicting()
-    right = pushed(bench, [0.1, -0.4, 0.0], [0.05, 0.02, 0.0], (0.1, 0.05, 0.0)) - planned
-    assert left == pytest.approx(right[::-1] * [1.0, -1.0, 1.0], abs=1e-6)
-
-
-def test_predicted_chooses_no_more_just_before_touchdown():
-    bench, _planned = predicting()
-    before = pushed(bench, [0.4, 0.0, 0.0], [0.0, 0.05, 0.0])
-    bench.set("terms", linear_momentum=[-0.4, 0.0, 0.0])
-    assert fly(bench, 0.28, 0.01).landing == pytest.approx(before, abs=1e-12)

@@ -26,7 +26,7 @@ def bulk() -> BulkExchange:
 def joints_of(current: float) -> NDArray[np.float64]:
     """The joints' torques with this current in all motors."""
     motors = np.full(10, CONSTANT * current)
-    return ROBOT.joint_to_motor.T @ motors
+    return np.asarray(ROBOT.joint_to_motor.T @ motors, dtype=np.float64)
 
 
 def test_torques_are_means_over_the_exchanges_of_a_tick(bulk: BulkExchange) -> None:

@@ -4,6 +4,8 @@ import base64
 import json
 import os
 import subprocess
+import time
+from contextlib import suppress
 from pathlib import Path
 from shutil import which
 from typing import Any, Self
@@ -15,6 +17,8 @@ FLAGS = (
     "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist",
     "--host-resolver-rules=MAP * ~NOTFOUND, EXCLUDE 127.0.0.1", "--remote-debugging-pipe",
 )  # fmt: skip
+LOADING = 60.0
+"""Seconds that the document of a page may take."""
 
 
 class Browser:
@@ -61,8 +65,16 @@ class Browser:
                 return answer["result"]
 
     def open(self, page: str) -> None:
-        """Go to a page."""
+        """Go to a page, and wait until its document is there."""
         self.ask("Page.navigate", url=page)
+        end = time.monotonic() + LOADING
+        while time.monotonic() < end:
+            with suppress(RuntimeError):  # between two pages there is none to ask
+                answer = self.ask("Runtime.evaluate", expression="document.readyState")
+                if answer["result"]["value"] == "complete":
+                    return
+            time.sleep(0.2)
+        raise RuntimeError(f"{page} is not there after {LOADING:g} s")
 
     def picture(self) -> bytes:
         """What the page looks like now, as PNG."""

@@ -7,28 +7,19 @@ from pathlib import Path
 from typing import Any
 from urllib.request import urlopen
 
-import numpy as np
 import pytest
-from PIL import Image
 
 from aloft import load
 from aloft.logs.file.reader import read
 from aloft.logs.recording.comparison import write_comparison
 from aloft.logs.recording.recorder import Recorder
-from aloft.logs.recording.whole_view import write_view
 from aloft.logs.viewing.page_server import OUTSIDE, policy
 from aloft.logs.viewing.viewer import ViewerError, find_program, free_ports, start_viewer
 
 from .browser import PROGRAM, Browser
+from .pixels import PATIENCE, needs_vulkan, wait_until_shown
 
 ROOT = Path(__file__).parents[3]
-DRIVERS = [*Path("/usr/share/vulkan/icd.d").glob("lvp*"), *Path("/etc/vulkan/icd.d").glob("lvp*")]
-PATIENCE = 180.0
-"""Seconds that anything may take on a machine with much else to do."""
-
-needs_vulkan = pytest.mark.skipif(
-    not DRIVERS, reason="draws with software Vulkan; install Debian's mesa-vulkan-drivers"
-)
 needs_browser = pytest.mark.skipif(
     PROGRAM is None, reason="looks through a real browser; install Debian's chromium"
 )
@@ -70,73 +61,9 @@ def test_the_viewer_finds_no_fault(recording: Path, tmp_path: Path) -> None:
         viewer.stop()
 
 
-def photograph(client: Any, instant: float, path: Path) -> Any:
-    """The pixels of the viewer at an instant [s], (rows, columns, 3)."""
-    client.set_time("t", duration=instant, play_state="paused")
-    time.sleep(3.0)
-    path.unlink(missing_ok=True)
-    client.save_screenshot(str(path))
-    return np.asarray(Image.open(path).convert("RGB")).astype(int)
-
-
-@pytest.mark.long
-@needs_vulkan
-@pytest.mark.parametrize("whole", [False, True], ids=["the file itself", "aloft view"])
-def test_the_ground_is_drawn_and_forces_are_zero_in_flight(tmp_path: Path, whole: bool) -> None:
-    """What a picture of a jump onto a step must show, counted in pixels of the colours drawn."""
-    from rerun.experimental import ViewerClient
-
-    recording, picture = tmp_path / "up.rrd", tmp_path / "up.png"
-    graph = load(ROOT / "graphs" / "up_5cm.yaml")
-    graph.run(sinks=[Recorder(recording)], log=False)
-    run = read(recording)
-    # 3.6 kB of numbers, and some pictures; this graph is not the jump but very like it
-    assert recording.stat().st_size < 4200 * len(run.ticks)
-    force = run["robot.truth.contact_force"]
-    flight = np.flatnonzero(~(force != 0.0).any(axis=(1, 2)) & (run.time > 0.5))
-    drawn = write_view(tmp_path / "view.rrd", run)
-    viewer = start_viewer("headless", [drawn if whole else recording], size="1600x900")
-    try:
-        client = ViewerClient.connect(viewer.source)
-        check_views(client, len(run.ticks))
-        standing = photograph(client, 0.2, picture)
-        pixels = photograph(client, float(run.time[flight].mean()), picture)
-    finally:
-        viewer.stop()
-    scene, plots = pixels[60:530, :635], pixels[:, 645:]
-    cones = near(standing[60:530, :635], (255, 183, 77), 30).sum()
-    assert not whole or cones > 40, "friction cones under the feet, where all is drawn"
-    assert near(scene, (141, 146, 153), 45).sum() > 2000, "the step is there"
-    assert near(scene, (229, 57, 53), 40).sum() == 0, "no force arrow in flight"
-    view = plots[365:590, 475:]  # the plot of the forces on the feet
-    lines = near(view, (38, 198, 218), 40) | near(view, (255, 167, 38), 40)
-    lines = lines[:, 25:]  # without the numbers of the axis
-    rows = np.array([np.flatnonzero(column)[-1] if column.any() else -1 for column in lines.T])
-    ends = run.time[flight[[0, -1]]] / run.time[-1] * len(rows)
-    within = rows[int(ends[0]) + 6 : int(ends[1]) - 6]
-    within = within[within >= 0]
-    assert len(within) > 20 and np.ptp(within) <= 2, "the curve is flat in flight"
-    assert within.max() >= rows.max() - 1, "and lies on zero, below everything else"
-
-
-def near(pixels: Any, color: tuple[int, int, int], most: int) -> Any:
-    """Which pixels differ from a colour by no more than ``most`` in each part."""
-    return (np.abs(pixels - np.array(color)) <= most).all(axis=-1)
-
-
 def check_views(client: Any, ticks: int) -> None:
     """Wait until a recording of so many ticks is shown; no view may have anything to report."""
-    last = round((ticks - 1) / 500 * 1e9)
-    end = time.monotonic() + PATIENCE
-    while time.monotonic() < end:
-        state = client.get_state()
-        shown = [r for r in state.recordings if r.store_id == state.active_recording]
-        ends = [line.end for r in shown for line in r.timelines if line.name == "t"]
-        if state.views and not state.loading and ends and (ends[0] or 0) >= 0.9 * last:
-            break
-        time.sleep(0.2)
-    else:
-        pytest.fail(f"not shown within {PATIENCE:g} s: {state}")
+    state = wait_until_shown(client, (ticks - 1) / 500)
     names = {str(view.name) for view in state.views}
     assert {"Robot", "States", "Events", "Block times"} <= names
     assert any(name.startswith("base [m], world · ") for name in names)

@@ -30,6 +30,10 @@ class Unfinished(Base):
 class NoPort(aloft.Block):
     def step(self): ...
 
+class Calls(KernelBlock):
+    """Its step is the framework's."""
+    y = Output(Number)
+
 class Unrelated:
     y: "Output" = Output(Number)
     def step(self): ...
@@ -60,7 +64,7 @@ def test_blocks_of_packages(tmp_path: Path) -> None:
         (tmp_path / package / "inner").mkdir(parents=True)
         (tmp_path / package / "inner" / f"{name}.py").write_text(text)
     found = blocks_in_packages(tmp_path, ("one", "two"))
-    assert list(found) == ["one.Late", "one.Whole", "two.Other"]
+    assert list(found) == ["one.Calls", "one.Late", "one.Whole", "two.Other"]
     assert found["two.Other"] == tmp_path / "two" / "inner" / "b.py"
 
 

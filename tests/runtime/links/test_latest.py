@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from aloft.runtime.language.stages import LinkPolicy
+from aloft.runtime.links.clock_offset import ClockOffset
 from aloft.runtime.links.latest import LatestInbox, LinkHealth
 from aloft.runtime.links.message import MessageReader, MessageWriter
 from aloft.runtime.placement.place import place
@@ -22,14 +23,14 @@ class Peers:
 
     def __init__(self) -> None:
         self.run = b"12345678"
-        self.offset = 0
+        self.clock = ClockOffset()
         self.checked: list[str] = []
 
     def run_of(self, name: str) -> bytes:
         return self.run
 
-    def offset_of(self, name: str) -> int:
-        return self.offset
+    def clock_of(self, name: str) -> ClockOffset:
+        return self.clock
 
     def note_checked(self, link: str) -> None:
         self.checked.append(link)
@@ -49,15 +50,16 @@ class Bench:
         bus = self.here.bus
         self.writer = MessageWriter(self.link, bus.layout, bus.buffer.data, self.peers.run)
         reader = MessageReader(self.link, bus.layout, self.there.bus.buffer.data)
+        others: Any = self.peers
         self.inbox = LatestInbox(
-            self.link, reader, self.peers, policy, self.health, self.stops.append, lambda: self.now
-        )  # type: ignore[arg-type]
+            self.link, reader, others, policy, self.health, self.stops.append, lambda: self.now
+        )
         self.tick = 0
 
     def message(self, value: float) -> bytes:
         self.here.bus.field("last.y.value")[...] = value
         self.tick += 1
-        return self.writer.write(self.tick, self.now + self.peers.offset)
+        return self.writer.write(self.tick, self.now + self.peers.clock.offset)
 
     def read(self, after: float = 0.0) -> float:
         self.now += int(after * MS)
@@ -84,14 +86,41 @@ def test_the_latest_message_counts() -> None:
 
 def test_the_age_is_by_the_clock_of_the_sender() -> None:
     bench = Bench(LinkPolicy(0.01, "hold"))
-    bench.peers.offset = -77_000 * MS
+    bench.peers.clock.offset = -77_000 * MS
+    bench.peers.clock.uncertainty = 3 * MS
     bench.inbox.hear(bench.message(1.0))
     bench.read(2.5)
     assert float(bench.health.age) == pytest.approx(2.5e-3)
     assert not bench.health.late
+    assert float(bench.health.clock_offset) == -77.0, "it is recorded with its uncertainty"
+    assert float(bench.health.clock_uncertainty) == 3e-3
     bench.read(8.0)
     assert float(bench.health.age) == pytest.approx(10.5e-3)
     assert bench.health.late
+
+
+@pytest.mark.parametrize("ahead", [0, 5_000 * MS])
+def test_the_jitter_is_that_of_rfc_3550_whatever_the_clocks_say(ahead: int) -> None:
+    bench = Bench(LinkPolicy(None, "hold"))
+    bench.peers.clock.offset = ahead
+    expected, last = 0.0, 0
+    for number, late in enumerate((2 * MS, 5 * MS, 1 * MS, 1 * MS, 9 * MS)):
+        data = bench.message(1.0)
+        bench.now += late
+        bench.inbox.hear(data)
+        if number:
+            expected += (abs(late - last) - expected) / 16.0
+        last = late
+    bench.read()
+    assert expected > 0.5 * MS
+    assert float(bench.health.jitter) == pytest.approx(expected * 1e-9)
+    assert bench.inbox.about()["jitter_ms"] == pytest.approx(expected * 1e-6)
+    bench.peers.run = b"another!"  # started again: its first message says nothing
+    bus = bench.here.bus
+    bench.writer = MessageWriter(bench.link, bus.layout, bus.buffer.data, bench.peers.run)
+    bench.now += 3_000 * MS
+    bench.inbox.hear(bench.message(1.0))
+    assert bench.inbox.received == 6 and bench.inbox.jitter == pytest.approx(expected)
 
 
 def test_hold_keeps_the_last_value() -> None:

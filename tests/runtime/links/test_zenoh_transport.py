@@ -5,8 +5,11 @@ import socket
 import threading
 import time
 from collections.abc import Callable, Iterator
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
+import zenoh
 
 from aloft.runtime.language.errors import AloftError
 from aloft.runtime.language.stages import MachineSpec
@@ -101,6 +104,32 @@ def test_the_configuration_searches_for_nobody() -> None:
     assert get("connect/endpoints") == ["tcp/127.0.0.1:7451"]
     assert get("transport/link/tx/lease") == LEASE
     assert get("transport/shared_memory/enabled") is False
+
+
+def test_congestion_express_and_priority_of_each_link_are_said(
+    machines: tuple[MachineSpec, ...],
+) -> None:
+    """Lockstep waits and sends at once, free links drop, and what is shown never delays a link."""
+
+    class Session:
+        def declare_publisher(self, key: str, **settings: Any) -> Any:
+            self.settings = settings
+            return SimpleNamespace(put=lambda data: None)
+
+    block, drop = zenoh.CongestionControl.BLOCK, zenoh.CongestionControl.DROP
+    for wait in (True, False):
+        transport = ZenohTransport("test", machines, wait=wait)
+        transport._session = session = Session()
+        transport.publisher("data/a/b/x")
+        assert session.settings == {
+            "congestion_control": block if wait else drop, "express": wait,
+            "priority": zenoh.Priority.REAL_TIME, "reliability": zenoh.Reliability.RELIABLE,
+        }  # fmt: skip
+        transport.shower("watch/a")
+        assert session.settings == {
+            "congestion_control": drop, "express": False,
+            "priority": zenoh.Priority.BACKGROUND, "reliability": zenoh.Reliability.BEST_EFFORT,
+        }  # fmt: skip
 
 
 def test_no_thread_of_ours_is_left(pair: Pair) -> None:

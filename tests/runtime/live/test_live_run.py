@@ -6,14 +6,30 @@ import time
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from aloft.runtime.language.errors import AloftError
+from aloft.runtime.links.part import part_graph
 from aloft.runtime.live import live_run
 from aloft.runtime.live.live_run import LiveRun
 from aloft.runtime.live.parameter_endpoint import EndpointError, ask_to_watch
+from aloft.runtime.live.texts import ValueTexts
+from aloft.runtime.live.window import digest
+from aloft.runtime.loading import load_text
+from aloft.runtime.placement.place import place
+from aloft.runtime.running.memory import Memory
 
 from .conftest import Running, start
+
+MACHINES = """\
+rate: 100 Hz
+machines: {onboard: tcp/127.0.0.1:7450, ground: tcp/127.0.0.1:7451}
+blocks:
+  wave: {use: blocks.SineWave}
+  twice: {use: blocks.Gain, in: {u: wave.y}, on: ground}
+  last: {use: blocks.Gain, in: {u: twice.y}}
+"""
 
 
 def wait_for(run: LiveRun, state: str, tick: int = 0) -> dict[str, Any]:
@@ -112,6 +128,22 @@ def test_blocks_that_have_changed_since(running: Running, monkeypatch: pytest.Mo
     monkeypatch.undo()
     assert given[0] in closed, "nothing is left open"
     os.close(given[0])
+
+
+def test_of_a_part_only_what_it_knows_is_shown() -> None:
+    graph = load_text(MACHINES, "spread.yaml")
+    placed = place(graph)
+    known = {"onboard": ["last", "twice", "wave"], "ground": ["twice", "wave"]}
+    for machine, expected in known.items():
+        part = part_graph(placed, machine)
+        layout = Memory(part.blocks, part.robot).bus.layout
+        found, where, paths = live_run._bus_of(graph, digest(layout, part))
+        assert (where, sorted(paths)) == (machine, expected)
+        texts = ValueTexts(graph, found, paths)
+        bus = np.zeros(found.size, np.uint8)
+        assert texts.brief(bus).keys() == {f"{path}.y" for path in paths}
+    layout = Memory(graph.blocks, graph.robot).bus.layout
+    assert live_run._bus_of(graph, digest(layout, graph))[1] == ""
 
 
 def test_parameters_are_changed_through_the_same_door(running: Running, live: LiveRun) -> None:

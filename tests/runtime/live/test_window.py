@@ -64,7 +64,7 @@ def test_before_a_round_of_stamps_is_full_only_those_there_are_read(graph_file: 
 
 
 def test_a_writer_that_stopped_within_a_tick_is_noticed() -> None:
-    shape = Shape(("a",), (), 64)
+    shape = Shape(("a",), (), (), 64)
     descriptor = nameless_memory(shape.size, "half")
     os.pwrite(descriptor, (7).to_bytes(8, "little"), 8 * SEQUENCE)
     reader = WindowReader(descriptor, shape)

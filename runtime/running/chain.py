@@ -1,0 +1,144 @@
+"""The steps of several blocks as one compiled call: the fused tier.
+
+A chain makes the very calls that the blocks would make one by one: the same machine code with the
+same memory in the same order. So the bytes are the same by construction. Between two blocks it takes
+a time stamp, so that every block's time is known as before, and it notes which block runs, so
+that a failure, and a block that hangs, are named as before.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...mathematics.compiling.chain_code import (
+    ATTENTION,
+    CLOCK,
+    CURSOR,
+    ENTRIES,
+    ERROR_CHECK,
+    HEAD,
+    NEXT,
+    OWNER,
+    RUNNING,
+    STAMP,
+    WIDTH,
+    chain_function,
+    clock_address,
+    error_check_address,
+)  # fmt: skip
+from ...mathematics.compiling.kernel_call import KernelCall
+from ..language.block import Block
+from ..language.errors import RunError
+from ..language.kernel_block import KernelBlock
+
+
+def can_be_chained(block: Block) -> bool:
+    """Whether a block's step is nothing but compiled kernels."""
+    if not isinstance(block, KernelBlock) or not block.kernel_calls:
+        return False
+    return all(call.compiled is not None for call in block.kernel_calls)
+
+
+class Chain:
+    """Some blocks that follow each other in every tick in which any of them runs.
+
+    Args:
+        blocks: the blocks, for each of which ``can_be_chained`` holds.
+        numbers: the number of each, which is written to ``running`` while it runs.
+        running: (1,), of the graph.
+    """
+
+    def __init__(
+        self, blocks: Sequence[Block], numbers: Sequence[int], running: NDArray[np.int64]
+    ) -> None:
+        self.blocks = tuple(block for block in blocks if isinstance(block, KernelBlock))
+        self.owners = tuple(block.context.path for block in self.blocks)
+        self._numbers = tuple(numbers)
+        self._running = running
+        self._function = chain_function()
+        self._now: Callable[[], int] | None = None
+        self._cursor: NDArray[np.int64] = np.zeros(1, np.int64)
+        self._first_stamp = 0
+        self._attending: KernelBlock | None = None
+        self._failed: KernelBlock | None = None
+        self.refresh()
+
+    def refresh(self) -> None:
+        """Take over the blocks' calls, which new parameters may have changed.
+
+        Raises:
+            RunError: a block has a call that is not compiled.
+        """
+        entries: list[tuple[int, KernelCall]] = []
+        for place, block in enumerate(self.blocks):
+            if not can_be_chained(block):
+                path = block.context.path
+                raise RunError(f"block '{path}' has a kernel that did not compile", block=path)
+            entries += [(place, call) for call in block.kernel_calls]
+        self._calls = [call.compiled for _, call in entries]
+        """Keeps machine code and arguments alive."""
+        self._places = [place for place, _ in entries]
+        table = np.zeros(HEAD + WIDTH * len(entries), np.int64)
+        rows = table[HEAD:].reshape(-1, WIDTH)
+        for row, (place, call) in zip(rows, entries, strict=True):
+            row[:2] = call.addresses
+            row[OWNER], row[STAMP] = self._numbers[place], -1
+        for place, block in enumerate(self.blocks):
+            last = rows[len(self._places) - 1 - self._places[::-1].index(place)]
+            if block.attention is not None:
+                last[ATTENTION] = block.attention.ctypes.data
+            if self._now is not None and place < len(self.blocks) - 1:
+                last[STAMP] = 8 * (self._first_stamp + place)
+        table[ERROR_CHECK] = error_check_address()
+        table[CLOCK] = clock_address()
+        table[ENTRIES] = len(entries)
+        table[RUNNING] = self._running.ctypes.data
+        table[CURSOR] = self._cursor.ctypes.data
+        self._table = table
+        self._address = ctypes.c_size_t(table.ctypes.data)
+
+    def stamp(self, cursor: NDArray[np.int64], first: int, now: Callable[[], int]) -> None:
+        """Take a time stamp after every block but the last.
+
+        Args:
+            cursor: (1,), the address of the present row of stamps.
+            first: the place of the first stamp in that row.
+            now: reads the same clock, for blocks that need attention.
+        """
+        self._cursor, self._first_stamp, self._now = cursor, first, now
+        self.refresh()
+
+    def run(self) -> None:
+        """Make all calls."""
+        try:
+            made = self._function(self._address)
+            while made:
+                self._attend(made - 1)
+                made = self._function(self._address)
+        except BaseException:
+            self._failed = self._attending or self._next
+            self._attending = None
+            self._table[NEXT] = 0
+            raise
+
+    def _attend(self, entry: int) -> None:
+        place = self._places[entry]
+        self._attending = self.blocks[place]
+        self._attending.attend()
+        self._attending = None
+        if self._now is not None and place < len(self.blocks) - 1:
+            address = int(self._cursor[0]) + 8 * (self._first_stamp + place)
+            ctypes.c_int64.from_address(address).value = self._now()
+
+    @property
+    def _next(self) -> KernelBlock:
+        return self.blocks[self._places[min(int(self._table[NEXT]), len(self._places) - 1)]]
+
+    @property
+    def current(self) -> KernelBlock:
+        """The block that runs, or whose failure ended the last run."""
+        return self._attending or self._failed or self._next

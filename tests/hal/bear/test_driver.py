@@ -1,0 +1,165 @@
+"""Arming step by step, against the twin in virtual time: what is refused, and that nothing is left on."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from aloft.blocks.signals import CommandMode, DrivePhase, JointCommand
+from aloft.hal.bear.bus import BusError
+from aloft.hal.bear.configuration import Hardware
+from aloft.hal.bear.drive_law import DriveLaw
+from aloft.hal.bear.driver import Driver
+from aloft.hal.bear.motor_thread import MotorThread
+from aloft.hal.simulated.parameters import SimulatorParameters
+from aloft.hal.twin.standing_twin import standing_twin
+from aloft.hal.twin.twin import Twin
+from aloft.hal.twin.virtual_port import VirtualBoardPort, VirtualBusPort
+from aloft.robots.description import find_robot
+
+ROBOT = find_robot("bruce")
+KNEE = "left_knee_motor"
+PATIENCE = 60.0
+
+
+def hardware(**motors: object) -> Hardware:
+    """The twin's hardware, with a short soft start; ``motors`` changes single motors."""
+    data = Hardware.for_twin(ROBOT).model_dump()
+    for name, change in motors.items():
+        data["motors"][name] |= change
+    # an IMU without noise in a robot that hangs still would count as frozen
+    data["board"] |= {"frozen_packets": 10_000}
+    return Hardware.model_validate({**data, "soft_start": {"duration": 0.3, "current": 6.0}})
+
+
+def made(settings: Hardware | None = None) -> tuple[Twin, Driver]:
+    """A twin, and a driver that has found its drives."""
+    twin = standing_twin(ROBOT, SimulatorParameters(), hardware())
+    found = settings or hardware()
+    stiffness = np.full(10, 3.5)
+    law = DriveLaw(ROBOT, stiffness, 0.1 * stiffness, found.bus.lead)
+    driver = Driver(ROBOT, found, VirtualBusPort(twin), VirtualBoardPort(twin), law)
+    driver.connect()
+    return twin, driver
+
+
+def states(twin: Twin) -> set[float]:
+    return {actuator.status["torque_enable"] for actuator in twin.actuators}
+
+
+def test_the_soft_start_uses_little_current_and_ends_in_the_standing_pose() -> None:
+    twin, driver = made()
+    before: DrivePhase = driver.loop.phase
+    assert states(twin) == {0.0} and before is DrivePhase.OFF
+    seen: list[tuple[DrivePhase, float, float]] = []
+
+    def next_cycle() -> bool:
+        loop = driver.loop
+        seen.append((loop.phase, loop.current_limit, float(np.abs(twin.drives.current).max())))
+        return True
+
+    driver.arm(next_cycle)
+    assert len(seen) == 300 and {phase for phase, _, _ in seen} == {DrivePhase.STARTING}
+    limits = [limit for _, limit, _ in seen]
+    assert limits[0] < 0.2 and limits == sorted(limits) and limits[-1] == 6.0
+    assert all(current <= limit + 1e-3 for _, limit, current in seen)
+    after: DrivePhase = driver.loop.phase
+    assert after is DrivePhase.HOLDING and states(twin) == {1.0}
+    np.testing.assert_allclose(
+        driver.loop.target, ROBOT.joint_to_motor @ ROBOT.standing_position, atol=1e-12
+    )
+    driver.damp()
+    assert states(twin) == {3.0} and driver.loop.phase is DrivePhase.DAMPED
+
+
+def test_letting_go_during_the_soft_start_damps() -> None:
+    twin, driver = made()
+    left = iter([True] * 50 + [False])
+    with pytest.raises(BusError, match="the dead man's switch was let go during the soft start"):
+        driver.arm(lambda: next(left))
+    assert states(twin) == {3.0} and driver.loop.phase is DrivePhase.DAMPED
+
+
+def low_voltage(twin: Twin) -> None:
+    twin.actuators[8].status["input_voltage"] = 12.0
+
+
+def hot(twin: Twin) -> None:
+    twin.actuators[8].status["winding_temperature"] = 76.0
+
+
+def emergency_stop(twin: Twin) -> None:
+    twin.actuators[8].stopped = True
+    twin.advance()
+
+
+def stays_off(twin: Twin) -> None:
+    def ignore(wanted: int) -> None:
+        if wanted == 3:
+            twin.actuators[8].status["torque_enable"] = 3
+
+    twin.actuators[8]._enable = ignore  # type: ignore[method-assign]
+
+
+@pytest.mark.parametrize(
+    ("wrong", "text"),
+    [
+        (low_voltage, r"the drives are not enabled: left_knee_motor has 12\.0 V instead of 13 to"),
+        (hot, "the drives are not enabled: left_knee_motor has 76 deg C"),
+        (emergency_stop, r"drive left_knee_motor \(address 9\): "),
+        (stays_off, "drives cannot be enabled: left_knee_motor: it does not say why"),
+    ],
+)
+def test_what_keeps_the_drives_from_being_enabled(wrong: Callable[[Twin], None], text: str) -> None:
+    twin, driver = made()
+    wrong(twin)
+    with pytest.raises(BusError, match=text):
+        driver.arm(lambda: True)
+    assert 1.0 not in states(twin), "nothing is left on"
+    assert not twin.released and driver.loop.phase is DrivePhase.DAMPED
+
+
+def test_a_motor_far_from_the_standing_pose_is_not_enabled() -> None:
+    """As with a wrong offset, or a robot that lies on the ground."""
+    twin, driver = made(hardware(**{KNEE: {"offset": 1.5}}))
+    with pytest.raises(BusError, match=r"left_knee_motor is at .* more than 1 rad away"):
+        driver.arm(lambda: True)
+    assert 1.0 not in states(twin)
+
+
+@pytest.fixture
+def driving() -> Driver:
+    """A driver that follows a command."""
+    _, driver = made()
+    driver.arm(lambda: True)
+    command = JointCommand.allocate(ROBOT.dimensions)
+    command.mode[()] = CommandMode.ACTIVE
+    command.position[:] = ROBOT.standing_position
+    driver.loop.follow(command)
+    assert driver.loop.phase is DrivePhase.DRIVING
+    return driver
+
+
+@pytest.mark.parametrize(
+    ("age", "objection", "text"),
+    [
+        (0.02, "", "no new command has come for "),
+        (PATIENCE, "the dead man's switch was let go", "the dead man's switch was let go"),
+    ],
+)
+def test_the_motor_thread_damps(driving: Driver, age: float, objection: str, text: str) -> None:
+    """When commands grow old, and when there is an objection: the graph says nothing meanwhile."""
+    loop = driving.loop
+    thread = MotorThread(loop, age, lambda: objection)
+    thread.start()
+    try:
+        end = time.monotonic() + PATIENCE
+        while not loop.fault and time.monotonic() < end:
+            time.sleep(0.005)
+        assert thread.wait_for(thread.done + 2, PATIENCE)
+    finally:
+        thread.stop()
+    assert loop.fault.startswith(text) and loop.phase is DrivePhase.DAMPED

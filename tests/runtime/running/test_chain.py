@@ -1,0 +1,292 @@
+"""Blocks of kernels as one compiled call: the same bytes, times, failures and stops as one by one."""
+
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from aloft.blocks.general.gain import Gain
+from aloft.blocks.general.sine_wave import SineWave
+from aloft.blocks.general.vector import Vector
+from aloft.mathematics.compiling import chain_code
+from aloft.mathematics.compiling.kernel_call import KernelCall
+from aloft.mathematics.kernel import kernel
+from aloft.runtime.graph import load
+from aloft.runtime.language.block import Input, Output, State
+from aloft.runtime.language.errors import DeclarationError, RunError
+from aloft.runtime.language.kernel_block import KernelBlock
+from aloft.runtime.language.parameters import Parameters, live_parameter, parameter
+from aloft.runtime.language.signals import Field, Signal
+from aloft.runtime.language.stages import ClockSpec
+from aloft.runtime.loading.adjust import adjust
+from aloft.runtime.loading.problems import LoadError
+from aloft.runtime.running.chain import Chain
+from aloft.runtime.running.executor import Executor
+from aloft.runtime.running.memory import BoundGraph
+from aloft.runtime.running.pacing import WallTime
+from aloft.runtime.running.ticker import Ticker
+from aloft.runtime.testing import Use, checked_graph
+
+GRAPHS = Path(__file__).parents[3] / "graphs"
+
+
+class Counts(Signal):
+    """Steps so far."""
+
+    steps = Field(dtype="int64", text="how many")
+
+
+@kernel
+def low_pass(u, gain, steps, y):
+    steps[()] += 1
+    for i in range(u.shape[0]):
+        y[i] += gain[0] * (u[i] - y[i])
+
+
+@kernel
+def divide(y, steps, limit, attention):
+    attention[0] = 1 if steps[()] == limit else 0
+    for i in range(y.shape[0]):
+        y[i] = y[i] / (steps[()] - 2.0 * limit)
+
+
+class Smooth(KernelBlock):
+    """A low-pass filter that divides by zero when it has run twice ``limit`` times."""
+
+    class Params(Parameters):
+        n: int = parameter(1, text="elements")
+        gain: float = live_parameter(0.25, text="of the filter")
+        limit: int = parameter(1000, text="the step that wants attention")
+        attend: str = parameter("note", text="what happens then")
+
+    params: Params
+    u = Input(Vector, text="what is filtered")
+    y = Output(Vector, text="filtered")
+    counts = State(Counts, text="steps")
+
+    def setup(self) -> None:
+        self.attended: list[int] = []
+        self.on_parameters()
+
+    def on_parameters(self) -> None:
+        """The calls are made anew, which a chain must notice."""
+        gain, limit = np.array([self.params.gain]), self.params.limit
+        self.attention = np.zeros(1, np.int64)
+        self.kernel_calls = (
+            KernelCall(low_pass, self.u.value, gain, self.counts.steps, self.y.value),
+            KernelCall(divide, self.y.value, self.counts.steps, limit, self.attention),
+        )
+
+    def attend(self) -> None:
+        self.attended.append(self.tick)
+        if self.params.attend == "stop":
+            self.request_stop("enough")
+        if self.params.attend == "fail":
+            raise ValueError("not so")
+        end = time.monotonic() + 60.0
+        while self.params.attend == "hang" and time.monotonic() < end:
+            pass
+
+
+def graph(**params: object):
+    """Three filters in a row, the second at half the rate, with a block of Python in between."""
+    return checked_graph(
+        {
+            "wave": Use(SineWave, {"frequency": 10.0}),
+            "one": Use(Smooth, wires={"u": "wave.y"}),
+            "slow": Use(Smooth, params, {"u": "one.y"}, period_ticks=2, offset_ticks=1),
+            "two": Use(Smooth, wires={"u": "slow.y"}),
+            "gain": Use(Gain, wires={"u": "two.y"}),
+            "three": Use(Smooth, wires={"u": "gain.y"}),
+        }
+    )
+
+
+def ticker(fuse: bool, **params: object) -> Ticker:
+    from aloft.mathematics.compiling.compile_calls import compile_calls
+
+    bound = BoundGraph(graph(**params))
+    assert compile_calls(bound.kernel_calls) == ""
+    made = Ticker(bound, ClockSpec(), WallTime())
+    if fuse:
+        assert made.fuse()
+    return made
+
+
+def chains(made: Ticker) -> list[tuple[str, ...]]:
+    return [chain.owners for program in made.programs for chain in program.chains]
+
+
+def test_consecutive_blocks_of_a_phase_are_one_call_with_the_same_bytes() -> None:
+    fused, single = ticker(fuse=True), ticker(fuse=False)
+    assert chains(fused) == [("one", "two"), ("three",), ("one", "slow", "two"), ("three",)]
+    assert chains(single) == []
+    for _ in range(40):
+        fused.advance(1)
+        single.advance(1)
+        assert fused.bound.snapshot() == single.bound.snapshot()
+    assert fused.bound.memory.bus.field("three.y.value").any()
+
+
+def test_the_executor_fuses_unless_it_is_told_not_to() -> None:
+    results = {}
+    for fuse in (True, False):
+        executor = Executor(graph(), fuse=fuse)
+        results[fuse] = executor.run(30)
+        assert bool(chains(executor.ticker)) == fuse
+    assert results[True].run_hash == results[False].run_hash
+    plain = Executor(graph(), plain=True)
+    assert plain.run(30).run_hash == results[True].run_hash
+    assert not chains(plain.ticker)
+
+
+def test_every_block_keeps_its_times() -> None:
+    result = Executor(graph()).run(300)  # stamps are folded in between
+    assert [times.calls for times in result.blocks.values()] == [300, 300, 150, 300, 300, 300]
+    for times in result.blocks.values():
+        assert 0.0 < times.p50_us <= times.max_us < 1e6
+    fused = ticker(fuse=True)
+    fused.advance(130)
+    for program in fused.programs:
+        program.fold()
+        kept = program._kept[: min(program.ticks, len(program._kept))]
+        assert (kept >= 0).all() and kept.sum() > 0
+
+
+def test_the_block_that_ran_at_an_instant_is_known() -> None:
+    fused = ticker(fuse=True)
+    fused.advance(1)
+    (program,) = (p for p in fused.programs if p.ticks or p._cursor)
+    row = program._stamps[0]
+    ends = row[program._ends].tolist()
+    assert ends == sorted(ends)
+    assert program.owners[:3] == ("wave", "one", "two")
+    for before, end, owner in zip([0, *ends], ends, program.owners, strict=False):
+        assert end == before or program.running_at(end - 1) == owner
+
+
+@pytest.mark.parametrize("fuse", [True, False])
+def test_a_request_to_stop_comes_in_the_same_tick(fuse: bool) -> None:
+    result = Executor(graph(limit=5, attend="stop"), fuse=fuse).run(30)
+    assert (result.ticks, result.reason) == (10, "enough")
+    assert result.success
+
+
+@pytest.mark.parametrize("fuse", [True, False])
+def test_a_failure_names_the_block(fuse: bool) -> None:
+    result = Executor(graph(limit=3), fuse=fuse).run(30)
+    assert result.reason == (
+        "block 'slow' failed at tick 11 (0.022 s): ZeroDivisionError: compiled kernel "
+        f"{__name__}.divide divided by zero"
+    )
+    assert result.error is not None and (result.error.block, result.error.tick) == ("slow", 11)
+
+
+@pytest.mark.parametrize("fuse", [True, False])
+def test_a_failure_in_attend_names_the_block(fuse: bool) -> None:
+    executor = Executor(graph(limit=3, attend="fail"), fuse=fuse)
+    result = executor.run(30)
+    assert result.reason == "block 'slow' failed at tick 5 (0.010 s): ValueError: not so"
+    assert result.error is not None
+    assert result.error.where.startswith(__file__)
+
+
+@pytest.mark.parametrize("fuse", [True, False])
+def test_a_hang_in_attend_names_the_block(fuse: bool) -> None:
+    clock = ClockSpec(hangs_after=0.4)
+    result = Executor(graph(limit=3, attend="hang"), clock=clock, fuse=fuse).run(30)
+    assert result.reason.startswith("block 'slow' hung at tick 5 (0.010 s): it did not return")
+    assert result.error is not None and result.error.where.startswith(__file__)
+
+
+def test_after_attention_the_rest_of_the_chain_runs_once() -> None:
+    fused, single = ticker(fuse=True, limit=2), ticker(fuse=False, limit=2)
+    for made in (fused, single):
+        made.advance(6)
+        slow = made.bound.blocks["slow"]
+        assert isinstance(slow, Smooth) and slow.attended == [3]
+    assert fused.bound.snapshot() == single.bound.snapshot()
+    assert fused.bound.memory.state.field("two.counts.steps") == 6
+
+
+@pytest.mark.parametrize("fuse", [True, False])
+def test_a_chain_takes_over_calls_that_new_parameters_have_made(fuse: bool) -> None:
+    class Change:
+        """A sink that changes the gain after tick 9."""
+
+        def open(self, bound: BoundGraph) -> None:
+            self.bound = bound
+
+        def record(self, tick: int) -> None:
+            if tick == 9:
+                blocks = self.bound.parameters.blocks
+                self.bound.parameters.requests.append(adjust(blocks, ["two.gain=0.75"]))
+
+        def close(self) -> None:
+            pass
+
+    hashes = {
+        plain: Executor(graph(), plain=plain, fuse=fuse, sinks=[Change()]).run(30).run_hash
+        for plain in (True, False)
+    }
+    assert hashes[True] == hashes[False] != Executor(graph()).run(30).run_hash
+
+
+def test_a_step_of_its_own_is_refused() -> None:
+    with pytest.raises(DeclarationError, match=r"Own: a KernelBlock has no step of its own; setup"):
+
+        class Own(KernelBlock):
+            def step(self) -> None:
+                pass
+
+
+def test_the_step_is_shown_in_the_file_of_the_class() -> None:
+    assert Smooth.step.__code__.co_filename == __file__
+    assert KernelBlock.step.__code__.co_filename != __file__
+
+
+def test_a_call_that_is_not_compiled_is_not_taken_over() -> None:
+    bound = ticker(fuse=False).bound
+    chain = Chain([bound.blocks["one"]], [1], bound.running)
+    one = bound.blocks["one"]
+    assert isinstance(one, Smooth)
+    one.kernel_calls[1].use_plain()
+    with pytest.raises(RunError, match="block 'one' has a kernel that did not compile"):
+        chain.refresh()
+
+
+def test_without_a_clock_for_machine_code_timed_blocks_are_not_fused(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("aloft.runtime.running.ticker.clock_address", lambda: 0)
+    assert not ticker(fuse=False).fuse()
+    monkeypatch.undo()
+    assert chain_code.clock_address() != 0
+    assert ticker(fuse=False).fuse()
+
+
+SHIPPED = sorted(
+    p.relative_to(GRAPHS).as_posix()
+    for p in (*GRAPHS.glob("*.yaml"), *GRAPHS.glob("robots/*.yaml"))
+)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", SHIPPED)
+def test_every_shipped_graph_has_the_same_bytes(name: str) -> None:
+    try:
+        checked = load(GRAPHS / name).checked
+    except LoadError as error:
+        if "pip install example-robot-data" in str(error):
+            pytest.skip("example-robot-data is not installed")
+        raise
+    if any(spec.block_type.outside == "real" for spec in checked.blocks):
+        pytest.skip("needs the robot")
+    executor = Executor(checked, clock=ClockSpec(), log=False)
+    fused = executor.run(700)
+    assert chains(executor.ticker)
+    assert (
+        fused.run_hash
+        == Executor(checked, clock=ClockSpec(), log=False, fuse=False).run(700).run_hash
+    )
