@@ -6,7 +6,8 @@ import numpy as np
 
 from ...mathematics.compiling.kernel_call import KernelCall
 from ...robots.standing_feet import foot_sides, standing_feet
-from ...runtime.language.block import Block, Input, Output, State
+from ...runtime.language.block import Input, Output, State
+from ...runtime.language.kernel_block import KernelBlock
 from ...runtime.language.parameters import Parameters, live_parameter
 from ...runtime.language.signals import Field, Signal
 from ..signals import DynamicsTerms, JumpReference, PhaseState
@@ -28,7 +29,7 @@ class StepMemory(Signal):
     foothold = Field(("n_feet", 3), unit="m", frame="world", text="where each foot last went")
 
 
-class CaptureStep(Block):
+class CaptureStep(KernelBlock):
     """Takes a step after touchdown, or several, where the feet can no longer hold the robot.
 
     It passes the phase on unchanged unless a foot steps. After the last planned touchdown it
@@ -121,11 +122,12 @@ class CaptureStep(Block):
                 for point, foot in zip(robot.contacts, foot_of_point, strict=True)
             ]
         )
-        self._settings = Settings(
-            np.zeros(1, np.int64), *np.zeros((8, 1)), np.zeros(2), np.zeros(1)
+        self._settings = Settings._make(
+            np.zeros(2 if name == "apart" else 1, np.int64 if name == "steps" else np.float64)
+            for name in Settings._fields
         )
         self.on_parameters()
-        self._take = KernelCall(
+        stepping = KernelCall(
             take_steps,
             PhaseFields(*(getattr(self.before, name) for name in PhaseFields._fields)),
             self.reference.time,
@@ -143,10 +145,8 @@ class CaptureStep(Block):
                 np.ones(n_feet, np.bool_),
             ),
         )  # fmt: skip
+        self.kernel_calls = (stepping,)
 
     def on_parameters(self) -> None:
         for name in Settings._fields:
             getattr(self._settings, name)[:] = getattr(self.params, name)
-
-    def step(self) -> None:
-        self._take.run()
