@@ -36,6 +36,8 @@ STATE_TO_TORQUE = ("dynamics", "wbc")
 """The blocks from the estimated state to torques."""
 
 CHUNK = 50
+PLAIN_TICKS = 200
+"""How many ticks plain Python takes part in: it needs tens of milliseconds for each."""
 EVERY = 10
 """One in so many ticks in stance is a state for the solvers by themselves."""
 ROUNDS = 5
@@ -49,7 +51,7 @@ def tick(rounds: int = 3, ticks: int | None = None, process: bool = True) -> lis
     """The rows.
 
     Args:
-        rounds: how often the jump is run again; plain Python takes part in the first round only.
+        rounds: how often the jump is run again; plain Python takes part in the first ticks of the first round only.
         ticks: how much of the jump is used; by default all.
         process: whether the whole process and the loop in real time are measured as well.
 
@@ -73,7 +75,7 @@ def tick(rounds: int = 3, ticks: int | None = None, process: bool = True) -> lis
             running = {PLAIN: plain, **cases} if number == 0 else cases
             _one_round(jump, running, programs if number == 0 else None)
     times = {name: np.array(case.times[-rounds * jump.ticks :]) for name, case in cases.items()}
-    of_first = {PLAIN: np.array(plain.times), COMPILED: times[COMPILED][: jump.ticks]}
+    of_first = {PLAIN: np.array(plain.times), COMPILED: times[COMPILED][: len(plain.times)]}
     rows = [
         *_block_rows(own, "block "),
         *_block_rows(fused, "fused block "),
@@ -98,7 +100,8 @@ def _one_round(
     for turn in range(-(-jump.ticks // CHUNK)):
         shift = turn % len(names)
         for name in (*names[shift:], *names[:shift]):
-            cases[name].run(CHUNK)
+            if name != PLAIN or cases[name].tick < PLAIN_TICKS:
+                cases[name].run(CHUNK)
     for name in (PLAIN, COMPILED, FUSED, BARE, HAND):
         if name in cases:
             cases[name].check()
