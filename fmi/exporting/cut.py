@@ -6,6 +6,7 @@ import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from difflib import get_close_matches
+from math import prod
 from typing import Any
 
 import numpy as np
@@ -94,9 +95,8 @@ def cut(
         block, _, port = source.rpartition(".")
         depends = _depends(block, specs, [b.path for b in inside])
         before = tuple(each.name for each in inputs if _block_of(each.source) in depends)
-        results += [
-            replace(each, depends=before) for each in _terminals(name, specs[block], port, None)
-        ]
+        found = filter(_has_elements, _terminals(name, specs[block], port, None))
+        results += [replace(each, depends=before) for each in found]
     _check_names([*inputs, *results])
     blocks = tuple(replace(b, machine=None) for b in inside)
     alone = replace(flat, blocks=blocks, duration=None, clock=None, machines=None, links=None)
@@ -157,13 +157,17 @@ def _stubs(
             if block in external:
                 params: Any = external[block].params
                 found = [replace(each, start=params.start_value().tolist()) for each in found]
-            inputs += found
+            inputs += filter(_has_elements, found)
+            signal = specs[block].block_type.outputs[port].signal
             stubs.setdefault(block, {})[port] = {
-                each.source.rpartition(".")[2]: {
-                    "shape": list(each.shape),
+                (field := each.source.rpartition(".")[2]): {
+                    # a size of zero can only be said by the name of a dimension
+                    "shape": list(
+                        each.shape if _has_elements(each) else signal.fields[field].shape
+                    ),
                     "dtype": each.dtype,
                     "unit": each.unit,
-                    "frame": _quantity(specs[block], port, each.source.rpartition(".")[2]).frame,
+                    "frame": _quantity(specs[block], port, field).frame,
                     "start": each.start,
                 }
                 for each in found
@@ -189,6 +193,11 @@ def _terminals(
         for field_name, field in fields.items()
         if wanted is None or field_name in wanted
     ]
+
+
+def _has_elements(terminal: Terminal) -> bool:
+    """Whether there is anything in it; a robot without feet, say, has no switches."""
+    return prod(terminal.shape) > 0
 
 
 def _quantity(spec: BlockSpec, port: str, name: str) -> Quantity:

@@ -227,3 +227,33 @@ def test_what_cannot_be_exported_is_said(
         )
     with pytest.raises(AloftError, match=message):
         export(str(folder / "rail.yaml"), folder / to, part, (), outputs)
+
+
+@pytest.mark.long
+def test_the_estimator_of_a_jump_as_an_fmu_beside_itself(tmp_path: Path) -> None:
+    """Fields of robots: quaternions, switches as booleans, and files and robots that are shipped."""
+    export("aloft:jump", tmp_path / "estimator.fmu", "estimator")
+    (tmp_path / "both.yaml").write_text(
+        "include: [jump.yaml]\nblocks:\n  unit:\n    use: fmi.CoSimulation\n"
+        f"    with: {{file: {tmp_path / 'estimator.fmu'}}}\n"
+        "    in: {robot_imu: robot.imu, robot_joints: robot.joints, contacts_state: contacts.state}\n"
+    )
+    text = (tmp_path / "both.yaml").read_text()
+    graphs = Path(aloft.__file__).parent / "graphs"
+    result = aloft.load(text, path=graphs / "both.yaml").run(0.3)
+    for field in ("position", "orientation", "linear_velocity", "angular_velocity"):
+        own = result.signal(f"estimator.base.{field}")
+        assert np.array_equal(result.signal(f"unit.base.{field}"), own)
+        assert np.ptp(own) > 0.0
+
+
+@pytest.mark.long
+def test_a_robot_without_feet_has_no_variable_for_its_switches(tmp_path: Path) -> None:
+    project = Path(__file__).parents[3] / "docs" / "projects" / "cart_pole" / "balance.yaml"
+    whole = export(str(project), tmp_path / "balance.fmu", outputs=["robot.contacts", "robot.imu"])
+    assert whole.problems == ()
+    assert [t.name for t in whole.outputs] == [
+        "robot.imu.angular_velocity", "robot.imu.specific_force",
+    ]  # fmt: skip
+    found = fmpy.simulate_fmu(str(whole.file), stop_time=0.02, output_interval=0.002)
+    assert len(found) == 11
