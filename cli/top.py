@@ -141,7 +141,15 @@ def _tables(observer: Observer) -> Group:
                     str(link["surplus"]),
                 )
             )
-    columns = ("machine", "state", ">tick", ">rate [Hz]", ">overruns", ">skipped", ">heard [s ago]")
+    columns: tuple[str, ...] = (
+        "machine",
+        "state",
+        ">tick",
+        ">rate [Hz]",
+        ">overruns",
+        ">skipped",
+        ">heard [s ago]",
+    )
     parts = [table(observer.placed.graph.name, columns, machines)]
     if links:
         columns = ("link", ">messages", ">age [ms]", ">jitter [ms]", ">late ticks", ">lost", ">damaged",

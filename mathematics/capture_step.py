@@ -132,7 +132,7 @@ def choose_foothold(
         distance = nearest_in_foot(points, foot_of_point, foot, capture, scratch)
         if distance < least:
             least = distance
-            nearest[:] = scratch
+            nearest[0], nearest[1] = scratch[0], scratch[1]
     grown = (1.0 + beyond) * math.exp(rate * left)
     for k in range(2):
         out[k] = float(nearest[k]) + grown * (float(capture[k]) - float(nearest[k]))

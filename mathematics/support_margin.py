@@ -32,7 +32,7 @@ def support_margin(
             if not loaded[j]:
                 continue
             dx, dy = float(points[j, 0]) - ax, float(points[j, 1]) - ay
-            length = math.hypot(dx, dy)
+            length = math.sqrt(dx * dx + dy * dy)
             if length < 1e-9:
                 continue
             leftmost = True
@@ -44,5 +44,6 @@ def support_margin(
     if first < 0:
         return -1.0
     if margin == math.inf:
-        return -math.hypot(float(points[first, 0]) - x, float(points[first, 1]) - y)
+        dx, dy = float(points[first, 0]) - x, float(points[first, 1]) - y
+        return -math.sqrt(dx * dx + dy * dy)
     return margin

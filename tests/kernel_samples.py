@@ -77,9 +77,6 @@ UNUSED = {
         POSE[0], 1.0, POSE[1], POSE[2], np.array([0.1, 0.2, 0.3]), np.array([0.3, 0.2, 0.1]), 0.05,
         np.array([0.1, 0.2]), POSE[3], np.zeros(3),
     ),
-    "aloft.mathematics.landing_law.pull_to_place": (
-        np.array([0.01, -0.02, 0.0]), np.array([0.03, 0.01, 0.2]), 0.5, 0.04,
-    ),
     "aloft.mathematics.landing_law.turn_places": (POSE, 0.3, np.zeros((4, 3))),
     "aloft.robots.limb.place_limb": (
         LIMB.links, LIMB.tip, MIDDLE, np.zeros((5, 6)), np.zeros((4, 3)),

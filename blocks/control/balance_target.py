@@ -135,7 +135,7 @@ class BalanceTarget(KernelBlock):
         heads = np.array([foot_shape(robot, foot)[0] != FootKind.POINT for foot in feet])
         kind = BY_FEET if heads.any() else BY_BASE if len(feet) == 1 else BY_PATTERN
         counted = heads if heads.any() else np.ones(len(feet), np.bool_)
-        self._gains = Gains(*(np.zeros(1) for _ in range(7)), np.zeros((2, 3)))
+        self._gains = Gains._make([*np.zeros((7, 1)), np.zeros((2, 3))])
         self.on_parameters()
         phase, terms = self.phase, self.terms
         present = Present(

@@ -147,9 +147,11 @@ class JointPD(KernelBlock):
         planned = Motion(reference.joint_position, reference.joint_velocity)
         if "reference" not in self.context.wired:
             planned = Motion(robot.standing_position.copy(), np.zeros(n))
-        self._joints = Joints(np.zeros(n), *(Feedback(*np.zeros((4, n))) for _ in range(2)))
-        one = [np.zeros(1) for _ in range(4)]
-        self._numbers = Numbers(*one[:3], np.zeros(n), np.zeros(n), one[3], np.zeros(1, np.bool_))
+        self._joints = Joints(np.zeros(n), Feedback(*np.zeros((4, n))), Feedback(*np.zeros((4, n))))
+        self._numbers = Numbers(
+            np.zeros(1), np.zeros(1), np.zeros(1), np.zeros(n), np.zeros(n), np.zeros(1),
+            np.zeros(1, np.bool_),
+        )  # fmt: skip
         flight = self._joints.flight
         self._stops = SoftStops(
             robot.joint_limits, np.zeros(1), np.zeros(1), flight.stiffness, flight.damping

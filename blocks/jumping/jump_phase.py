@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.constants import GRAVITY
 from ...mathematics.kernel import kernel
-from ...runtime.language.block import Block, Input, Output, State
+from ...runtime.language.block import Input, Output, State
+from ...runtime.language.kernel_block import KernelBlock
 from ...runtime.language.parameters import Parameters, live_parameter
 from ...runtime.language.signals import Field, Signal
 from ..signals import ContactState, DynamicsTerms, JumpReference, Phase, PhaseState
+from .capture_law import PhaseFields
 from .phase_table import (
     IN_PHASE,
     LIFT_OFF,
@@ -25,6 +29,10 @@ from .phase_table import (
     find_conditions,
     next_phase,
 )
+
+Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+Indices = NDArray[np.int64]
 
 
 class PhaseMemory(Signal):
@@ -39,7 +47,7 @@ class PhaseMemory(Signal):
     stance = Field("n_contacts", dtype="bool", text="the points in stance after touchdown")
 
 
-class JumpPhase(Block):
+class JumpPhase(KernelBlock):
     """The phase by plan time and measured contact, the stance points, and the time to touchdown.
 
     ============  =====================================================================
@@ -113,63 +121,135 @@ class JumpPhase(Block):
     memory = State(PhaseMemory, text="the phase, its times, and contacts lately lost")
 
     def setup(self) -> None:
-        self._foot_of_point = np.array(self.robot.foot_of_contact())
-        self._table, self._holds = TABLE, np.zeros(len(Condition), bool)
-        self._times = np.zeros(6)
+        reference, terms = self.reference, self.terms
+        self._limits, self._stance_limits = np.zeros(5), np.zeros(2)
         self.on_parameters()
+        following = KernelCall(
+            follow_phases,
+            self.period,
+            Planned(*(getattr(reference, name) for name in Planned._fields)),
+            self.contacts.active,
+            Present(terms.com, terms.com_velocity, terms.contact_position),
+            np.array(self.robot.foot_of_contact(), np.int64),
+            Table(
+                TABLE, self._limits, self._stance_limits, np.zeros(6),
+                np.zeros(len(Condition), np.bool_),
+            ),
+            Memory(*(getattr(self.memory, name) for name in Memory._fields)),
+            PhaseFields(*(getattr(self.phase, name) for name in PhaseFields._fields)),
+        )  # fmt: skip
+        self.kernel_calls = (following,)
 
     def on_parameters(self) -> None:
         p = self.params
-        self._limits = np.array([
+        self._limits[:] = (
             p.late_lift_off, p.early_lift_off, p.touchdown_share, p.landing_time, p.lost_contact,
-        ])  # fmt: skip
+        )  # fmt: skip
+        self._stance_limits[:] = p.contact_hold, p.flat_height
 
     def start(self) -> None:
         self.memory.touchdown[()] = -1.0
 
-    def step(self) -> None:
-        p, memory, out = self.params, self.memory, self.phase
-        now = float(self.reference.time)
-        active, unloaded = self.contacts.active, memory.unloaded
-        shortest = count_unloaded(active, self.period, unloaded)
-        if int(memory.phase) < Phase.FLIGHT:
-            memory.lift_off_time[...] = self.reference.lift_off_time
-            memory.touchdown_time[...] = self.reference.touchdown_time
-        lift_off, touchdown_time = float(memory.lift_off_time), float(memory.touchdown_time)
-        another = float(self.reference.lift_off_time) > touchdown_time
-        remaining = 0.0
-        if int(memory.phase) <= Phase.FLIGHT:
-            remaining = time_to_height(
-                float(self.terms.com[2]), float(self.terms.com_velocity[2]),
-                planned_touchdown_height(
-                    float(self.reference.com[2]), float(self.reference.com_velocity[2]),
-                    touchdown_time - max(now, lift_off),
-                ),
-            )  # fmt: skip
-        before = int(memory.phase)
-        times = self._times
-        times[NOW], times[IN_PHASE] = now, now - float(memory.began)
-        times[LIFT_OFF], times[TOUCHDOWN] = lift_off, touchdown_time
-        times[REMAINING], times[UNLOADED] = remaining, shortest
-        find_conditions(times, self._limits, int(self.reference.phase), another, self._holds)
-        phase = next_phase(self._table, before, self._holds)
-        if phase != before:
-            memory.phase[()] = phase
-            memory.began[()] = now
-            if phase == Phase.LANDING:
-                memory.touchdown[()] = now
-        choose_stance(
-            phase, self.reference.contact, unloaded, p.contact_hold, self.terms.contact_position,
-            self._foot_of_point, p.flat_height, memory.stance,
+
+class Planned(NamedTuple):
+    """The fields of ``JumpReference`` that the phases follow."""
+
+    time: Array
+    phase: Indices
+    lift_off_time: Array
+    touchdown_time: Array
+    com: Array
+    com_velocity: Array
+    contact: Flags
+
+
+class Present(NamedTuple):
+    """The fields of ``DynamicsTerms`` that tell the time to touchdown, and the points."""
+
+    com: Array
+    com_velocity: Array
+    contact_position: Array
+
+
+class Memory(NamedTuple):
+    """The fields of ``PhaseMemory``."""
+
+    phase: Indices
+    began: Array
+    touchdown: Array
+    lift_off_time: Array
+    touchdown_time: Array
+    unloaded: Array
+    stance: Flags
+
+
+class Table(NamedTuple):
+    """The ``transitions`` and their ``limits``, those of the stance, and memory: see ``phase_table``.
+
+    ``stance_limits`` (2,) are how long a lost contact counts [s], and how high a point of a flat foot
+    may be above the lowest [m].
+    """
+
+    transitions: Indices
+    limits: Array
+    stance_limits: Array
+    times: Array
+    holds: Flags
+
+
+@kernel
+def follow_phases(
+    period: float,
+    planned: Planned,
+    active: Flags,
+    present: Present,
+    foot_of_point: Indices,
+    table: Table,
+    memory: Memory,
+    out: PhaseFields,
+) -> None:
+    """One tick of ``JumpPhase``; ``active`` are the points with contact, (n_contacts,)."""
+    now, before, times = float(planned.time[()]), int(memory.phase[()]), table.times
+    shortest = count_unloaded(active, period, memory.unloaded)
+    if before < Phase.FLIGHT:
+        memory.lift_off_time[()] = float(planned.lift_off_time[()])
+        memory.touchdown_time[()] = float(planned.touchdown_time[()])
+    lift_off = float(memory.lift_off_time[()])
+    touchdown = float(memory.touchdown_time[()])
+    another = float(planned.lift_off_time[()]) > touchdown
+    remaining = 0.0
+    if before <= Phase.FLIGHT:
+        remaining = time_to_height(
+            float(present.com[2]), float(present.com_velocity[2]),
+            planned_touchdown_height(
+                float(planned.com[2]), float(planned.com_velocity[2]),
+                touchdown - max(now, lift_off),
+            ),
         )  # fmt: skip
-        out.phase[()] = phase
-        out.time_in_phase[()] = now - float(memory.began)
-        out.time_to_touchdown[()] = remaining if phase == Phase.FLIGHT else 0.0
-        since = now - float(memory.touchdown) if float(memory.touchdown) >= 0.0 else 0.0
-        out.time_since_touchdown[()] = since
-        out.stance[...] = memory.stance
-        out.stepping[...] = False  # steps are for CaptureStep to take
-        out.step_acceleration[...] = 0.0
+    times[NOW], times[IN_PHASE] = now, now - float(memory.began[()])
+    times[LIFT_OFF], times[TOUCHDOWN] = lift_off, touchdown
+    times[REMAINING], times[UNLOADED] = remaining, shortest
+    find_conditions(times, table.limits, int(planned.phase[()]), another, table.holds)
+    phase = next_phase(table.transitions, before, table.holds)
+    if phase != before:
+        memory.phase[()] = phase
+        memory.began[()] = now
+        if phase == Phase.LANDING:
+            memory.touchdown[()] = now
+    choose_stance(
+        phase, planned.contact, memory.unloaded, float(table.stance_limits[0]),
+        present.contact_position, foot_of_point, float(table.stance_limits[1]), memory.stance,
+    )  # fmt: skip
+    out.phase[()] = phase
+    out.time_in_phase[()] = now - float(memory.began[()])
+    out.time_to_touchdown[()] = remaining if phase == Phase.FLIGHT else 0.0
+    landed = float(memory.touchdown[()])
+    out.time_since_touchdown[()] = now - landed if landed >= 0.0 else 0.0
+    for i in range(active.shape[0]):
+        out.stance[i] = memory.stance[i]
+        out.stepping[i] = False  # steps are for CaptureStep to take
+        for k in range(3):
+            out.step_acceleration[i, k] = 0.0
 
 
 @kernel
@@ -220,14 +300,18 @@ def choose_stance(
         position: the positions of the points [m, world], (n, 3).
         foot: the foot of each point.
     """
-    if phase < Phase.FLIGHT:
-        if np.any(planned):
-            stance[:] = planned
-        elif not np.any(stance):
-            stance[:] = True
-        return
-    if phase == Phase.FLIGHT:
-        stance[:] = False
+    if phase <= Phase.FLIGHT:
+        any_planned, any_stance = False, False
+        for i in range(stance.shape[0]):
+            any_planned = any_planned or bool(planned[i])
+            any_stance = any_stance or bool(stance[i])
+        for i in range(stance.shape[0]):
+            if phase == Phase.FLIGHT:
+                stance[i] = False
+            elif any_planned:
+                stance[i] = planned[i]
+            elif not any_stance:
+                stance[i] = True
         return
     ground = math.inf
     for i in range(unloaded.shape[0]):

@@ -118,8 +118,8 @@ def drive_loops(
 
 
 class MotorLimits:
-    """Limits joint torques to what the motors can do at their speed, and records how near they
-    come to it."""
+    """What ``drive_motors`` needs to limit joint torques to what the motors can do at their speed, and
+    to record how near they come to it."""
 
     def __init__(self, robot: RobotDescription, record: TickRecord) -> None:
         motors = robot.motors
@@ -135,11 +135,7 @@ class MotorLimits:
         self.scratch = MotorScratch(*(np.zeros(n) for _ in MotorScratch._fields))
         self.record = MotorRecord(*(getattr(record, name) for name in MotorRecord._fields))
         self.motor_torque = self.scratch.torque
-        """The motors' torques of the last call [N m], (n_joints,)."""
-
-    def apply(self, velocity: Array, torque: Array) -> None:
-        """Limit the joint ``torque`` [N m] at the joint ``velocity`` [rad/s] in place."""
-        drive_motors(velocity, torque, self.motors, self.scratch, self.record)
+        """The motors' torques of the last step [N m], (n_joints,)."""
 
 
 class Row(NamedTuple):

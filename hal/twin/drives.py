@@ -7,10 +7,12 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from ...mathematics.compiling.kernel_call import KernelCall
 from ...robots.robot_description import RobotDescription
 from ...robots.transmission import Transmission
 from ..bear.configuration import Hardware
 from ..bear.registers import Mode
+from ..simulated.actuator import drive_motors
 from ..simulated.drives import MotorLimits
 from ..simulated.motor_feedback import motor_feedback
 from ..simulated.state import TickRecord
@@ -51,7 +53,13 @@ class EmulatedDrives:
         n = len(actuators)
         self.actuators = tuple(actuators)
         self._transmission = Transmission(robot)
-        self._limits = MotorLimits(robot, record)
+        limits = MotorLimits(robot, record)
+        self._motor_torque = limits.motor_torque
+        self._moving_at, self._limited = np.zeros(n), np.zeros(n)
+        self._limit = KernelCall(
+            drive_motors, self._moving_at, self._limited, limits.motors, limits.scratch,
+            limits.record,
+        )  # fmt: skip
         settings = [hardware.motors[name] for name in robot.transmission.motors]
         self.sign = np.array([float(motor.sign) for motor in settings])
         """1 where a drive turns as the description's motor does, -1 where it does not."""
@@ -153,9 +161,11 @@ class EmulatedDrives:
         np.subtract(current, wanted, out=current)
         np.multiply(current, self._constant, out=self._torque)
         np.multiply(self._torque, self.sign, out=self._torque)
-        self._transmission.joint_torque(self._torque, out)
-        self._limits.apply(velocity, out)
-        np.add(self.torque_sum, self._limits.motor_torque, out=self.torque_sum)
+        self._transmission.joint_torque(self._torque, self._limited)
+        self._moving_at[:] = velocity
+        self._limit.run()
+        out[:] = self._limited
+        np.add(self.torque_sum, self._motor_torque, out=self.torque_sum)
         self.torque_steps += 1
 
     def mean_current(self, out: Array) -> None:

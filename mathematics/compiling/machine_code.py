@@ -7,6 +7,7 @@ be compiled.
 from __future__ import annotations
 
 import ctypes
+import os
 from collections.abc import Callable
 from functools import cache
 from importlib.metadata import version
@@ -28,12 +29,11 @@ def tools() -> str:
     import platform
 
     binding = _binding()
-    features = binding.get_host_cpu_features().flatten()
     names = (
         f"python {platform.python_version()}",
         f"numba {version('numba')}",
         f"llvmlite {version('llvmlite')}",
-        f"{binding.get_process_triple()} {binding.get_host_cpu_name()} {features}",
+        f"{binding.get_process_triple()} {' '.join(processor())}",
         OPTIONS,
     )
     return "; ".join(names)
@@ -48,12 +48,24 @@ def _binding() -> Any:
     return binding
 
 
-def target_machine() -> Any:
-    """The processor of this computer, for LLVM."""
+def processor() -> tuple[str, str]:
+    """LLVM's name of the processor for which code is made, and its features.
+
+    It is this computer's, or the one that numba's ``NUMBA_CPU_NAME`` and ``NUMBA_CPU_FEATURES`` name.
+    The results are the same bits for all of them.
+    """
+    if name := os.environ.get("NUMBA_CPU_NAME"):
+        return name, os.environ.get("NUMBA_CPU_FEATURES", "")
     binding = _binding()
+    return binding.get_host_cpu_name(), binding.get_host_cpu_features().flatten()
+
+
+def target_machine() -> Any:
+    """What LLVM makes code with."""
+    binding, (name, features) = _binding(), processor()
     return binding.Target.from_default_triple().create_target_machine(
-        cpu=binding.get_host_cpu_name(),
-        features=binding.get_host_cpu_features().flatten(),
+        cpu=name,
+        features=features,
         opt=3,
         reloc="pic",
         codemodel="jitdefault",

@@ -59,7 +59,8 @@ def _obj_triangles(text: str) -> Array:
             faces += [(face[0], face[k], face[k + 1]) for k in range(1, len(face) - 1)]
     if not faces:
         return np.zeros((0, 3, 3))
-    return np.array(corners, dtype=float).reshape(-1, 3)[np.array(faces)]
+    triangles: Array = np.array(corners, dtype=float).reshape(-1, 3)[np.array(faces)]
+    return triangles
 
 
 def simplified(triangles: Array, most: int) -> tuple[Array, Indices]:

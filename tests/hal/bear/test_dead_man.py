@@ -10,7 +10,6 @@ from pathlib import Path
 
 import pytest
 
-from aloft.hal.bear import dead_man
 from aloft.hal.bear.bus import BusError
 from aloft.hal.bear.configuration import DeadMan
 from aloft.hal.bear.dead_man import AlwaysHeld, GamepadButton, open_switch, wait_until_held
@@ -58,7 +57,7 @@ def test_the_space_bar(monkeypatch: pytest.MonkeyPatch) -> None:
         before = termios.tcgetattr(theirs)
         switch = open_switch(DeadMan(kind="key"))
         now = [100.0]
-        monkeypatch.setattr(dead_man.time, "monotonic", lambda: now[0])
+        monkeypatch.setattr("aloft.hal.bear.dead_man.time.monotonic", lambda: now[0])
         assert not switch.held()
         for key, held in ((b"x", False), (b" ", True)):
             os.write(ours, key)

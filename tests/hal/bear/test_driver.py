@@ -52,7 +52,8 @@ def states(twin: Twin) -> set[float]:
 
 def test_the_soft_start_uses_little_current_and_ends_in_the_standing_pose() -> None:
     twin, driver = made()
-    assert states(twin) == {0.0} and driver.loop.phase is DrivePhase.OFF
+    before: DrivePhase = driver.loop.phase
+    assert states(twin) == {0.0} and before is DrivePhase.OFF
     seen: list[tuple[DrivePhase, float, float]] = []
 
     def next_cycle() -> bool:
@@ -65,7 +66,8 @@ def test_the_soft_start_uses_little_current_and_ends_in_the_standing_pose() -> N
     limits = [limit for _, limit, _ in seen]
     assert limits[0] < 0.2 and limits == sorted(limits) and limits[-1] == 6.0
     assert all(current <= limit + 1e-3 for _, limit, current in seen)
-    assert driver.loop.phase is DrivePhase.HOLDING and states(twin) == {1.0}
+    after: DrivePhase = driver.loop.phase
+    assert after is DrivePhase.HOLDING and states(twin) == {1.0}
     np.testing.assert_allclose(
         driver.loop.target, ROBOT.joint_to_motor @ ROBOT.standing_position, atol=1e-12
     )

@@ -1,6 +1,7 @@
 """Damaged recordings: every changed byte is found, nothing aborts, and the rest is kept."""
 
 from pathlib import Path
+from zlib import crc32
 
 import numpy as np
 import pytest
@@ -9,7 +10,7 @@ from aloft.blocks.general.constant import Constant
 from aloft.logs import RecordingError, read
 from aloft.logs.file.contents import DamagedError
 from aloft.logs.file.header import header_of
-from aloft.logs.file.messages import Content
+from aloft.logs.file.messages import CLOSING, FILE_HEAD, HEAD, Content, _checked
 from aloft.logs.file.repair import repair
 from aloft.logs.recording.writer import RecordingWriter
 from aloft.runtime.running.memory import BoundGraph, Snapshot
@@ -69,6 +70,23 @@ def test_a_changed_byte_anywhere_is_found(whole: Path, tmp_path: Path) -> None:
         [np.arange(140), rng.integers(0, size, 250), np.arange(size - 80, size)]
     )
     expect_found(whole, tmp_path, places, rng.integers(0, 8, len(places)))
+
+
+def test_no_message_is_taken_for_intact_with_any_of_its_bytes_changed(whole: Path) -> None:
+    """Every byte of every message, which is what a file is made of but for its first and last bytes."""
+    data, scan = whole.read_bytes(), read(whole).scan
+    assert FILE_HEAD + sum(message.size for message in scan.messages) == scan.end
+    assert scan.end + len(CLOSING) == len(data)
+    for number, message in enumerate(scan.messages):
+        known = crc32(data[:FILE_HEAD]) if number == 0 else 0
+        taken = bytearray(data[message.place : message.end])
+        for place in range(len(taken)):
+            taken[place] ^= 1 << place % 8
+            head, body = bytes(taken[: HEAD.size]), bytes(taken[HEAD.size :])
+            assert _checked(message.place, head, body, known) is None, (number, place)
+            taken[place] ^= 1 << place % 8
+        again = _checked(message.place, bytes(taken[: HEAD.size]), bytes(taken[HEAD.size :]), known)
+        assert again == message
 
 
 STRIDE = 23

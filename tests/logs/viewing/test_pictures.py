@@ -163,6 +163,17 @@ def test_a_comparison(jump: RecordedRun, step: RecordedRun, tmp_path: Path) -> N
     assert not curves[: zero - 2, first + 6 : last - 6].any(), "no force in flight"
 
 
+def expect_no_calls_outside(browser: Browser) -> None:
+    """The page has asked this machine only, and could not ask another."""
+    asked = "performance.getEntriesByType('resource').map(entry => entry.name).join(' ')"
+    addresses = browser.ask("Runtime.evaluate", expression=asked)["result"]["value"].split()
+    assert any("re_viewer" in address for address in addresses)
+    assert [a for a in addresses if not a.startswith("http://127.0.0.1:")] == []
+    tried = "fetch('https://example.com').then(() => 'gone out', error => 'refused')"
+    answer = browser.ask("Runtime.evaluate", expression=tried, awaitPromise=True)
+    assert answer["result"]["value"] == "refused"
+
+
 @needs_browser
 @pytest.mark.parametrize("theme", ["dark", "light"])
 def test_the_page_in_a_browser(theme: str, step: RecordedRun, tmp_path: Path) -> None:
@@ -180,6 +191,7 @@ def test_the_page_in_a_browser(theme: str, step: RecordedRun, tmp_path: Path) ->
             browser.ask("Emulation.setEmulatedMedia", features=preferred)
             browser.open(viewer.page)
             pixels = settled(lambda: pixels_of(browser.picture()), there, still=False)
+            expect_no_calls_outside(browser)
     finally:
         viewer.stop()
     background = np.median(part(pixels, FORCES))
