@@ -7,6 +7,7 @@ else the machine does hits them alike. A ratio is the median over the ratios of 
 from __future__ import annotations
 
 import gc
+import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 
@@ -17,7 +18,7 @@ from ..blocks.control.whole_body_controller import WholeBodyController
 from ..blocks.control.whole_body_program import WholeBodyProgram
 from ..mathematics.whole_body_qp import joint_torque
 from ..runtime.running.timing import block_times
-from .rows import Row, compare, take_turns
+from .rows import Row, compare
 from .tick_controller import HandWrittenLoop, RecordedController, RecordedJump, record_jump
 from .tick_process import busy_wait_row, process_row
 from .tick_programs import DaqpProgram, OsqpController, OsqpProgram, PeerProgram
@@ -35,8 +36,12 @@ STATE_TO_TORQUE = ("dynamics", "wbc")
 """The blocks from the estimated state to torques."""
 
 CHUNK = 50
+PLAIN_TICKS = 200
+"""How many ticks plain Python takes part in: it needs tens of milliseconds for each."""
 EVERY = 10
 """One in so many ticks in stance is a state for the solvers by themselves."""
+ROUNDS = 5
+"""Turns of the solvers in each of these states, of which the median counts."""
 TORQUE_ERROR = 1e-6
 """How much the torques of two exact methods may differ [N m]."""
 Times = dict[str, NDArray[np.float64]]
@@ -46,7 +51,7 @@ def tick(rounds: int = 3, ticks: int | None = None, process: bool = True) -> lis
     """The rows.
 
     Args:
-        rounds: how often the jump is run again; plain Python takes part in the first round only.
+        rounds: how often the jump is run again; plain Python takes part in the first ticks of the first round only.
         ticks: how much of the jump is used; by default all.
         process: whether the whole process and the loop in real time are measured as well.
 
@@ -70,10 +75,11 @@ def tick(rounds: int = 3, ticks: int | None = None, process: bool = True) -> lis
             running = {PLAIN: plain, **cases} if number == 0 else cases
             _one_round(jump, running, programs if number == 0 else None)
     times = {name: np.array(case.times[-rounds * jump.ticks :]) for name, case in cases.items()}
-    of_first = {PLAIN: np.array(plain.times), COMPILED: times[COMPILED][: jump.ticks]}
+    of_first = {PLAIN: np.array(plain.times), COMPILED: times[COMPILED][: len(plain.times)]}
     rows = [
         *_block_rows(own, "block "),
         *_block_rows(fused, "fused block "),
+        *(_block_rows(cases[OSQP], "OSQP block ") if OSQP in cases else []),
         *_controller_rows(times, of_first, missing),
     ]
     rows += _program_rows(programs.times, missing)
@@ -94,7 +100,8 @@ def _one_round(
     for turn in range(-(-jump.ticks // CHUNK)):
         shift = turn % len(names)
         for name in (*names[shift:], *names[:shift]):
-            cases[name].run(CHUNK)
+            if name != PLAIN or cases[name].tick < PLAIN_TICKS:
+                cases[name].run(CHUNK)
     for name in (PLAIN, COMPILED, FUSED, BARE, HAND):
         if name in cases:
             cases[name].check()
@@ -128,15 +135,18 @@ class _Programs:
         if tick % EVERY or not active.size:
             return
         prepared = self._daqp.assemble(active)
-        cases: dict[str, Callable[[int], object]] = {
-            QP: _repeated(self._block._solve.run),
-            QP_DAQP: _repeated(lambda: self._solve(self._daqp, active, prepared)),
+        cases: dict[str, Callable[[], object]] = {
+            QP: self._block._solve.run,
+            QP_DAQP: lambda: self._solve(self._daqp, active, prepared),
         }
         if self._osqp is not None:
             osqp = self._osqp
             ready = osqp.assemble(active)
-            cases[QP_OSQP] = _repeated(lambda: self._solve(osqp, active, ready))
-        taken = take_turns(cases, 5, 1)
+            cases[QP_OSQP] = lambda: self._solve(osqp, active, ready)
+        taken: dict[str, list[float]] = {name: [] for name in cases}
+        for _ in range(ROUNDS):
+            for name, body in cases.items():
+                taken[name].append(_hot(body))
         self._found.append({name: float(np.median(found)) for name, found in taken.items()})
         self.times = {name: np.array([each[name] for each in self._found]) for name in cases}
         self._solve(self._daqp, active, prepared)
@@ -175,12 +185,13 @@ def _osqp_controller(jump: RecordedJump) -> RecordedController:
     return controller
 
 
-def _repeated(body: Callable[[], object]) -> Callable[[int], object]:
-    def run(count: int) -> None:
-        for _ in range(count):
-            body()
-
-    return run
+def _hot(body: Callable[[], object]) -> float:
+    """Microseconds of a call that follows two others, as in a loop that does nothing else."""
+    body()
+    body()
+    start = time.perf_counter_ns()
+    body()
+    return (time.perf_counter_ns() - start) * 1e-3
 
 
 def _block_rows(controller: RecordedController, prefix: str) -> list[Row]:

@@ -52,7 +52,7 @@ def busy_wait_row(jump: RecordedJump, seconds: float = SECONDS) -> Row:
     best, shares = 0, []
     for rate in RATES:
         share = late_share(controller, jump, rate, seconds)
-        shares.append(f"{rate / 1000:g} kHz {100 * share:.2g} %")
+        shares.append(f"{rate / 1000:g} kHz {100 * share:.1f} %")
         if share < LATE:
             best = rate
     if not best:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import sys
 import tempfile
 from pathlib import Path
@@ -13,6 +14,7 @@ from ..runtime.language.errors import AloftError, ExitCode
 from .output import errors_reported
 
 if TYPE_CHECKING:
+    from ..logs.file.reader import RecordedRun
     from ..logs.viewing.viewer import Viewer
 
 MANY_TICKS = 20_000
@@ -100,9 +102,25 @@ def draw(recording: Path, layout: Path | None, path: Path) -> Path:
     if chosen is not None:
         own = blueprint_with(read_layout(chosen, run.header), run.header)
     try:
-        return write_view(path, run, own)
+        return write_view(path, run, own, diagram_of(run))
     except OSError as error:
         raise AloftError(f"{path} cannot be written ({error.strerror or error})") from error
+
+
+def diagram_of(run: RecordedRun) -> bytes:
+    """The block diagram of the graph that ran, as PNG; nothing where its code has gone since."""
+    from ..logs.replay.opened_run import OpenedRun
+    from ..runtime.drawing.diagram import diagram
+    from ..runtime.drawing.placing import draw as drawn
+    from ..runtime.drawing.png import save_png
+
+    try:
+        graph = OpenedRun(run, Path(run.header.source).parent).graph
+    except (AloftError, OSError):
+        return b""
+    picture = io.BytesIO()
+    save_png(drawn(diagram(graph)), picture)
+    return picture.getvalue()
 
 
 def show(file: Path, *, web: bool) -> None:

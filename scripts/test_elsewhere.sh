@@ -59,4 +59,4 @@ OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 timeout "$limit" "$folder/bin/python" -
     tests/runtime/language tests/runtime/running tests/runtime/loading/test_examine.py \
     tests/blocks/general/test_pid.py tests/blocks/general/test_transfer_function.py \
     tests/studies/batch/test_jobs.py tests/planner/solving/test_bounded.py \
-    tests/logs/file tests/cli/test_run.py
+    tests/logs/file tests/logs/recording/test_finished_run.py tests/cli/test_view.py tests/cli/test_run.py

@@ -61,7 +61,7 @@ FORMAT = 4
 READABLE = (2, 3, 4)
 """The formats that can be read."""
 SIGNALS, STATES, KEYFRAMES, NOTES, EVENTS = "signals", "states", "keyframes", "notes", "events"
-LIMITS, TIMES, WORLD, GRAPH = "limits", "times", "world", "graph"
+LIMITS, TIMES, WORLD, GRAPH, DIAGRAM = "limits", "times", "world", "graph", "diagram"
 PLOTS = "plots"
 RECORDED, ROWS = "recorded", "rows"
 EXACT, BUS, STATE, NOTE, SPAN, PACKED = "exact", "bus", "state", "note", "span", "packed"

@@ -11,6 +11,7 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
+from ..file.format import DIAGRAM
 from ..file.reader import RecordedRun
 from ..viewing.blueprint import recording_blueprint
 from .run_stream import RunStream
@@ -19,13 +20,16 @@ DRAWN_TICKS = 4096
 """Ticks that are drawn at once: the viewer likes few large pieces."""
 
 
-def write_view(path: str | PathLike[str], run: RecordedRun, layout: Any = None) -> Path:
+def write_view(
+    path: str | PathLike[str], run: RecordedRun, layout: Any = None, diagram: bytes = b""
+) -> Path:
     """Write all that can be seen of a run, replacing an older file.
 
     Args:
         path: the file.
         run: the recording; some thousand of its ticks are in memory at a time.
         layout: by default the one that is made from the run's graph.
+        diagram: a PNG picture of the graph, which gets a tab of that layout.
 
     Raises:
         RecordingError: the recording cannot be read.
@@ -33,8 +37,12 @@ def write_view(path: str | PathLike[str], run: RecordedRun, layout: Any = None) 
         OSError: the file cannot be written.
     """
     path = Path(path)
-    shown = recording_blueprint(run.header) if layout is None else layout
+    shown = layout
+    if layout is None:
+        shown = recording_blueprint(run.header, diagram=bool(diagram))
     with opened_stream(path, run.header.name, shown) as stream:
+        if diagram:
+            write_picture(stream, diagram)
         draw(RunStream(stream, run.header), run)
     return path
 
@@ -54,6 +62,14 @@ def opened_stream(path: Path, name: str, layout: Any) -> Iterator[Any]:
     finally:
         stream.flush(timeout_sec=30)
         stream.disconnect()
+
+
+def write_picture(stream: Any, diagram: bytes) -> None:
+    """Put the picture of the graph into a stream."""
+    import rerun as rr
+
+    picture = rr.EncodedImage(contents=diagram, media_type="image/png")
+    stream.log(DIAGRAM, picture, static=True)
 
 
 def draw(out: RunStream, run: RecordedRun) -> None:

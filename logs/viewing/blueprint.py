@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from ..file.format import EVENTS, GRAPH, TIMES, WORLD, Header
+from ..file.format import DIAGRAM, EVENTS, GRAPH, TIMES, WORLD, Header
 from .plot_views import Shown, block_tabs, main_plots
 from .robot_shapes import eye_controls
 from .scene_ports import scene_ports
@@ -29,12 +29,14 @@ def recording_blueprint(
     first_tabs: Sequence[Any] = (),
     follow: bool = True,
     main_only: bool = False,
+    diagram: bool = False,
 ) -> Any:
     """The layout, saved in the file so that it needs no set-up to look at.
 
     ``shown`` are the runs in the stream, by default one; of several, each entity has its root.
     ``first_tabs`` come before those made from the graph; with ``follow`` the camera goes along with
     the robot. With ``main_only`` blocks have no tabs, because their signals are not drawn.
+    With ``diagram`` there is a tab for the picture of the graph, at ``DIAGRAM``.
     """
     import rerun.blueprint as rrb
 
@@ -47,6 +49,7 @@ def recording_blueprint(
         *(() if main_only and ports else block_tabs(header, shown)),
         rrb.TextDocumentView(origin=f"{shown[0].root}{TIMES}", name="Block times"),
         rrb.TextDocumentView(origin=f"{shown[0].root}{GRAPH}", name="Graph"),
+        *((rrb.Spatial2DView(origin=f"/{DIAGRAM}", name="Diagram"),) if diagram else ()),
         active_tab=0,
     )
     below = rrb.Tabs(

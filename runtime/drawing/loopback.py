@@ -19,7 +19,7 @@ class LoopbackHandler(BaseHTTPRequestHandler):
         in ``Host``.
         """
         host, _, port = (self.headers.get("Host") or "").rpartition(":")
-        server_port = str(self.server.server_address[1])
+        server_port = str(self.connection.getsockname()[1])
         if host in (ADDRESS, "localhost") and port == server_port:
             return True
         self.send_error(403, "this page is for this machine only")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 from .diagram import INTO, OUT, Wire
 from .geometry import HEAD, NOTE, PAD, PORT, TITLE, USE, Box, Drawing, note_of, width_of
@@ -23,7 +23,9 @@ from .svg import LEGEND
 _POINTS = 72.0
 
 
-def save_png(drawing: Drawing, path: Path, *, dark: bool = False, scale: float = 2.0) -> None:
+def save_png(
+    drawing: Drawing, path: Path | IO[bytes], *, dark: bool = False, scale: float = 2.0
+) -> None:
     """Write the picture, with ``scale`` dots for every pixel of the SVG file."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
@@ -41,7 +43,13 @@ def save_png(drawing: Drawing, path: Path, *, dark: bool = False, scale: float =
     painter = _Painter(axes, style, dark)
     painter.content(drawing, 0.0, 0.0)
     painter.legend(drawing)
-    figure.savefig(path, dpi=_POINTS * scale, facecolor=colours["page"], metadata={"Software": ""})
+    figure.savefig(
+        path,
+        format="png",
+        dpi=_POINTS * scale,
+        facecolor=colours["page"],
+        metadata={"Software": ""},
+    )
 
 
 class _Painter:

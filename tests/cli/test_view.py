@@ -7,6 +7,10 @@ import pytest
 from typer.testing import CliRunner
 
 from aloft.cli import make_app
+from aloft.cli.view import diagram_of
+from aloft.logs.file.reader import read
+from aloft.logs.replay.opened_run import OpenedRun
+from aloft.runtime.language.errors import AloftError
 
 ROOT = Path(__file__).parent.parent.parent
 
@@ -32,12 +36,30 @@ def test_what_is_shown_can_be_kept(tmp_path: Path) -> None:
     CliRunner().invoke(make_app(), ["run", graph, "--record", str(recording), "-q"])
     code, _ = view(recording, "--save", kept, "--no-show")
     assert code == 0 and kept.stat().st_size > 1000
+    assert b"\x89PNG" in kept.read_bytes(), "the diagram is in it"
     before = recording.read_bytes()
     code, text = view(recording, "--save", recording, "--no-show")
     assert code == 2 and "would overwrite the recording; name another file" in text
     code, text = view(kept, "--layout", tmp_path / "own.yaml")
     assert code == 2 and "has no signals for the layout" in text
     assert recording.read_bytes() == before
+
+
+def test_where_the_code_has_gone_there_is_no_diagram(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    recording, kept = tmp_path / "count.rrd", tmp_path / "kept.rrd"
+    graph = str(ROOT / "tests/cli/count.yaml")
+    CliRunner().invoke(make_app(), ["run", graph, "--record", str(recording), "-q"])
+    assert diagram_of(read(recording)).startswith(b"\x89PNG")
+
+    def gone(*_: object) -> None:
+        raise AloftError("there is no block counter:Counter")
+
+    monkeypatch.setattr(OpenedRun, "load", gone)
+    assert diagram_of(read(recording)) == b""
+    code, _ = view(recording, "--save", kept, "--no-show")
+    assert code == 0 and b"\x89PNG" not in kept.read_bytes()
 
 
 def test_a_comparison_of_what_is_no_recording(tmp_path: Path) -> None:

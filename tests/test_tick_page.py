@@ -1,0 +1,59 @@
+"""The table and the picture of one tick, from what ``aloft bench tick --json`` prints."""
+
+import importlib.util
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+from aloft.benchmarks.rows import Row
+from aloft.benchmarks.tick_chart import tick_chart
+
+ROOT = Path(__file__).parent.parent
+ROWS = [
+    Row("block wbc", 20.0, "us/tick"),
+    Row("block legs", 10.0, "us/tick"),
+    Row("block step", 0.5, "us/tick"),
+    Row("fused block wbc", 19.0, "us/tick"),
+    Row("fused block legs", 9.0, "us/tick"),
+    Row("fused block step", 0.25, "us/tick"),
+    Row("controller, fused", 30.0, "us/tick", "OSQP", 0.04, 1 / 30, floor=1 / 20),
+    Row("TSID", None, "us/tick", "x", note="not installed"),
+    Row("period", 100.0, "us", goal=50.0, floor=250.0),
+]
+FOUND = {
+    "machine": {"processor": "Quick", "cores": 2, "python": "3.11"},
+    "load": {"before": [0.5, 1, 1], "after": [0.75, 1, 1]},
+    "rows": [row.to_json() for row in ROWS],
+}
+
+
+@pytest.fixture
+def script() -> ModuleType:
+    spec = importlib.util.spec_from_file_location("refresh", ROOT / "docs/refresh_tick.py")
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_the_tables(script: ModuleType) -> None:
+    page = script.refreshed("a\n<!-- tick -->\nold\n<!-- end of tick -->\nb", FOUND)
+    assert page.startswith("a\n<!-- tick -->\nQuick, 2 cores, Python 3.11; load before 0.5, after")
+    assert page.endswith("<!-- end of tick -->\nb") and "old" not in page
+    assert "| median [us] | fused | kernels one by one |" in page  # without OSQP
+    assert "| `wbc` | 19.0 | 20.0 |" in page
+    assert "| controller, fused | 30 us | OSQP | 25 | 20 | 30 | floor reached |" in page
+    assert "| TSID | - | x |  |  |  | not installed |" in page
+    assert "| period | 100 us |  |  | 250 us | 50 us | floor reached |" in page
+    with pytest.raises(ValueError, match="<!-- tick -->"):
+        script.refreshed("", FOUND)
+
+
+def test_the_picture_has_every_large_block() -> None:
+    text = tick_chart(FOUND["rows"])
+    assert text == tick_chart(FOUND["rows"])
+    for word in ("wbc", "legs", "the others", "kernels one by one", "28 us"):
+        assert f">{word}<" in text
+    for word in ("step", "OSQP"):
+        assert f">{word}<" not in text
