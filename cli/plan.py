@@ -152,8 +152,7 @@ def plan_task(
     from ..planner.solving.bounded import cpu_time
     from ..planner.task.errors import PlanError
 
-    robot = library.robot
-    started = cpu_time()
+    robot, started = library.robot, cpu_time()
     try:
         with screen.status(f"planning {task.name}") as status:
             found, kept = library.plan(task, solver_with_progress(status.update), anew=anew)
@@ -163,7 +162,8 @@ def plan_task(
     except PlanError as error:
         print_error(str(error))
         row = failure(task, robot, error)
-        return row | (search_nearest(task, library, error.family, screen) if nearest else {})
+        spent = cpu_time() - started
+        return row | (search_nearest(task, library, error.family, spent, screen) if nearest else {})
     row = plan_json(found, robot, library.path_of(task), kept, reason)
     row["cpu_s"] = None if kept else cpu_time() - started
     print_plan(screen, found, tests=tests or not found.valid)
@@ -174,7 +174,7 @@ def plan_task(
     if row["path"]:
         say(screen, f"plan: {row['path']} ({reason})")
     if not found.valid and nearest:
-        row |= search_nearest(task, library, "", screen)
+        row |= search_nearest(task, library, "", cpu_time() - started, screen)
     return row
 
 
@@ -192,17 +192,20 @@ def list_plans(keep: Path | None, screen: Console, as_json: bool) -> ExitCode:
 
 
 def search_nearest(
-    task: JumpTask, library: PlanLibrary, family: str, screen: Console
+    task: JumpTask, library: PlanLibrary, family: str, spent: float, screen: Console
 ) -> dict[str, Any]:
-    """Search the nearest task that has a plan, keep that plan, and return it for the failed task's row."""
-    from ..planner.library.nearest_feasible import nearest_feasible
+    """Search the nearest task that has a plan, after so much processor time [s] was ``spent`` on it;
+    keep that plan, and return it for the failed task's row."""
+    from ..planner.library.nearest_feasible import nearest_feasible, seconds_left
 
     with screen.status("searching the nearest task that can be planned") as status:
 
         def progress(text: str) -> None:
             status.update(f"searching the nearest task that can be planned: {text}")
 
-        found = nearest_feasible(task, library.robot, family=family, progress=progress)
+        found = nearest_feasible(
+            task, library.robot, family=family, seconds=seconds_left(spent), progress=progress
+        )
     if found is None:
         say(screen, "a short search found no task near it that can be planned")
         return {"nearest": None}

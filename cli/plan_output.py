@@ -112,6 +112,10 @@ def nearest_json(found: NearestFeasible, path: Path) -> dict[str, Any]:
         "asked": found.asked,
         "value": found.value,
         "beyond": found.beyond,
+        "others": {
+            name: dict(zip(("asked", "value", "beyond"), way, strict=True))
+            for name, way in found.others.items()
+        },
         "text": found.text,
         "binds": list(found.binds),
         "solves": found.solves,

@@ -2,6 +2,8 @@
 
 import numpy as np
 
+from aloft.blocks.control import balance_law
+from aloft.blocks.jumping import capture_law
 from aloft.mathematics.body_tree import BodyMotion
 from aloft.mathematics.flight_prediction import LandingCost, flight_map
 from aloft.mathematics.joint_feedback import Feedback, Motion, SoftStops
@@ -35,7 +37,55 @@ LANDING = LandingCost(
 )
 SOLES = np.array([[0.05, -0.08, 0.0], [-0.04, -0.08, 0.0], [0.05, 0.08, 0.0], [-0.04, 0.08, 0.0]])
 MOVING = BodyMotion(*(NORMAL(shape) for shape in ((2, 3, 3), (2, 3), (1, 6), (2, 6), (2, 6))))
+STEPPING = (
+    capture_law.Terms(
+        np.array([0.02, 0.01, 0.3]), np.array([-0.4, 0.1, 0.0]), NORMAL(3), 4.8 * np.eye(16), SOLES,
+        NORMAL((4, 3)), np.array([[0.0, -0.08, 0.0], [0.0, 0.08, 0.0]]), np.tile(np.eye(3), (2, 1, 1)),
+    ),
+    capture_law.Settings._make(
+        np.array(value) for value in (
+            [2], [0.015], [0.006], [0.08], [1.0], [0.13], [0.015], [0.1], [0.2], [0.6, 1.8], [0.35],
+        )
+    ),
+    capture_law.Feet(
+        np.array([0, 0, 1, 1]), np.array([-1.0, 1.0]), np.array([0.16, 0.16]), 0.5 * SOLES, 4.8, 0.002
+    ),
+    capture_law.Memory(
+        np.array(1), np.array(0.05), np.array(0), np.array(0.0), np.array(0.0), np.array(0.0),
+        np.array(0.1), np.array([[0.0, -0.08, 0.0], [0.0, 0.08, 0.0]]),
+    ),
+)  # fmt: skip
+STEP_SCRATCH = capture_law.Scratch(
+    np.array([-0.1, 0.02]),
+    np.zeros(2),
+    np.zeros(2),
+    np.zeros(3),
+    np.zeros(4, bool),
+    np.ones(2, bool),
+)
+STEP_PHASE = capture_law.PhaseFields(
+    np.array(4), np.array(0.1), np.array(0.0), np.array(0.2), np.array([False, False, True, True]),
+    np.zeros(4, bool), np.zeros((4, 3)),
+)  # fmt: skip
+PLACE = (
+    balance_law.Plan(
+        np.array(0.4), np.array(0.5), np.array(0.8), *NORMAL((5, 3)), np.array([0.0, 0.0, 0.0, 1.0]),
+        NORMAL(3), NORMAL((2, 3)), NORMAL(2), *NORMAL((3, 10)),
+    ),
+    balance_law.Gains._make([*np.full((7, 1), 0.3), np.zeros((2, 3))]),
+    balance_law.Memory(
+        np.array(0.3), np.array(True), np.zeros(3), NORMAL(3), np.array(0.1), 0.02 * NORMAL(3)
+    ),
+    balance_law.Aim(*NORMAL((5, 3)), np.ones(4), NORMAL(3), *NORMAL((3, 10))),
+    balance_law.Scratch(*np.zeros((2, 4)), *NORMAL((3, 3))),
+)  # fmt: skip
 UNUSED = {
+    "aloft.blocks.control.balance_law.correct_place": PLACE,
+    "aloft.blocks.jumping.capture_law.best_foot": (*STEPPING, STEP_SCRATCH, 5.7),
+    "aloft.blocks.jumping.capture_law.aim_step": (*STEPPING, STEP_SCRATCH, 1, 5.7, 0.05),
+    "aloft.blocks.jumping.capture_law.swing_foot": (
+        STEP_PHASE, *STEPPING, STEP_PHASE, STEP_SCRATCH, 5.7,
+    ),
     "aloft.mathematics.capture_step.nearest_in_foot": (
         SOLES, np.array([0, 0, 1, 1]), 1, np.array([0.1, 0.02]), np.zeros(2),
     ),

@@ -248,10 +248,13 @@ def solve_and_check(
     robot: RobotDescription,
     warm_start: JumpPlan | None = None,
     solve: Solver | None = None,
+    *,
+    refine: bool = True,
 ) -> JumpPlan:
     """A valid plan of a task with its report; a warm start that leads nowhere is tried without.
 
-    A plan that fails the check because its intervals are too long is solved again on finer ones.
+    With ``refine`` a plan that fails the check because its intervals are too long is solved again on
+    finer ones.
 
     Raises:
         TaskError, PlanError, InvalidPlanError: as ``PlanLibrary.plan``.
@@ -271,7 +274,7 @@ def solve_and_check(
             if plan.valid:
                 return plan
     plan = checked(make(task, robot, None), robot)
-    for _ in range(ROUNDS):
+    for _ in range(ROUNDS if refine else 0):
         if plan.valid or not curable(plan):
             break
         try:

@@ -1,15 +1,16 @@
 """Searches for the nearest task that can be planned, where the given task cannot.
 
 The search changes one parameter at a time between the given value and a modest one, by bisection over round
-values. It takes several solves, so only commands whose user waits for an answer call it; loading or running a
-graph never does.
+values. Where that finds nothing, because more than one is beyond the robot, all that say how far the jump goes
+change together, each by the same share of its way. It takes several solves, so only commands whose user waits
+for an answer call it; loading or running a graph never does.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 
 from ...robots.description import RobotDescription
 from ..checking.binding import what_binds
@@ -21,8 +22,16 @@ from ..task.task import JumpTask
 from .library import SCALES, Solver, solve_and_check
 
 MOST_SOLVES = 10
-MOST_SECONDS = 6.0
-"""Processor time after which no further solve is begun [s]."""
+MOST_SECONDS, LEAST_SECONDS = 6.0, 3.0
+"""Processor time after which no further solve is begun [s]; and where the task itself took long."""
+ALTOGETHER = 8.5
+"""s of processor time after which no further solve is begun, with what the task itself took."""
+SINGLE = 2
+"""So many parameters are changed on their own before all are changed together."""
+TOGETHER = ("rise", "take_off_speed", "distance_x", "distance_y", "twist", "landing_height")
+UPWARDS = ("rise", "take_off_speed", "landing_height")
+SHARES = 20
+"""Steps of the way from a modest jump to the given one where all change together."""
 
 
 @dataclass(frozen=True)
@@ -80,6 +89,8 @@ class NearestFeasible:
         solves, cpu_s: what the search cost.
         plan: the valid plan of the changed task.
         binds: what of the robot that plan uses to the full.
+        others: parameters that were changed together with it, each with what was asked for, what
+            can be planned, and what could not.
     """
 
     parameter: str
@@ -90,16 +101,23 @@ class NearestFeasible:
     cpu_s: float
     plan: JumpPlan
     binds: tuple[str, ...] = ()
+    others: Mapping[str, tuple[float, float, float]] = field(default_factory=dict)
 
     @property
     def text(self) -> str:
         """One line for people, with a value to paste."""
-        axis = AXES[self.parameter]
+        ways = {self.parameter: (self.asked, self.value, self.beyond), **self.others}
+        asked, value, beyond = (
+            ", ".join(f"{name}: {AXES[name].text(way[i])}" for name, way in ways.items())
+            for i in range(3)
+        )
+        if not self.others:
+            beyond = AXES[self.parameter].text(self.beyond)
+        are = "together are" if self.others else "is"
         binds = f"; what binds: {', '.join(self.binds)}" if self.binds else ""
         return (
-            f"{self.parameter}: {axis.text(self.asked)} is beyond the robot; the nearest that can be "
-            f"planned is {self.parameter}: {axis.text(self.value)}; {axis.text(self.beyond)} cannot"
-            f"{binds} ({self.solves} solves, {self.cpu_s:.1f} s)"
+            f"{asked} {are} beyond the robot; the nearest that can be planned is {value}; {beyond} "
+            f"cannot{binds} ({self.solves} solves, {self.cpu_s:.1f} s)"
         )
 
 
@@ -119,13 +137,47 @@ def nearest_feasible(
     ``progress`` is told what is being tried.
     """
     search = _Search(task, robot, solve, seconds, progress)
-    for parameter in candidates(task, family):
-        found = search.along(parameter)
+    tried = candidates(task, family)
+    ways = ways_together(task)
+    for parameter in tried[:SINGLE] if ways else tried:
+        found = search.along([{parameter: value} for value in values_towards(task, parameter)])
         if found is not None:
             return found
-        if search.spent:
+        if search.spent or (ways and search.cpu > seconds / 3.0):
             break
+    for way in ways:
+        found = search.along(way)
+        if found is not None:
+            return found
     return None
+
+
+def ways_together(task: JumpTask) -> list[list[dict[str, float]]]:
+    """From a modest jump to what is asked for: onto a step with its height and the rise only, as
+    the robot cannot jump up close to a step; then with all parameters that say how far it goes.
+    Empty where the task sets fewer than two of them to something else."""
+    far = [name for name in TOGETHER if name in AXES and len(values_towards(task, name)) > 1]
+    up = [name for name in far if name in UPWARDS] if task.landing_height > 0.0 else []
+    groups = [names for names in (up, far) if len(names) > 1]
+    return [_way(task, names) for names in groups[: 1 if up == far else 2]]
+
+
+def _way(task: JumpTask, names: list[str]) -> list[dict[str, float]]:
+    far = {name: AXES[name].modest for name in names}
+    found = []
+    for k in range(SHARES + 1):
+        point = {}
+        for name, modest in far.items():
+            step, way = AXES[name].step, getattr(task, name) - modest
+            round_way = step * round(way * k / SHARES / step)
+            point[name] = getattr(task, name) if k == SHARES else round(modest + round_way, 9)
+        found.append(point)
+    return found
+
+
+def seconds_left(spent: float) -> float:
+    """How long a search may take [s] after a task that took so much processor time [s]."""
+    return max(LEAST_SECONDS, min(MOST_SECONDS, ALTOGETHER - spent))
 
 
 def candidates(task: JumpTask, family: str) -> list[str]:
@@ -155,14 +207,16 @@ def values_towards(task: JumpTask, parameter: str) -> list[float]:
     return [*(round(modest + sign * k * axis.step, 9) for k in range(count)), asked]
 
 
-def _only_from_near(solve: Solver | None, start: JumpPlan | None) -> Solver:
-    """The planner, which gives up soon where it has a plan to start from."""
+def _quick(solve: Solver | None, near: bool) -> Solver:
+    """The planner, which gives up soon. From a near plan, too, it tries from nothing by itself."""
     from ..solving.solve import solve_jump
 
     def make(task: JumpTask, robot: RobotDescription, warm_start: JumpPlan | None) -> JumpPlan:
         if solve is not None:
             return solve(task, robot, warm_start)
-        return solve_jump(task, robot, warm_start=warm_start, quick=start is not None)
+        if near and warm_start is None:
+            raise PlanError("what is not found from near is not looked for again")
+        return solve_jump(task, robot, warm_start=warm_start, quick=True)
 
     return make
 
@@ -193,31 +247,35 @@ class _Search:
         """Whether no further solve is begun."""
         return self._solves >= MOST_SOLVES or self.cpu > self._seconds
 
-    def along(self, parameter: str) -> NearestFeasible | None:
-        """The best value of one parameter; ``None`` where even the modest one has no plan."""
-        values = values_towards(self._task, parameter)
-        plan = self._try(parameter, values[0], None)
+    def along(self, way: list[dict[str, float]]) -> NearestFeasible | None:
+        """The best point of a way from modest values to what is asked for; ``None`` where even the
+        modest one has no plan, or no time is left to try it."""
+        plan = None if self._solves and self.spent else self._try(way[0], None)
         if plan is None:
             return None
-        good, bad = 0, len(values) - 1
+        good, bad = 0, len(way) - 1
         while bad - good > 1 and not self.spent:
-            middle = (good + bad) // 2
-            better = self._try(parameter, values[middle], plan)
+            # What fails costs several times what succeeds, so the first step is the smaller one.
+            middle = good + max(1, (bad - good) // (2 if good else 4))
+            better = self._try(way[middle], plan)
             if better is None:
                 bad = middle
             else:
                 good, plan = middle, better
+        ends = {name: (way[-1][name], way[good][name], way[bad][name]) for name in way[0]}
+        first, *others = ends
         return NearestFeasible(
-            parameter, values[-1], values[good], values[bad], self._solves, self.cpu, plan,
-            what_binds(plan, self._robot),
+            first, *ends[first], self._solves, self.cpu, plan, what_binds(plan, self._robot),
+            {name: ends[name] for name in others},
         )  # fmt: skip
 
-    def _try(self, parameter: str, value: float, start: JumpPlan | None) -> JumpPlan | None:
-        """A valid plan with that value, or ``None``."""
-        self._progress(f"{parameter}: {AXES[parameter].text(value)}")
+    def _try(self, values: Mapping[str, float], start: JumpPlan | None) -> JumpPlan | None:
+        """A valid plan with those values, or ``None``."""
+        self._progress(", ".join(f"{name}: {AXES[name].text(x)}" for name, x in values.items()))
         self._solves += 1
-        task = self._task.model_copy(update={parameter: value})
+        task = self._task.model_copy(update=dict(values))
+        make = _quick(self._solve, start is not None)
         try:
-            return solve_and_check(task, self._robot, start, _only_from_near(self._solve, start))
+            return solve_and_check(task, self._robot, start, make, refine=False)
         except (PlanError, InvalidPlanError, TaskError):
             return None

@@ -50,7 +50,7 @@ class KernelBlock(Block):
                 f"{cls.__name__}: a KernelBlock has no step of its own; setup() sets kernel_calls, "
                 "and attend() does what needs Python. Derive from Block to write a step"
             )
-        cls.step = _step_in_file_of(cls)  # type: ignore[method-assign]
+        cls.step = _step_in_file_of(cls)  # type: ignore[assignment]
 
     def step(self) -> None:
         for call in self.kernel_calls:

@@ -192,5 +192,5 @@ def test_the_solvers_agree_on_states_of_a_jump(monkeypatch):
 
 @pytest.mark.long
 @pytest.mark.filterwarnings("ignore:Converted matrix")
-def test_the_solvers_agree_on_five_thousand_states_of_jumps(monkeypatch):
+def test_the_solvers_agree_on_the_states_of_four_jumps(monkeypatch):
     assert check(monkeypatch, JUMPS.values(), duration=None, every=1) > 4_500

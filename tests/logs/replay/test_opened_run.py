@@ -1,13 +1,17 @@
 """A recording file replayed: keyframes, live changes and failures come out of the file."""
 
+import os
+import platform
 import shutil
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from aloft.logs.file.header import make_header
+from aloft.logs.file.header import machine, make_header
 from aloft.logs.recording.writer import RecordingWriter
 from aloft.logs.replay.opened_run import OpenedRun
 from aloft.logs.replay.replay import replay
@@ -141,3 +145,22 @@ def test_other_versions_are_named(opened: OpenedRun, monkeypatch: pytest.MonkeyP
     other = opened.what_is_other_now()
     assert any(line.startswith("numpy was ") and line.endswith(" and is 0.1") for line in other)
     assert any(line.startswith("python was ") and "not installed" in line for line in other)
+
+
+@pytest.mark.skipif(platform.machine() != "x86_64", reason="names kernels of x86-64 processors")
+def test_another_kernel_of_blas_is_named(made: tuple[Path, RunResult]) -> None:
+    """With other routines BLAS rounds otherwise, which a replay must be able to say."""
+    program = (
+        "from aloft.logs.replay.opened_run import OpenedRun\n"
+        "print(*OpenedRun.of('recordings/sum.rrd').what_is_other_now(), sep='\\n')\n"
+    )
+    said = subprocess.run(
+        [sys.executable, "-c", program],
+        cwd=made[0],
+        env={**os.environ, "OPENBLAS_CORETYPE": "Nehalem"},
+        capture_output=True,
+        text=True,
+        check=True,
+    ).stdout
+    ours = machine()["blas kernel"]
+    assert said.splitlines() == [f"blas kernel was {ours} and is Nehalem"]

@@ -9,7 +9,13 @@ import pytest
 
 from aloft.planner.library import nearest_feasible as module
 from aloft.planner.library.library import SHIPPED, PlanLibrary
-from aloft.planner.library.nearest_feasible import candidates, nearest_feasible, values_towards
+from aloft.planner.library.nearest_feasible import (
+    candidates,
+    nearest_feasible,
+    seconds_left,
+    values_towards,
+    ways_together,
+)
 from aloft.planner.task.errors import PlanError
 from aloft.planner.task.plan import JumpPlan
 from aloft.planner.task.read_task import read_task
@@ -47,7 +53,8 @@ class Planner:
 def _no_check(monkeypatch: pytest.MonkeyPatch) -> None:
     """What stands in for plans is valid."""
 
-    def solved(task: JumpTask, robot: Any, warm: Any, solve: Any) -> JumpPlan:
+    def solved(task: JumpTask, robot: Any, warm: Any, solve: Any, *, refine: bool) -> JumpPlan:
+        assert not refine, "a finer grid costs more than a value that is a step nearer"
         plan = solve(task, robot, warm)
         assert isinstance(plan, JumpPlan)
         return plan
@@ -103,6 +110,41 @@ def test_values_come_from_both_sides_and_onto_a_step() -> None:
     assert values_towards(low, "friction") == []
     slippery = make_task({"recipe": "paper", "name": "ice", "rise": 0.1, "friction": 0.65})
     assert values_towards(slippery, "friction") == [0.7, 0.675, 0.65]
+
+
+def test_onto_a_step_its_height_and_the_rise_change_together() -> None:
+    asked = {"rise": 0.46, "distance_x": 0.2, "landing_height": 0.4}
+    task = make_task({"recipe": "paper", "name": "onto a table", **asked})
+    solve = Planner(lambda task: (task.rise or 0.0) < 0.3)
+    found = nearest_feasible(task, ROBOT, solve=solve)
+    assert found is not None
+    ways = {found.parameter: (found.asked, found.value, found.beyond), **found.others}
+    assert ways == {"rise": (0.46, 0.29, 0.31), "landing_height": (0.4, 0.22, 0.24)}
+    assert found.plan.task.distance_x == 0.2
+    assert found.text.startswith(
+        "rise: 46 cm, landing_height: 40 cm together are beyond the robot; the nearest that can be "
+        "planned is rise: 29 cm, landing_height: 22 cm; rise: 31 cm, landing_height: 24 cm cannot; "
+        "what binds: "
+    )
+
+
+def test_where_no_single_parameter_helps_all_change_together() -> None:
+    asked = {"rise": 0.5, "distance_x": 1.0, "twist": 2.0}
+    task = make_task({"recipe": "paper", "name": "far", **asked})
+    (way,) = ways_together(task)
+    assert way[0] == {"rise": 0.08, "distance_x": 0.0, "twist": 0.0}
+    assert way[-1] == asked
+    solve = Planner(lambda task: (task.rise or 0.0) < 0.3 and task.distance_x < 0.5)
+    found = nearest_feasible(task, ROBOT, solve=solve)
+    assert found is not None
+    assert (found.parameter, found.value, found.beyond) == ("rise", 0.27, 0.29)
+    assert set(found.others) == {"distance_x", "twist"}
+    assert found.solves == len(solve.asked) <= module.MOST_SOLVES
+    assert ways_together(make_task({"recipe": "paper", "name": "high", "rise": 0.6})) == []
+
+
+def test_a_task_that_took_long_leaves_less_time() -> None:
+    assert [seconds_left(spent) for spent in (0.0, 4.0, 20.0)] == [6.0, 4.5, 3.0]
 
 
 def test_the_search_is_bounded() -> None:
