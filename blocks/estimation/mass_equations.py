@@ -113,11 +113,12 @@ def publish_mass(
     mass: float, memory: Memory, out: Array, deviation: Array, offset: Array, offset_std: Array
 ) -> None:
     """Write the estimate's ``mass`` and ``deviation`` () [kg], and the torso's offset (3,) [m]."""
+    # Rounding may leave a variance that is all but zero just below it.
     out[()] = mass * float(memory.published[0])
-    deviation[()] = mass * math.sqrt(float(memory.covariance[SCALE, SCALE]))
+    deviation[()] = mass * math.sqrt(max(float(memory.covariance[SCALE, SCALE]), 0.0))
     for k in range(3):
         offset[k] = memory.published[1 + k]
-        offset_std[k] = math.sqrt(float(memory.covariance[COM + k, COM + k]))
+        offset_std[k] = math.sqrt(max(float(memory.covariance[COM + k, COM + k]), 0.0))
 
 
 @kernel
