@@ -11,12 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from aloft.blocks.control.dynamics import Dynamics
-from aloft.blocks.control.tasks import ContactPoints
 from aloft.blocks.control.whole_body_controller import WholeBodyController
 from aloft.blocks.signals import Phase
-from aloft.mathematics.compiling.kernel_call import KernelCall
-from aloft.mathematics.kernel import kernel
-from aloft.mathematics.whole_body_solution import ILL_POSED
 from aloft.robots.description import find_robot
 from aloft.runtime.language.errors import BlockError
 from aloft.runtime.testing import BlockBench
@@ -319,75 +315,6 @@ def test_the_fallback_is_the_defined_one(dynamics):
     bench.block._arrange()
     bench.step()
     assert command.torque.tolist() == last.tolist()
-
-
-@kernel
-def give_up(code):
-    code[0] = ILL_POSED
-
-
-@pytest.mark.parametrize("plain", [False, True])
-def test_where_the_own_method_fails_daqp_and_then_the_fallback_follow(dynamics, plain):
-    bench = BlockBench(WholeBodyController, robot=ROBOT, plain=plain)
-    feed(bench, model(dynamics))
-    bench.step()
-    block, command = bench.block, bench.get("command")
-    last = command.torque.copy()
-    own = tuple(block.kernel_calls)
-    fails = KernelCall(give_up, block._code)
-    fails.when = block._solve.when
-    block.kernel_calls = tuple(fails if call is block._solve else call for call in own)
-    bench.step()
-    assert bool(command.solved) and int(command.failures) == 0
-    assert command.torque == pytest.approx(last, abs=1e-5)
-    last = command.torque.copy()
-    block._other = type("Broken", (), {"solve": lambda self, *args: None})()
-    for failed in (1, 2):
-        bench.step()
-        assert not bool(command.solved) and int(command.failures) == failed
-        assert command.torque == pytest.approx(0.9**failed * last, abs=1e-12)
-    bench.set("phase", phase=Phase.FLIGHT, stance=[False] * 4)
-    bench.step()
-    assert bool(command.solved) and int(command.failures) == 2 and not command.torque.any()
-    feed(bench, model(dynamics))
-    bench.step()
-    assert int(command.failures) == 3 and not command.torque.any()  # what is held is zero now
-    block.kernel_calls = own
-    bench.step()
-    assert bool(command.solved) and int(command.failures) == 3 and command.torque.any()
-
-
-class SlowContactPoints(ContactPoints):
-    """The task as Python writes it, so that the controller's step is no chain of kernels."""
-
-    def update(self, gains):
-        gains.run()
-
-
-class OneCallForAll(ContactPoints):
-    """Gives one and the same call for all kinds of phases."""
-
-    def prepare(self, gains):
-        self.once = getattr(self, "once", None) or super().prepare(gains)
-        return self.once
-
-
-@pytest.mark.parametrize("kind", [SlowContactPoints, OneCallForAll])
-@pytest.mark.parametrize("phase", [Phase.STAND, Phase.THRUST, Phase.LANDING])
-def test_tasks_in_python_give_the_same_bytes(dynamics, kind, phase):
-    others = ["LinearMomentum", "TorsoOrientation", "AngularMomentum", "Posture"]
-    found = []
-    for first in ("ContactPoints", f"{__name__}:{kind.__name__}"):
-        bench = make(model(dynamics, 3), phase=phase, tasks=[first, *others])
-        assert bool(bench.block.kernel_calls) == (first == "ContactPoints")
-        bench.step()
-        assert bool(bench.get("command").solved)
-        snapshot = bench.snapshot()
-        found.append((snapshot.bus, snapshot.state))
-        bench.set("phase", phase=Phase.FLIGHT, stance=[False] * 4)
-        bench.step()
-        assert bool(bench.get("command").solved) and not bench.get("command").torque.any()
-    assert found[0] == found[1]
 
 
 def test_the_fallback_survives_a_snapshot(dynamics):
