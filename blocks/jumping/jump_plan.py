@@ -7,13 +7,24 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
+import numpy as np
+
+from ...mathematics.compiling.kernel_call import KernelCall
 from ...planner.library.jump_table import JumpTableReader
-from ...runtime.language.block import Block, Context, Input, Metric, Misfit, Output, State
+from ...runtime.language.block import Context, Input, Metric, Misfit, Output, State
 from ...runtime.language.errors import BlockError
+from ...runtime.language.kernel_block import KernelBlock
 from ...runtime.language.parameters import Parameters, parameter
 from ...runtime.language.signals import Field, Signal
-from ..signals import DelayEstimate, DynamicsTerms, JumpReference, Phase
-from .plan_progress import delay_change, speed_error
+from ..signals import DelayEstimate, DynamicsTerms, JumpReference
+from .plan_progress import (
+    Motion,
+    Planned,
+    Progress,
+    ProgressSettings,
+    follow_motion,
+    plan_instant,
+)
 
 if TYPE_CHECKING:
     from ...planner.checking.validity import ValidityReport
@@ -34,7 +45,7 @@ class PlanProgress(Signal):
     before = Field(unit="s", text="the same before the thrust's last part")
 
 
-class JumpPlan(Block):
+class JumpPlan(KernelBlock):
     """The reference motion of a jump, found by the kino-dynamic planner (paper, III).
 
     The task is a file (``tasks/in_situ.yaml``; looked for beside the graph, then among the shipped
@@ -237,37 +248,39 @@ class JumpPlan(Block):
         robot, task = self.robot, planned_task(self.params, self.context)
         plan = self._plan(task, robot)
         self._report = self._report_validity(plan)
-        self._by_progress = self.params.by == "progress" and "terms" in self.context.wired
-        self._reader = JumpTableReader(
+        reader = JumpTableReader(
             reference_table_once(plan, robot, self.params.stand_time), self.reference
         )
+        self.kernel_calls = self._calls(reader)
 
-    def step(self) -> None:
-        lead = self.params.lead
-        lead = float(self.delay.delay) if lead is None else lead
-        time = self.time - float(self.progress.late)
-        self._reader.read(time, lead, self.period)
-        if self._by_progress:
-            self._follow_motion(time)
-
-    def _follow_motion(self, time: float) -> None:
-        """Delay or hasten the end of a thrust by the speed and height of the centre of mass."""
-        p, reference, terms, progress = self.params, self.reference, self.terms, self.progress
-        left = float(reference.lift_off_time) - time
-        if int(reference.phase) != Phase.THRUST or not 0.0 < left <= p.progress_time:
-            progress.before[()] = progress.late
-            return
-        error = speed_error(
-            float(terms.com[2]) - float(terms.foot_position[:, 2].mean()),
-            float(terms.com_velocity[2]),
-            float(reference.com[2]) - float(reference.foot_position[:, 2].mean()),
-            float(reference.com_velocity[2]),
-        )
-        push = float(reference.com_acceleration[2])
-        late = float(progress.late) - float(progress.before)
-        late += delay_change(error, push, p.progress_gain, FASTEST, self.period)
-        late = min(max(late, -p.progress_limit), p.progress_limit)
-        progress.late[()] = float(progress.before) + late
+    def _calls(self, reader: JumpTableReader) -> list[KernelCall]:
+        """Find the instant of the plan, read it, and follow the motion where that is asked for."""
+        p, clock, period, reference = self.params, self.context.clock, self.period, self.reference
+        progress = Progress(self.progress.late, self.progress.before)
+        lead = self.delay.delay if p.lead is None else np.array(p.lead, np.float64)
+        calls = [
+            KernelCall(
+                plan_instant, clock.present, clock.base_period, progress.late, lead, period,
+                reader.instant,
+            ),
+            reader.call,
+        ]  # fmt: skip
+        if p.by == "progress" and "terms" in self.context.wired:
+            measured, planned = (
+                Motion(*(getattr(signal, name) for name in Motion._fields))
+                for signal in (self.terms, reference)
+            )
+            settings = ProgressSettings(
+                float(p.progress_time), float(p.progress_gain), float(p.progress_limit), FASTEST,
+                period,
+            )  # fmt: skip
+            others = Planned(*(getattr(reference, name) for name in Planned._fields))
+            calls.append(
+                KernelCall(
+                    follow_motion, reader.instant, measured, planned, others, settings, progress
+                )
+            )
+        return calls
 
     def metrics(self) -> Mapping[str, Metric]:
         report = self._report

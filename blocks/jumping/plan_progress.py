@@ -2,8 +2,17 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
 from ...mathematics.constants import GRAVITY
 from ...mathematics.kernel import kernel
+from ..signals import Phase
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
 
 SLOWEST = 0.5
 """Vertical speed [m/s] below which a height makes no difference to the apex yet."""
@@ -43,3 +52,99 @@ def delay_change(error: float, push: float, gain: float, fastest: float, period:
     """
     rate = -gain * error / max(push, LEAST_PUSH)
     return min(max(rate, -fastest), fastest) * period
+
+
+class Motion(NamedTuple):
+    """The measured or the planned motion that tells the progress.
+
+    ``com`` and ``com_velocity`` (3,) [m, m/s], and ``foot_position`` (n_feet, 3) [m], all in the world.
+    """
+
+    com: Array
+    com_velocity: Array
+    foot_position: Array
+
+
+class Planned(NamedTuple):
+    """What else the plan says: its phase, when it lifts off [s], of shape () each, and the
+    acceleration of the centre of mass [m/s^2, world], (3,)."""
+
+    phase: Indices
+    lift_off_time: Array
+    com_acceleration: Array
+
+
+class ProgressSettings(NamedTuple):
+    """The parameters of ``JumpPlan`` about progress, the largest rate of the delay, and the period."""
+
+    time: float
+    gain: float
+    limit: float
+    fastest: float
+    period: float
+
+
+class Progress(NamedTuple):
+    """The fields of ``PlanProgress``, of shape () each."""
+
+    late: Array
+    before: Array
+
+
+@kernel
+def plan_instant(
+    present: Indices, base_period: float, late: Array, lead: Array, hold: float, instant: Array
+) -> None:
+    """The instant at which the plan is read.
+
+    Args:
+        present: the tick, (1,).
+        base_period: the seconds of a tick.
+        late: how much later than by the clock the plan is read [s], of shape ().
+        lead: how far ahead the feedforward is read [s], of shape ().
+        hold: the seconds over which the feedforward is the mean.
+        instant: the time, the lead and the hold [s], (3,).
+    """
+    instant[0] = base_period * int(present[0]) - float(late[()])
+    instant[1] = float(lead[()])
+    instant[2] = hold
+
+
+@kernel
+def follow_motion(
+    instant: Array,
+    measured: Motion,
+    reference: Motion,
+    planned: Planned,
+    settings: ProgressSettings,
+    progress: Progress,
+) -> None:
+    """Delay or hasten the end of a thrust by the speed and height of the centre of mass.
+
+    Args:
+        instant: as ``plan_instant`` writes it; all others but ``measured`` are of that instant.
+    """
+    left = float(planned.lift_off_time[()]) - float(instant[0])
+    if int(planned.phase[()]) != Phase.THRUST or not 0.0 < left <= settings.time:
+        progress.before[()] = float(progress.late[()])
+        return
+    error = speed_error(
+        float(measured.com[2]) - mean_height(measured.foot_position),
+        float(measured.com_velocity[2]),
+        float(reference.com[2]) - mean_height(reference.foot_position),
+        float(reference.com_velocity[2]),
+    )
+    push, before = float(planned.com_acceleration[2]), float(progress.before[()])
+    late = float(progress.late[()]) - before
+    late += delay_change(error, push, settings.gain, settings.fastest, settings.period)
+    late = min(max(late, -settings.limit), settings.limit)
+    progress.late[()] = before + late
+
+
+@kernel
+def mean_height(position: Array) -> float:
+    """The mean height [m] of positions (n, 3)."""
+    total = 0.0
+    for i in range(position.shape[0]):
+        total += float(position[i, 2])
+    return total / len(position)

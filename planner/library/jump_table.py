@@ -100,7 +100,12 @@ class Marks(NamedTuple):
 
 
 class JumpTableReader:
-    """Writes the reference of any instant of a table to ``reference``, without allocating."""
+    """Writes the reference of any instant of a table to ``reference``, without allocating.
+
+    Attributes:
+        instant: the time, the lead and the hold of ``read`` [s], (3,).
+        call: reads the reference at ``instant``, for blocks whose own kernels write it.
+    """
 
     def __init__(self, table: JumpTable, reference: JumpReference) -> None:
         n = len(table.time)
@@ -113,15 +118,15 @@ class JumpTableReader:
         first = (table.thrust_time, table.lift_off_time, table.touchdown_time)
         jumps = np.array([first, *table.later_jumps], dtype=np.float64)
         contact = np.zeros((0, 1), np.bool_) if table.contact is None else table.contact
-        self._instant = np.zeros(3)
-        self._read = KernelCall(
+        self.instant = np.zeros(3)
+        self.call = KernelCall(
             read_table,
             Rows(
                 np.ascontiguousarray(table.time, dtype=np.float64), rows,
                 integral(table.time, rows), fed, np.array([table.squat_time, table.recover_time]),
                 jumps, jumps[:, 2].copy(), np.ascontiguousarray(contact),
             ),
-            self._instant, np.zeros(rows.shape[1]),
+            self.instant, np.zeros(rows.shape[1]),
             Fields(*(getattr(reference, name).reshape(-1) for name in Fields._fields)),
             Marks(*(getattr(reference, name) for name in Marks._fields)),
         )  # fmt: skip
@@ -137,8 +142,8 @@ class JumpTableReader:
         from then on, because a command holds until the next one. So a thrust that ends between two
         commands ends with the right momentum.
         """
-        self._instant[0], self._instant[1], self._instant[2] = time, lead, hold
-        self._read.run()
+        self.instant[0], self.instant[1], self.instant[2] = time, lead, hold
+        self.call.run()
 
 
 @kernel

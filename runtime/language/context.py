@@ -7,24 +7,38 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ...robots.description import RobotDescription
 
 
-@dataclass
 class Clock:
     """The time of a run: the present tick, the duration of a tick [s], and how the run is paced
     (the ``kind`` of its ``ClockSpec``)."""
 
-    base_period: float
-    tick: int = 0
-    stop_reason: str | None = None
-    kind: str = "free"
-    stopped_by: str = ""
-    """The path of the block that asked for the end of the run."""
-    began: int = 0
-    """When the present tick began, by the run's source of time [ns]; zero if ticks are not timed."""
-    command_limit: float = 0.0
-    """How long the links that bring commands may be silent [s]; zero where none is watched."""
+    def __init__(self, base_period: float, tick: int = 0) -> None:
+        self.base_period = base_period
+        self.present: NDArray[np.int64] = np.array([tick], np.int64)
+        """The present tick, (1,), where kernels read it."""
+        self.stop_reason: str | None = None
+        self.kind = "free"
+        self.stopped_by = ""
+        """The path of the block that asked for the end of the run."""
+        self.began = 0
+        """When the present tick began, by the run's source of time [ns]; zero if ticks are not
+        timed."""
+        self.command_limit = 0.0
+        """How long the links that bring commands may be silent [s]; zero where none is watched."""
+
+    @property
+    def tick(self) -> int:
+        """The present tick."""
+        return self.present.item()
+
+    @tick.setter
+    def tick(self, tick: int) -> None:
+        self.present[0] = tick
 
     def commands_heard(self) -> int:
         """When the most silent link that brings commands last brought one, by the monotonic clock

@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...mathematics.compiling.kernel_call import KernelCall
+from ...mathematics.compiling.ring import Octets, next_entry, read_entry, write_entry
 from .block import Block, Input, Output, State
 from .errors import BlockError
 from .parameters import Parameters, parameter
@@ -44,7 +46,7 @@ class Delay(Block):
     ring_position = State(RingPosition, text="place in the ring buffer")
 
     def setup(self) -> None:
-        """Fill the ring with the initial values and take a view of each entry."""
+        """Fill the ring with the initial values."""
         ports: Mapping[str, Any] = self.__dict__
         source, target, ring = (dict(ports[n].views()) for n in ("u", "y", "past"))
         shapes = {name: view.shape for name, view in target.items()}
@@ -53,27 +55,33 @@ class Delay(Block):
         for name, value in self.params.initial.items():
             ring[name][...] = value
             target[name][...] = value  # read before the first run of a block with an offset
-        self._length: int = next(iter(ring.values())).shape[0]
-        # the views are made here, so that a tick indexes no array and thus allocates none
-        self._entries: list[list[NDArray[Any]]] = [
-            [ring[name][i : i + 1].reshape(target[name].shape) for name in target]
-            for i in range(self._length)
+        oldest = self.ring_position.oldest
+        entries = {name: _octets(values, len(values)) for name, values in ring.items()}
+        self._reading = [
+            KernelCall(read_entry, entries[name], oldest, _octets(values, 1))
+            for name, values in target.items()
         ]
-        self._source = list(source.values())
-        self._target = list(target.values())
+        self._writing = [
+            KernelCall(write_entry, entries[name], oldest, _octets(values, 1))
+            for name, values in source.items()
+        ]
+        length = next(iter(ring.values())).shape[0]
+        self._writing.append(KernelCall(next_entry, oldest, length))
 
     def emit(self) -> None:
         """Write the oldest entry."""
-        oldest = self._entries[self.ring_position.oldest.item()]
-        for target, entry in zip(self._target, oldest, strict=True):
-            np.copyto(target, entry)
+        for call in self._reading:
+            call.run()
 
     def update(self) -> None:
         """Put the input in the place of the oldest entry."""
-        position = self.ring_position.oldest.item()
-        for entry, source in zip(self._entries[position], self._source, strict=True):
-            np.copyto(entry, source)
-        self.ring_position.oldest[()] = (position + 1) % self._length
+        for call in self._writing:
+            call.run()
+
+
+def _octets(values: NDArray[Any], rows: int) -> Octets:
+    """A view of the bytes of an array in so many rows, so that one kernel serves every dtype."""
+    return values.reshape(rows, -1).view(np.uint8)
 
 
 def initial_problems(

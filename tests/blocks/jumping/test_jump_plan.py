@@ -133,6 +133,20 @@ def follow(block: BlockBench, slower: float) -> float:
     raise AssertionError("it never lifts off")
 
 
+def test_plain_python_and_machine_code_follow_a_slow_robot_to_the_same_bytes() -> None:
+    found = []
+    for plain in (False, True):
+        block = BlockBench(
+            JumpPlan, {"solve": False, "task": "tasks/in_situ_12cm.yaml"},
+            robot="bruce", rate=500.0, plain=plain,
+        )  # fmt: skip
+        assert follow(block, 0.1) > 0.0
+        assert float(block.get("progress").late) > 0.0
+        snapshot = block.snapshot()
+        found.append((snapshot.tick, snapshot.bus, snapshot.state))
+    assert found[0] == found[1]
+
+
 @pytest.mark.parametrize(("slower", "least", "most"), [(0.0, -0.002, 0.001), (0.1, 0.004, 0.012),
                                                      (-0.1, -0.012, -0.004)])  # fmt: skip
 def test_a_slow_robot_thrusts_longer_and_a_fast_one_shorter(slower, least, most) -> None:

@@ -120,3 +120,13 @@ def test_a_port_needs_a_signal_with_fields() -> None:
         Input(3)  # type: ignore[type-var]
     with pytest.raises(DeclarationError, match="signal Signal has no fields"):
         Output(Signal)
+
+
+def test_the_tick_of_a_clock_is_where_kernels_read_it() -> None:
+    clock = Clock(0.002, 7)
+    present = clock.present
+    assert present.tolist() == [7]
+    clock.tick += 2
+    assert clock.present is present and present.tolist() == [9]
+    present[0] = 4
+    assert clock.tick == 4 and type(clock.tick) is int

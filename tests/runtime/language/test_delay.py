@@ -43,9 +43,11 @@ class VectorCounter(Block):
         self.y.value.fill(self.tick)
 
 
+@pytest.mark.parametrize("plain", [False, True])
 @pytest.mark.parametrize("k", [1, 2, 3])
-def test_every_field_comes_k_runs_later(k: int) -> None:
-    bench = BlockBench(delay_block_type(Mixed, k), {"initial": {"number": -1.0, "count": 9}})
+def test_every_field_comes_k_runs_later(k: int, plain: bool) -> None:
+    initial = {"initial": {"number": -1.0, "count": 9}}
+    bench = BlockBench(delay_block_type(Mixed, k), initial, plain=plain)
     for tick in range(8):
         bench.set("u", number=tick, pair=[tick, -tick], count=tick, even=tick % 2 == 0)
         bench.step()
