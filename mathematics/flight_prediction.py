@@ -101,13 +101,15 @@ def map_flight(
             for k in range(n):
                 along = float(jacobian[i, j, 6 + k]) - float(momentum[j, 6 + k]) / mass
                 rows[j, k] = along - float(rows[j, k])
-    np.dot(out.jacobian.T, out.jacobian, out.normal)
+    multiply_matrices(out.jacobian.T, out.jacobian, out.normal)
     for k in range(n):
         out.normal[k, k] += damping * damping
     multiply_matrices(rotation[0:2], out.reaction, out.answers)
     solve_rows(out.normal, out.answers)
-    np.dot(out.answers, out.jacobian.T, out.turn)
-    np.negative(out.turn, out.turn)
+    multiply_matrices(out.answers, out.jacobian.T, out.turn)
+    for i in range(2):
+        for k in range(out.turn.shape[1]):
+            out.turn[i, k] = -float(out.turn[i, k])
 
 
 @kernel

@@ -7,39 +7,17 @@ from typing import Annotated, Literal
 
 import numpy as np
 import pydantic
-from numpy.typing import NDArray
 
-from ...mathematics.constants import GRAVITY
-from ...mathematics.landing_law import (
-    hasten,
-    heading_matrix,
-    keep_within,
-    landing_place,
-    lowest_height,
-    retraction,
-    swing,
-    turn_places,
-)
-from ...mathematics.polynomials import minimum_jerk
-from ...mathematics.rotations import (
-    conjugate,
-    cross,
-    exponential,
-    from_matrix,
-    logarithm,
-    multiply,
-    to_matrix,
-    yaw,
-)
+from ...mathematics.compiling.kernel_call import KernelCall
 from ...robots.description import RobotDescription
 from ...robots.standing_feet import foot_sides, standing_feet
-from ...runtime.language.block import Block, Input, Misfit, Output, State
+from ...runtime.language.block import Input, Misfit, Output, State
+from ...runtime.language.kernel_block import KernelBlock
 from ...runtime.language.parameters import Parameters, live_parameter, parameter
 from ...runtime.language.signals import Field, Signal
-from ..signals import DynamicsTerms, FootTarget, JumpReference, Phase, PhaseState
-from .landing_prediction import LandingPrediction, PredictionGains
-
-Array = NDArray[np.float64]
+from ..signals import DynamicsTerms, FootTarget, JumpReference, PhaseState
+from .landing_prediction import PredictionGains, Terms, landing_prediction, scale_gains
+from .landing_targets import Law, Memory, Now, Plan, Scratch, Settings, Targets, aim_feet
 
 
 def _three(value: object) -> object:
@@ -47,8 +25,6 @@ def _three(value: object) -> object:
     return (value,) * 3 if isinstance(value, int | float) else value
 
 
-_SLOWEST = 0.3
-"""The least speed of descent [m/s] by which a change of the legs' length changes the time."""
 Share = Annotated[float, pydantic.Field(ge=0.0, le=1.0)]
 Shares = Annotated[tuple[Share, Share, Share], pydantic.BeforeValidator(_three)]
 
@@ -73,7 +49,7 @@ class LandingMemory(Signal):
     wished = Field(3, unit="m", frame="world", text="planned place of the com at touchdown")
 
 
-class LandingHeuristic(Block):
+class LandingHeuristic(KernelBlock):
     """Foot targets in flight from momentum feedback (paper, IV).
 
     All places are relative to the centre of mass, in world axes. The law, for each of any number
@@ -201,190 +177,34 @@ class LandingHeuristic(Block):
                 return
 
     def setup(self) -> None:
-        robot = self.robot
-        self._mass = robot.total_mass
+        robot, p = self.robot, self.params
         stance = standing_feet(robot)
-        self._sides = foot_sides(stance)
-        self._prediction = LandingPrediction(robot, -float(stance[:, 2].mean()), self._sides)
-        self._predicts = self.params.law == "predicted"
-        self._turned = self.params.limits_about == "stance"
-        self._stance = stance if self._turned else np.zeros_like(stance)
-        self._centres = np.zeros_like(stance)
+        self._mass, self._height = robot.total_mass, -float(stance[:, 2].mean())
+        sides, n = foot_sides(stance), len(robot.feet)
+        turned = p.limits_about == "stance"
+        law = Law(
+            p.law == "predicted", p.law != "paper", turned, np.array(sides), stance, self._mass,
+            self.period,
+        )  # fmt: skip
+        self._prediction = landing_prediction(robot, sides)
+        self._settings = Settings(*(np.zeros(size) for size in (2, 2, 2, 3, 1, 1, 1, 1, 1)))
         self.on_parameters()
-        n = len(robot.feet)
-        self._place, self._speed = np.zeros((n, 3)), np.zeros(3)
-        self._linear, self._angular = np.zeros(3), np.zeros(3)
-        self._quaternion, self._other = np.zeros(4), np.zeros(4)
-        self._rotation, self._heading = np.zeros((3, 3)), np.zeros((3, 3))
-        self._vector, self._com_body, self._rate = np.zeros(3), np.zeros(3), np.zeros(3)
-        self._scratch, self._miss = np.zeros(3), np.zeros(3)
+        shapes = (n, 3), (n, 3), 4, 4, (3, 3), (3, 3), 3, 3, 3, 3, 3, 3, 3, 3
+        aiming = KernelCall(
+            aim_feet,
+            Now(*(getattr(self.phase, name) for name in Now._fields)),
+            Plan(*(getattr(self.reference, name) for name in Plan._fields)),
+            Terms(*(getattr(self.terms, name) for name in Terms._fields)),
+            law,
+            self._settings,
+            self._prediction,
+            Memory(*(getattr(self.memory, name) for name in Memory._fields)),
+            Targets(*(getattr(self.feet, name) for name in Targets._fields)),
+            Scratch(*(np.zeros(shape) for shape in shapes)),
+        )
+        self.kernel_calls = (aiming,)
 
     def on_parameters(self) -> None:
-        p = self.params
-        self._w_l, self._w_k, self._p_max = np.array(p.w_l), np.array(p.w_k), np.array(p.p_max)
-        self._alpha = np.array(p.alpha)
-        self._beta = 1.0 - self._alpha
-        if self._predicts:
-            self._prediction.prepare(p)
-
-    def step(self) -> None:
-        p, reference, terms, memory = self.params, self.reference, self.terms, self.memory
-        phase = int(self.phase.phase)
-        flying, landing = phase == Phase.FLIGHT, phase == Phase.LANDING
-        if not memory.started:
-            self._find_origin()
-        self._remember_landing(flying)
-        overdue = flying and int(reference.phase) > Phase.FLIGHT
-        if not overdue:
-            self._remember_plan()
-        self._feed_back()
-        if flying and not memory.flying:
-            memory.shift[...] = 0.0
-            np.subtract(terms.foot_position, terms.com, out=memory.offset)
-            np.subtract(memory.offset, memory.planned, out=memory.offset)
-        memory.flying[()] = flying
-        elapsed, left = float(self.phase.time_in_phase), float(self.phase.time_to_touchdown)
-        if self._predicts and flying:
-            left = self._predict(left)
-        reach = p.reach_share * max(elapsed + left, self.period)
-        share, rate, _ = minimum_jerk(elapsed / reach)
-        lift, lift_rate = retraction(left, p.retraction, p.retraction_time)
-        lowest = lowest_height(terms.foot_position)
-        self._turn_frame(overdue)
-        if self._turned:
-            turn_places(self._stance, yaw(memory.orientation), self._centres)
-        for foot in range(len(self._sides)):
-            planned, place = memory.planned[foot], self.feet.landing[foot]
-            self._choose_place(foot, planned, place)
-            np.subtract(reference.foot_velocity[foot], reference.com_velocity, out=self._speed)
-            if overdue:
-                self._speed[:] = 0.0
-            else:
-                memory.swing[foot] = self._speed
-            if flying:
-                swing(
-                    planned, place, memory.offset[foot], share, rate / reach,
-                    self._place[foot], self._speed,
-                )  # fmt: skip
-                if self._predicts:
-                    hasten(
-                        memory.swing[foot], p.lead_time * share, p.lead_time * rate / reach,
-                        self._place[foot], self._speed,
-                    )  # fmt: skip
-                self._place[foot, 2] += lift
-                self._speed[2] += lift_rate
-                np.add(terms.com, place, out=memory.goal[foot])
-            elif landing:
-                np.subtract(memory.goal[foot], terms.com, out=self._place[foot])
-                self._place[foot, 2] = lowest - float(terms.com[2])
-                np.negative(terms.com_velocity, out=self._speed)
-            else:
-                self._place[foot] = planned
-            self._to_body(foot)
-
-    def _remember_plan(self) -> None:
-        """Keep the plan of this instant, unless it is past its touchdown."""
-        reference, memory = self.reference, self.memory
-        np.subtract(reference.foot_position, reference.com, out=memory.planned)
-        mass = float(self.terms.mass_matrix[0, 0]) or self._mass
-        np.multiply(reference.com_velocity, mass, out=memory.linear)
-        np.multiply(reference.angular_momentum, mass / self._mass, out=memory.angular)
-        memory.orientation[...] = reference.orientation
-
-    def _find_origin(self) -> None:
-        """Note the place of the plan in the world, by the middle of the feet."""
-        memory, n = self.memory, len(self._sides)
-        for k in range(3):
-            for foot in range(n):
-                memory.origin[k] += (
-                    float(self.terms.foot_position[foot, k])
-                    - float(self.reference.foot_position[foot, k])
-                ) / n
-        memory.started[()] = True
-
-    def _remember_landing(self, flying: bool) -> None:
-        """Keep where the centre of mass should touch down, before the plan names the next jump."""
-        reference, memory = self.reference, self.memory
-        if not flying:
-            memory.lift_off_time[()] = reference.lift_off_time
-        elif reference.lift_off_time != memory.lift_off_time:
-            return
-        fall = float(reference.touchdown_time) - float(reference.time)
-        if flying and fall < 0.0:
-            return
-        np.multiply(reference.com_velocity, fall, out=memory.wished)
-        memory.wished += reference.com
-        memory.wished += memory.origin
-
-    def _predict(self, left: float) -> float:
-        """Choose the shift; returns the time [s] to a touchdown with the legs that much shorter."""
-        memory, terms, miss = self.memory, self.terms, self._miss
-        np.multiply(terms.com_velocity, left, out=miss)
-        miss += terms.com
-        miss -= memory.wished
-        self._prediction.choose(
-            terms, self.reference, memory.planned, memory.orientation, self._linear, self._angular,
-            miss, left, memory.shift,
-        )  # fmt: skip
-        speed = max(GRAVITY * left - float(terms.com_velocity[2]), _SLOWEST)
-        return max(left + float(memory.shift[3]) / speed, 0.0)
-
-    def _choose_place(self, foot: int, planned: Array, place: Array) -> None:
-        """The landing place of a foot from the centre of mass, by the law."""
-        p, side, centre = self.params, self._sides[foot], self._centres[foot]
-        if self._predicts:
-            shift = self.memory.shift
-            place[...] = planned
-            place[0] += shift[0]
-            place[1] += shift[1] + side * shift[2]
-            place[2] += shift[3]
-            keep_within(self._p_max, centre, place)
-            return
-        landing_place(
-            planned, side, self._linear, self._angular, self._w_l, self._w_k, p.w_c, self._p_max,
-            centre, place,
-        )  # fmt: skip
-
-    def _feed_back(self) -> None:
-        """Compute the momenta that the law feeds back."""
-        self._linear[:] = self.terms.linear_momentum
-        self._angular[:] = self.terms.angular_momentum
-        if self.params.law != "paper":
-            np.subtract(self._linear, self.memory.linear, out=self._linear)
-            np.subtract(self._angular, self.memory.angular, out=self._angular)
-
-    def _turn_frame(self, overdue: bool) -> None:
-        """Compute the frame that the targets are fixed in, its rate, and the CoM in the body."""
-        terms, planned, turn = self.terms, self.memory.orientation, self._other
-        from_matrix(terms.base_rotation, self._quaternion)
-        conjugate(planned, turn)
-        multiply(turn, self._quaternion, turn)
-        logarithm(turn, self._vector)
-        np.multiply(self._vector, self._alpha, out=self._vector)
-        exponential(self._vector, turn)
-        multiply(planned, turn, turn)
-        to_matrix(turn, self._rotation)
-        np.multiply(terms.velocity[3:6], self._alpha, out=self._rate)
-        if not overdue:
-            np.multiply(self.reference.angular_velocity, self._beta, out=self._vector)
-            np.add(self._rate, self._vector, out=self._rate)
-        np.subtract(terms.com, terms.base_position, out=self._vector)
-        np.dot(terms.base_rotation.T, self._vector, self._com_body)
-
-    def _to_body(self, foot: int) -> None:
-        """Convert position and velocity relative to the CoM into those relative to the base."""
-        terms, feet, vector, scratch = self.terms, self.feet, self._vector, self._scratch
-        turn = self._rotation.T
-        np.dot(turn, self._place[foot], vector)
-        np.add(self._com_body, vector, out=feet.position[foot])
-        velocity = feet.velocity[foot]
-        np.dot(turn, self._speed, velocity)
-        cross(self._rate, vector, scratch)
-        np.subtract(velocity, scratch, out=velocity)
-        np.dot(terms.base_rotation.T, terms.com_velocity, scratch)
-        np.add(velocity, scratch, out=velocity)
-        np.subtract(velocity, terms.velocity[0:3], out=velocity)
-        cross(terms.velocity[3:6], self._com_body, scratch)
-        np.subtract(velocity, scratch, out=velocity)
-        heading_matrix(float(self.reference.foot_yaw[foot]), self._heading)
-        np.dot(turn, self._heading, feet.rotation[foot])
+        for name in Settings._fields:
+            getattr(self._settings, name)[:] = getattr(self.params, name)
+        scale_gains(self.params, self._mass, self._height, self._prediction.gains)

@@ -1,27 +1,32 @@
-"""Chooses the landing place by what it does to the torso: the law ``predicted``."""
+"""Chooses the landing place by what it does to the torso: the law ``predicted``, as kernels."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...mathematics.constants import GRAVITY
 from ...mathematics.flight_prediction import (
+    FlightMap,
     LandingCost,
     choose_shift,
     flight_map,
     map_flight,
     predict_tilt,
 )
+from ...mathematics.kernel import kernel
 from ...mathematics.landing_law import heading_matrix, pull_to_place
+from ...mathematics.linear import multiply_vector
 from ...mathematics.rotations import conjugate, from_matrix, logarithm, multiply
 from ...robots.description import RobotDescription
 from ...runtime.language.parameters import Parameters, live_parameter
-from ..signals import DynamicsTerms, JumpReference
 
 Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
 
 LAST = 0.02
 """Nearer to touchdown than this [s] the choice stands."""
@@ -81,109 +86,186 @@ class PredictionGains(Parameters):
     )
 
 
-class LandingPrediction:
-    """The shift of the landing place that costs least; see ``LandingHeuristic``.
+class Terms(NamedTuple):
+    """The fields of ``DynamicsTerms`` that the landing law takes."""
 
-    Args:
-        robot: with feet and contact points.
-        standing: height of its centre of mass above its feet as it stands [m].
-        sides: 1, -1 or 0 for every foot.
+    velocity: Array
+    mass_matrix: Array
+    contact_position: Array
+    contact_jacobian: Array
+    com: Array
+    com_velocity: Array
+    linear_momentum: Array
+    angular_momentum: Array
+    centroidal_matrix: Array
+    base_position: Array
+    base_rotation: Array
+    foot_position: Array
+
+
+class Soles(NamedTuple):
+    """Of the robot: its ``mass`` [kg], and for every contact point the number of its foot, the foot's
+    side (1, -1 or 0), (n_contacts,) both, and its place from the sole's, (n_contacts, 3) [m]."""
+
+    mass: float
+    foot_of_point: Indices
+    side: Array
+    offset: Array
+
+
+class Gains(NamedTuple):
+    """``PredictionGains`` for a robot of some size: arrays of one element, or of more where said.
+
+    Attributes:
+        cost: what the shift is judged by; its goal and its highest shift are computed in every tick.
+        per_linear, per_angular: way of the feet ahead and aside per momentum, (2,).
+        clearance: way apart per lateral momentum [s/kg].
+        highest: largest shift upwards [m].
+        stroke: of the legs per square of the speed of the fall [s^2/m].
+        damping: where a leg is nearly stretched [m].
+        place_gain: share of a small miss of the planned place that is corrected.
+        place_range: way at which half of it is [m].
     """
 
-    def __init__(self, robot: RobotDescription, standing: float, sides: tuple[float, ...]) -> None:
-        self._mass, self._standing = robot.total_mass, standing
-        rate = math.sqrt(GRAVITY / standing)
-        self._capture = 1.0 / (self._mass * rate)
-        self._capture_turn = rate / (self._mass * GRAVITY)
-        self._foot_of_point = robot.foot_of_contact()
-        soles = [np.array(robot.feet[foot].sole) for foot in self._foot_of_point]
-        self._from_sole = [
-            np.array(point.position) - sole
-            for point, sole in zip(robot.contacts, soles, strict=True)
-        ]
-        self._side = np.array([sides[foot] for foot in self._foot_of_point])
-        self._flight = flight_map(len(robot.joints), len(robot.contacts))
-        self._way = np.zeros((len(robot.contacts), 3))
-        self._flat_way = self._way.reshape(-1)
-        self._heading, self._vector = np.zeros((3, 3)), np.zeros(3)
-        self._quaternion, self._other = np.zeros(4), np.zeros(4)
-        self._tilt, self._turn, self._matrix = np.zeros(2), np.zeros((2, 4)), np.zeros((4, 4))
-        self._cost = LandingCost(np.zeros(3), np.zeros(6), np.zeros((2, 2)), np.zeros(2))
+    cost: LandingCost
+    per_linear: Array
+    per_angular: Array
+    clearance: Array
+    highest: Array
+    stroke: Array
+    damping: Array
+    place_gain: Array
+    place_range: Array
 
-    def prepare(self, p: PredictionGains) -> None:
-        """Take over the parameters."""
-        height = self._standing
-        aside, back, ahead = p.free_tilt
-        self._cost = LandingCost(
-            np.zeros(3),
-            np.array([
-                1.0, 1.0, p.apart_cost**2, p.height_cost**2,
-                (height * p.tilt_cost[0]) ** 2, (height * p.tilt_cost[1]) ** 2,
-            ]),
-            np.array([[-aside, aside], [-back, ahead]]),
-            np.array([height * p.height_range[0], 0.0]),
-        )  # fmt: skip
-        self._highest = height * p.height_range[1]
-        self._stroke = 0.5 / (GRAVITY * p.stop_acceleration)
-        self._damping = height * p.stretch_damping
-        self._per_linear = self._capture * p.capture[0], self._capture * p.capture[1]
-        self._per_angular = (
-            self._capture_turn * p.capture_turn[0],
-            self._capture_turn * p.capture_turn[1],
-        )
-        self._clearance = self._capture * p.clearance
-        self._place_gain, self._place_range = p.place_gain, height * p.place_range
 
-    def choose(
-        self,
-        terms: DynamicsTerms,
-        reference: JumpReference,
-        planned: Array,
-        orientation: Array,
-        linear: Array,
-        angular: Array,
-        miss: Array,
-        left: float,
-        shift: Array,
-    ) -> None:
-        """Choose the ``shift`` (4,) [m] of all feet: ahead, to the left, apart, upwards.
+class PredictionScratch(NamedTuple):
+    """``way`` (3 n_contacts,), ``heading`` (3, 3), ``vector`` (3,), ``quaternion`` and ``turned`` (4,),
+    ``tilt`` (2,), ``turn`` (2, 4), ``matrix`` (4, 4)."""
 
-        Args:
-            planned: places of the feet from the centre of mass, (n_feet, 3).
-            orientation: the planned one, quaternion x, y, z, w.
-            linear, angular: the momenta that were not planned.
-            miss: by how much unshifted feet will miss their planned place in the world [m], (3,).
-            left: time until touchdown [s].
-        """
-        if left < LAST:
-            return
-        flight, cost = self._flight, self._cost
-        map_flight(
-            terms.centroidal_matrix, terms.contact_jacobian, terms.base_rotation, self._mass,
-            self._damping, flight,
-        )  # fmt: skip
-        self._find_ways(terms, reference, planned)
-        from_matrix(terms.base_rotation, self._quaternion)
-        conjugate(orientation, self._other)
-        multiply(self._quaternion, self._other, self._other)
-        logarithm(self._other, self._vector)
-        predict_tilt(
-            flight, self._vector, angular, self._flat_way, left, self._side, self._tilt, self._turn
-        )
-        fall = GRAVITY * left - float(terms.com_velocity[2])
-        cost.bounds[1] = max(self._highest - fall * fall * self._stroke, 0.0)
-        cost.goal[0] = self._per_linear[0] * linear[0] + self._per_angular[0] * angular[1]
-        cost.goal[1] = self._per_linear[1] * linear[1] - self._per_angular[1] * angular[0]
-        cost.goal[2] = self._clearance * abs(linear[1])
-        pull_to_place(cost.goal, miss, self._place_gain, self._place_range)
-        choose_shift(self._tilt, self._turn, cost, self._matrix, shift)
+    flight: FlightMap
+    way: Array
+    heading: Array
+    vector: Array
+    quaternion: Array
+    turned: Array
+    tilt: Array
+    turn: Array
+    matrix: Array
 
-    def _find_ways(self, terms: DynamicsTerms, reference: JumpReference, planned: Array) -> None:
-        """How far every contact point is from its planned place, with flat soles."""
-        for point, foot in enumerate(self._foot_of_point):
-            heading_matrix(float(reference.foot_yaw[foot]), self._heading)
-            way = self._way[point]
-            np.dot(self._heading, self._from_sole[point], way)
-            way += planned[foot]
-            way += terms.com
-            way -= terms.contact_position[point]
+
+class Prediction(NamedTuple):
+    """What ``choose_shift_of_feet`` needs beside the present state."""
+
+    soles: Soles
+    gains: Gains
+    scratch: PredictionScratch
+
+
+def landing_prediction(robot: RobotDescription, sides: Sequence[float]) -> Prediction:
+    """The memory of the law for a robot with feet; its gains are zero.
+
+    Args:
+        sides: 1, -1 or 0 for every foot.
+    """
+    foot_of_point = robot.foot_of_contact()
+    offset = [
+        np.array(point.position) - np.array(robot.feet[foot].sole)
+        for point, foot in zip(robot.contacts, foot_of_point, strict=True)
+    ]
+    n = len(robot.contacts)
+    soles = Soles(
+        robot.total_mass, np.array(foot_of_point, dtype=np.int64),
+        np.array([sides[foot] for foot in foot_of_point]), np.array(offset),
+    )  # fmt: skip
+    cost = LandingCost(np.zeros(3), np.zeros(6), np.zeros((2, 2)), np.zeros(2))
+    gains = Gains(cost, np.zeros(2), np.zeros(2), *np.zeros((6, 1)))
+    shapes = 3 * n, (3, 3), 3, 4, 4, 2, (2, 4), (4, 4)
+    flight = flight_map(len(robot.joints), n)
+    return Prediction(
+        soles, gains, PredictionScratch(flight, *(np.zeros(shape) for shape in shapes))
+    )
+
+
+def scale_gains(p: PredictionGains, mass: float, height: float, gains: Gains) -> None:
+    """Write the parameters for a robot of a ``mass`` [kg] and standing ``height`` [m] to ``gains``."""
+    rate = math.sqrt(GRAVITY / height)
+    capture, capture_turn = 1.0 / (mass * rate), rate / (mass * GRAVITY)
+    aside, back, ahead = p.free_tilt
+    gains.cost.weight[:] = (
+        1.0, 1.0, p.apart_cost**2, p.height_cost**2,
+        (height * p.tilt_cost[0]) ** 2, (height * p.tilt_cost[1]) ** 2,
+    )  # fmt: skip
+    gains.cost.free[:] = (-aside, aside), (-back, ahead)
+    gains.cost.bounds[:] = height * p.height_range[0], 0.0
+    gains.per_linear[:] = capture * p.capture[0], capture * p.capture[1]
+    gains.per_angular[:] = capture_turn * p.capture_turn[0], capture_turn * p.capture_turn[1]
+    gains.clearance[0] = capture * p.clearance
+    gains.highest[0] = height * p.height_range[1]
+    gains.stroke[0] = 0.5 / (GRAVITY * p.stop_acceleration)
+    gains.damping[0] = height * p.stretch_damping
+    gains.place_gain[0], gains.place_range[0] = p.place_gain, height * p.place_range
+
+
+@kernel
+def choose_shift_of_feet(
+    terms: Terms,
+    foot_yaw: Array,
+    planned: Array,
+    orientation: Array,
+    linear: Array,
+    angular: Array,
+    miss: Array,
+    left: float,
+    prediction: Prediction,
+    shift: Array,
+) -> None:
+    """Choose the ``shift`` (4,) [m] of all feet: ahead, to the left, apart, upwards.
+
+    Args:
+        foot_yaw: the planned heading of every foot [rad], (n_feet,).
+        planned: places of the feet from the centre of mass, (n_feet, 3).
+        orientation: the planned one, quaternion x, y, z, w.
+        linear, angular: the momenta that were not planned.
+        miss: by how much unshifted feet will miss their planned place in the world [m], (3,).
+        left: time until touchdown [s].
+    """
+    if left < LAST:
+        return
+    soles, gains, scratch = prediction.soles, prediction.gains, prediction.scratch
+    cost = gains.cost
+    map_flight(
+        terms.centroidal_matrix, terms.contact_jacobian, terms.base_rotation, soles.mass,
+        float(gains.damping[0]), scratch.flight,
+    )  # fmt: skip
+    find_ways(terms, foot_yaw, planned, soles, scratch)
+    from_matrix(terms.base_rotation, scratch.quaternion)
+    conjugate(orientation, scratch.turned)
+    multiply(scratch.quaternion, scratch.turned, scratch.turned)
+    logarithm(scratch.turned, scratch.vector)
+    predict_tilt(
+        scratch.flight, scratch.vector, angular, scratch.way, left, soles.side, scratch.tilt,
+        scratch.turn,
+    )  # fmt: skip
+    fall = GRAVITY * left - float(terms.com_velocity[2])
+    cost.bounds[1] = max(float(gains.highest[0]) - fall * fall * float(gains.stroke[0]), 0.0)
+    ahead = float(gains.per_linear[0]) * float(linear[0])
+    cost.goal[0] = ahead + float(gains.per_angular[0]) * float(angular[1])
+    aside = float(gains.per_linear[1]) * float(linear[1])
+    cost.goal[1] = aside - float(gains.per_angular[1]) * float(angular[0])
+    cost.goal[2] = float(gains.clearance[0]) * abs(float(linear[1]))
+    pull_to_place(cost.goal, miss, float(gains.place_gain[0]), float(gains.place_range[0]))
+    choose_shift(scratch.tilt, scratch.turn, cost, scratch.matrix, shift)
+
+
+@kernel
+def find_ways(
+    terms: Terms, foot_yaw: Array, planned: Array, soles: Soles, scratch: PredictionScratch
+) -> None:
+    """How far every contact point is from its planned place, with flat soles."""
+    for point in range(soles.foot_of_point.shape[0]):
+        foot = int(soles.foot_of_point[point])
+        heading_matrix(float(foot_yaw[foot]), scratch.heading)
+        multiply_vector(scratch.heading, soles.offset[point], scratch.vector)
+        for k in range(3):
+            place = float(scratch.vector[k]) + float(planned[foot, k]) + float(terms.com[k])
+            scratch.way[3 * point + k] = place - float(terms.contact_position[point, k])

@@ -193,6 +193,50 @@ def test_a_push_on_the_torso_moves_the_feet_the_way_it_pushes(axis, push):
     assert (moved[:, axis] * push).min() > 0.0 if axis == 0 else moved[:, 1].sum() * push > 0.0
 
 
+@pytest.mark.parametrize("limits_about", ["com", "stance"])
+@pytest.mark.parametrize("law", ["paper", "deviation", "predicted"])
+def test_machine_code_computes_the_bytes_of_plain_python(law, limits_about):
+    """From the thrust through a flight that is longer than planned to the ground, all at random."""
+    params = {"law": law, "limits_about": limits_about, "alpha": [0.3, 0.8, 1.0], **GAINS}
+    benches = [
+        BlockBench(LandingHeuristic, params, robot=ROBOT, plain=plain) for plain in (False, True)
+    ]
+    random, seen = np.random.default_rng(4), []
+    for phase, planned, left in (
+        *[(Phase.THRUST, Phase.THRUST, 0.0)] * 2,
+        *[(Phase.FLIGHT, Phase.FLIGHT, 0.3 - 0.1 * k) for k in range(4)],
+        (Phase.FLIGHT, Phase.LANDING, 0.0),
+        (Phase.LANDING, Phase.LANDING, 0.0),
+    ):
+        turn = np.zeros((3, 3))
+        to_matrix(rotation_vector(0.1 * random.standard_normal(3)), turn)
+        noise = {
+            "reference": {
+                "foot_position": (2, 3), "foot_velocity": (2, 3), "foot_yaw": 2, "com": 3,
+                "com_velocity": 3, "angular_velocity": 3, "angular_momentum": 3,
+            },
+            "terms": {
+                "velocity": 16, "contact_position": (4, 3), "contact_jacobian": (4, 3, 16), "com": 3,
+                "com_velocity": 3, "linear_momentum": 3, "angular_momentum": 3,
+                "centroidal_matrix": (6, 16), "base_position": 3, "foot_position": (2, 3),
+            },
+        }  # fmt: skip
+        for port, shapes in noise.items():
+            values = {name: 0.1 * random.standard_normal(shape) for name, shape in shapes.items()}
+            for bench in benches:
+                bench.set(port, **values)
+        for bench in benches:
+            bench.set("reference", phase=planned, orientation=rotation_vector([0.0, 0.1, 0.2]))
+            bench.set("terms", base_rotation=turn)
+            bench.set("phase", phase=phase, time_in_phase=0.3 - left, time_to_touchdown=left)
+            bench.step()
+        machine, plain = (bench.get("feet") for bench in benches)
+        for name in ("position", "velocity", "rotation", "landing"):
+            np.testing.assert_array_equal(getattr(machine, name), getattr(plain, name))
+        seen.append(machine.landing.copy())
+    assert np.abs(np.diff(seen[:-2], axis=0)).max(axis=(1, 2)).min() > 1e-3
+
+
 # On the way there.
 
 
