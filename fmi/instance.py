@@ -7,6 +7,7 @@ import sys
 import tempfile
 from collections import deque
 from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,7 @@ from numpy.typing import NDArray
 from ..runtime.language.errors import BlockError
 from ..runtime.language.signals import Signal
 from .description import Description, Variable, nearest
+from .library import release_at_exit
 
 _NATIVE = {
     "Real": "f8", "Float64": "f8", "Float32": "f4", "Integer": "i4", "Enumeration": "i8",
@@ -75,6 +77,7 @@ class Instance:
                 loggingOn=True,
                 logMessage=lambda _, status, category, text: self._hear(status, text),
             )
+        release_at_exit(Path(folder) / "binaries")
         return fmu
 
     def _hear(self, status: int, text: bytes | None) -> None:

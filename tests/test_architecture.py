@@ -73,7 +73,7 @@ ALLOWED: dict[str, tuple[str, ...]] = {
     "hal": ("blocks/signals", "mathematics", "robots", "runtime/language"),
     "ros2": ("robots", "runtime/language"),
     "fmi": ("robots", "runtime/language"),
-    "fmi/exporting": ("robots", "runtime", "logs/file"),
+    "fmi/exporting": ("fmi", "robots", "runtime", "logs/file"),
     "logs/file": ("robots", "runtime/language", "runtime/running"),
     "logs/viewing": ("logs/file", "robots", "runtime/language"),
     "logs/recording": (

@@ -10,6 +10,7 @@ from xml.etree.ElementTree import Element
 
 from ...runtime.language.errors import AloftError
 from ...runtime.language.units import BASE_UNITS, parse_unit
+from ..library import release_at_exit
 from .running_graph import RunningGraph, terminals
 
 
@@ -25,7 +26,9 @@ class GraphSlave:
 
         super().__init__(**given)
         me: Any = self
-        self.running = RunningGraph(Path(given["resources"]) / "graph")
+        resources = Path(given["resources"])
+        release_at_exit(resources.parent / "binaries")
+        self.running = RunningGraph(resources / "graph")
         interface = self.running.interface
         me.guid = interface["token"]
         me.description = interface["description"]
