@@ -160,6 +160,7 @@ class OsqpController(WholeBodyController):
         super().setup()
         usual = self._other
         self._own = False
+        self._arrange()
         program = OsqpProgram(self)
         solve = program.solve
 

@@ -10,8 +10,10 @@ from aloft.mathematics.joint_feedback import Feedback, Motion, SoftStops
 from aloft.mathematics.pid import PidGains, PidMemory
 from aloft.robots.description import find_robot
 from aloft.robots.five_joint_leg import read_leg
+from aloft.robots.five_joint_track import FootMotion, LegSettings, LegTargets
 from aloft.robots.limb import read_limb
 from aloft.robots.limb_inverse import limb_scratch
+from aloft.robots.limb_track import limb_geometry, limb_memory
 
 LEG = read_leg(find_robot("bruce"), 0)
 LIMB = read_limb(find_robot("bruce"), 0)
@@ -79,6 +81,15 @@ PLACE = (
     balance_law.Aim(*NORMAL((5, 3)), np.ones(4), NORMAL(3), *NORMAL((3, 10))),
     balance_law.Scratch(*np.zeros((2, 4)), *NORMAL((3, 3))),
 )  # fmt: skip
+LIMB_GEOMETRY = limb_geometry(find_robot("bruce"), 0, 0.05)
+FOOT = FootMotion(np.array([0.03, -0.07, -0.28]), np.array([0.5, -0.2, 0.9]), np.eye(3))
+FOLLOWING = (
+    LegSettings(
+        *np.array([[0.005], [0.3], [3e-4], [0.3], [30.0]]), np.zeros(1, np.bool_)
+    ),
+    limb_memory(5)._replace(target=TARGET.copy(), twist=0.1 * NORMAL(6)),
+    LegTargets(np.zeros(10), np.zeros(10), np.zeros(2, np.bool_)),
+)  # fmt: skip
 UNUSED = {
     "aloft.blocks.control.balance_law.correct_place": PLACE,
     "aloft.blocks.jumping.capture_law.best_foot": (*STEPPING, STEP_SCRATCH, 5.7),
@@ -145,6 +156,12 @@ UNUSED = {
     ),
     "aloft.robots.limb_inverse.limb_velocity": (
         *CHAIN, MIDDLE, np.ones(6), 3e-4, limb_scratch(5), np.zeros(5),
+    ),
+    "aloft.robots.limb_track.watch_foot": (
+        LIMB_GEOMETRY, FOOT, True, np.array(0.1), 0.002, np.array(True), TARGET, limb_memory(5),
+    ),
+    "aloft.robots.limb_track.follow_limb": (
+        LIMB_GEOMETRY, 0, FOOT, np.tile(MIDDLE, 2), np.array(True), np.tile(MIDDLE + 0.1, 2), *FOLLOWING,
     ),
     "aloft.robots.limb_error.turning": (LIMB.tip, POSE, TARGET, 0.002, 10.0, np.zeros(3)),
     "aloft.robots.limb_inverse._stuck": (LIMB.limits, 1, 0.3, 1.0),

@@ -7,13 +7,10 @@ from collections.abc import Iterable
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...mathematics.compiling.kernel_call import KernelCall
-from ...robots.ball_feet import ball_feet
 from ...robots.description import RobotDescription
 from ...robots.five_joint_leg import Leg, find_leg
-from ...robots.five_joint_reach import pitched_line
 from ...robots.five_joint_track import (
     FootMotion,
     LegTargets,
@@ -23,30 +20,14 @@ from ...robots.five_joint_track import (
     leg_settings,
     watch_line,
 )
-from ...robots.limb import FootKind, Limb, chain_to, read_limb
-from ...robots.limb_error import aim, turning
-from ...robots.limb_inverse import (
-    REACHED,
-    approach,
-    limb_scratch,
-    limb_velocity,
-    reach,
-)
-from ...runtime.language.block import Block, Input, Misfit, Output, State
+from ...robots.limb import chain_to
+from ...robots.limb_track import follow_limb, limb_geometry, limb_memory, watch_foot
+from ...runtime.language.block import Input, Misfit, Output, State
+from ...runtime.language.kernel_block import KernelBlock
 from ...runtime.language.parameters import Parameters, live_parameter, parameter
 from ...runtime.language.signals import Field, Signal
-from ..signals import FootTarget, JointState, JointTarget, JumpReference, Phase
-
-Array = NDArray[np.float64]
-
-_FASTEST = 100.0
-"""Foot velocities are limited to this [m/s], so that no square overflows."""
-_JUMP = 0.1
-"""A target that rotates by more than this [rad] in a tick is a new target, not a motion."""
-_STEPS = 24
-"""The largest number of least-squares steps from each starting point."""
-_LOOSE = 0.1
-"""Weight of those errors that matter less for a target out of reach; the others have weight 1."""
+from ..signals import FootTarget, JointState, JointTarget, JumpReference
+from .leg_targets import PlannedJoints, begin_targets, end_targets
 
 
 class LegMemory(Signal):
@@ -58,7 +39,7 @@ class LegMemory(Signal):
     position = Field("n_joints", unit="rad", text="joint positions found")
 
 
-class LegInverseKinematics(Block):
+class LegInverseKinematics(KernelBlock):
     """Joint positions and velocities for foot targets relative to the base (paper, V).
 
     A leg is the chain of joints from the base to a foot, of any number and kind. The kind of foot
@@ -165,139 +146,67 @@ class LegInverseKinematics(Block):
                 )
 
     def setup(self) -> None:
-        robot, p = self.robot, self.params
-        self.leg_settings = leg_settings()
+        robot, p, memory = self.robot, self.params, self.memory
+        self._settings = leg_settings()
         self.on_parameters()
-        self._legs: list[_ClosedForm | _LeastSquares] = []
-        for foot in range(len(robot.feet)):
-            leg = find_leg(robot, foot) if p.method == "auto" else None
-            if leg is None:
-                self._legs.append(_LeastSquares(self, foot, read_limb(robot, foot, p.margin)))
-            else:
-                self._legs.append(_ClosedForm(self, foot, leg))
-        self._held = [
-            (k, robot.held[joint.name])
+        self._target = LegTargets(*(getattr(self.target, name) for name in LegTargets._fields))
+        held = {
+            k: robot.held[joint.name]
             for k, joint in enumerate(robot.joints)
             if joint.name in robot.held
-        ]
+        }
+        begin = KernelCall(
+            begin_targets, self.joints.position, np.array(list(held), np.int64),
+            np.array(list(held.values()), np.float64), self._target,
+        )  # fmt: skip
+        legs: list[KernelCall] = []
+        for foot in range(len(robot.feet)):
+            leg = find_leg(robot, foot) if p.method == "auto" else None
+            legs += self._least_squares(foot) if leg is None else self._closed_form(foot, leg)
+        plan = PlannedJoints(*(getattr(self.reference, name) for name in PlannedJoints._fields))
+        end = KernelCall(
+            end_targets, p.follow == "plan", plan, self._target, memory.known, memory.position
+        )
+        self.kernel_calls = (begin, *legs, end)
 
     def on_parameters(self) -> None:
-        p, settings = self.params, self.leg_settings
+        p, settings = self.params, self._settings
         settings.softness[0], settings.turn_length[0] = p.softness, p.turn_length
         settings.damping[0], settings.speed_limit[0] = p.damping, p.speed_limit
         settings.level[0] = p.level
         settings.slides[0] = p.beyond == "slide"
 
-    def step(self) -> None:
-        target = self.target
-        follows_plan = self.params.follow == "plan" and int(self.reference.phase) == Phase.FLIGHT
-        if not follows_plan:
-            target.position[...] = self.joints.position
-            target.velocity[...] = 0.0
-            for joint, angle in self._held:
-                target.position[joint] = angle
-        for leg in self._legs:
-            leg.note()
-            if not follows_plan:
-                leg.solve()
-        if follows_plan:
-            target.position[...] = self.reference.joint_position
-            target.velocity[...] = self.reference.joint_velocity
-            target.reachable[...] = True
-        self.memory.position[...] = target.position
-        self.memory.known[()] = True
-
-
-class _ClosedForm:
-    """One five-joint leg of the block, solved in closed form."""
-
-    def __init__(self, block: LegInverseKinematics, foot: int, leg: Leg) -> None:
-        feet, target, scratch = block.feet, block.target, leg_scratch()
-        self._watch = KernelCall(
-            watch_line, feet.rotation[foot], block.params.follow == "pitch",
-            block.reference.foot_pitch[foot : foot + 1].reshape(()), block.period,
-            block.memory.known, block.memory.direction[foot], scratch,
+    def _closed_form(self, foot: int, leg: Leg) -> tuple[KernelCall, KernelCall]:
+        """The calls for a five-joint leg."""
+        motion, scratch = self._motion(foot), leg_scratch()
+        watch = KernelCall(
+            watch_line, motion.rotation, self.params.follow == "pitch",
+            self.reference.foot_pitch[foot : foot + 1].reshape(()), self.period, self.memory.known,
+            self.memory.direction[foot], scratch,
         )  # fmt: skip
-        self._follow = KernelCall(
-            follow_foot, leg_geometry(leg, block.params.margin), foot,
-            FootMotion(feet.position[foot], feet.velocity[foot], feet.rotation[foot]),
-            block.reference.joint_position, block.reference.joint_velocity, block.leg_settings,
-            scratch,
-            LegTargets(target.position, target.velocity, target.reachable),
+        follow = KernelCall(
+            follow_foot, leg_geometry(leg, self.params.margin), foot, motion,
+            self.reference.joint_position, self.reference.joint_velocity, self._settings, scratch,
+            self._target,
         )  # fmt: skip
+        return watch, follow
 
-    def note(self) -> None:
-        """Take the line that is wanted, and how fast it turns."""
-        self._watch.run()
-
-    def solve(self) -> None:
-        """The joints' positions and velocities."""
-        self._follow.run()
-
-
-class _LeastSquares:
-    """One leg of any number of joints, solved by damped least squares."""
-
-    def __init__(self, block: LegInverseKinematics, foot: int, limb: Limb) -> None:
-        self.block, self.foot, self.limb = block, foot, limb
-        n = len(limb.joints)
-        self._radius, self._place = 0.0, np.zeros(3)
-        for ball in ball_feet(block.robot):
-            if ball.foot == foot:
-                self._radius = ball.radius
-                limb.tip[:3] = ball.centre
-        self._standing = block.robot.standing_position[list(limb.joints)]
-        self._starts, self._work = np.zeros((3, n + 1)), limb_scratch(n)
-        self._angles, self._speeds = np.zeros(n), np.zeros(n)
-        self._target, self._rotation = np.zeros((4, 3)), np.zeros((3, 3))
-        self._line, self._twist = np.zeros(3), np.zeros(6)
-        self._weights = np.ones(3)
-
-    def note(self) -> None:
-        """Take the target, and how fast it turns."""
-        block, foot = self.block, self.foot
-        self._rotation[...] = block.feet.rotation[foot]
-        if block.params.follow == "pitch":
-            pitched_line(self._rotation, float(block.reference.foot_pitch[foot]), self._line)
-            self._rotation[:, 0] = self._line
-        # A ball's centre is its radius above the ground, whichever way the leg comes.
-        np.multiply(block.feet.rotation[foot, :, 2], self._radius, out=self._place)
-        self._place += block.feet.position[foot]
-        aim(self._place, self._rotation, self._target)
-        self._twist[3:] = 0.0
-        if block.memory.known[()]:
-            last = block.memory.target[foot]
-            turning(self.limb.tip, last, self._target, block.period, _JUMP, self._twist[3:])
-        block.memory.target[foot] = self._target
-
-    def solve(self) -> None:
-        """The joints' positions and velocities."""
-        block, limb, p = self.block, self.limb, self.block.params
-        n, angles, weights = len(limb.joints), self._angles, self._weights
-        known = bool(block.memory.known[()])
-        for i, joint in enumerate(limb.joints):
-            measured = min(max(float(block.joints.position[joint]), -_FASTEST), _FASTEST)
-            self._starts[0, i] = block.memory.position[joint] if known else measured
-            self._starts[1, i] = measured
-            self._starts[2, i] = self._standing[i]
-        weights[0], weights[1], weights[2] = 1.0, 1.0, p.turn_length
-        square = reach(
-            limb.links, limb.tip, limb.limits, self._target, weights, self._starts, 3, _STEPS,
-            self._work, angles,
+    def _least_squares(self, foot: int) -> tuple[KernelCall, KernelCall]:
+        """The calls for a leg of any number of joints."""
+        limb, motion = limb_geometry(self.robot, foot, self.params.margin), self._motion(foot)
+        scratch, memory = limb_memory(len(limb.joints)), self.memory
+        watch = KernelCall(
+            watch_foot, limb, motion, self.params.follow == "pitch",
+            self.reference.foot_pitch[foot : foot + 1].reshape(()), self.period, memory.known,
+            memory.target[foot], scratch,
         )  # fmt: skip
-        block.target.reachable[self.foot] = reached = square <= REACHED
-        if not reached and (p.beyond == "slide" or limb.kind != FootKind.POINT):
-            weights[0 if p.beyond == "slide" else 2] *= _LOOSE
-            approach(
-                limb.links, limb.tip, limb.limits, self._target, weights, _STEPS, self._work, angles
-            )
-        np.clip(block.feet.velocity[self.foot], -_FASTEST, _FASTEST, out=self._twist[:3])
-        limb_velocity(
-            limb.links, limb.tip, limb.limits, self._target, weights, angles, self._twist,
-            p.damping, self._work, self._speeds,
+        follow = KernelCall(
+            follow_limb, limb, foot, motion, self.joints.position, memory.known, memory.position,
+            self._settings, scratch, self._target,
         )  # fmt: skip
-        limit = p.speed_limit
-        for i in range(n):
-            block.target.position[limb.joints[i]] = angles[i]
-            speed = float(self._speeds[i])
-            block.target.velocity[limb.joints[i]] = min(max(speed, -limit), limit)
+        return watch, follow
+
+    def _motion(self, foot: int) -> FootMotion:
+        """The target of one foot."""
+        feet = self.feet
+        return FootMotion(feet.position[foot], feet.velocity[foot], feet.rotation[foot])

@@ -21,8 +21,8 @@ from ...mathematics.whole_body_qp import (
 from ...mathematics.whole_body_solution import (
     JOINT_LIMITS,
     MOTOR_LIMITS,
+    NO_CONTACT,
     NO_LIMITS,
-    SOLVED,
     Motors,
     Solution,
     Weights,
@@ -31,21 +31,22 @@ from ...mathematics.whole_body_solution import (
     solve_whole_body,
 )
 from ...robots.description import RobotDescription
-from ...runtime.language.block import Block, Context, Input, Misfit, Output, State
+from ...runtime.language.block import Context, Input, Misfit, Output, State
+from ...runtime.language.kernel_block import KernelBlock
 from ...runtime.language.parameters import Parameters, live_parameter, parameter
 from ...runtime.language.signals import Field, Signal
 from ..signals import (
     DynamicsTerms,
     JointState,
-    Phase,
     PhaseState,
     WholeBodyCommand,
     WholeBodyTarget,
 )
 from .task_gains import TaskGains
 from .tasks.choose import OWN_TASKS, PHASE_KINDS, ChosenTask, TaskChoiceError, choose_tasks
-from .tasks.task import Situation, Task, TaskChoice
+from .tasks.task import KernelTask, Situation, Task, TaskChoice
 from .whole_body_program import FullProgram
+from .whole_body_step import Kept, Told, Turns, keep_solution, take_turns
 
 OWN_SOLVER = "active_set"
 """The name of the method that needs no library."""
@@ -59,7 +60,7 @@ class SolverMemory(Signal):
     failures = Field(dtype="int64", text="failures in all")
 
 
-class WholeBodyController(Block):
+class WholeBodyController(KernelBlock):
     """The weighted whole-body quadratic program of the paper (V, wbc_qp), solved in every tick.
 
     Over the generalised acceleration a and the forces f_j of the points in stance::
@@ -227,7 +228,6 @@ class WholeBodyController(Block):
             terms.mass_matrix, terms.nonlinear_effects, terms.contact_jacobian
         )
         self._build_tasks(robot, n)
-        self.on_parameters()
         self._code = np.zeros(1, dtype=np.int64)
         self._solve = KernelCall(
             solve_whole_body, self._rows, self._model, self.phase.stance, self.joints.velocity,
@@ -235,11 +235,20 @@ class WholeBodyController(Block):
             Solution(command.torque, command.acceleration, command.force, self._code),
         )  # fmt: skip
         self._limit = KernelCall(limit_motors, self.joints.velocity, limits, self._motors)
+        self._turns = Turns(*(np.zeros(1, np.int64) for _ in Turns._fields))
+        self._unsolved = np.zeros(1, np.int64)
+        self._take_turns = KernelCall(take_turns, self.phase.phase, self.phase.stance, self._turns)
+        self._keep = KernelCall(
+            keep_solution, self._turns.loaded, self._code,
+            Told(*(getattr(command, name) for name in Told._fields)),
+            Kept(*(getattr(self.memory, name) for name in Kept._fields)), self._unsolved,
+        )  # fmt: skip
         self._own = p.solver == OWN_SOLVER
         self._other = FullProgram(
             "daqp" if self._own else p.solver, self._rows, self._model, self._motors,
             self._weights, limited=limited, n_contacts=n_contacts,
         )  # fmt: skip
+        self.on_parameters()
 
     def _build_tasks(self, robot: RobotDescription, n: int) -> None:
         """The chosen tasks, each with its part of the rows."""
@@ -274,26 +283,28 @@ class WholeBodyController(Block):
             ]
             for kind in PHASE_KINDS
         }
+        self._arrange()
 
-    def step(self) -> None:
-        memory, command = self.memory, self.command
-        if not any(self.phase.stance.tolist()):
-            for array in (command.force, command.acceleration, command.torque, memory.torque):
-                array.fill(0.0)
-            memory.failed[()] = 0
-            command.solved[()] = True
-            command.failures[()] = memory.failures
+    def _arrange(self) -> None:
+        """Let the step be kernels alone if the tasks and the solver are; else leave it to ``attend``."""
+        calls = [call for kind in PHASE_KINDS for call in self._gains[kind]]
+        own = all(type(task).update is KernelTask.update for task in self._tasks)
+        if not self._own or not own or len(set(map(id, calls))) < len(calls):
+            self.kernel_calls, self.attention = (), np.ones(1, np.int64)
             return
-        phase = int(self.phase.phase)
-        kind = "thrust" if phase == Phase.THRUST else "landing" if phase > Phase.THRUST else "stand"
-        for task, gains in zip(self._tasks, self._gains[kind], strict=True):
-            task.update(gains)
-        solved = False
-        if self._own:
-            self._solve.run()
-            solved = int(self._code[0]) == SOLVED
-        if not solved:
-            solved = self._solve_otherwise()
+        for kind in PHASE_KINDS:
+            for call in self._gains[kind]:
+                call.when = getattr(self._turns, kind)
+        self._solve.when = self._turns.loaded
+        self.kernel_calls = (self._take_turns, *calls, self._solve, self._keep)
+        self.attention = self._unsolved
+
+    def attend(self) -> None:
+        """Do what is left to Python: other solvers and other tasks, and ticks without a solution."""
+        if not self.kernel_calls and self._step_in_python():
+            return
+        memory, command = self.memory, self.command
+        solved = self._solve_otherwise()
         if solved:
             memory.torque[...] = command.torque
             memory.failed[()] = 0
@@ -301,6 +312,20 @@ class WholeBodyController(Block):
             self._fall_back()
         command.solved[()] = solved
         command.failures[()] = memory.failures
+
+    def _step_in_python(self) -> bool:
+        """The same step where a task or the solver is no kernel; returns whether all is done."""
+        turns = self._turns
+        self._take_turns.run()
+        for kind in PHASE_KINDS:
+            if getattr(turns, kind)[0]:
+                for task, gains in zip(self._tasks, self._gains[kind], strict=True):
+                    task.update(gains)
+        self._code[0] = NO_CONTACT
+        if self._own and turns.loaded[0]:
+            self._solve.run()
+        self._keep.run()
+        return not self._unsolved[0]
 
     def _solve_otherwise(self) -> bool:
         """Solve the program in accelerations and forces by the chosen solver, or where the own

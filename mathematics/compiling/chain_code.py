@@ -24,11 +24,12 @@ entry to go on with; the address of the word that says who runs; that of the wor
 of the present row of time stamps."""
 HEAD = 6
 """The number of words before the first entry."""
-FUNCTION, ARGUMENTS, OWNER, ATTENTION, STAMP = range(5)
+FUNCTION, ARGUMENTS, OWNER, ATTENTION, STAMP, WHEN = range(6)
 """The words of an entry: the addresses of machine code and of its arguments; who makes the call; the
 address of the word that asks for attention after the call, or zero; the place of the time stamp that
-is taken after the call, in bytes from the present row, or -1."""
-WIDTH = 5
+is taken after the call, in bytes from the present row, or -1; the address of the word that is zero
+where the call is left out, or zero where it is always made."""
+WIDTH = 6
 """The number of words of an entry."""
 _MONOTONIC = 1
 """Linux's number of the clock that ``time.perf_counter_ns`` reads."""
@@ -79,7 +80,7 @@ def _module() -> Any:
     module = ir.Module("aloft.chain")
     function = ir.Function(module, ir.FunctionType(word, [word]), ENTRY)
     blocks = [function.append_basic_block(name) for name in _STEPS]
-    start, test, call, failed, called, asks, stamps, take, following, done = blocks
+    start, test, call, look, make, failed, called, asks, stamps, take, following, done = blocks
     builder = ir.IRBuilder(start)
 
     def constant(value: int) -> Any:
@@ -111,6 +112,14 @@ def _module() -> Any:
     entry = builder.add(entry, constant(8 * HEAD))
     builder.store(number, at(table, NEXT))
     builder.store(builder.load(at(entry, OWNER)), pointer(running))
+    when = builder.load(at(entry, WHEN))
+    builder.cbranch(builder.icmp_signed("!=", when, constant(0)), look, make)
+
+    builder.position_at_end(look)
+    now_made = builder.icmp_signed("!=", builder.load(pointer(when)), constant(0))
+    builder.cbranch(now_made, make, called)
+
+    builder.position_at_end(make)
     kernel = ir.FunctionType(ir.VoidType(), [word]).as_pointer()
     address = builder.inttoptr(builder.load(at(entry, FUNCTION)), kernel)
     builder.call(address, [builder.load(at(entry, ARGUMENTS))])
@@ -160,5 +169,5 @@ def _module() -> Any:
 
 
 _STEPS = (
-    "start", "test", "call", "failed", "called", "asks", "stamps", "take", "following", "done",
+    "start", "test", "call", "look", "make", "failed", "called", "asks", "stamps", "take", "following", "done",
 )  # fmt: skip

@@ -37,9 +37,11 @@ class KernelCall:
     Attributes:
         run: performs the call. It is replaced when the kernel is compiled, so keep the call and not
             this attribute.
+        when: (1,); who makes several calls in turn, such as a ``KernelBlock``, leaves this one out
+            where it is zero. None: it is always made. ``run`` does not look at it.
     """
 
-    __slots__ = ("arguments", "compiled", "kernel", "run")
+    __slots__ = ("arguments", "compiled", "kernel", "run", "when")
 
     def __init__(self, kernel: Callable[..., None], *arguments: Any) -> None:
         self.kernel = kernel
@@ -47,6 +49,7 @@ class KernelCall:
         self.run: Callable[[], Any] = partial(kernel, *arguments)
         self.compiled: tuple[MachineCode, NDArray[np.int64]] | None = None
         """The machine code and the packed arguments, kept alive here; none for plain Python."""
+        self.when: NDArray[np.int64] | None = None
         for calls in _collecting:
             calls.append(self)
 

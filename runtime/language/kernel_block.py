@@ -29,7 +29,9 @@ from .errors import DeclarationError
 class KernelBlock(Block):
     """A block whose step makes ``kernel_calls`` in their order, and does nothing else.
 
-    ``setup`` must set ``kernel_calls``. A subclass has no ``step`` of its own.
+    ``setup`` must set ``kernel_calls``. A subclass has no ``step`` of its own. A call whose ``when``
+    is zero at its turn, such as one for another phase, is left out; a kernel before it writes that.
+    The last call of a block with ``attention`` has no ``when``.
 
     What happens rarely and needs Python, such as asking for the end of the run, is done by
     ``attend``: the step calls it after the kernels where ``attention`` is not zero. One of the
@@ -54,7 +56,8 @@ class KernelBlock(Block):
 
     def step(self) -> None:
         for call in self.kernel_calls:
-            call.run()
+            if call.when is None or call.when[0]:
+                call.run()
         if self.attention is not None and self.attention[0]:
             self.attend()
 

@@ -25,6 +25,7 @@ from ...mathematics.compiling.chain_code import (
     OWNER,
     RUNNING,
     STAMP,
+    WHEN,
     WIDTH,
     chain_function,
     clock_address,
@@ -79,7 +80,7 @@ class Chain:
                 path = block.context.path
                 raise RunError(f"block '{path}' has a kernel that did not compile", block=path)
             entries += [(place, call) for call in block.kernel_calls]
-        self._calls = [call.compiled for _, call in entries]
+        self._calls = [(call.compiled, call.when) for _, call in entries]
         """Keeps machine code and arguments alive."""
         self._places = [place for place, _ in entries]
         table = np.zeros(HEAD + WIDTH * len(entries), np.int64)
@@ -87,6 +88,8 @@ class Chain:
         for row, (place, call) in zip(rows, entries, strict=True):
             row[:2] = call.addresses
             row[OWNER], row[STAMP] = self._numbers[place], -1
+            if call.when is not None:
+                row[WHEN] = call.when.ctypes.data
         for place, block in enumerate(self.blocks):
             last = rows[len(self._places) - 1 - self._places[::-1].index(place)]
             if block.attention is not None:

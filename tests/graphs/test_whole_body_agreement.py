@@ -82,7 +82,7 @@ def compare(name, overrides=(), every=1, duration=None):
     watch = Watch(block, every)
     block.step = watch
     ticks = None if duration is None else round(duration * graph.checked.base_rate)
-    Executor(bound, log=False).run(ticks)
+    Executor(bound, log=False, fuse=False).run(ticks)  # so that the step can be watched
     return watch
 
 

@@ -6,12 +6,13 @@ from .angular_momentum import AngularMomentum
 from .contact_points import ContactPoints
 from .linear_momentum import LinearMomentum
 from .posture import Posture
-from .task import Situation, Task, TaskChoice
+from .task import KernelTask, Situation, Task, TaskChoice
 from .torso_orientation import TorsoOrientation
 
 __all__ = [
     "AngularMomentum",
     "ContactPoints",
+    "KernelTask",
     "LinearMomentum",
     "Posture",
     "Situation",

@@ -12,7 +12,7 @@ from ....mathematics.kernel import kernel
 from ....mathematics.whole_body_qp import TaskRows
 from ....robots.description import RobotDescription
 from ....runtime.language.parameters import Parameters, parameter
-from .task import Situation, Task
+from .task import KernelTask, Situation
 
 Array = NDArray[np.float64]
 Vector = tuple[float, float, float]
@@ -47,7 +47,7 @@ class Momentum(NamedTuple):
     rate: Array
 
 
-class AngularMomentum(Task[KernelCall]):
+class AngularMomentum(KernelTask):
     """The rate of the angular momentum k is -K_d k, the paper's damping (V, task 4), or, with
     ``track_angular_momentum``, k_ref' + K_d (k_ref - k).
 
@@ -75,9 +75,6 @@ class AngularMomentum(Task[KernelCall]):
         )  # fmt: skip
         matrix = self.situation.terms.centroidal_matrix
         return KernelCall(angular_rows, matrix, self._measured, self._target, feedback, self.rows)
-
-    def update(self, gains: KernelCall) -> None:
-        gains.run()
 
 
 @kernel

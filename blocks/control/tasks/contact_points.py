@@ -14,7 +14,7 @@ from ....robots.description import RobotDescription
 from ....runtime.language.parameters import Parameters, parameter
 from ...signals import Phase
 from .foot_joints import rolling_joint
-from .task import Situation, Task
+from .task import KernelTask, Situation
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -104,7 +104,7 @@ class JointMotion(NamedTuple):
     acceleration: Array
 
 
-class ContactPoints(Task[KernelCall]):
+class ContactPoints(KernelTask):
     """Points in stance do not accelerate (paper, V, task 1): J a + drift = -damping velocity.
 
     Points that are not in stance while others are go to the ground, at the mean height of the
@@ -148,9 +148,6 @@ class ContactPoints(Task[KernelCall]):
             now.terms.foot_rotation, self._planned, now.joints.position, now.terms.velocity,
             self._ankles, PointGains(**numbers), self.rows,
         )  # fmt: skip
-
-    def update(self, gains: KernelCall) -> None:
-        gains.run()
 
 
 @kernel

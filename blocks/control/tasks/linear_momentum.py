@@ -12,7 +12,7 @@ from ....mathematics.kernel import kernel
 from ....mathematics.whole_body_qp import TaskRows
 from ....robots.description import RobotDescription
 from ....runtime.language.parameters import Parameters, parameter
-from .task import Situation, Task
+from .task import KernelTask, Situation
 
 Array = NDArray[np.float64]
 Vector = tuple[float, float, float]
@@ -48,7 +48,7 @@ class Centre(NamedTuple):
     acceleration: Array
 
 
-class LinearMomentum(Task[KernelCall]):
+class LinearMomentum(KernelTask):
     """The centre of mass accelerates by a_ref + K_p (p_ref - p) + K_d (v_ref - v) (paper, V, task 2).
 
     With the linear rows A_l of the centroidal momentum matrix, their drift and the desired
@@ -79,9 +79,6 @@ class LinearMomentum(Task[KernelCall]):
             linear_task, terms.mass_matrix, self._described, terms.centroidal_matrix,
             self._measured, self._target, feedback, self.rows,
         )  # fmt: skip
-
-    def update(self, gains: KernelCall) -> None:
-        gains.run()
 
 
 @kernel

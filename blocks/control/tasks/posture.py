@@ -15,7 +15,7 @@ from ....mathematics.whole_body_qp import TaskRows
 from ....robots.description import RobotDescription
 from ....runtime.language.parameters import Parameters, parameter
 from .foot_joints import leg_joints
-from .task import Situation, Task
+from .task import KernelTask, Situation
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -58,7 +58,7 @@ class JointTargets(NamedTuple):
     acceleration: Array
 
 
-class Posture(Task[KernelCall]):
+class Posture(KernelTask):
     """Joints accelerate by q_ref'' + K_p (q_ref - q) + K_d (q_ref' - q'), one row a joint.
 
     Joints that the robot's description holds stand still at their angle; others follow the
@@ -111,9 +111,6 @@ class Posture(Task[KernelCall]):
             self.situation.joints.position, self.situation.terms.velocity, self._reference,
             feedback, self.rows,
         )  # fmt: skip
-
-    def update(self, gains: KernelCall) -> None:
-        gains.run()
 
 
 def chosen_joints(robot: RobotDescription, gains: PostureChoice) -> list[int]:

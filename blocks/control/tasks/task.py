@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar, Generic, TypeVar
 
+from ....mathematics.compiling.kernel_call import KernelCall
 from ....mathematics.whole_body_qp import TaskRows
 from ....robots.description import RobotDescription
 from ....runtime.language.parameters import Parameters, parameter
@@ -69,6 +70,20 @@ class Task(ABC, Generic[G]):
     @abstractmethod
     def update(self, gains: G) -> None:
         """Write the rows for the present tick."""
+
+
+class KernelTask(Task[KernelCall]):
+    """A task whose rows are written by one kernel: ``prepare`` makes the call of it.
+
+    The controller's step is compiled as a whole where all its tasks are of this kind.
+    """
+
+    @abstractmethod
+    def prepare(self, gains: Any) -> KernelCall:
+        """The call that writes the rows with these ``Gains``; a new one every time."""
+
+    def update(self, gains: KernelCall) -> None:
+        gains.run()
 
 
 class TaskChoice(Parameters):

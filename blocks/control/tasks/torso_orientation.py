@@ -13,7 +13,7 @@ from ....mathematics.rotations import conjugate, from_matrix, logarithm, multipl
 from ....mathematics.whole_body_qp import TaskRows
 from ....robots.description import RobotDescription
 from ....runtime.language.parameters import Parameters, parameter
-from .task import Situation, Task
+from .task import KernelTask, Situation
 
 Array = NDArray[np.float64]
 Vector = tuple[float, float, float]
@@ -46,7 +46,7 @@ class Attitude(NamedTuple):
     angular_velocity: Array
 
 
-class TorsoOrientation(Task[KernelCall]):
+class TorsoOrientation(KernelTask):
     """The base's angular acceleration is K_p Log(R' R_ref) + K_d (w_ref - w) (paper, V, task 3).
 
     The rows select the base's angular acceleration [rad/s^2, body].
@@ -74,9 +74,6 @@ class TorsoOrientation(Task[KernelCall]):
             torso_task, self.situation.terms.base_rotation, self._measured, self._target, feedback,
             self._error, self._quaternion, self.rows,
         )  # fmt: skip
-
-    def update(self, gains: KernelCall) -> None:
-        gains.run()
 
 
 @kernel

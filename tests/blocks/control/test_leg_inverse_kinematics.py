@@ -296,6 +296,34 @@ def test_legs_of_any_kind_follow_their_feet(robot):
             assert np.abs(target.velocity - speeds)[legs].max() < 0.05
 
 
+@pytest.mark.parametrize("beyond", ["turn", "slide"])
+@pytest.mark.parametrize("follow", ["feet", "pitch", "plan"])
+@pytest.mark.parametrize("robot", [ROBOT, quadruped(), humanoid()], ids=lambda robot: robot.name)
+def test_machine_code_computes_the_bytes_of_plain_python(robot, follow, beyond):
+    """Within reach and out of it, on the way there and back."""
+    params = {"follow": follow, "beyond": beyond}
+    benches = [
+        BlockBench(LegInverseKinematics, params, robot=robot, plain=plain)
+        for plain in (False, True)
+    ]
+    n, reached = len(robot.joints), []
+    for tick in range(8):
+        joints = robot.standing_position + 0.1 * np.sin(0.02 * tick + np.arange(n))
+        position, rotation = placed(robot, joints)
+        position[:, 2] -= 0.3 * (tick % 4 > 1)
+        for bench in benches:
+            bench.set("feet", position=position, rotation=rotation, velocity=0.1)
+            bench.set("joints", position=joints + 0.02)
+            bench.set("reference", phase=Phase.FLIGHT if tick == 5 else Phase.LANDING)
+            bench.set("reference", foot_pitch=0.1, joint_position=0.2, joint_velocity=1.0)
+            bench.step()
+        machine, plain = (bench.get("target") for bench in benches)
+        for name in ("position", "velocity", "reachable"):
+            np.testing.assert_array_equal(getattr(machine, name), getattr(plain, name))
+        reached.append(bool(machine.reachable.all()))
+    assert not all(reached) and (follow == "pitch" or any(reached))
+
+
 def test_joints_of_no_leg_keep_their_held_or_their_measured_position():
     robot = humanoid()
     bench = BlockBench(LegInverseKinematics, robot=robot)

@@ -290,6 +290,7 @@ def test_the_fallback_is_the_defined_one(dynamics):
     command = bench.get("command")
     last = command.torque.copy()
     works, bench.block._own = bench.block._other, False
+    bench.block._arrange()
     bench.block._other = type("Broken", (), {"solve": lambda self, *args: None})()
     for failed in (1, 2, 3):
         bench.step()
@@ -311,6 +312,7 @@ def test_the_fallback_is_the_defined_one(dynamics):
     assert int(command.failures) == 4
     assert command.torque == pytest.approx(last, abs=1e-5)
     bench.block._own = True
+    bench.block._arrange()
     bench.step()
     assert command.torque.tolist() == last.tolist()
 

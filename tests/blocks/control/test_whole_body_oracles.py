@@ -61,7 +61,7 @@ def states_of_a_jump(monkeypatch, overrides, *, duration, every):
 
     with monkeypatch.context() as patch:
         patch.setattr(WholeBodyController, "step", recording)
-        aloft.load(GRAPH, overrides).run(duration=duration)
+        aloft.load(GRAPH, overrides).run(duration=duration, fuse=False)
     return blocks[0], found
 
 

@@ -233,6 +233,62 @@ def test_a_chain_takes_over_calls_that_new_parameters_have_made(fuse: bool) -> N
     assert hashes[True] == hashes[False] != Executor(graph()).run(30).run_hash
 
 
+@kernel
+def count_up(steps, every, turn):
+    steps[()] += 1
+    turn[0] = 1 if steps[()] % every == 0 else 0
+
+
+@kernel
+def add_one(y):
+    for i in range(y.shape[0]):
+        y[i] += 1.0
+
+
+class Sometimes(KernelBlock):
+    """Adds one in every ``every``-th step."""
+
+    class Params(Parameters):
+        n: int = parameter(1, text="elements")
+        every: int = parameter(3, text="steps between two additions")
+
+    params: Params
+    y = Output(Vector, text="how often it was added")
+    counts = State(Counts, text="steps")
+
+    def setup(self) -> None:
+        turn = np.ones(1, np.int64)
+        adding = KernelCall(add_one, self.y.value)
+        adding.when = turn
+        counting = KernelCall(count_up, self.counts.steps, self.params.every, turn)
+        self.kernel_calls = (counting, adding)
+
+
+@pytest.mark.parametrize("options", [{}, {"fuse": False}, {"plain": True}])
+def test_a_call_is_left_out_where_it_is_not_its_turn(options: dict[str, bool]) -> None:
+    """Also as the last one of a block, after which a time stamp is taken."""
+    counters = {
+        name: Use(Sometimes, {"every": every}) for name, every in (("a", 3), ("b", 1), ("c", 100))
+    }
+    result = Executor(checked_graph(counters), **options).run(10)  # type: ignore[arg-type]
+    found = [result.signal(f"{name}.y.value")[:, 0].tolist() for name in "abc"]
+    assert found == [[n // 3 for n in range(1, 11)], list(range(1, 11)), [0.0] * 10]
+    assert [times.calls for times in result.blocks.values()] == [10, 10, 10]
+
+
+def test_the_jumps_controller_has_no_python_where_its_blocks_are_kernels() -> None:
+    from aloft.mathematics.compiling.compile_calls import compile_calls
+
+    bound = BoundGraph(load(GRAPHS / "jump.yaml").checked)
+    assert compile_calls(bound.kernel_calls) == ""
+    made = Ticker(bound, ClockSpec(), WallTime())
+    assert made.fuse()
+    found = chains(made)
+    before = "contacts", "estimator", "dynamics", "plan", "phase", "step", "switches", "targets"
+    assert any(chain[: len(before)] == before for chain in found)
+    assert any("wbc" in chain for chain in found)
+
+
 def test_a_step_of_its_own_is_refused() -> None:
     with pytest.raises(DeclarationError, match=r"Own: a KernelBlock has no step of its own; setup"):
 

@@ -1,0 +1,52 @@
+"""What ``LegInverseKinematics`` does in every tick before and after its legs, as kernels."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...mathematics.kernel import kernel
+from ...robots.five_joint_track import LegTargets
+from ..signals import Phase
+
+Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+Indices = NDArray[np.int64]
+
+_FLIGHT = int(Phase.FLIGHT)
+
+
+class PlannedJoints(NamedTuple):
+    """The fields of ``JumpReference`` that say what the joints should do."""
+
+    phase: Indices
+    joint_position: Array
+    joint_velocity: Array
+
+
+@kernel
+def begin_targets(measured: Array, held: Indices, angles: Array, target: LegTargets) -> None:
+    """Joints that belong to no leg stay where they are measured; the ``held`` ones at ``angles``."""
+    for joint in range(measured.shape[0]):
+        target.position[joint] = measured[joint]
+        target.velocity[joint] = 0.0
+    for k in range(held.shape[0]):
+        target.position[int(held[k])] = angles[k]
+
+
+@kernel
+def end_targets(
+    follows: bool, plan: PlannedJoints, target: LegTargets, known: Flags, found: Array
+) -> None:
+    """Take the plan's joints instead where it flies and is followed; remember what was ``found``."""
+    if follows and int(plan.phase[()]) == _FLIGHT:
+        for joint in range(found.shape[0]):
+            target.position[joint] = plan.joint_position[joint]
+            target.velocity[joint] = plan.joint_velocity[joint]
+        for foot in range(target.reachable.shape[0]):
+            target.reachable[foot] = True
+    for joint in range(found.shape[0]):
+        found[joint] = target.position[joint]
+    known[()] = True
