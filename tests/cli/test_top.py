@@ -78,6 +78,12 @@ def test_machines_and_links_are_shown(running: Path) -> None:
         viewer.stop()
 
 
+def sockets_in(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Not in the current folder: Python would take its ``aloft`` there for the package."""
+    folder.mkdir()
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(folder))
+
+
 def test_the_parts_of_a_local_run_are_found(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -85,7 +91,7 @@ def test_the_parts_of_a_local_run_are_found(
     (tmp_path / "pieces.py").write_text(BLOCKS)
     write_graph(tmp_path)
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    sockets_in(tmp_path / "sockets", monkeypatch)
     run = run_elsewhere(
         "run", "graph.yaml", "--local", "--no-record", "--set", "controller.stop_at=99999"
     )
@@ -107,7 +113,7 @@ def test_the_parts_of_a_local_run_are_found(
 
 def test_local_runs_end_with_their_process(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    sockets_in(tmp_path / "sockets", monkeypatch)
     graph = Path("graph.yaml")
     assert settings_of(graph) == ()
     with registered(graph, ["a.b=1"]):
@@ -131,7 +137,7 @@ def test_local_runs_end_with_their_process(tmp_path: Path, monkeypatch: pytest.M
             assert settings_of(graph, other.pid) == ("a.b=2",)
             other.communicate("\n", timeout=120)
         assert [run.process for run in local_runs(graph)] == [os.getpid()], "it was killed"
-    assert local_runs(graph) == [] and not list((tmp_path / "aloft").glob("*.local"))
+    assert local_runs(graph) == [] and not list((tmp_path / "sockets").rglob("*.local"))
     with pytest.raises(AloftError, match="has the process 7; there is none"):
         settings_of(graph, 7)
 

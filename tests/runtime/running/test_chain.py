@@ -325,6 +325,7 @@ def test_without_a_clock_for_machine_code_timed_blocks_are_not_fused(
 SHIPPED = sorted(
     p.relative_to(GRAPHS).as_posix()
     for p in (*GRAPHS.glob("*.yaml"), *GRAPHS.glob("robots/*.yaml"))
+    if p != GRAPHS / "robots/jump.yaml"  # the others in its folder include it and name the robot
 )
 
 

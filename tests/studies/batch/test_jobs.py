@@ -7,7 +7,8 @@ import signal
 import subprocess
 import sys
 import time
-from contextlib import closing
+from collections.abc import Iterator
+from contextlib import closing, contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -103,6 +104,16 @@ def test_a_process_that_is_killed_is_replaced_and_its_job_done_again(tmp_path: P
     assert len(set(first.read_text().split())) == 2
 
 
+def test_a_worker_lets_the_interruption_of_a_terminal_pass() -> None:
+    """It is for the process that wants the results, which decides what becomes of the job."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)  # a worker must not inherit
+    try:  # that SIGINT is ignored, as it is where the tests run in the background
+        found = results(signal.raise_signal, [signal.SIGINT], workers=1)
+    finally:
+        signal.signal(signal.SIGINT, before)
+    assert found == {0: JobResult(0, None, "")}
+
+
 def test_a_result_that_cannot_be_sent_is_an_error() -> None:
     found = results(open, [os.devnull])
     assert found[0].error.startswith("the result cannot be sent: cannot pickle")
@@ -148,12 +159,15 @@ def work(seconds):
         file.write(f"{os.getpid()}\\n")
     time.sleep(seconds)
 """
+# A shell that runs its tests in the background (sh -c 'make test &') has them ignore SIGINT, and a
+# Python that is started so never raises KeyboardInterrupt. The parent therefore asks for it.
 PARENT = """
-import sys
+import signal, sys
 from aloft.studies.batch.jobs import run_jobs
 from work import work
 if __name__ == "__main__":
     try:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
         print("go", flush=True)
         run_jobs(work, [600.0] * 4, workers=2, on_result=print)
     except KeyboardInterrupt:
@@ -161,29 +175,35 @@ if __name__ == "__main__":
 """
 
 
-def start_parent(folder: Path) -> subprocess.Popen[str]:
+@contextmanager
+def parent_process(folder: Path) -> Iterator[subprocess.Popen[str]]:
+    """A process that has begun to start its workers; whatever is left of them is killed."""
     (folder / "work.py").write_text(WORK)
     (folder / "parent.py").write_text(PARENT)
-    parent = subprocess.Popen(
+    with subprocess.Popen(
         [sys.executable, "parent.py"], cwd=folder, stdout=subprocess.PIPE,
         stderr=subprocess.PIPE, text=True, start_new_session=True,
-    )  # fmt: skip
-    assert parent.stdout is not None
-    assert parent.stdout.readline() == "go\n"
-    return parent
+    ) as parent:  # fmt: skip
+        try:
+            assert parent.stdout is not None
+            assert parent.stdout.readline() == "go\n"
+            yield parent
+        finally:
+            with suppress(ProcessLookupError):
+                os.killpg(parent.pid, signal.SIGKILL)
 
 
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGINT])
 def test_workers_end_with_the_process_that_wants_their_results(
     tmp_path: Path, number: signal.Signals
 ) -> None:
-    parent = start_parent(tmp_path)
     pids = tmp_path / "pids"
-    wait_until(lambda: pids.is_file() and len(pids.read_text().split()) == 2)
-    parent.send_signal(number)
-    _, errors = parent.communicate(timeout=240)
-    workers = [int(pid) for pid in pids.read_text().split()]
-    wait_until(lambda: not any(map(running, workers)))
+    with parent_process(tmp_path) as parent:
+        wait_until(lambda: pids.is_file() and len(pids.read_text().split()) == 2)
+        parent.send_signal(number)
+        _, errors = parent.communicate(timeout=240)
+        workers = [int(pid) for pid in pids.read_text().split()]
+        wait_until(lambda: not any(map(running, workers)))
     assert errors == ""
     assert parent.returncode == (130 if number == signal.SIGINT else -number)
 
@@ -191,10 +211,10 @@ def test_workers_end_with_the_process_that_wants_their_results(
 def test_interrupting_while_processes_start_prints_nothing(tmp_path: Path) -> None:
     """As a terminal does it: the whole process group gets the signal."""
     for pause in (0.0, 0.1, 0.3):
-        parent = start_parent(tmp_path)
-        time.sleep(pause)
-        os.killpg(parent.pid, signal.SIGINT)
-        _, errors = parent.communicate(timeout=240)
+        with parent_process(tmp_path) as parent:
+            time.sleep(pause)
+            os.killpg(parent.pid, signal.SIGINT)
+            _, errors = parent.communicate(timeout=240)
         assert parent.returncode == 130
         assert errors == ""
 

@@ -7,10 +7,11 @@ tries is small so that the test takes a bounded time; ``ALOFT_FUZZ=100000`` make
 import json
 import os
 import random
+from typing import Any
 
 from aloft.blocks.general.gain import Gain
 from aloft.blocks.general.sine_wave import SineWave
-from aloft.runtime.parameter_endpoint import _answer
+from aloft.runtime.live.parameter_endpoint import _answer
 from aloft.runtime.running.memory import BoundGraph
 from aloft.runtime.testing import Use, checked_graph
 
@@ -27,7 +28,10 @@ NAMES = (
 def request(draw: random.Random) -> bytes:
     """A request that may be good, with what people, programs and cables make of one."""
     settings = [f"{draw.choice(NAMES)}={draw.choice(VALUES)}" for _ in range(draw.randrange(4))]
-    message = {"verb": draw.choice(["set", "set", "list", "", None, 3]), "settings": settings}
+    message = {
+        "verb": draw.choice(["set", "set", "list", "watch", "", None, 3]),
+        "settings": settings,
+    }
     kind = draw.randrange(6)
     if kind == 0:
         message["settings"] = draw.choice([5, None, "gain.gain=1", [None], [["a"]], {"a": 1}])
@@ -42,19 +46,26 @@ def request(draw: random.Random) -> bytes:
     return bytes(data)
 
 
+def starting() -> dict[str, Any]:
+    """What somebody who wants to watch is told before the run has begun."""
+    return {"starting": True}
+
+
 def test_every_request_has_an_answer_and_the_next_one_too() -> None:
     bound = BoundGraph(
         checked_graph({"wave": Use(SineWave), "gain": Use(Gain, wires={"u": "wave.y"})})
     )
     bound.parameters.submit = lambda adjustment: None  # type: ignore[method-assign]
     draw = random.Random(11)
-    kinds = {"error": 0, "parameters": 0, "changes": 0}
+    kinds = {"error": 0, "parameters": 0, "changes": 0, "starting": 0}
     for _ in range(TRIES):
         data = request(draw)
-        answer = _answer(data, bound.parameters, "g")
+        answer = _answer(data, bound.parameters, "g", starting)
         assert json.loads(json.dumps(answer)) is not None
         (kind,) = set(kinds) & set(answer)
         kinds[kind] += 1
     assert min(kinds.values()) > 0
-    good = _answer(b'{"verb": "set", "settings": ["gain.gain=0.5"]}', bound.parameters, "g")
+    good = _answer(
+        b'{"verb": "set", "settings": ["gain.gain=0.5"]}', bound.parameters, "g", starting
+    )
     assert good["changes"][0]["new"] == 0.5
