@@ -65,6 +65,11 @@ class KernelCall:
         code, words = self.compiled
         return code.address, int(words.ctypes.data)
 
+    def take_turn(self) -> None:
+        """Perform the call, unless ``when`` leaves it out."""
+        if self.when is None or self.when[0]:
+            self.run()
+
     @property
     def name(self) -> str:
         """The kernel's name with its module."""

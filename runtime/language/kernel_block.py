@@ -56,8 +56,7 @@ class KernelBlock(Block):
 
     def step(self) -> None:
         for call in self.kernel_calls:
-            if call.when is None or call.when[0]:
-                call.run()
+            call.take_turn()
         if self.attention is not None and self.attention[0]:
             self.attend()
 
@@ -68,7 +67,8 @@ class KernelBlock(Block):
 def _step_in_file_of(cls: type[KernelBlock]) -> Callable[[KernelBlock], None]:
     """The common step, in the name of a class: stacks and reports of errors show the class's file.
 
-    The line is that of the class's first method.
+    The step begins at the line of the class's first method. Its calls are two lines further down,
+    which a class with a ``setup`` still has, so their line is one of the class's.
     """
     file = getattr(sys.modules.get(cls.__module__), "__file__", None)
     own = [value.__code__ for value in vars(cls).values() if isinstance(value, FunctionType)]
