@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from aloft.runtime.live.live_run import LiveRun
+from aloft.runtime.live.live_server import LiveServer
 from aloft.runtime.live.parameter_endpoint import ParameterEndpoint
 from aloft.runtime.loading import load
 from aloft.runtime.running.executor import Executor
@@ -83,3 +84,13 @@ def live(running: Running) -> Iterator[LiveRun]:
     run = LiveRun(running.path)
     yield run
     run.close()
+
+
+@pytest.fixture
+def server(live: LiveRun, tmp_path: Path) -> Iterator[LiveServer]:
+    """The page of the graph that runs, served in a thread."""
+    made = LiveServer(live, tmp_path / "waves-tuned.yaml")
+    threading.Thread(target=made.serve_forever, args=(0.02,), daemon=True).start()
+    yield made
+    made.shutdown()
+    made.server_close()

@@ -1,14 +1,11 @@
 """The page in a real browser: it shows a graph that runs, tunes it, and says when it has ended."""
 
-import threading
 import time
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from aloft.runtime.live.live_run import LiveRun
 from aloft.runtime.live.live_server import LiveServer
 from aloft.runtime.loading import load
 
@@ -46,15 +43,6 @@ class Page:
             f"(() => {{ const i = document.querySelector('[aria-label=\"{name}\"]');"
             f" i.value = '{value}'; i.dispatchEvent(new Event('{event}')); }})()"
         )
-
-
-@pytest.fixture
-def server(live: LiveRun, tmp_path: Path) -> Iterator[LiveServer]:
-    made = LiveServer(live, tmp_path / "waves-tuned.yaml")
-    threading.Thread(target=made.serve_forever, args=(0.02,), daemon=True).start()
-    yield made
-    made.shutdown()
-    made.server_close()
 
 
 def click(path: str) -> str:

@@ -2,29 +2,16 @@
 
 import http.client
 import json
-import threading
-from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import pytest
 
-from aloft.runtime.live.live_run import LiveRun
 from aloft.runtime.live.live_server import LONGEST_BODY, LiveServer
 from aloft.runtime.loading import load
 
 from .conftest import Running
 
 JSON = "application/json"
-
-
-@pytest.fixture
-def server(live: LiveRun, tmp_path: Path) -> Iterator[LiveServer]:
-    made = LiveServer(live, tmp_path / "waves-tuned.yaml")
-    threading.Thread(target=made.serve_forever, args=(0.02,), daemon=True).start()
-    yield made
-    made.shutdown()
-    made.server_close()
 
 
 def ask(
