@@ -5,17 +5,14 @@ from __future__ import annotations
 from math import atan2, cos, hypot, sin
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...mathematics.arrays import Array, Flags
 from ...mathematics.constants import GRAVITY
 from ...mathematics.rotations import rotate, yaw
 from ...robots.ball_feet import ball_feet
 from ...robots.description import RobotDescription
 from ...robots.limb import place_limb, read_limb
 from ...robots.link_poses import standing_heights
-
-Array = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 
 FALL_SHARE = 0.315
 """A base below this share of its standing height counts as fallen: 0.12 m for BRUCE."""
