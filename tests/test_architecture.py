@@ -62,7 +62,7 @@ ALLOWED: dict[str, tuple[str, ...]] = {
         "mathematics", "robots", "runtime/language", "blocks/signals",
     ),
     "planner/drawing": (
-        "planner/task", "planner/models", "planner/checking", "planner/library", "robots",
+        "planner/task", "planner/models", "planner/checking", "planner/library", "mathematics/arrays", "robots",
         "blocks/signals",
     ),
     "blocks/general": ("blocks/signals", "mathematics", "robots", "runtime/language"),
@@ -75,13 +75,15 @@ ALLOWED: dict[str, tuple[str, ...]] = {
     "fmi": ("robots", "runtime/language"),
     "fmi/exporting": ("fmi", "robots", "runtime", "logs/file"),
     "logs/file": ("robots", "runtime/language", "runtime/running"),
-    "logs/viewing": ("logs/file", "robots", "runtime/language"),
+    "logs/viewing": ("logs/file", "mathematics/arrays", "robots", "runtime/language"),
     "logs/recording": (
-        "logs/file", "logs/viewing", "robots", "runtime/language", "runtime/running",
+        "logs/file", "logs/viewing", "mathematics/arrays", "robots", "runtime/language", "runtime/running",
         "runtime/placement", "runtime/links",
     ),
     "logs/replay": ("logs/file", "logs/viewing", "robots", "runtime"),
-    "logs/exporting": ("logs/file", "logs/viewing", "robots", "runtime/language"),
+    "logs/exporting": (
+        "logs/file", "logs/viewing", "mathematics/arrays", "robots", "runtime/language",
+    ),
     "logs": ("logs/file",),
     "studies": ("mathematics", "robots", "runtime", "planner", "blocks", "hal", "logs"),
     "benchmarks": (

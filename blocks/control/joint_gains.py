@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...mathematics.arrays import Array
 from ...robots.description import RobotDescription
 from ...robots.pinocchio_model import build_pinocchio_model
-
-Array = NDArray[np.float64]
 
 NATURAL_FREQUENCY = 60.0
 """Natural frequency [rad/s] of a joint with the default gains, if its motor is strong enough."""

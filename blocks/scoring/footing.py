@@ -6,8 +6,8 @@ from math import atan2, cos, sin, sqrt
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...mathematics.arrays import Array, Counts, Flags
 from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.constants import GRAVITY
 from ...mathematics.kernel import kernel
@@ -16,10 +16,6 @@ from ...robots.ball_feet import ball_feet
 from ...robots.description import RobotDescription
 from ...robots.limb import place_limb, read_limb
 from ...robots.link_poses import standing_heights
-
-Array = NDArray[np.float64]
-Counts = NDArray[np.int64]
-Flags = NDArray[np.bool_]
 
 FALL_SHARE = 0.315
 """A base below this share of its standing height counts as fallen: 0.12 m for BRUCE."""

@@ -5,9 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from math import atan2, cos, degrees, radians, sin
 
-import numpy as np
-from numpy.typing import NDArray
-
+from ...mathematics.arrays import Array
 from ...mathematics.kernel import kernel
 from ...runtime.language.parameters import parameter
 from ...runtime.language.signals import Field
@@ -21,8 +19,6 @@ from .stand_criteria import (
     judge_rest,
     judge_safety,
 )
-
-Array = NDArray[np.float64]
 
 
 class JumpRecord(StandRecord):
@@ -102,7 +98,8 @@ def mean_turn(start: Array, now: Array) -> float:
         ax, ay = float(start[foot, 0]), float(start[foot, 1])
         bx, by = float(now[foot, 0]), float(now[foot, 1])
         total += atan2(ax * by - ay * bx, ax * bx + ay * by)
-    return total / start.shape[0]
+    count: int = start.shape[0]
+    return total / count
 
 
 def first_failure(record: JumpRecord, limits: JumpCriteria, planned: bool) -> str | None:

@@ -5,9 +5,7 @@ from __future__ import annotations
 from enum import IntEnum
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
+from ...mathematics.arrays import Array, Counts
 from ...mathematics.constants import GRAVITY
 from ...mathematics.kernel import kernel
 from ...mathematics.rotations import tilt
@@ -27,10 +25,6 @@ from .stand_following import (
     note_machine,
     note_rest,
 )
-
-Array = NDArray[np.float64]
-Counts = NDArray[np.int64]
-Flags = NDArray[np.bool_]
 
 EARLY_LIFT_OFF = 0.1
 """Feet that leave the ground more than this time [s] before the planned lift-off have bounced."""

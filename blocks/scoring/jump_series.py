@@ -9,16 +9,11 @@ from __future__ import annotations
 from math import degrees, sqrt
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
+from ...mathematics.arrays import Array, Counts
 from ...mathematics.kernel import kernel
 from ...runtime.language.signals import Field, Signal
 from .jump_criteria import JumpCriteria, mean_turn
 from .stand_criteria import NEVER
-
-Array = NDArray[np.float64]
-Counts = NDArray[np.int64]
 
 
 class JumpSeries(Signal):

@@ -5,9 +5,7 @@ from __future__ import annotations
 from math import sqrt
 from typing import Any, NamedTuple, TypeVar
 
-import numpy as np
-from numpy.typing import NDArray
-
+from ...mathematics.arrays import Array, Counts, Flags
 from ...mathematics.kernel import kernel
 from ...mathematics.rotations import tilt
 from ...mathematics.support_margin import support_margin
@@ -15,9 +13,6 @@ from ...runtime.language.signals import Signal
 from .footing import Footing, least_load, points_missing
 from .stand_criteria import NEVER, StandCriteria
 
-Array = NDArray[np.float64]
-Counts = NDArray[np.int64]
-Flags = NDArray[np.bool_]
 Fields = TypeVar("Fields", bound=tuple[Any, ...])
 
 

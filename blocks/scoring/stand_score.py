@@ -7,8 +7,8 @@ from math import degrees
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...mathematics.arrays import Array, Counts
 from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.kernel import kernel
 from ...mathematics.rotations import tilt
@@ -43,9 +43,6 @@ from .stand_following import (
     note_rest,
 )
 from .stand_metrics import judgement_metrics, rest_metrics
-
-Array = NDArray[np.float64]
-Counts = NDArray[np.int64]
 
 SETTLING = 0.15
 """A foot that has taken a step may settle for so long [s]."""

@@ -9,12 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...blocks.signals import JumpReference, Phase
+from ...mathematics.arrays import Array, Flags
 from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.kernel import kernel
 from ...mathematics.rotations import normalise
-
-Array = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 
 _THRUST, _FLIGHT, _LANDING = int(Phase.THRUST), int(Phase.FLIGHT), int(Phase.LANDING)
 
