@@ -9,17 +9,17 @@
 from __future__ import annotations
 
 import json
-import re
 import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from marks import refresh
+
 from aloft.benchmarks.tick_chart import BARS, tick_chart
 
 PAGE = Path(__file__).parent / "compiled.md"
 PICTURE = "tick.svg"
-TABLE = re.compile(r"(<!-- tick -->\n).*?(<!-- end of tick -->)", re.DOTALL)
 
 
 def tick_tables(found: Mapping[str, Any]) -> str:
@@ -74,18 +74,7 @@ def _line(row: Mapping[str, Any]) -> str:
     return f"| {' | '.join([*cells, '; '.join(filter(None, (met, row['note'])))])} |"
 
 
-def refreshed(page: str, found: Mapping[str, Any]) -> str:
-    """The page with the tables.
-
-    Raises:
-        ValueError: the page has no place for them.
-    """
-    if not TABLE.search(page):
-        raise ValueError(f"{PAGE.name} has no <!-- tick -->")
-    return TABLE.sub(lambda mark: mark[1] + tick_tables(found) + mark[2], page)
-
-
 if __name__ == "__main__":
     result = json.loads(Path(sys.argv[1]).read_text())
-    PAGE.write_text(refreshed(PAGE.read_text(), result))
+    refresh(PAGE, "tick", tick_tables(result))
     PAGE.with_name(PICTURE).write_text(tick_chart(result["rows"]))
