@@ -28,16 +28,14 @@ from types import ModuleType
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..blocks.control.tasks.choose import PHASE_KINDS
 from ..blocks.control.tasks.posture import chosen_joints
 from ..blocks.control.whole_body_controller import WholeBodyController
 from ..blocks.signals import Phase
+from ..mathematics.arrays import Array
 from ..robots.pinocchio_model import build_pinocchio_model
 from ..runtime.language.errors import AloftError
-
-Array = NDArray[np.float64]
 
 INSTALL = (
     "pip install --only-binary :all: --target FOLDER tsid==1.7.1 pin==3.4.0 cmeel-urdfdom==4.0.1 "

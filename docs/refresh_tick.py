@@ -9,18 +9,18 @@
 from __future__ import annotations
 
 import json
-import re
 import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
+
+from marks import refresh
 
 from aloft.benchmarks.tick_chart import BARS, tick_chart
 
 PAGE = Path(__file__).parent / "compiled.md"
 README = PAGE.parent.parent / "README.md"
 PICTURE = "tick.svg"
-TABLE = re.compile(r"(<!-- tick -->\n).*?(<!-- end of tick -->)", re.DOTALL)
 
 
 def tick_tables(found: Mapping[str, Any]) -> str:
@@ -89,19 +89,8 @@ def short_table(found: Mapping[str, Any]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def refreshed(page: str, tables: str) -> str:
-    """The page with the tables.
-
-    Raises:
-        ValueError: the page has no place for them.
-    """
-    if not TABLE.search(page):
-        raise ValueError("the page has no <!-- tick -->")
-    return TABLE.sub(lambda mark: mark[1] + tables + mark[2], page)
-
-
 if __name__ == "__main__":
     result = json.loads(Path(sys.argv[1]).read_text())
-    PAGE.write_text(refreshed(PAGE.read_text(), tick_tables(result)))
-    README.write_text(refreshed(README.read_text(), short_table(result)))
+    refresh(PAGE, "tick", tick_tables(result))
+    refresh(README, "tick", short_table(result))
     PAGE.with_name(PICTURE).write_text(tick_chart(result["rows"]))
