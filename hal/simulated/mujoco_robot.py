@@ -8,13 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from ...blocks.signals import ExternalForce, RobotTruth
 from ...robots.description import RobotDescription
-from ...runtime.language.block import Context, Input, Metric, Misfit, Output, State
+from ...runtime.language.block import Context, Metric, Misfit, State
 from ...runtime.language.parameters import Parameters
-from ...runtime.language.terrain import Terrain
 from ..drive_gains import gain_misfits, lost_gains
-from ..robot import Robot
 from .drives import Drives
 from .holding import RELEASED
 from .motor_feedback import FeedbackState, MotorFeedback
@@ -22,11 +19,12 @@ from .parameters import SimulatorParameters
 from .plant import Plant
 from .random_streams import Purpose
 from .rotors import unfit_motor
+from .simulated_robot import SimulatedRobot
 from .stance import uneven_contacts
-from .state import DriveState, PhysicsState, TickRecord
+from .state import DriveState, TickRecord
 
 
-class MujocoRobot(Robot):
+class MujocoRobot(SimulatedRobot):
     """The robot of the graph in MuJoCo: rigid links, rotors, motors, contact, noisy sensors.
 
     Time: the control tick ``n`` is at ``t_n``. Physics runs in steps of ``timestep`` between ticks;
@@ -68,15 +66,10 @@ class MujocoRobot(Robot):
         IndexError: a push acts at a point that the robot does not have.
     """
 
-    outside = "simulated"
-
     Params = SimulatorParameters
     needs = ("robot",)
     params: SimulatorParameters
 
-    push = Input(ExternalForce, default={}, text="a force from outside, held for the tick")
-    truth = Output(RobotTruth, truth=True, text="what only a simulator knows")
-    physics = State(PhysicsState, text="the simulator's state, written for a snapshot")
     drives = State(DriveState, text="commands in the drives and on their way")
     feedback = State(FeedbackState, text="the goals of the drives' own loops")
     record = State(TickRecord, text="what happened in the physics steps of the last tick")
@@ -140,19 +133,6 @@ class MujocoRobot(Robot):
         """The latency that is simulated."""
         assert isinstance(params, SimulatorParameters)
         return params.latency
-
-    @classmethod
-    def terrain(cls, params: Parameters) -> Terrain | None:
-        """The scene's floor and boxes."""
-        assert isinstance(params, SimulatorParameters)
-        return params.build_scene().terrain()
-
-    @classmethod
-    def local_dimensions(
-        cls, params: Parameters, robot: RobotDescription | None
-    ) -> Mapping[str, int]:
-        """The number of named points that a force may act at; the seed is not a dimension."""
-        return {"n_points": len(robot.points) if robot is not None else 0}
 
     @classmethod
     def example_inputs(

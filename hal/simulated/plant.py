@@ -11,9 +11,9 @@ from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...blocks.signals import ExternalForce, ImuReading, JointState
+from ...mathematics.arrays import Array
 from ...mathematics.compiling.kernel_call import KernelCall
 from ...robots.description import RobotDescription
 from ...runtime.language.block import Metric
@@ -33,7 +33,6 @@ from .world import build_world, draw_variation
 if TYPE_CHECKING:
     from mujoco import MjData
 
-Array = NDArray[np.float64]
 
 SETTLING_TIME = 0.3
 """The time that a robot settles for, before it is checked whether it stands [s]."""

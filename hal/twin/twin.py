@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...blocks.signals import ExternalForce, ImuReading, JointState
+from ...mathematics.arrays import Array
 from ...robots.robot_description import RobotDescription
 from ..bear.configuration import Hardware
 from ..bear.frames import BROADCAST, Instruction, frame_bytes
@@ -22,8 +22,6 @@ from .drives import EmulatedDrives
 from .faults import ANSWERS, Fault, Faults, flip, spoil
 from .frozen import Part
 from .sense_board import EmulatedBoard
-
-Array = NDArray[np.float64]
 
 BRAKING = 0.5
 """Of an actuator with shorted windings [N m s/rad]: an estimate."""

@@ -9,14 +9,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...mathematics.arrays import Array
 from ...robots.description import RobotDescription
 from ...robots.kinematics import LinkPoses, from_base_outwards
 from ..task.sequence import edge_of
 from ..task.task import JumpTask
-
-Array = NDArray[np.float64]
 
 BALLS = 13
 """Along a capsule, where the ground has edges."""

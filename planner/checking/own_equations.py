@@ -7,9 +7,9 @@ fulfil all of these equations although the robot would move differently, which t
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...blocks.signals import Phase
+from ...mathematics.arrays import Array
 from ...mathematics.constants import GRAVITY
 from ...robots.description import RobotDescription
 from ...robots.kinematics import matrices_of_quaternions
@@ -18,7 +18,6 @@ from ..models.midpoint import angular_motion, euler_angles, euler_rates, rotatio
 from ..models.quaternions import product
 from ..task.plan import JumpPlan
 
-Array = NDArray[np.float64]
 WEIGHT = np.array([0.0, 0.0, -GRAVITY])
 
 

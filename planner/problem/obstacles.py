@@ -12,8 +12,8 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...mathematics.arrays import Indices
 from ...robots.ball_feet import ball_feet
 from ...robots.description import RobotDescription
 from ..models.coordinates import Coordinates
@@ -21,7 +21,6 @@ from ..models.symbolic_model import SymbolicModel
 from ..task.sequence import Hop
 from .layout import Stretch
 
-Indices = NDArray[np.int64]
 Vector3 = tuple[float, float, float]
 Point = tuple[str, tuple[str, tuple[float, float, float]], float]
 SHARES = (0.125, 0.25, 0.375, 0.625, 0.75, 0.875)

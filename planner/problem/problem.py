@@ -12,9 +12,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...blocks.signals import Phase
+from ...mathematics.arrays import Array
 from ...mathematics.constants import GRAVITY
 from ..models.coordinates import Coordinates
 from ..models.stance import Stance
@@ -27,7 +27,6 @@ from .obstacles import step_parameters
 from .stage_functions import Piece, body_points, parameter_sizes
 from .structure import Structure
 
-Array = NDArray[np.float64]
 BODY_CLEARANCE = 0.002
 """m; what a body between two knots may come nearer to a step than at them."""
 Rows = tuple[str, int, float, float]

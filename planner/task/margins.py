@@ -5,12 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...mathematics.arrays import Array
 from ...robots.description import RobotDescription
 from ...runtime.language.parameters import Parameters, parameter
-
-Array = NDArray[np.float64]
 
 LIMIT_MARGIN = 0.005
 """rad; between two knots a joint at its limit would pass it by about as much."""

@@ -215,7 +215,9 @@ def _margins(task: Asked, robot: RobotDescription) -> Iterator[Choice]:
         why = "the torso lies down in front of a step, as the calves keep away from it"
         yield Choice("margins.squat_lean", STEP_LEAN, why)
     if "load" not in said:
-        yield Choice("margins.load", LOAD, "it does not squat so fast that its feet lose the ground")
+        yield Choice(
+            "margins.load", LOAD, "it does not squat so fast that its feet lose the ground"
+        )
     if "landing_lean" not in said:
         yield Choice("margins.landing_lean", LANDING_LEAN, "it lands upright")
     knees = knee_limits(robot, KNEE_BEND)

@@ -2,17 +2,16 @@
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from aloft.hal.simulated.parameters import SimulatorParameters
 from aloft.hal.simulated.plant import Plant
 from aloft.hal.simulated.random_streams import Purpose
 from aloft.hal.simulated.state import PhysicsState, TickRecord
+from aloft.mathematics.arrays import Array
 from aloft.robots.description import RobotDescription, find_robot
 
 ROBOT = find_robot("bruce")
 PERIOD = 0.002
-Array = NDArray[np.float64]
 
 
 class Held:
