@@ -161,22 +161,28 @@ class MujocoRobot(SimulatedRobot):
         plant = self.plant = Plant(robot, params, self.period, self.physics, self.record)
         plant.attach(self.imu, self.joints)
         plant.truth.attach(self.truth)
-        self._steps = round(self.period / params.timestep)
+        steps = round(self.period / params.timestep)
         self._jitter = plant.streams[Purpose.JITTER]
         damping = RELEASED * plant.damping
         if params.drive_damping is not None:
             damping = np.full(len(robot.joints), params.drive_damping)
         feedback = None
         if params.bus_period is not None:
-            steps = round(params.bus_period / params.timestep)
-            feedback = MotorFeedback(robot, params, params.bus_period, steps, self.feedback)
-        self._drives = Drives(robot, damping, self.drives, self.record, feedback)
+            exchange = round(params.bus_period / params.timestep)
+            feedback = MotorFeedback(robot, params, params.bus_period, exchange, self.feedback)
+        drives = self._drives = Drives(robot, damping, self.drives, self.record, feedback)
+        self._settling = plant.simulating(drives, 1)
+        self._ticking = plant.simulating(drives, steps, self.push)
+        self._damped = plant.simulating(drives, steps)
 
     def open(self) -> None:
         """Stand on the ground, settle, and wait for the first command."""
         plant, drives = self.plant, self._drives
+        self._ticking.prepare()
+        self._damped.prepare()
         plant.stand(
-            drives, lambda pose, torque: drives.hold(pose, torque, plant.stiffness, plant.damping)
+            self._settling,
+            lambda pose, torque: drives.hold(pose, torque, plant.stiffness, plant.damping),
         )
 
     def read(self) -> None:
@@ -198,13 +204,14 @@ class MujocoRobot(SimulatedRobot):
     def advance(self) -> None:
         """Simulate to the next tick."""
         self.plant.clear_record()
-        self.plant.simulate(self._drives, self._steps, self.push)
+        self._ticking.run()
+        self.plant.forces.check(self.push)
 
     def damp(self) -> None:
         """Simulate one tick with the drives in damping and no external force."""
         self._drives.damp()
         self.plant.clear_record()
-        self.plant.simulate(self._drives, self._steps)
+        self._damped.run()
 
     def freeze(self) -> None:
         """Copy the state of the simulator and the random streams to the declared state."""

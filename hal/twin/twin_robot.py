@@ -136,7 +136,7 @@ class TwinRobot(SimulatedRobot, DrivenRobot):
             robot, params, hardware, self.period, self.physics, self.record, self.gantry,
             tuple(params.faults),
         )  # fmt: skip
-        self.twin.push = self.push
+        self.twin.push_by(self.push)
         self.twin.plant.truth.attach(self.truth)
         self._hardware = hardware
         self.driver = _driver(robot, params, hardware, self.twin)
@@ -173,7 +173,7 @@ class TwinRobot(SimulatedRobot, DrivenRobot):
 
     def damp(self) -> None:
         """One tick with the drives in damping and no external force."""
-        self.twin.push = None
+        self.twin.push_by(None)
         self._pass_time(lambda: self._driver.damp(self._queue.cycles))
 
     def _pass_time(self, exchange: Callable[[], None]) -> None:

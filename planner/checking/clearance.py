@@ -111,14 +111,6 @@ def leg_lack(robot: RobotDescription, poses: LinkPoses, wanted: float) -> Array 
     return lack
 
 
-def leg_gap(robot: RobotDescription, poses: LinkPoses) -> Array:
-    """The least distance [m] between links of different legs, (n,); negative where they overlap."""
-    nearest = np.full(len(poses.position), np.inf)
-    for gap in _gaps(robot, poses):
-        nearest = np.minimum(nearest, gap)
-    return nearest
-
-
 def _gaps(robot: RobotDescription, poses: LinkPoses) -> Iterator[Array]:
     """The distances (n,) between all capsules of one leg and all of another."""
     chains = [
