@@ -245,7 +245,11 @@ def _slow_feet(task: Asked, robot: RobotDescription, said: set[str]) -> Iterator
         return
     for name, speed, why in (
         ("touchdown_speed", TOUCHDOWN_SPEED, "fast feet sink into soft ground"),
-        ("touchdown_slide", TOUCHDOWN_SLIDE, "feet that swing on miss their place if they land early"),
+        (
+            "touchdown_slide",
+            TOUCHDOWN_SLIDE,
+            "feet that swing on miss their place if they land early",
+        ),
     ):
         if name not in said:
             yield Choice(f"margins.{name}", rounded(speed * size.slow), why)
