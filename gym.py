@@ -23,8 +23,8 @@ from os import PathLike
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from .mathematics.arrays import Array
 from .runtime.graph import Graph, load
 from .runtime.language.errors import AloftError
 from .runtime.running.stepping import SteppedRun
@@ -35,7 +35,6 @@ except ModuleNotFoundError as error:
     raise ModuleNotFoundError("aloft.gym needs Gymnasium: pip install 'aloft[gym]'") from error
 
 Reward = str | Callable[[SteppedRun], float]
-Array = NDArray[np.float64]
 _MOST_SEEDS = 2**31
 
 

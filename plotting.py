@@ -15,14 +15,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
+
+from .mathematics.arrays import Array
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
     from PIL.Image import Image
 
-Array = NDArray[np.float64]
 
 COLOURS = (
     "#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#6d4c41", "#7f7f7f",
@@ -103,6 +103,23 @@ def svg_text(figure: Figure) -> str:
     buffer = io.StringIO()
     figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": "aloft"})
     return "\n".join(line.rstrip() for line in buffer.getvalue().splitlines()) + "\n"
+
+
+_DARK = {"#ffffff": "#14191f", INK: "#e6eaee", FAINT: "#9aa7b3", PALE: "#38424c"}
+"""What the colours of backgrounds, text and lines become on a dark screen."""
+
+
+def light_and_dark(text: str) -> str:
+    """An SVG file of ``svg_text`` that is dark where its reader's screen is."""
+    rules = [
+        f'[style*="{what}: {light}"]{{{what}:{dark}!important}}'
+        for light, dark in _DARK.items()
+        for what in ("fill", "stroke")
+    ]
+    rules.append(f"text:not([style*=fill]){{fill:{_DARK[INK]}}}")
+    sheet = f"<style>@media (prefers-color-scheme:dark){{{''.join(rules)}}}</style>"
+    head, end, rest = text.partition("<defs>")
+    return f"{head}{sheet}\n {end}{rest}"
 
 
 def image(figure: Figure) -> Image:

@@ -14,13 +14,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..mathematics.arrays import Array
 from ..planner.problem.assembly import Assembly
 from ..planner.problem.problem import Problem
 from ..planner.solving.solver import violation_of
-
-Array = NDArray[np.float64]
 
 OPTIONS: dict[str, float | int] = {
     "Major feasibility tolerance": 1e-6,

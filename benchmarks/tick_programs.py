@@ -16,13 +16,11 @@ from numpy.typing import NDArray
 
 from ..blocks.control.whole_body_controller import WholeBodyController
 from ..blocks.control.whole_body_program import FullProgram, WholeBodyProgram
+from ..mathematics.arrays import Array, Indices
 from ..mathematics.whole_body_qp import (
     FrictionCone,
     friction_pyramids,
 )
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
 
 OSQP_TOLERANCE = 1e-3
 """Absolute and relative, as in BRUCE's code."""

@@ -9,11 +9,12 @@
 from __future__ import annotations
 
 import json
-import re
 import shutil
 import sys
 from pathlib import Path
 from typing import Any
+
+from marks import refresh
 
 PAGE = Path(__file__).parent / "comparisons.md"
 Column = tuple[str, str, str, float]
@@ -75,25 +76,10 @@ def _figures(row: dict[str, Any], metric: str, less: str, factor: float) -> str:
     return f"{median:.3g} ({low:.3g} to {high:.3g}{missing})"
 
 
-def refreshed(page: str, summary: dict[str, Any]) -> str:
-    """The page with that study's table.
-
-    Raises:
-        ValueError: the page has no place for it.
-    """
-    name = summary["study"]
-    begin, end = f"<!-- study: {name} -->\n", f"<!-- end of {name} -->"
-    pattern = re.compile(f"({re.escape(begin)}).*?({re.escape(end)})", re.DOTALL)
-    if not pattern.search(page):
-        raise ValueError(f"{PAGE.name} has no {begin.strip()}")
-    return pattern.sub(lambda found: found[1] + comparison_table(summary) + found[2], page)
-
-
 if __name__ == "__main__":
     for folder in map(Path, sys.argv[1:]):
         result = json.loads((folder / "summary.json").read_text())
-        PAGE.write_text(refreshed(PAGE.read_text(), result))
+        study, table = result["study"], comparison_table(result)
+        refresh(PAGE, f"study: {study}", table, of=study)
         for picture in result["plots"]:
-            shutil.copyfile(
-                folder / f"{picture}.svg", PAGE.with_name(f"{result['study']}_{picture}.svg")
-            )
+            shutil.copyfile(folder / f"{picture}.svg", PAGE.with_name(f"{study}_{picture}.svg"))

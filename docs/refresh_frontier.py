@@ -9,16 +9,16 @@
 from __future__ import annotations
 
 import json
-import re
 import shutil
 import sys
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from marks import refresh
+
 PAGE = Path(__file__).parent / "frontier.md"
 PICTURE = "frontier.svg"
-TABLE = re.compile(r"(<!-- frontier -->\n).*?(<!-- end of frontier -->)", re.DOTALL)
 HEADINGS = (
     "direction", "lands at 95 %", "runs", "95 % interval", "next that fails, and why", "planned",
     "theory", "what binds there",
@@ -58,19 +58,8 @@ def _line(each: Mapping[str, Any]) -> str:
     return f"| {' | '.join([*cells, each['binds'] or '-'])} |"
 
 
-def refreshed(page: str, found: Mapping[str, Any]) -> str:
-    """The page with the table.
-
-    Raises:
-        ValueError: the page has no place for it.
-    """
-    if not TABLE.search(page):
-        raise ValueError(f"{PAGE.name} has no <!-- frontier -->")
-    return TABLE.sub(lambda mark: mark[1] + frontier_table(found) + mark[2], page)
-
-
 if __name__ == "__main__":
     folder = Path(sys.argv[1])
     result = json.loads((folder / "frontier.json").read_text())
-    PAGE.write_text(refreshed(PAGE.read_text(), result))
+    refresh(PAGE, "frontier", frontier_table(result))
     shutil.copyfile(folder / PICTURE, PAGE.with_name(PICTURE))

@@ -10,11 +10,12 @@
 from __future__ import annotations
 
 import json
-import re
 import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
+
+from marks import refresh
 
 ROOT = Path(__file__).parent.parent
 PAGE = ROOT / "docs" / "landing.md"
@@ -98,19 +99,9 @@ def direction_table(rows: Sequence[Row]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def replaced(text: str, mark: str, table: str) -> str:
-    """The page with what is between the marks of that name replaced."""
-    pattern = re.compile(rf"(<!-- {mark} -->\n).*?(<!-- end of {mark} -->)", re.DOTALL)
-    if not pattern.search(text):
-        raise SystemExit(f"{PAGE} has no <!-- {mark} -->")
-    return pattern.sub(lambda found: f"{found[1]}{table}{found[2]}", text)
-
-
 if __name__ == "__main__":
-    page = PAGE.read_text()
     for mark, file in zip(("", " 12 cm"), sys.argv[1:], strict=False):
         every = json.loads(Path(file).read_text())["rows"]
-        page = replaced(page, "impulses" + mark, impulse_table(every))
-        page = replaced(page, "quarters" + mark, quarter_table(every))
-        page = replaced(page, "directions" + mark, direction_table(every))
-    PAGE.write_text(page)
+        refresh(PAGE, "impulses" + mark, impulse_table(every))
+        refresh(PAGE, "quarters" + mark, quarter_table(every))
+        refresh(PAGE, "directions" + mark, direction_table(every))

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 from statistics import median
+
+from marks import refresh
 
 from aloft.studies.batch.seeds import SeedRow, run_seeds
 
@@ -23,7 +24,6 @@ FIGURES = (
     ("peak_motor_speed_rad_s", "peak motor speed", 1.0, "rad/s", ""),
     ("qp_failures", "QP failures", 1.0, "", "0"),
 )
-TABLE = re.compile(r"(<!-- results -->\n).*?(<!-- end of results -->)", re.DOTALL)
 
 
 def results_table(rows: list[SeedRow]) -> str:
@@ -47,5 +47,4 @@ def results_table(rows: list[SeedRow]) -> str:
 
 if __name__ == "__main__":
     found = list(run_seeds(ROOT / "graphs" / "jump.yaml", [], SEEDS))
-    readme = ROOT / "README.md"
-    readme.write_text(TABLE.sub(rf"\g<1>{results_table(found)}\g<2>", readme.read_text()))
+    refresh(ROOT / "README.md", "results", results_table(found))

@@ -11,12 +11,12 @@
 from __future__ import annotations
 
 import json
-import re
 import sys
 from pathlib import Path
 
+from marks import refresh
+
 ROOT = Path(__file__).parent.parent
-TABLE = re.compile(r"(<!-- tasks -->\n).*?(<!-- end of tasks -->)", re.DOTALL)
 
 
 def tasks_table(summary: dict[str, object]) -> str:
@@ -34,4 +34,4 @@ def tasks_table(summary: dict[str, object]) -> str:
 if __name__ == "__main__":
     page = Path(sys.argv[2]) if len(sys.argv) > 2 else ROOT / "README.md"
     table = tasks_table(json.loads(Path(sys.argv[1]).read_text()))
-    page.write_text(TABLE.sub(rf"\g<1>{table}\g<2>", page.read_text()))
+    refresh(page, "tasks", table)

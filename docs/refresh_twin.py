@@ -12,14 +12,14 @@ from __future__ import annotations
 
 import json
 import math
-import re
 import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from marks import refresh
+
 PAGE = Path(__file__).parent / "bring_up.md"
-TABLE = re.compile(r"(<!-- twin -->\n).*?(<!-- end of twin -->)", re.DOTALL)
 ARMS = ("simulation", "twin")
 RISE, TILT = "apex_above_standing_m", "peak_tilt_deg"
 
@@ -114,21 +114,10 @@ def _highest(pairs: Sequence[tuple[Run, Run]], arm: int) -> str:
     return f"{max(values):.0f} deg" if values else "-"
 
 
-def refreshed(page: str, table: str) -> str:
-    """The page with the table in its place.
-
-    Raises:
-        ValueError: the page has no place for it.
-    """
-    if not TABLE.search(page):
-        raise ValueError("the page has no <!-- twin --> and <!-- end of twin -->")
-    return TABLE.sub(lambda found: f"{found[1]}{table}{found[2]}", page)
-
-
 if __name__ == "__main__":
     from pyarrow import parquet
 
     summary = Path(sys.argv[1])
     made = parquet.read_table(summary.with_name("runs.parquet")).to_pylist()
     found = twin_table(json.loads(summary.read_text())["rows"], made)
-    PAGE.write_text(refreshed(PAGE.read_text(), found))
+    refresh(PAGE, "twin", found)

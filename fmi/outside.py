@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 from pydantic import field_validator
 
-from ..robots.description import RobotDescription
 from ..runtime.language.block import Block, Output, State
 from ..runtime.language.errors import UnitError
 from ..runtime.language.parameters import Parameters, parameter
@@ -65,13 +64,6 @@ class Outside(Block):
             body[port] = Output(signal, text="what is outside")
             body[f"kept_{port}"] = State(signal, text="what was set last")
         return type("Outside", (Outside,), body)
-
-    @classmethod
-    def local_dimensions(
-        cls, params: Parameters, robot: RobotDescription | None
-    ) -> Mapping[str, int]:
-        """All shapes are numbers."""
-        return {}
 
     @classmethod
     def example_parameters(cls) -> Mapping[str, Any]:

@@ -70,13 +70,6 @@ class UnitBlock(Block):
                 )
 
     @classmethod
-    def local_dimensions(
-        cls, params: Parameters, robot: RobotDescription | None
-    ) -> Mapping[str, int]:
-        """No parameter is a dimension."""
-        return {}
-
-    @classmethod
     def example_parameters(cls) -> Mapping[str, Any]:
         """A mass on a spring, made for this process."""
         from .example import example_fmu

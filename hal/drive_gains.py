@@ -6,15 +6,13 @@ from collections.abc import Iterator
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..mathematics.arrays import Array
 from ..robots.robot_description import RobotDescription
 from ..robots.transmission import MotorGains, motor_gains
 from ..runtime.language.block import Misfit
 from ..runtime.language.parameters import Parameters, parameter
 from ..runtime.language.per_joint import PerJoint
-
-Array = NDArray[np.float64]
 
 _REACH = 3.0
 """How far from its target a joint is [rad] where the default stiffness asks for the peak torque.

@@ -25,14 +25,12 @@ from __future__ import annotations
 from typing import NamedTuple, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..mathematics.arrays import Array
 from ..mathematics.compiling.kernel_call import KernelCall
 from ..mathematics.kernel import kernel
 from ..mathematics.linear import multiply_vector
 from ..robots.robot_description import RobotDescription
-
-Array = NDArray[np.float64]
 
 
 class Targets(NamedTuple):

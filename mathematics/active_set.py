@@ -18,13 +18,9 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from .arrays import Array, Flags, Indices
 from .kernel import kernel
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
-Flags = NDArray[np.bool_]
 
 INFEASIBLE = -1
 """No x fulfils the constraints."""

@@ -10,13 +10,11 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from .arrays import Array
 from .body_tree import BodyMotion, BodyTree, place_of
 from .constants import GRAVITY
 from .kernel import kernel
-
-Array = NDArray[np.float64]
 
 
 class Inertias(NamedTuple):

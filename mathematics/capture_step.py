@@ -15,15 +15,9 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-from numpy.typing import NDArray
-
+from .arrays import Array, Flags, Indices
 from .constants import GRAVITY
 from .kernel import kernel
-
-Array = NDArray[np.float64]
-Flags = NDArray[np.bool_]
-Indices = NDArray[np.int64]
 
 _SHORTEST = 0.03
 """The motion of a foot counts on at least this much time [s], which limits its feedback gains."""

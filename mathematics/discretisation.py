@@ -8,12 +8,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from .arrays import Array
 from .kernel import kernel
 from .linear import multiply_matrices
-
-Array = NDArray[np.float64]
 
 _TERMS = 20
 """Terms of the exponential's series; for a norm of one half the rest is below 1e-26."""

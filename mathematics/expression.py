@@ -14,7 +14,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+
+from .arrays import Array
 
 FUNCTIONS: Mapping[str, tuple[Any, int]] = {
     "abs": (np.absolute, 1), "sign": (np.sign, 1), "sqrt": (np.sqrt, 1), "exp": (np.exp, 1),
@@ -31,8 +32,6 @@ _OPERATORS: Mapping[type[ast.AST], Any] = {
     ast.Lt: np.less, ast.LtE: np.less_equal, ast.Gt: np.greater, ast.GtE: np.greater_equal,
     ast.Eq: np.equal, ast.NotEq: np.not_equal,
 }  # fmt: skip
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

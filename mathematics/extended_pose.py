@@ -12,15 +12,11 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-from numpy.typing import NDArray
-
+from .arrays import Array
 from .kernel import kernel
 from .rotations import exponential as rotation_exponential
 from .rotations import logarithm as rotation_logarithm
 from .rotations import multiply, normalise, rotate
-
-Array = NDArray[np.float64]
 
 _SMALL = 1e-4
 """Below this angle [rad] the coefficients are computed by their series, which is exact there."""

@@ -19,13 +19,11 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from .arrays import Array
 from .kernel import kernel
 from .least_squares import solve_positive
 from .linear import multiply_matrices
-
-Array = NDArray[np.float64]
 
 _HELD = 1e6
 """The weight of a shift in height that is held at its bound; the others' weights are near one."""

@@ -11,15 +11,10 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
+from .arrays import Array, Flags
 from .constants import GRAVITY
 from .kernel import kernel
 from .rotations import integrate, normalise, rotate
-
-Array = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 
 
 @kernel

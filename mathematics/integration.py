@@ -9,9 +9,9 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from .arrays import Array
+
 Rates = Callable[[float, Array, Array], None]
 """Writes dx/dt at a time [s] and a state into its last argument."""
 

@@ -12,13 +12,9 @@ robot state estimation, IJRR 2020.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from .arrays import Array, Flags, Indices
 from .kernel import kernel
-
-Array = NDArray[np.float64]
-Flags = NDArray[np.bool_]
-Indices = NDArray[np.int64]
 
 
 @kernel

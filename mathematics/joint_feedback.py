@@ -9,12 +9,8 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
+from .arrays import Array
 from .kernel import kernel
-
-Array = NDArray[np.float64]
 
 
 class Feedback(NamedTuple):

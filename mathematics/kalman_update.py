@@ -8,11 +8,9 @@ zero in H and r and have a noise of one. No function here allocates memory.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from .arrays import Array
 from .kernel import kernel
-
-Array = NDArray[np.float64]
 
 
 @kernel

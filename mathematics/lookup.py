@@ -2,13 +2,8 @@
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
-
+from .arrays import Array, Indices
 from .kernel import kernel
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
 
 
 @kernel

@@ -20,12 +20,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from .arrays import Array, Indices
 from .kernel import kernel
 from .least_squares import solve_positive_columns
 from .linear import multiply_vector
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
 
 DAMPING = 1e-8
 """Added to the squared levers [m^2] of the joints, so that a straight leg has a finite inverse."""

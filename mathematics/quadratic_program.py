@@ -1,14 +1,24 @@
-"""Quadratic programs through qpsolvers: one call, any installed solver, no exceptions."""
+"""Quadratic programs: one call, any installed solver, no exceptions.
+
+DAQP is called directly; any other solver is called through qpsolvers, which imports SciPy and every
+solver that is installed: about 0.4 s that no process pays that does without them.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from importlib.util import find_spec
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from .arrays import Array
+
+Solve = Callable[[Array, Array, Array, Array, Array, Array], Array | None]
+
+DAQP = "daqp"
+EQUALITY = 5
+"""DAQP's mark of a row that is an equality."""
+UNBOUNDED = -1e30
 
 
 class QuadraticProgramSolver:
@@ -18,7 +28,7 @@ class QuadraticProgramSolver:
     as DAQP or quadprog it is also exact and the same in every process.
 
     Args:
-        name: any solver that qpsolvers finds installed and that takes dense matrices.
+        name: ``daqp``, or any solver that qpsolvers finds installed and that takes dense matrices.
         options: passed to the solver, e.g. its tolerances.
 
     Raises:
@@ -32,7 +42,7 @@ class QuadraticProgramSolver:
         For the usual solver this takes microseconds. For any other one qpsolvers is imported, which
         takes about 0.3 s.
         """
-        if name == "daqp" and find_spec("daqp") is not None:
+        if name == DAQP and find_spec("daqp") is not None:
             return
         from qpsolvers import available_solvers
 
@@ -43,23 +53,46 @@ class QuadraticProgramSolver:
             )
 
     def __init__(self, name: str, options: dict[str, float] | None = None) -> None:
-        from qpsolvers import Problem, solve_problem
-
         self.check_name(name)
         self.name = name
-        self._options = dict(options or {})
-        self._problem: Any = Problem
-        self._solve: Any = solve_problem
+        make = _daqp if name == DAQP else _any_solver
+        self._solve: Solve = make(name, dict(options or {}))
 
     def solve(self, p: Array, q: Array, g: Array, h: Array, a: Array, b: Array) -> Array | None:
         """The minimiser x (n,), or ``None`` if the solver found none or failed."""
         try:
-            answer = self._solve(self._problem(p, q, g, h, a, b), self.name, **self._options)
+            x = self._solve(p, q, g, h, a, b)
         except Exception:  # noqa: BLE001
             # On an infeasible problem solvers raise errors of many types. The caller has a defined
             # fallback for all of them, so each means that there is no solution.
             return None
-        x = answer.x
-        if not answer.found or x is None or not np.isfinite(x).all():
+        if x is None or not np.isfinite(x).all():
             return None
         return np.asarray(x)
+
+
+def _daqp(_: str, options: Mapping[str, float]) -> Solve:
+    """DAQP's own function."""
+    import daqp
+
+    def solve(p: Array, q: Array, g: Array, h: Array, a: Array, b: Array) -> Array | None:
+        upper = np.concatenate([h, b])
+        kinds = np.zeros(len(upper), np.intc)
+        kinds[len(h) :] = EQUALITY
+        x, _, flag, _ = daqp.solve(
+            p, q, np.concatenate([g, a]), upper, np.full(len(upper), UNBOUNDED), kinds, **options
+        )
+        return x if flag > 0 else None
+
+    return solve
+
+
+def _any_solver(name: str, options: Mapping[str, float]) -> Solve:
+    """A solver that qpsolvers calls."""
+    from qpsolvers import Problem, solve_problem
+
+    def solve(p: Array, q: Array, g: Array, h: Array, a: Array, b: Array) -> Array | None:
+        answer = solve_problem(Problem(p, q, g, h, a, b), name, **options)
+        return answer.x if answer.found else None
+
+    return solve

@@ -13,9 +13,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from .arrays import Array
 from .kernel import kernel
-
-Array = NDArray[np.float64]
 
 _SMALL = 1e-8
 """Below this angle [rad] the series to second order is exact to the last bit."""

@@ -12,12 +12,8 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-from numpy.typing import NDArray
-
+from .arrays import Array
 from .kernel import kernel
-
-Array = NDArray[np.float64]
 
 
 @kernel

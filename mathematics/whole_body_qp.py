@@ -19,10 +19,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from .arrays import Array, Indices
 from .kernel import kernel
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
 
 PYRAMID_ROWS = 6
 """Inequality rows of a point in stance: four of its pyramid, two bounds of its normal force."""

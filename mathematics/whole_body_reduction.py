@@ -24,14 +24,11 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from .arrays import Array, Indices
 from .kernel import kernel
 from .triangular import factorise, solve_rows_transposed, solve_transposed, solve_upper
 from .whole_body_qp import Bounds, RigidBodyTerms, TaskRows
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
 
 
 class Reduction(NamedTuple):

@@ -9,9 +9,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from .active_set import ActiveSetMemory, Program, active_set_memory, polish, solve_program
+from .arrays import Array, Flags, Indices
 from .kernel import kernel
 from .whole_body_qp import (
     Bounds,
@@ -33,10 +33,6 @@ from .whole_body_reduction import (
     torque_rows,
     within_limits,
 )
-
-Array = NDArray[np.float64]
-Flags = NDArray[np.bool_]
-Indices = NDArray[np.int64]
 
 NO_CONTACT = 0
 """Result where no point is in stance: nothing to solve."""

@@ -10,15 +10,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-import numpy as np
-from numpy.typing import NDArray
-
+from ..mathematics.arrays import Array
 from .link_poses import contact_centres
 
 if TYPE_CHECKING:
     from .robot_description import RobotDescription
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..mathematics.arrays import Array, Indices
 from ..mathematics.body_tree import (
     BodyMotion,
     BodyTree,
@@ -23,9 +23,6 @@ from .ball_feet import ball_feet
 from .body_tree import body_tree
 from .link_poses import contact_centres, link_poses
 from .robot_description import RobotDescription
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
 
 
 class Contacts(NamedTuple):

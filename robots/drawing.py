@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..mathematics.arrays import Array
 from ..plotting import COLOURS, FAINT, INK, image, new_figure, style, svg_text
 from .link_poses import contact_centres, link_poses, standing_com, standing_heights
 from .robot_description import RobotDescription
@@ -16,7 +16,6 @@ from .robot_description import RobotDescription
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-Array = NDArray[np.float64]
 Poses = Mapping[str, tuple[Array, Array]]
 
 VIEWS = (("from the right", 0, 1.0), ("from behind", 1, -1.0))

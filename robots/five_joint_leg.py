@@ -16,15 +16,13 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..mathematics.arrays import Array
 from ..mathematics.directions import unit
 from ..mathematics.kernel import kernel
 from ..mathematics.rotations import wrap
 from .limb import FootKind, chain_to, foot_shape
 from .robot_description import RobotDescription
-
-Array = NDArray[np.float64]
 
 _AXES = ("yaw", 2), ("pitch", 1), ("roll", 0), ("knee", 1), ("ankle", 1)
 _CANONICAL = np.array([1.0, -1.0, 1.0, -1.0, -1.0])

@@ -9,15 +9,11 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-from numpy.typing import NDArray
-
+from ..mathematics.arrays import Array
 from ..mathematics.kernel import kernel
 from ..mathematics.least_squares import solve_damped
 from ..mathematics.linear import multiply_matrices
 from .five_joint_leg import inverse
-
-Array = NDArray[np.float64]
 
 _LEVEL = 0.3
 """A sole whose normal has less than this along the base's z axis does not slide."""

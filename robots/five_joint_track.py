@@ -10,8 +10,8 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..mathematics.arrays import Array, Flags, Indices
 from ..mathematics.kernel import kernel
 from .five_joint_leg import Leg, forward, inverse, jacobian, yaw_share
 from .five_joint_reach import (
@@ -22,10 +22,6 @@ from .five_joint_reach import (
     slide,
     slow_stretch,
 )
-
-Array = NDArray[np.float64]
-Flags = NDArray[np.bool_]
-Indices = NDArray[np.int64]
 
 _FASTEST = 100.0
 """Foot velocities are limited to this [m/s], so that no square overflows."""

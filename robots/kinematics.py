@@ -9,12 +9,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..mathematics.arrays import Array
 from .parts import Joint
 from .robot_description import RobotDescription
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

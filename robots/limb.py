@@ -11,12 +11,10 @@ from dataclasses import dataclass
 from enum import IntEnum
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..mathematics.arrays import Array
 from ..mathematics.kernel import kernel
 from .robot_description import RobotDescription
-
-Array = NDArray[np.float64]
 
 _COLLINEAR = 1e-6
 """Contact points nearer to one line than this [m] are a line."""

@@ -10,13 +10,9 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-from numpy.typing import NDArray
-
+from ..mathematics.arrays import Array
 from ..mathematics.directions import unit
 from ..mathematics.kernel import kernel
-
-Array = NDArray[np.float64]
 
 _FAR = 10.0
 """Targets are limited to this distance [m], so that no square overflows."""

@@ -26,14 +26,12 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..mathematics.arrays import Array
 from ..mathematics.kernel import kernel
 from ..mathematics.least_squares import solve_positive
 from .limb import limb_jacobian, place_limb
 from .limb_error import foot_error, weigh_rows
-
-Array = NDArray[np.float64]
 
 FOUND = 1e-22
 """A squared error [m^2] below which no further step is taken."""

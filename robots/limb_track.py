@@ -9,8 +9,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..mathematics.arrays import Array, Flags, Indices
 from ..mathematics.kernel import kernel
 from .ball_feet import ball_feet
 from .description import RobotDescription
@@ -19,10 +19,6 @@ from .five_joint_track import FootMotion, LegSettings, LegTargets
 from .limb import FootKind, read_limb
 from .limb_error import aim, turning
 from .limb_inverse import REACHED, approach, limb_scratch, limb_velocity, reach
-
-Array = NDArray[np.float64]
-Flags = NDArray[np.bool_]
-Indices = NDArray[np.int64]
 
 _FASTEST = 100.0
 """Foot velocities [m/s] and measured joints [rad or m] are limited to this, so that no square overflows."""

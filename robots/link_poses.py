@@ -10,12 +10,11 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
+
+from ..mathematics.arrays import Array
 
 if TYPE_CHECKING:
     from .robot_description import RobotDescription
-
-Array = NDArray[np.float64]
 
 
 def link_poses(robot: RobotDescription, position: Array) -> Mapping[str, tuple[Array, Array]]:

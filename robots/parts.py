@@ -10,8 +10,6 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, ClassVar, Literal
 
-import numpy as np
-from numpy.typing import NDArray
 from pydantic import (
     BaseModel,
     ConfigDict,
@@ -20,8 +18,9 @@ from pydantic import (
     model_serializer,
 )
 
+from ..mathematics.arrays import Array
+
 Vector3 = tuple[float, float, float]
-Array = NDArray[np.float64]
 
 
 class Part(BaseModel):

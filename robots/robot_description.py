@@ -14,9 +14,9 @@ from typing import Any, Literal, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from ..mathematics.arrays import Array
 from .parts import (
     ActuatorProfile,
-    Array,
     ContactPoint,
     Foot,
     Joint,

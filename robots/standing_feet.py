@@ -5,12 +5,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..mathematics.arrays import Array
 from .description import RobotDescription
 from .kinematics import link_poses
-
-Array = NDArray[np.float64]
 
 
 def standing_feet(robot: RobotDescription) -> Array:

@@ -13,13 +13,11 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..mathematics.arrays import Array
 from .kinematics import LinkPoses, link_poses
 from .link_poses import contact_centres
 from .robot_description import RobotDescription
-
-Array = NDArray[np.float64]
 
 STEPS = 200
 DAMPING = 1e-6

@@ -16,11 +16,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..mathematics.arrays import Array
 from .robot_description import RobotDescription
-
-Array = NDArray[np.float64]
 
 _SWEEPS = 10_000
 _CONVERGED = 1e-15

@@ -13,12 +13,10 @@ from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..mathematics.arrays import Array
 from .parts import Joint, Link, Shape
 from .robot_description import RobotDescription
-
-Array = NDArray[np.float64]
 
 FREE = 1e3
 """The limits [m] of a slide that has none: a URDF demands some."""

@@ -12,12 +12,10 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..mathematics.arrays import Array
 from .description import Joint, Link, RobotDescription, Shape, Vector3
 from .kinematics import from_base_outwards, rotations_about
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -14,9 +14,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..blocks.jumping.plan_progress import speed_error
+from ..mathematics.arrays import Array
 from ..mathematics.constants import GRAVITY
 from ..planner.library.rehearsed import ZERO, Deviation, Rehearsed, Vector
 from ..runtime.graph import load
@@ -27,8 +27,6 @@ from ..runtime.running.run_result import RunResult
 from .batch.jobs import job_results
 from .batch.seeds import overrides_for
 from .trials import trial_settings
-
-Array = NDArray[np.float64]
 
 TRIAL = "standard"
 SEEDS = (7001, 7002, 7003)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import importlib.util
+from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
 
@@ -15,12 +15,8 @@ PAGE = (ROOT / "docs" / "comparisons.md").read_text()
 
 
 @pytest.fixture(scope="module")
-def script() -> ModuleType:
-    spec = importlib.util.spec_from_file_location("refresh", ROOT / "docs/refresh_comparisons.py")
-    assert spec is not None and spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+def script(docs_script: Callable[[str], ModuleType]) -> ModuleType:
+    return docs_script("refresh_comparisons")
 
 
 def row(arm: str, **metrics: float) -> dict[str, object]:
@@ -44,16 +40,6 @@ def test_a_table_has_a_row_a_cell(script: ModuleType) -> None:
         "| one | 1 of 4 | 5 % to 70 % | 2 | - | 2 (1.99 to 2.01, 3 runs) | 1 (0 to 2, 3 runs) |"
     )
     assert second == "| other | 1 of 4 | 5 % to 70 % | 2 | - | - | - |"
-
-
-def test_a_table_goes_to_its_place(script: ModuleType) -> None:
-    page = "a\n<!-- study: controller -->\nold\n<!-- end of controller -->\nb\n"
-    summary = {"study": "controller", "rows": [row("one")]}
-    found = script.refreshed(page, summary)
-    assert found.startswith("a\n<!-- study: controller -->\n| succeeded |")
-    assert found.endswith("|\n<!-- end of controller -->\nb\n") and "old" not in found
-    with pytest.raises(ValueError, match=r"comparisons.md has no <!-- study: controller -->"):
-        script.refreshed("", summary)
 
 
 @pytest.mark.parametrize("name", ["formulations", "controller", "estimator"])

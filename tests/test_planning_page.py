@@ -1,13 +1,14 @@
 """docs/planning.md is true: its files plan, its table is the declarations', its code reads a plan."""
 
 import re
+from collections.abc import Callable
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import pytest
 
 import aloft
-from aloft.cli.task_page import BEGIN, END, task_tables
 from aloft.planner.library.library import SHIPPED
 from aloft.planner.task.read_task import read_task
 from aloft.studies.batch.plan_grid import read_grid
@@ -17,9 +18,11 @@ PAGE = (ROOT / "docs" / "planning.md").read_text(encoding="utf-8")
 FILES = dict(re.findall(r"<!-- file: (\S+) -->\n```\w+\n(.*?)```", PAGE, re.DOTALL))
 
 
-def test_the_table_of_parameters_is_up_to_date() -> None:
-    written = PAGE.partition(BEGIN)[2].partition(END)[0]
-    assert written == task_tables(), "run: python docs/refresh_task_parameters.py"
+def test_the_table_of_parameters_is_up_to_date(docs_script: Callable[[str], ModuleType]) -> None:
+    script = docs_script("refresh_task_parameters")
+    written = PAGE.partition(f"<!-- {script.MARK} -->\n")[2]
+    written = written.partition(f"<!-- end of {script.MARK} -->")[0]
+    assert written == script.task_tables(), "run: python docs/refresh_task_parameters.py"
 
 
 def test_the_task_and_the_grid_are_what_the_page_says(tmp_path: Path) -> None:

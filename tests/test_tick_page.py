@@ -1,7 +1,6 @@
 """The table and the picture of one tick, from what ``aloft bench tick --json`` prints."""
 
-import importlib.util
-from pathlib import Path
+from collections.abc import Callable
 from types import ModuleType
 
 import pytest
@@ -9,7 +8,6 @@ import pytest
 from aloft.benchmarks.rows import Row
 from aloft.benchmarks.tick_chart import tick_chart
 
-ROOT = Path(__file__).parent.parent
 ROWS = [
     Row("block wbc", 20.0, "us/tick"),
     Row("block legs", 10.0, "us/tick"),
@@ -29,25 +27,36 @@ FOUND = {
 
 
 @pytest.fixture
-def script() -> ModuleType:
-    spec = importlib.util.spec_from_file_location("refresh", ROOT / "docs/refresh_tick.py")
-    assert spec is not None and spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+def script(docs_script: Callable[[str], ModuleType]) -> ModuleType:
+    return docs_script("refresh_tick")
 
 
 def test_the_tables(script: ModuleType) -> None:
-    page = script.refreshed("a\n<!-- tick -->\nold\n<!-- end of tick -->\nb", FOUND)
-    assert page.startswith("a\n<!-- tick -->\nQuick, 2 cores, Python 3.11; load before 0.5, after")
-    assert page.endswith("<!-- end of tick -->\nb") and "old" not in page
+    page = script.tick_tables(FOUND)
+    assert page.startswith("Quick, 2 cores, Python 3.11; load before 0.5, after")
     assert "| median [us] | fused | kernels one by one |" in page  # without OSQP
     assert "| `wbc` | 19.0 | 20.0 |" in page
     assert "| controller, fused | 30 us | OSQP | 25 | 20 | 30 | floor reached |" in page
     assert "| TSID | - | x |  |  |  | not installed |" in page
     assert "| period | 100 us |  |  | 250 us | 50 us | floor reached |" in page
-    with pytest.raises(ValueError, match="<!-- tick -->"):
-        script.refreshed("", FOUND)
+
+
+def test_readme_has_only_what_has_a_goal(script: ModuleType) -> None:
+    table = script.short_table(FOUND)
+    assert "![The blocks of one tick beside its peers](docs/tick.svg)" in table
+    assert "| controller, fused | 30 us | OSQP | 25 | 20 | 30 | floor reached |" in table
+    assert "| period | 100 us |" in table
+    assert "TSID" not in table and "`wbc`" not in table
+    page = script.README.read_text()
+    assert page.count("<!-- tick -->") == page.count("<!-- end of tick -->") == 1
+
+
+def test_an_earlier_commit_has_other_blocks(script: ModuleType) -> None:
+    rows = [*FOUND["rows"], Row("old block wbc", 200.0, "us/tick").to_json()]
+    assert "| `wbc` | 19.0 | 20.0 | 200.0 |" in script.tick_tables({**FOUND, "rows": rows})
+    assert "| `legs` | 9.0 | 10.0 |  |" in script.tick_tables({**FOUND, "rows": rows})
+    text = tick_chart(rows)
+    assert ">at an earlier commit<" in text and ">200 us<" in text
 
 
 def test_the_picture_has_every_large_block() -> None:
@@ -55,5 +64,6 @@ def test_the_picture_has_every_large_block() -> None:
     assert text == tick_chart(FOUND["rows"])
     for word in ("wbc", "legs", "the others", "kernels one by one", "28 us"):
         assert f">{word}<" in text
+    assert "prefers-color-scheme:dark" in text
     for word in ("step", "OSQP"):
         assert f">{word}<" not in text

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import importlib.util
+from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -15,12 +15,8 @@ ROOT = Path(__file__).parent.parent
 
 
 @pytest.fixture(scope="module")
-def script() -> ModuleType:
-    spec = importlib.util.spec_from_file_location("refresh_twin", ROOT / "docs/refresh_twin.py")
-    assert spec is not None and spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+def script(docs_script: Callable[[str], ModuleType]) -> ModuleType:
+    return docs_script("refresh_twin")
 
 
 def run(task: str, arm: str, seed: int, success: bool, tilt: float | None = 5.0) -> dict[str, Any]:
@@ -81,13 +77,6 @@ def test_one_arm_alone_says_nothing(script: ModuleType) -> None:
 def test_mcnemars_exact_test(script: ModuleType, first: int, second: int, chance: float) -> None:
     """Against the binomial distribution by hand: 2 (1 + 10 + 45) / 2^10 for a split of 2 to 8."""
     assert script.equally_likely(first, second) == script.equally_likely(second, first) == chance
-
-
-def test_the_table_goes_to_its_place(script: ModuleType) -> None:
-    page = (ROOT / "docs" / "bring_up.md").read_text()
-    assert "new\n<!-- end of twin -->" in script.refreshed(page, "new\n")
-    with pytest.raises(ValueError, match="the page has no <!-- twin -->"):
-        script.refreshed("", "new\n")
 
 
 def test_the_study_runs_the_tasks_of_the_other_on_both(script: ModuleType) -> None:

@@ -6,8 +6,8 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...mathematics.arrays import Array, Flags, Indices
 from ...mathematics.kernel import kernel
 from ...mathematics.polynomials import minimum_jerk
 from ...mathematics.rotations import (
@@ -19,10 +19,6 @@ from ...mathematics.rotations import (
     multiply,
 )
 from ..signals import Phase
-
-Array = NDArray[np.float64]
-Flags = NDArray[np.bool_]
-Indices = NDArray[np.int64]
 
 BY_FEET, BY_PATTERN, BY_BASE = 0, 1, 2
 """What tells the heading: the feet's own directions, the pattern in which they stand, the base."""

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...mathematics.arrays import Array, Indices
 from ...mathematics.body_dynamics import (
     Inertias,
     MotionTerms,
@@ -31,9 +31,6 @@ from ...robots.body_tree import body_tree
 from ...runtime.language.block import Input, Output
 from ...runtime.language.kernel_block import KernelBlock
 from ..signals import BaseState, DynamicsTerms, JointState, MassEstimate
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
 
 LEAST_SCALE, LEAST_OFFSET = 1e-4, 2e-5
 """The steps in which the model's mass (as a share) and its torso's CoM [m] change."""

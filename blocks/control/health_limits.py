@@ -7,15 +7,14 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from ...mathematics.arrays import Array, Flags
 from ...mathematics.kernel import kernel
 from ...runtime.language.parameters import Parameters, parameter
 from ..signals import RobotHealth
 from ..signals.drive_conditions import describe
 from .safety_faults import Fault
 
-Array = NDArray[np.float64]
 Counts = NDArray[np.int64]
-Flags = NDArray[np.bool_]
 
 _CRITICAL = 0x7C
 """The bits of a drive's condition with which it has switched its torque off."""

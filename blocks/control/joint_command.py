@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
+from ...mathematics.arrays import Array, Flags, Indices
 from ...mathematics.joint_feedback import (
     Feedback,
     Motion,
@@ -18,10 +16,6 @@ from ...mathematics.joint_feedback import (
 )
 from ...mathematics.kernel import kernel
 from ..signals import CommandMode, Phase
-
-Array = NDArray[np.float64]
-Flags = NDArray[np.bool_]
-Indices = NDArray[np.int64]
 
 MEASURED, ACCELERATION, LEGS = 0, 1, 2
 """Kinds of targets of the stance gains."""

@@ -4,16 +4,10 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
+from ...mathematics.arrays import Array, Flags, Indices
 from ...mathematics.kernel import kernel
 from ...robots.five_joint_track import LegTargets
 from ..signals import Phase
-
-Array = NDArray[np.float64]
-Flags = NDArray[np.bool_]
-Indices = NDArray[np.int64]
 
 _FLIGHT = int(Phase.FLIGHT)
 

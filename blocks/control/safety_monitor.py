@@ -6,7 +6,6 @@ import math
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...mathematics.compiling.kernel_call import KernelCall
 from ...runtime.language.block import Input, Metric, Output, State
@@ -28,8 +27,6 @@ from ..signals.drive_conditions import HEALTHY
 from .health_limits import UNSTAMPED, HealthParameters, health_of, health_text
 from .safety_faults import SWITCH_TEXTS, TEXTS, Fault, is_of_hardware
 from .safety_watch import Bounds, Command, RobotState, Switches, Timers, Verdict, watch
-
-Array = NDArray[np.float64]
 
 _DAMPED_SPEED = 20.0
 """Joint speed [rad/s] at which the default damping asks for the motors' peak torque."""

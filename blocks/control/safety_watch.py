@@ -8,14 +8,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ...mathematics.arrays import Array, Flags
 from ...mathematics.kernel import kernel
 from ...mathematics.rotations import tilt
 from ..signals import CommandMode, DrivePhase, SwitchFault
 from .health_limits import Health, judge_health, measured
 from .safety_faults import Fault
 
-Array = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 Counts = NDArray[np.int64]
 
 # What a compiled kernel can return.

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...mathematics.arrays import Array, Indices
 from ...mathematics.quadratic_program import QuadraticProgramSolver
 from ...mathematics.whole_body_qp import (
     PYRAMID_ROWS,
@@ -23,9 +23,6 @@ from ...mathematics.whole_body_qp import (
     torque_limits,
 )
 from ...mathematics.whole_body_solution import Motors, Weights
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
 
 
 @dataclass(frozen=True)

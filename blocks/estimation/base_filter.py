@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ...mathematics.arrays import Array, Flags
 from ...mathematics.constants import GRAVITY
 from ...mathematics.inertial_filter import (
     StandingPoints,
@@ -21,8 +22,6 @@ from ...mathematics.kernel import kernel
 from ...mathematics.rotations import rotate
 from ...robots.contact_kinematics import Contacts, Measured, Rigid, Seen, see_contacts
 
-Array = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 Counts = NDArray[np.int64]
 
 _FASTEST_TURN = 100.0

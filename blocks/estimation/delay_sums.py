@@ -7,10 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ...mathematics.arrays import Array, Indices
 from ...mathematics.kernel import kernel
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
 
 LAGS = 12
 """Delays up to this many periods less one can be measured."""

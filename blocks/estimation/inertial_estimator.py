@@ -6,7 +6,6 @@ from abc import abstractmethod
 from typing import ClassVar, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.inertial_filter import StandingPoints
@@ -27,8 +26,6 @@ from .base_filter import (
     Scratch,
     Settings,
 )
-
-Array = NDArray[np.float64]
 
 
 class BaseEstimate(Signal):

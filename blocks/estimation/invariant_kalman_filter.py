@@ -6,8 +6,8 @@ import math
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...mathematics.arrays import Array
 from ...mathematics.constants import GRAVITY
 from ...mathematics.extended_pose import retract
 from ...mathematics.inertial_filter import misalignment, propagate, turn, upright
@@ -36,8 +36,6 @@ from ...runtime.language.block import Block, Input, Output, State
 from ...runtime.language.parameters import Parameters
 from ..signals import BaseState, ContactState, EstimatorHealth, ImuReading, JointState
 from .invariant_estimate import InvariantEstimate, InvariantFilterParameters
-
-Array = NDArray[np.float64]
 
 _FASTEST_TURN = 100.0
 _STRONGEST_FORCE = 1000.0

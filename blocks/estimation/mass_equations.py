@@ -5,9 +5,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
+from ...mathematics.arrays import Array, Flags, Indices
 from ...mathematics.constants import GRAVITY
 from ...mathematics.kernel import kernel
 from ...mathematics.linear import multiply_vector
@@ -20,10 +18,6 @@ from ...mathematics.mass_filter import (
     torso_moment,
 )
 from ..signals import Phase
-
-Array = NDArray[np.float64]
-Flags = NDArray[np.bool_]
-Indices = NDArray[np.int64]
 
 SCALE, COM, TILT, FRICTION = 0, 1, 4, 6
 """Where the unknowns begin: the factor on all masses; the offset of the torso's CoM [m] (3); the

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ...mathematics.arrays import Array, Flags
 from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.constants import GRAVITY
 from ...mathematics.inertial_filter import misalignment, right_up, turn, weigh
@@ -28,8 +29,6 @@ from .base_filter import (
 )
 from .inertial_estimator import InertialEstimator, InertialParameters
 
-Array = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 Counts = NDArray[np.int64]
 
 

@@ -5,9 +5,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
+from ...mathematics.arrays import Array, Flags, Indices
 from ...mathematics.capture_step import (
     capture_point,
     choose_foothold,
@@ -20,10 +18,6 @@ from ...mathematics.kernel import kernel
 from ...mathematics.rotations import mean_heading
 from ...mathematics.support_margin import support_margin
 from ..signals import Phase
-
-Array = NDArray[np.float64]
-Flags = NDArray[np.bool_]
-Indices = NDArray[np.int64]
 
 _EARLIEST, _LATEST = 0.6, 1.5
 """The share of a step's duration after which a contact ends it, and that at which it ends anyway."""

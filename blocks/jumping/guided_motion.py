@@ -23,16 +23,14 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...mathematics.arrays import Array
 from ...robots.ball_feet import ball_feet
 from ...robots.description import RobotDescription
 from ...robots.limb import FootKind, foot_shape
 from ...robots.pinocchio_model import PinocchioModel
 from ...runtime.language.block import Misfit
 from ...runtime.language.errors import BlockError
-
-Array = NDArray[np.float64]
 
 _STEP = 0.002
 """Longest step of the integration [s]."""

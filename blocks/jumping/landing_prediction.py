@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...mathematics.arrays import Array, Indices
 from ...mathematics.constants import GRAVITY
 from ...mathematics.flight_prediction import (
     FlightMap,
@@ -24,9 +24,6 @@ from ...mathematics.linear import multiply_vector
 from ...mathematics.rotations import conjugate, from_matrix, logarithm, multiply
 from ...robots.description import RobotDescription
 from ...runtime.language.parameters import Parameters, live_parameter
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
 
 LAST = 0.02
 """Nearer to touchdown than this [s] the choice stands."""

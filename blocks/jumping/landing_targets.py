@@ -5,9 +5,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
+from ...mathematics.arrays import Array, Flags, Indices
 from ...mathematics.constants import GRAVITY
 from ...mathematics.kernel import kernel
 from ...mathematics.landing_law import (
@@ -34,10 +32,6 @@ from ...mathematics.rotations import (
 )
 from ..signals import Phase
 from .landing_prediction import LAST, Prediction, Terms, choose_shift_of_feet
-
-Array = NDArray[np.float64]
-Flags = NDArray[np.bool_]
-Indices = NDArray[np.int64]
 
 _SLOWEST = 0.3
 """The least speed of descent [m/s] by which a change of the legs' length changes the time."""

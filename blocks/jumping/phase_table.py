@@ -8,10 +8,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ...mathematics.arrays import Array
 from ...mathematics.kernel import kernel
 from ..signals import Phase
-
-Array = NDArray[np.float64]
 
 
 class Condition(IntEnum):

@@ -4,15 +4,10 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
+from ...mathematics.arrays import Array, Indices
 from ...mathematics.constants import GRAVITY
 from ...mathematics.kernel import kernel
 from ..signals import Phase
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
 
 SLOWEST = 0.5
 """Vertical speed [m/s] below which a height makes no difference to the apex yet."""

@@ -13,16 +13,14 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...mathematics.arrays import Array
 from ...mathematics.constants import GRAVITY
 from ...mathematics.polynomials import minimum_jerk, quintic
 from ...planner.library.jump_table import JumpTable
 from ...robots.description import RobotDescription
 from ...robots.pinocchio_model import PinocchioModel
 from .guided_motion import GuidedBody, Motion, MotionRecorder, check_limits
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

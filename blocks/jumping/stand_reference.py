@@ -6,8 +6,8 @@ from collections.abc import Iterable
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...mathematics.arrays import Array
 from ...mathematics.polynomials import minimum_jerk
 from ...planner.library.jump_table import JumpTable, JumpTableReader
 from ...robots.description import RobotDescription
@@ -16,8 +16,6 @@ from ...runtime.language.block import Block, Misfit, Output
 from ...runtime.language.parameters import Parameters, parameter
 from ..signals import JumpReference
 from .guided_motion import GuidedBody, Motion, MotionRecorder, check_limits, too_few_joints
-
-Array = NDArray[np.float64]
 
 NEVER = 1e6
 """The time [s] of a lift-off that is not planned."""

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ...mathematics.arrays import Array, Flags
 from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.kernel import kernel
 from ...runtime.language.block import Input, Output, State
@@ -15,9 +16,7 @@ from ...runtime.language.parameters import Parameters, parameter
 from ...runtime.language.signals import Field, Signal
 from ..signals import ContactSwitches, Phase, PhaseState, SwitchFault, SwitchHealth
 
-Array = NDArray[np.float64]
 Counts = NDArray[np.int64]
-Flags = NDArray[np.bool_]
 
 _CLOSED, _OPEN = int(SwitchFault.STUCK_CLOSED), int(SwitchFault.STUCK_OPEN)
 _BOUNCING = int(SwitchFault.BOUNCING)

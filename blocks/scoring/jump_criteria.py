@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from math import atan2, cos, degrees, radians, sin
 
+from ...mathematics.arrays import Array
+from ...mathematics.kernel import kernel
 from ...runtime.language.parameters import parameter
 from ...runtime.language.signals import Field
 from .stand_criteria import (
@@ -85,11 +87,19 @@ def feet_moved(record: JumpRecord) -> tuple[float, float]:
 
 def feet_turned(record: JumpRecord) -> float:
     """How far the feet have turned since the start [rad], to the left, on average."""
-    turns = [
-        atan2(a[0] * b[1] - a[1] * b[0], a[0] * b[0] + a[1] * b[1])
-        for a, b in zip(record.start_direction.tolist(), record.direction.tolist(), strict=True)
-    ]
-    return sum(turns) / len(turns)
+    return mean_turn(record.start_direction, record.direction)
+
+
+@kernel
+def mean_turn(start: Array, now: Array) -> float:
+    """The mean angle [rad] from each row of ``start`` (n, 2) to that of ``now``, to the left."""
+    total = 0.0
+    for foot in range(start.shape[0]):
+        ax, ay = float(start[foot, 0]), float(start[foot, 1])
+        bx, by = float(now[foot, 0]), float(now[foot, 1])
+        total += atan2(ax * by - ay * bx, ax * bx + ay * by)
+    count: int = start.shape[0]
+    return total / count
 
 
 def first_failure(record: JumpRecord, limits: JumpCriteria, planned: bool) -> str | None:

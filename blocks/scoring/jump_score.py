@@ -5,27 +5,22 @@ from __future__ import annotations
 from collections.abc import Mapping
 from math import degrees, hypot
 
-from ...mathematics.constants import GRAVITY
-from ...mathematics.rotations import tilt
-from ...runtime.language.block import Block, Input, Metric, State
+import numpy as np
+
+from ...mathematics.compiling.kernel_call import KernelCall
+from ...runtime.language.block import Input, Metric, State
+from ...runtime.language.kernel_block import KernelBlock
 from ..signals import JumpReference, RobotTruth, WholeBodyCommand
 from .footing import Footing
 from .jump_criteria import JumpCriteria, JumpRecord, feet_moved, feet_turned, first_failure
-from .jump_series import (
-    EARLY_LIFT_OFF,
-    JumpSeries,
-    goes_on,
-    keep_place,
-    note_landing,
-    note_place,
-    series_failure,
-)
+from .jump_following import Ending, Reference, Times, Verdict, follow_jump, follow_reference
+from .jump_series import Jump, JumpSeries, Planned, Series, series_failure
 from .stand_criteria import NEVER
-from .stand_following import begin, note_fall, note_feet, note_machine, note_rest
+from .stand_following import Stand, Truth, fields_of, following_limits
 from .stand_metrics import judgement_metrics, rest_metrics
 
 
-class JumpScore(Block):
+class JumpScore(KernelBlock):
     """Judges one jump and ends the run. No controller can see it.
 
     A jump is a success when all of these hold; every tolerance is a parameter:
@@ -71,38 +66,52 @@ class JumpScore(Block):
     series = State(JumpSeries, text="the jumps of a row that are over")
 
     def setup(self) -> None:
-        """Group the contact points by foot."""
-        self._footing = Footing(self.robot)
-        limits = self.params.for_robot(self._footing)
+        """Group the contact points by foot, and bind what a tick needs."""
+        footing, truth, record = Footing(self.robot), self.truth, self.record
+        limits = self.params.for_robot(footing)
         assert isinstance(limits, JumpCriteria)
         self._limits = limits
         self._planned = "reference" in self.context.wired
-
-    def step(self) -> None:
-        """Follow the jump by one tick."""
-        record, truth = self.record, self.truth
-        time = self.time
-        first = record.ticks == 0
-        record.now[()] = time
-        self._footing.measure(
-            truth.contact_position, truth.base_orientation, record.foot, record.direction
+        clock = self.context.clock
+        planned = Planned(*(getattr(record, f"planned_{name}") for name in Planned._fields))
+        series = fields_of(Series, self.series)
+        reference = fields_of(Reference, self.reference)
+        self._verdict = Verdict(np.zeros(1, np.int64), np.zeros(1))
+        comparing = KernelCall(
+            follow_reference, clock.present, clock.base_period, record.ticks, reference, planned,
+            series,
+        )  # fmt: skip
+        following = KernelCall(
+            follow_jump, clock.present, clock.base_period, fields_of(Truth, truth),
+            truth.angular_momentum, reference, self.wbc.failures, fields_of(Stand, record),
+            fields_of(Jump, record), planned, series,
+            following_limits(limits, footing, limits.slip_delay, self.period),
+            Times(
+                limits.flight_confirmation, limits.rest_time, limits.settle_time,
+                limits.slip_delay, limits.jumps, self._planned,
+            ),
+            self._verdict,
+        )  # fmt: skip
+        self.kernel_calls = (
+            footing.measuring(
+                truth.contact_position, truth.base_orientation, record.foot, record.direction
+            ),
+            *footing.unrolling(truth.joint_position, truth.base_orientation, record.foot),
+            *((comparing,) if self._planned else ()),
+            following,
         )
-        self._footing.unroll(truth.joint_position, truth.base_orientation, record.foot)
-        if self._planned:
-            self._follow_reference(time, first)
-        if first:
-            self._begin()
-        record.ticks += 1
-        note_machine(record, truth)
-        record.failures[()] = self.wbc.failures
-        if note_fall(record, truth, self._limits):
-            self.request_stop("the robot fell")
-        self._follow_flight(time)
-        if record.touchdown_time != NEVER:
-            self._follow_landing(time - float(record.touchdown_time))
-        elif self.series.made:
-            self._follow_row(time)
-        record.vertical_speed[()] = truth.com_velocity.item(2)
+        self.attention = self._verdict.ending
+
+    def attend(self) -> None:
+        """Ask for the end of the run."""
+        landed = float(self._verdict.landed[0])
+        self.request_stop(
+            {
+                Ending.FELL: "the robot fell",
+                Ending.ALONE: f"no other jump {landed:.2f} s after touchdown",
+                Ending.RESTED: f"{landed:.2f} s after touchdown",
+            }[Ending(int(self._verdict.ending[0]))]
+        )
 
     def metrics(self) -> Mapping[str, Metric]:
         """The judgement and its figures."""
@@ -150,105 +159,3 @@ class JumpScore(Block):
                 ),
             }
         return values
-
-    def _begin(self) -> None:
-        record, height = self.record, self.truth.com[2]
-        begin(record, self.truth)
-        for instant in (
-            record.unloaded_time, record.lift_off_time, record.touchdown_time,
-            record.planned_speed_time,
-        ):  # fmt: skip
-            instant[()] = NEVER
-        for start in (record.squat_height, record.apex_height):
-            start[()] = height
-        record.start_foot[:] = record.foot
-        record.start_direction[:] = record.direction
-
-    def _follow_reference(self, time: float, first: bool) -> None:
-        record, plan = self.record, self.reference
-        yaw = sum(plan.foot_yaw.tolist()) / len(self._footing.points_of_foot)
-        record.planned_foot[:] = plan.foot_position[:, :2]
-        record.planned_yaw[()] = yaw
-        height = plan.com.item(2)
-        if first:
-            record.planned_start[:] = record.planned_foot
-            record.planned_yaw_start[()] = yaw
-            record.planned_standing[()] = height
-            record.planned_apex[()] = height
-            record.planned_speed_time[()] = NEVER
-        record.planned_apex[()] = max(record.planned_apex.item(), height)
-        taken_off = plan.lift_off_time - 1e-9 <= plan.time < plan.touchdown_time
-        fresh = record.planned_speed_time == NEVER
-        if fresh or taken_off:  # from the middle of a flight on the reference names the next
-            record.planned_flight[()] = plan.touchdown_time - plan.lift_off_time
-        later = plan.lift_off_time > self.series.planned_lift_off
-        if taken_off and (fresh or later):
-            self.series.planned_lift_off[()] = plan.lift_off_time
-            record.planned_apex[()] = height if not fresh else record.planned_apex.item()
-            record.planned_speed_time[()] = time
-            # The plan's own ballistic flight takes it back to the planned instant.
-            late = plan.time.item() - plan.lift_off_time.item()
-            record.planned_speed[()] = plan.com_velocity.item(2) + GRAVITY * late
-
-    def _follow_flight(self, time: float) -> None:
-        """Lift-off, apex and touchdown, by the simulator's contacts."""
-        record, truth = self.record, self.truth
-        height, speed = truth.com.item(2), truth.com_velocity.item(2)
-        touched = any(truth.contact_touched.tolist())
-        if record.lift_off_time == NEVER:
-            touched = touched or self._bounces()
-            record.squat_height[()] = min(record.squat_height.item(), height)
-            if touched:
-                record.unloaded_time[()] = NEVER
-                return
-            if record.unloaded_time == NEVER:
-                # Nothing touched during the whole of the tick before.
-                record.unloaded_time[()] = max(0.0, time - self.period)
-                record.unloaded_speed[()] = record.vertical_speed if time > 0.0 else speed
-                record.unloaded_momentum[:] = truth.angular_momentum
-                record.apex_height[()] = height
-            if time - record.unloaded_time.item() >= self.params.flight_confirmation - 1e-9:
-                record.lift_off_time[()] = record.unloaded_time
-                record.lift_off_speed[()] = record.unloaded_speed
-                record.lift_off_momentum[:] = record.unloaded_momentum
-                if self.series.made:
-                    keep_place(self.series)
-        elif record.touchdown_time == NEVER and touched:
-            record.touchdown_time[()] = time - self.period
-            record.touchdown_speed[()] = -record.vertical_speed
-            if goes_on(self.series, self.params):
-                note_landing(record, self.series, self._planned)
-                return
-        if record.touchdown_time == NEVER:
-            record.apex_height[()] = max(record.apex_height.item(), height)
-
-    def _bounces(self) -> bool:
-        """Whether a foot off the ground between two jumps is no lift-off."""
-        plan = self.reference
-        early = float(plan.time) < float(plan.lift_off_time) - EARLY_LIFT_OFF
-        return self._planned and bool(self.series.made) and early
-
-    def _follow_row(self, time: float) -> None:
-        """Between two jumps: where the feet stand, and whether another comes."""
-        if self._planned and any(self.truth.contact_touched.tolist()):
-            note_place(self.record, self.series)
-        landed = time - float(self.series.landed_time)
-        if self.record.lift_off_time == NEVER and landed >= self.params.rest_time - 1e-9:
-            self.request_stop(f"no other jump {landed:.2f} s after touchdown")
-
-    def _follow_landing(self, landed: float) -> None:
-        """Peaks since touchdown, feet that slide or step, and the rest when its time comes."""
-        record, truth, params = self.record, self.truth, self.params
-        record.peak_tilt[()] = max(record.peak_tilt.item(), tilt(truth.base_orientation))
-        note_feet(
-            record, truth, self._footing, self.period, landed >= params.slip_delay - 1e-9,
-            params, params.slip_delay,
-        )  # fmt: skip
-        if record.steps:
-            landed = min(landed, float(record.now) - max(record.step_end.tolist()))
-        if record.judged_time == NEVER and landed >= params.rest_time - 1e-9:
-            note_rest(record, truth, self._footing)
-            record.ground_low[()] = min(truth.ground_height.tolist())
-            record.ground_high[()] = max(truth.ground_height.tolist())
-        if landed >= params.rest_time + params.settle_time - 1e-9:
-            self.request_stop(f"{landed:.2f} s after touchdown")

@@ -6,14 +6,14 @@ their apex and where they land.
 
 from __future__ import annotations
 
-from math import degrees, hypot
+from math import degrees, sqrt
+from typing import NamedTuple
 
+from ...mathematics.arrays import Array, Counts
+from ...mathematics.kernel import kernel
 from ...runtime.language.signals import Field, Signal
-from .jump_criteria import JumpCriteria, JumpRecord, feet_turned
+from .jump_criteria import JumpCriteria, mean_turn
 from .stand_criteria import NEVER
-
-EARLY_LIFT_OFF = 0.1
-"""Feet that leave the ground more than this time [s] before the planned lift-off have bounced."""
 
 
 class JumpSeries(Signal):
@@ -38,56 +38,119 @@ class JumpSeries(Signal):
     turn_jump = Field(dtype="int64", text="number of that jump")
 
 
-def goes_on(series: JumpSeries, limits: JumpCriteria) -> bool:
-    """Whether more jumps must follow the one under way."""
-    return int(series.made) + 1 < limits.jumps
+class Jump(NamedTuple):
+    """The fields of ``JumpRecord`` that are followed in a jump, and where the feet point now."""
+
+    direction: Array
+    unloaded_time: Array
+    unloaded_speed: Array
+    unloaded_momentum: Array
+    lift_off_time: Array
+    lift_off_speed: Array
+    lift_off_momentum: Array
+    touchdown_time: Array
+    touchdown_speed: Array
+    vertical_speed: Array
+    squat_height: Array
+    apex_height: Array
+    start_foot: Array
+    start_direction: Array
+    ground_low: Array
+    ground_high: Array
 
 
-def note_landing(record: JumpRecord, series: JumpSeries, planned: bool) -> None:
-    """Record a jump that has touched down, and prepare for the next lift-off."""
-    series.made += 1
-    series.landed_time[()] = record.touchdown_time
-    if series.made == 1:
+class Planned(NamedTuple):
+    """The fields of ``JumpRecord`` whose names begin with ``planned_``."""
+
+    flight: Array
+    speed: Array
+    speed_time: Array
+    standing: Array
+    apex: Array
+    start: Array
+    foot: Array
+    yaw_start: Array
+    yaw: Array
+
+
+class Series(NamedTuple):
+    """The fields of ``JumpSeries``."""
+
+    made: Counts
+    landed_time: Array
+    planned_lift_off: Array
+    flight_share: Array
+    flight_jump: Counts
+    speed_error: Array
+    speed_jump: Counts
+    rise_error: Array
+    rise_jump: Counts
+    place_error: Array
+    place_now: Array
+    place_jump: Counts
+    turn_error: Array
+    turn_now: Array
+    turn_jump: Counts
+
+
+@kernel
+def keep_worst(worst: Array, of_jump: Counts, error: float, jump: int) -> None:
+    """``error`` becomes the ``worst`` one if it is larger, and ``jump`` the number of its jump."""
+    if error > worst[()]:
+        worst[()] = error
+        of_jump[()] = jump
+
+
+@kernel
+def note_landing(
+    standing: float, jump: Jump, planned: Planned, series: Series, compared: bool
+) -> None:
+    """Record a jump that has touched down, and prepare for the next lift-off.
+
+    Args:
+        standing: the height of the com at the start [m].
+        compared: whether there is a reference to compare the jump with.
+    """
+    made = int(series.made[()]) + 1
+    series.made[()] = made
+    series.landed_time[()] = float(jump.touchdown_time[()])
+    if made == 1:
         series.flight_share[()] = 1e9
-    if planned:
-        jump = int(series.made)
-        flight = float(record.touchdown_time - record.lift_off_time)
-        share = flight / max(float(record.planned_flight), 1e-9)
-        if share < series.flight_share:
-            series.flight_share[()], series.flight_jump[()] = share, jump
-        speed = abs(float(record.planned_speed))
-        error = abs(float(record.lift_off_speed) - float(record.planned_speed)) / max(speed, 1e-9)
-        if error > series.speed_error:
-            series.speed_error[()], series.speed_jump[()] = error, jump
-        rise = float(record.planned_apex - record.planned_standing)
-        error = abs(float(record.apex_height - record.standing_height) - rise) / max(rise, 1e-9)
-        if error > series.rise_error:
-            series.rise_error[()], series.rise_jump[()] = error, jump
-    for instant in (record.lift_off_time, record.touchdown_time, record.unloaded_time):
-        instant[()] = NEVER
-    record.peak_tilt[()] = 0.0
+    if compared:
+        flight = float(jump.touchdown_time[()]) - float(jump.lift_off_time[()])
+        share = flight / max(float(planned.flight[()]), 1e-9)
+        if share < series.flight_share[()]:
+            series.flight_share[()] = share
+            series.flight_jump[()] = made
+        speed = float(planned.speed[()])
+        error = abs(float(jump.lift_off_speed[()]) - speed) / max(abs(speed), 1e-9)
+        keep_worst(series.speed_error, series.speed_jump, error, made)
+        rise = float(planned.apex[()]) - float(planned.standing[()])
+        error = abs(float(jump.apex_height[()]) - standing - rise) / max(rise, 1e-9)
+        keep_worst(series.rise_error, series.rise_jump, error, made)
+    jump.lift_off_time[()] = jump.touchdown_time[()] = jump.unloaded_time[()] = NEVER
 
 
-def note_place(record: JumpRecord, series: JumpSeries) -> None:
-    """Between two jumps: note how far the feet are from their planned position."""
-    off = [0.0, 0.0]
-    for foot in range(record.foot.shape[0]):
-        for axis in range(2):
-            moved = record.foot.item(foot, axis) - record.start_foot.item(foot, axis)
-            planned = record.planned_foot.item(foot, axis) - record.planned_start.item(foot, axis)
-            off[axis] += (moved - planned) / record.foot.shape[0]
-    series.place_now[()] = hypot(*off)
-    turn = float(record.planned_yaw - record.planned_yaw_start)
-    series.turn_now[()] = abs(feet_turned(record) - turn)
+@kernel
+def note_place(foot: Array, jump: Jump, planned: Planned, series: Series) -> None:
+    """Between two jumps: note how far the feet, (n_feet, 2), are from their planned position."""
+    x, y, feet = 0.0, 0.0, foot.shape[0]
+    for k in range(feet):
+        moved = float(foot[k, 0]) - float(jump.start_foot[k, 0])
+        x += (moved - (float(planned.foot[k, 0]) - float(planned.start[k, 0]))) / feet
+        moved = float(foot[k, 1]) - float(jump.start_foot[k, 1])
+        y += (moved - (float(planned.foot[k, 1]) - float(planned.start[k, 1]))) / feet
+    series.place_now[()] = sqrt(x * x + y * y)
+    turn = float(planned.yaw[()]) - float(planned.yaw_start[()])
+    series.turn_now[()] = abs(mean_turn(jump.start_direction, jump.direction) - turn)
 
 
-def keep_place(series: JumpSeries) -> None:
+@kernel
+def keep_place(series: Series) -> None:
     """When the next jump lifts off: keep the last landing's error if it is the largest."""
-    jump = int(series.made)
-    if series.place_now > series.place_error:
-        series.place_error[()], series.place_jump[()] = series.place_now, jump
-    if series.turn_now > series.turn_error:
-        series.turn_error[()], series.turn_jump[()] = series.turn_now, jump
+    made = int(series.made[()])
+    keep_worst(series.place_error, series.place_jump, float(series.place_now[()]), made)
+    keep_worst(series.turn_error, series.turn_jump, float(series.turn_now[()]), made)
 
 
 def series_failure(series: JumpSeries, limits: JumpCriteria, made: int) -> str | None:

@@ -2,101 +2,242 @@
 
 from __future__ import annotations
 
-from math import hypot, sqrt
+from math import sqrt
+from typing import Any, NamedTuple, TypeVar
 
+from ...mathematics.arrays import Array, Counts, Flags
+from ...mathematics.kernel import kernel
 from ...mathematics.rotations import tilt
 from ...mathematics.support_margin import support_margin
-from ..signals import RobotTruth
-from .footing import Footing
-from .stand_criteria import NEVER, StandCriteria, StandRecord
+from ...runtime.language.signals import Signal
+from .footing import Footing, least_load, points_missing
+from .stand_criteria import NEVER, StandCriteria
+
+Fields = TypeVar("Fields", bound=tuple[Any, ...])
 
 
-def begin(record: StandRecord, truth: RobotTruth) -> None:
+class Truth(NamedTuple):
+    """The fields of ``RobotTruth`` that a judge of a robot on its feet reads."""
+
+    base_position: Array
+    base_orientation: Array
+    base_angular_velocity: Array
+    com: Array
+    com_velocity: Array
+    contact_position: Array
+    contact_force: Array
+    contact_touched: Flags
+    ground_height: Array
+    forbidden_contacts: Counts
+    joint_limit_violation: Array
+    motor_overload: Array
+    saturated_share: Array
+    motor_torque: Array
+    motor_speed: Array
+
+
+class Stand(NamedTuple):
+    """The fields of ``StandRecord`` that are followed here."""
+
+    now: Array
+    ticks: Counts
+    fall_time: Array
+    fall_tilt: Array
+    fall_height: Array
+    standing_height: Array
+    foot: Array
+    landed_foot: Array
+    foot_slip: Array
+    lifted_time: Array
+    steps: Counts
+    step_end: Array
+    longest_lift: Array
+    peak_tilt: Array
+    judged_time: Array
+    tilt: Array
+    com_speed: Array
+    angular_speed: Array
+    margin: Array
+    load_share: Array
+    points_unloaded: Counts
+    forbidden: Counts
+    forbidden_time: Array
+    violation: Array
+    overload: Array
+    peak_torque: Array
+    peak_speed: Array
+    saturated: Array
+    failures: Counts
+
+
+class Limits(NamedTuple):
+    """What following a robot on its feet must know: ``fall_tilt`` [rad], ``fall_height`` [m],
+    ``step_time`` [s] and ``steps`` of the ``StandCriteria``, for how long [s] a foot that has taken a
+    step may settle, the ``period`` of the block [s], the robot's ``weight`` [N], and for every contact
+    point the index of its foot, (n_contacts,)."""
+
+    fall_tilt: float
+    fall_height: float
+    step_time: float
+    steps: int
+    settling: float
+    period: float
+    weight: float
+    foot_of_point: Counts
+
+
+def fields_of(kind: type[Fields], signal: Signal) -> Fields:
+    """The fields of a signal that a named tuple has, as kernels take them."""
+    names: tuple[str, ...] = kind._fields  # type: ignore[attr-defined]
+    return kind._make(getattr(signal, name) for name in names)  # type: ignore[attr-defined, no-any-return]
+
+
+def following_limits(
+    criteria: StandCriteria, footing: Footing, settling: float, period: float
+) -> Limits:
+    """The limits of a robot; ``criteria`` as ``for_robot`` gives them."""
+    assert criteria.fall_height is not None
+    return Limits(
+        criteria.fall_tilt, criteria.fall_height, criteria.step_time, criteria.steps, settling,
+        period, footing.weight, footing.foot_of_point,
+    )  # fmt: skip
+
+
+@kernel
+def keep_largest(largest: Array, value: float) -> None:
+    """``largest``, without a dimension, becomes ``value`` if that is larger."""
+    largest[()] = max(float(largest[()]), value)
+
+
+@kernel
+def keep_least(least: Array, value: float) -> None:
+    """``least``, without a dimension, becomes ``value`` if that is smaller."""
+    least[()] = min(float(least[()]), value)
+
+
+@kernel
+def largest_of(values: Array) -> float:
+    """The largest of at least one value, (n,)."""
+    largest = float(values[0])
+    for k in range(1, values.shape[0]):
+        largest = max(largest, float(values[k]))
+    return largest
+
+
+@kernel
+def largest_magnitude(values: Array) -> float:
+    """The largest magnitude of at least one value, (n,)."""
+    largest = abs(float(values[0]))
+    for k in range(1, values.shape[0]):
+        largest = max(largest, abs(float(values[k])))
+    return largest
+
+
+@kernel
+def any_touched(touched: Flags) -> bool:
+    """Whether any contact point carries load."""
+    found = False
+    for point in range(touched.shape[0]):
+        found = found or bool(touched[point])
+    return found
+
+
+@kernel
+def begin(record: Stand, truth: Truth) -> None:
     """Start a record in its first tick."""
-    for instant in (record.fall_time, record.judged_time, record.forbidden_time):
-        instant[()] = NEVER
-    record.standing_height[()] = truth.com[2]
+    record.fall_time[()] = record.judged_time[()] = record.forbidden_time[()] = NEVER
+    record.standing_height[()] = float(truth.com[2])
 
 
-def note_machine(record: StandRecord, truth: RobotTruth) -> None:
+@kernel
+def note_machine(record: Stand, truth: Truth) -> None:
     """Note forbidden contacts and excesses over the limits of joints and motors."""
-    if truth.forbidden_contacts and not record.forbidden:
-        record.forbidden_time[()] = record.now
-    record.forbidden += truth.forbidden_contacts
-    record.saturated += truth.saturated_share
-    for largest, value in (
-        (record.violation, truth.joint_limit_violation.item()),
-        (record.overload, truth.motor_overload.item()),
-        (record.peak_torque, max(abs(t) for t in truth.motor_torque.tolist())),
-        (record.peak_speed, max(abs(v) for v in truth.motor_speed.tolist())),
-    ):
-        largest[()] = max(largest.item(), value)
+    forbidden = int(truth.forbidden_contacts[()])
+    if forbidden != 0 and record.forbidden[()] == 0:
+        record.forbidden_time[()] = float(record.now[()])
+    record.forbidden[()] = int(record.forbidden[()]) + forbidden
+    record.saturated[()] = float(record.saturated[()]) + float(truth.saturated_share[()])
+    keep_largest(record.violation, float(truth.joint_limit_violation[()]))
+    keep_largest(record.overload, float(truth.motor_overload[()]))
+    keep_largest(record.peak_torque, largest_magnitude(truth.motor_torque))
+    keep_largest(record.peak_speed, largest_magnitude(truth.motor_speed))
 
 
-def note_fall(record: StandRecord, truth: RobotTruth, limits: StandCriteria) -> bool:
+@kernel
+def note_fall(record: Stand, truth: Truth, limits: Limits) -> bool:
     """Note a fall; returns whether the robot falls in this tick, which happens at most once."""
-    assert limits.fall_height is not None
     tilted = tilt(truth.base_orientation)
-    height = truth.base_position.item(2) - max(truth.ground_height.tolist())
+    height = float(truth.base_position[2]) - largest_of(truth.ground_height)
     fallen = tilted > limits.fall_tilt or height < limits.fall_height
-    if not fallen or record.fall_time != NEVER:
+    if not fallen or record.fall_time[()] != NEVER:
         return False
-    record.fall_time[()] = record.now
+    record.fall_time[()] = float(record.now[()])
     record.fall_tilt[()] = tilted
     record.fall_height[()] = height
     return True
 
 
-def note_feet(
-    record: StandRecord,
-    truth: RobotTruth,
-    footing: Footing,
-    period: float,
-    stay: bool,
-    limits: StandCriteria,
-    settling: float,
-) -> None:
+@kernel
+def note_feet(record: Stand, touched: Flags, limits: Limits, stay: bool) -> None:
     """How far the feet slide and for how long one is off the ground, once they should ``stay``.
 
     A foot that is off the ground for longer than a step takes has stepped, if it may. Then it may
-    move until it has been on the ground for ``settling`` [s].
+    move until it has been on the ground for ``limits.settling``.
     """
-    if not stay:
-        record.landed_foot[:] = record.foot
-        return
-    touched = truth.contact_touched.tolist()
-    now = record.now.item()
-    for number, points in enumerate(footing.points_of_foot):
-        loaded = any(touched[k] for k in points)
-        total = 0.0 if loaded else record.lifted_time.item(number) + period
-        record.lifted_time[number] = total
-        end = record.step_end.item(number)
-        if total > limits.step_time:
-            going_on = end > 0.0 and now - end < 1.5 * period
-            if going_on or record.steps < limits.steps:
-                record.steps += 0 if going_on else 1
-                record.step_end[number] = end = now
-        if end > 0.0 and now - end < settling:
-            record.landed_foot[number] = record.foot[number]
+    for foot in range(record.foot.shape[0]):
+        if stay:
+            note_foot(record, touched, limits, foot)
             continue
-        moved = hypot(
-            record.foot.item(number, 0) - record.landed_foot.item(number, 0),
-            record.foot.item(number, 1) - record.landed_foot.item(number, 1),
-        )
-        if loaded or limits.steps == 0:
-            record.foot_slip[()] = max(record.foot_slip.item(), moved)
-        if total <= limits.step_time or record.steps >= limits.steps:
-            record.longest_lift[()] = max(record.longest_lift.item(), total)
+        for axis in range(2):
+            record.landed_foot[foot, axis] = record.foot[foot, axis]
 
 
-def note_rest(record: StandRecord, truth: RobotTruth, footing: Footing) -> None:
+@kernel
+def note_foot(record: Stand, touched: Flags, limits: Limits, foot: int) -> None:
+    """The same of one foot that should stay."""
+    now, loaded = float(record.now[()]), False
+    for point in range(touched.shape[0]):
+        if limits.foot_of_point[point] == foot and touched[point]:
+            loaded = True
+    total = 0.0 if loaded else float(record.lifted_time[foot]) + limits.period
+    record.lifted_time[foot] = total
+    end = float(record.step_end[foot])
+    if total > limits.step_time:
+        going_on = end > 0.0 and now - end < 1.5 * limits.period
+        if going_on or record.steps[()] < limits.steps:
+            record.steps[()] = int(record.steps[()]) + (0 if going_on else 1)
+            record.step_end[foot] = end = now
+    if end > 0.0 and now - end < limits.settling:
+        for axis in range(2):
+            record.landed_foot[foot, axis] = record.foot[foot, axis]
+        return
+    x = float(record.foot[foot, 0]) - float(record.landed_foot[foot, 0])
+    y = float(record.foot[foot, 1]) - float(record.landed_foot[foot, 1])
+    if loaded or limits.steps == 0:
+        keep_largest(record.foot_slip, sqrt(x * x + y * y))
+    if total <= limits.step_time or record.steps[()] >= limits.steps:
+        keep_largest(record.longest_lift, total)
+
+
+@kernel
+def speed_of(velocity: Array) -> float:
+    """The magnitude of a vector (3,)."""
+    x, y, z = float(velocity[0]), float(velocity[1]), float(velocity[2])
+    return sqrt(x * x + y * y + z * z)
+
+
+@kernel
+def note_rest(record: Stand, truth: Truth, limits: Limits) -> None:
     """Note how the robot stands now, for the judgement of its rest."""
-    record.judged_time[()] = record.now
+    feet = record.foot.shape[0]
+    record.judged_time[()] = float(record.now[()])
     record.tilt[()] = tilt(truth.base_orientation)
-    record.com_speed[()] = sqrt(sum(v * v for v in truth.com_velocity.tolist()))
-    record.angular_speed[()] = sqrt(sum(w * w for w in truth.base_angular_velocity.tolist()))
-    record.points_unloaded[()] = footing.points_missing(truth.contact_touched)
+    record.com_speed[()] = speed_of(truth.com_velocity)
+    record.angular_speed[()] = speed_of(truth.base_angular_velocity)
+    record.points_unloaded[()] = points_missing(limits.foot_of_point, truth.contact_touched, feet)
     record.margin[()] = support_margin(
-        truth.contact_position, truth.contact_touched, truth.com.item(0), truth.com.item(1)
+        truth.contact_position, truth.contact_touched, float(truth.com[0]), float(truth.com[1])
     )
-    record.load_share[()] = footing.least_load(truth.contact_force)
+    record.load_share[()] = least_load(
+        limits.foot_of_point, truth.contact_force, feet, limits.weight
+    )

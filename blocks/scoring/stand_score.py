@@ -4,9 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from math import degrees
+from typing import NamedTuple
 
+import numpy as np
+
+from ...mathematics.arrays import Array, Counts
+from ...mathematics.compiling.kernel_call import KernelCall
+from ...mathematics.kernel import kernel
 from ...mathematics.rotations import tilt
-from ...runtime.language.block import Block, Input, Metric, State
+from ...runtime.language.block import Input, Metric, State
+from ...runtime.language.kernel_block import KernelBlock
 from ...runtime.language.parameters import parameter
 from ...runtime.language.signals import Field
 from ..signals import JumpReference, RobotTruth, WholeBodyCommand
@@ -21,11 +28,26 @@ from .stand_criteria import (
     judge_rest,
     judge_safety,
 )
-from .stand_following import begin, note_fall, note_feet, note_machine, note_rest
+from .stand_following import (
+    Limits,
+    Stand,
+    Truth,
+    begin,
+    fields_of,
+    following_limits,
+    keep_largest,
+    keep_least,
+    note_fall,
+    note_feet,
+    note_machine,
+    note_rest,
+)
 from .stand_metrics import judgement_metrics, rest_metrics
 
 SETTLING = 0.15
 """A foot that has taken a step may settle for so long [s]."""
+_FELL, _JUDGED = 1, 2
+"""Why the end of the run is asked for."""
 
 
 class SquatRecord(StandRecord):
@@ -34,6 +56,14 @@ class SquatRecord(StandRecord):
     lowest_height = Field(unit="m", text="least height of the com so far")
     planned_standing = Field(unit="m", text="com height of the reference at the start")
     planned_lowest = Field(unit="m", text="least com height of the reference so far")
+
+
+class Squat(NamedTuple):
+    """The fields of ``SquatRecord`` beside those of ``StandRecord``."""
+
+    lowest_height: Array
+    planned_standing: Array
+    planned_lowest: Array
 
 
 class SquatCriteria(StandCriteria):
@@ -51,7 +81,7 @@ class SquatCriteria(StandCriteria):
     depth_tolerance: float = parameter(0.1, ge=0, text="of that depth, as a share of it")
 
 
-class StandScore(Block):
+class StandScore(KernelBlock):
     """Judges a robot that stands, squats or takes a push, and ends the run. No controller sees it.
 
     It is a success when all of these hold, which are those of a jump that concern standing;
@@ -82,37 +112,31 @@ class StandScore(Block):
     record = State(SquatRecord, text="everything the judgement needs")
 
     def setup(self) -> None:
-        self._footing = Footing(self.robot)
-        self._limits = self.params.for_robot(self._footing)
+        """Group the contact points by foot, and bind what a tick needs."""
+        footing, truth, record = Footing(self.robot), self.truth, self.record
+        self._limits = self.params.for_robot(footing)
         self._planned = "reference" in self.context.wired
-
-    def step(self) -> None:
-        """Follow the robot by one tick."""
-        record, truth, height = self.record, self.truth, self.truth.com.item(2)
-        record.now[()] = self.time
-        self._footing.measure(
-            truth.contact_position, truth.base_orientation, record.foot, record.direction
+        clock, params = self.context.clock, self.params
+        self._ending = np.zeros(1, np.int64)
+        following = KernelCall(
+            follow_stand, clock.present, clock.base_period, fields_of(Truth, truth),
+            self.reference.com, self.wbc.failures, fields_of(Stand, record),
+            fields_of(Squat, record), following_limits(self._limits, footing, SETTLING, self.period),
+            params.settle_time, params.judge_time, self._ending,
+        )  # fmt: skip
+        self.kernel_calls = (
+            footing.measuring(
+                truth.contact_position, truth.base_orientation, record.foot, record.direction
+            ),
+            *footing.unrolling(truth.joint_position, truth.base_orientation, record.foot),
+            following,
         )
-        self._footing.unroll(truth.joint_position, truth.base_orientation, record.foot)
-        if record.ticks == 0:
-            begin(record, truth)
-            record.lowest_height[()] = height
-            record.planned_standing[()] = record.planned_lowest[()] = self.reference.com[2]
-        record.ticks += 1
-        note_machine(record, truth)
-        record.failures[()] = self.wbc.failures
-        if note_fall(record, truth, self._limits):
-            self.request_stop("the robot fell")
-        record.lowest_height[()] = min(record.lowest_height.item(), height)
-        lowest = min(record.planned_lowest.item(), self.reference.com.item(2))
-        record.planned_lowest[()] = lowest
-        settled = self.time >= self.params.settle_time - 1e-9
-        if settled:
-            record.peak_tilt[()] = max(record.peak_tilt.item(), tilt(truth.base_orientation))
-        note_feet(record, truth, self._footing, self.period, settled, self.params, SETTLING)
-        if record.judged_time == NEVER and self.time >= self.params.judge_time - 1e-9:
-            note_rest(record, truth, self._footing)
-            self.request_stop(f"judged at {self.time:.2f} s")
+        self.attention = self._ending
+
+    def attend(self) -> None:
+        """Ask for the end of the run."""
+        fell = self._ending[0] == _FELL
+        self.request_stop("the robot fell" if fell else f"judged at {self.time:.2f} s")
 
     def metrics(self) -> Mapping[str, Metric]:
         """The judgement and its figures."""
@@ -152,3 +176,48 @@ class StandScore(Block):
                     f"{1e3 * target:.1f} mm"
                 ),
             )
+
+
+@kernel
+def follow_stand(
+    tick: Counts,
+    base_period: float,
+    truth: Truth,
+    planned_com: Array,
+    failures: Counts,
+    stand: Stand,
+    squat: Squat,
+    limits: Limits,
+    settle_time: float,
+    judge_time: float,
+    ending: Counts,
+) -> None:
+    """Follow a robot on its feet by one tick, once these have been measured.
+
+    Args:
+        tick: the present tick, (1,), each of ``base_period`` [s].
+        planned_com: the reference's [m], (3,).
+        failures: of the solver so far, without a dimension.
+        settle_time, judge_time: of ``SquatCriteria`` [s].
+        ending: becomes why the end of the run is asked for, or zero, (1,).
+    """
+    now, height, planned = base_period * int(tick[0]), float(truth.com[2]), float(planned_com[2])
+    stand.now[()] = now
+    if stand.ticks[()] == 0:
+        begin(stand, truth)
+        squat.lowest_height[()] = height
+        squat.planned_standing[()] = squat.planned_lowest[()] = planned
+    stand.ticks[()] = int(stand.ticks[()]) + 1
+    note_machine(stand, truth)
+    stand.failures[()] = int(failures[()])
+    ending[0] = _FELL if note_fall(stand, truth, limits) else 0
+    keep_least(squat.lowest_height, height)
+    keep_least(squat.planned_lowest, planned)
+    settled = now >= settle_time - 1e-9
+    if settled:
+        keep_largest(stand.peak_tilt, tilt(truth.base_orientation))
+    note_feet(stand, truth.contact_touched, limits, settled)
+    if stand.judged_time[()] == NEVER and now >= judge_time - 1e-9:
+        note_rest(stand, truth, limits)
+        if ending[0] == 0:
+            ending[0] = _JUDGED

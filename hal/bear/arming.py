@@ -6,16 +6,14 @@ import math
 from collections.abc import Callable, Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...blocks.signals import DrivePhase
 from ...blocks.signals.drive_conditions import describe, is_critical
+from ...mathematics.arrays import Array
 from .bus import BearBus, BusError, Reply
 from .configuration import Hardware
 from .motor_loop import MotorLoop
 from .registers import Mode, Torque
-
-Array = NDArray[np.float64]
 
 LISTENING = 0.05
 """How long the bus must be silent before anything is sent on it [s]."""

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...blocks.signals.drive_conditions import describe, is_critical
+from ...mathematics.arrays import Array
 from ...robots.robot_description import RobotDescription
 from ...robots.transmission import Transmission
 from .arming import LISTENING
@@ -20,8 +20,6 @@ from .configuration import Hardware, MotorSettings
 from .motor_loop import WRITE
 from .registers import Mode, Torque
 from .watchdog import damping_frame
-
-Array = NDArray[np.float64]
 
 STATUS = (
     "torque_enable", "present_position", "present_velocity", "present_iq", "input_voltage",

@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
-
+from ...mathematics.arrays import Array
 from ...robots.robot_description import RobotDescription
 from ...robots.transmission import motor_gains
 from ..drive_goals import DriveGoals
-
-Array = NDArray[np.float64]
 
 
 class DriveLaw:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...blocks.signals import ContactSwitches, ImuReading, JointState
 from ...robots.robot_description import RobotDescription
@@ -11,8 +10,6 @@ from ...robots.transmission import Transmission
 from .bulk import BulkExchange
 from .configuration import Hardware
 from .sense_board import SenseBoard
-
-Array = NDArray[np.float64]
 
 READ = (
     "present_position", "present_velocity", "present_iq", "input_voltage", "winding_temperature",

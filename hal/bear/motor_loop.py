@@ -6,9 +6,9 @@ from collections.abc import Callable
 from threading import Lock
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...blocks.signals import CommandMode, DrivePhase, JointCommand, RobotHealth
+from ...mathematics.arrays import Array
 from ...robots.robot_description import RobotDescription
 from ..drive_goals import DriveGoals
 from .bulk import BulkExchange
@@ -18,8 +18,6 @@ from .measurement import FASTEST, LARGEST_STEP, PLAUSIBLE, READ, Measurement
 from .registers import Torque
 from .sense_board import SenseBoard
 from .supervision import Supervision
-
-Array = NDArray[np.float64]
 
 WRITE = ("goal_iq", "goal_position", "goal_velocity")
 

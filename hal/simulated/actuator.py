@@ -14,10 +14,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ...mathematics.arrays import Array
 from ...mathematics.kernel import kernel
 from ...mathematics.linear import multiply_vector
 
-Array = NDArray[np.float64]
 Counts = NDArray[np.int64]
 
 

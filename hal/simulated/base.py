@@ -6,14 +6,12 @@ import math
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...blocks.signals import RobotTruth
+from ...mathematics.arrays import Array
 
 if TYPE_CHECKING:
     from mujoco import MjData
-
-Array = NDArray[np.float64]
 
 
 class FixedBase:

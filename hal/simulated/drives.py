@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...blocks.signals import CommandMode, JointCommand
+from ...mathematics.arrays import Array, Flags
 from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.kernel import kernel
 from ...robots.description import RobotDescription
@@ -22,9 +23,7 @@ from .actuator import (
 from .motor_feedback import Loops, MotorFeedback, close_loops
 from .state import DriveState, TickRecord
 
-Array = NDArray[np.float64]
 Counts = NDArray[np.int64]
-Flags = NDArray[np.bool_]
 
 _ACTIVE, _DAMPING = int(CommandMode.ACTIVE), int(CommandMode.DAMPING)
 
@@ -40,8 +39,8 @@ class Commands(NamedTuple):
 
 
 class Joints(NamedTuple):
-    """What the drives of all joints read and give in a physics step: the count of the step, (1,),
-    whether a command has ``arrived`` in it, (1,), the ``position`` that their encoders read [rad], the ``velocity`` [rad/s] and the ``torque`` [N m],
+    """What the drives of all joints read and give in a physics step: the count of the step, without a
+    dimension, whether a command has ``arrived`` in it, (1,), the ``position`` that their encoders read [rad], the ``velocity`` [rad/s] and the ``torque`` [N m],
     each (n_joints,)."""
 
     step: Counts
@@ -62,7 +61,7 @@ def follow_commands(commands: Commands, released: Array, joints: Joints) -> None
     joints.arrived[0] = False
     while pending > 0:
         following = (active + 1) % commands.due.shape[0]
-        if commands.due[following] > joints.step[0]:
+        if commands.due[following] > joints.step[()]:
             break
         active, pending = following, pending - 1
         joints.arrived[0] = True
@@ -180,20 +179,26 @@ class Drives:
             for k in range(self._slots)
         ]  # fmt: skip
         limits = MotorLimits(robot, record)
-        n = len(robot.joints)
-        joints = self._joints = Joints(
-            np.zeros(1, np.int64), np.zeros(1, np.bool_), *(np.zeros(n) for _ in range(3))
-        )
-        commands = Commands(
+        self._commands = Commands(
             state.active, state.pending, state.due, state.mode,
             Targets(*(getattr(state, name) for name in Targets._fields)),
         )  # fmt: skip
-        motors = limits.motors, limits.scratch, limits.record
-        if feedback is None:
-            self._drive = KernelCall(drive_joints, commands, damping, joints, *motors)
-        else:
-            loops = feedback.loops
-            self._drive = KernelCall(drive_loops, commands, damping, loops, joints, *motors)
+        self._damping = damping
+        self._motors = limits.motors, limits.scratch, limits.record
+
+    def torque_call(self, step: Counts, position: Array, velocity: Array, out: Array) -> KernelCall:
+        """Writes the joint torques [N m] during a physics step to ``out``, (n_joints,).
+
+        Args:
+            step: the count of the step, without a dimension.
+            position: the reading of the drives' own encoders [rad], (n_joints,).
+            velocity: the joint velocity [rad/s], (n_joints,).
+        """
+        joints = Joints(step, np.zeros(1, np.bool_), position, velocity, out)
+        first = self._commands, self._damping
+        if self._feedback is None:
+            return KernelCall(drive_joints, *first, joints, *self._motors)
+        return KernelCall(drive_loops, *first, self._feedback.loops, joints, *self._motors)
 
     def hold(self, position: Array, torque: Array, stiffness: Array, damping: Array) -> None:
         """Drop all commands and from now on hold the joints at a position with these gains.
@@ -236,16 +241,3 @@ class Drives:
         state.due[slot] = due
         state.last_due[()] = due
         state.pending[()] = pending + 1
-
-    def joint_torque(self, step: int, position: Array, velocity: Array, out: Array) -> None:
-        """Write the joint torques [N m] during physics step ``step`` to ``out``.
-
-        ``position`` is the reading of the drives' own encoders [rad], ``velocity`` the joint
-        velocity [rad/s].
-        """
-        joints = self._joints
-        joints.step[0] = step
-        joints.position[...] = position
-        joints.velocity[...] = velocity
-        self._drive.run()
-        out[...] = joints.torque

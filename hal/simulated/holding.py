@@ -22,6 +22,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from ...mathematics.arrays import Array
 from ...mathematics.constants import GRAVITY
 from ...robots.description import RobotDescription
 from ...robots.link_poses import joints_above, standing_com, standing_heights
@@ -30,7 +31,6 @@ from .base import BASES
 if TYPE_CHECKING:
     from mujoco import MjModel
 
-Array = NDArray[np.float64]
 
 GRAVITY_SHARE = 18.0
 DAMPING_TIME = 0.005

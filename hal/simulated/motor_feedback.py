@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ...mathematics.arrays import Array, Flags
 from ...mathematics.kernel import kernel
 from ...mathematics.linear import multiply_vector
 from ...robots.robot_description import RobotDescription
@@ -29,8 +30,6 @@ from ..drive_goals import (
     make_goals,
 )
 
-Array = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 Counts = NDArray[np.int64]
 
 _LEAD = 1.5

@@ -8,13 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from ...blocks.signals import ExternalForce, RobotTruth
 from ...robots.description import RobotDescription
-from ...runtime.language.block import Context, Input, Metric, Misfit, Output, State
+from ...runtime.language.block import Context, Metric, Misfit, State
 from ...runtime.language.parameters import Parameters
-from ...runtime.language.terrain import Terrain
 from ..drive_gains import gain_misfits, lost_gains
-from ..robot import Robot
 from .drives import Drives
 from .holding import RELEASED
 from .motor_feedback import FeedbackState, MotorFeedback
@@ -22,11 +19,12 @@ from .parameters import SimulatorParameters
 from .plant import Plant
 from .random_streams import Purpose
 from .rotors import unfit_motor
+from .simulated_robot import SimulatedRobot
 from .stance import uneven_contacts
-from .state import DriveState, PhysicsState, TickRecord
+from .state import DriveState, TickRecord
 
 
-class MujocoRobot(Robot):
+class MujocoRobot(SimulatedRobot):
     """The robot of the graph in MuJoCo: rigid links, rotors, motors, contact, noisy sensors.
 
     Time: the control tick ``n`` is at ``t_n``. Physics runs in steps of ``timestep`` between ticks;
@@ -68,15 +66,10 @@ class MujocoRobot(Robot):
         IndexError: a push acts at a point that the robot does not have.
     """
 
-    outside = "simulated"
-
     Params = SimulatorParameters
     needs = ("robot",)
     params: SimulatorParameters
 
-    push = Input(ExternalForce, default={}, text="a force from outside, held for the tick")
-    truth = Output(RobotTruth, truth=True, text="what only a simulator knows")
-    physics = State(PhysicsState, text="the simulator's state, written for a snapshot")
     drives = State(DriveState, text="commands in the drives and on their way")
     feedback = State(FeedbackState, text="the goals of the drives' own loops")
     record = State(TickRecord, text="what happened in the physics steps of the last tick")
@@ -142,19 +135,6 @@ class MujocoRobot(Robot):
         return params.latency
 
     @classmethod
-    def terrain(cls, params: Parameters) -> Terrain | None:
-        """The scene's floor and boxes."""
-        assert isinstance(params, SimulatorParameters)
-        return params.build_scene().terrain()
-
-    @classmethod
-    def local_dimensions(
-        cls, params: Parameters, robot: RobotDescription | None
-    ) -> Mapping[str, int]:
-        """The number of named points that a force may act at; the seed is not a dimension."""
-        return {"n_points": len(robot.points) if robot is not None else 0}
-
-    @classmethod
     def example_inputs(
         cls, rng: np.random.Generator, dimensions: Mapping[str, int]
     ) -> Mapping[str, Mapping[str, Any]]:
@@ -181,22 +161,28 @@ class MujocoRobot(Robot):
         plant = self.plant = Plant(robot, params, self.period, self.physics, self.record)
         plant.attach(self.imu, self.joints)
         plant.truth.attach(self.truth)
-        self._steps = round(self.period / params.timestep)
+        steps = round(self.period / params.timestep)
         self._jitter = plant.streams[Purpose.JITTER]
         damping = RELEASED * plant.damping
         if params.drive_damping is not None:
             damping = np.full(len(robot.joints), params.drive_damping)
         feedback = None
         if params.bus_period is not None:
-            steps = round(params.bus_period / params.timestep)
-            feedback = MotorFeedback(robot, params, params.bus_period, steps, self.feedback)
-        self._drives = Drives(robot, damping, self.drives, self.record, feedback)
+            exchange = round(params.bus_period / params.timestep)
+            feedback = MotorFeedback(robot, params, params.bus_period, exchange, self.feedback)
+        drives = self._drives = Drives(robot, damping, self.drives, self.record, feedback)
+        self._settling = plant.simulating(drives, 1)
+        self._ticking = plant.simulating(drives, steps, self.push)
+        self._damped = plant.simulating(drives, steps)
 
     def open(self) -> None:
         """Stand on the ground, settle, and wait for the first command."""
         plant, drives = self.plant, self._drives
+        self._ticking.prepare()
+        self._damped.prepare()
         plant.stand(
-            drives, lambda pose, torque: drives.hold(pose, torque, plant.stiffness, plant.damping)
+            self._settling,
+            lambda pose, torque: drives.hold(pose, torque, plant.stiffness, plant.damping),
         )
 
     def read(self) -> None:
@@ -218,13 +204,14 @@ class MujocoRobot(Robot):
     def advance(self) -> None:
         """Simulate to the next tick."""
         self.plant.clear_record()
-        self.plant.simulate(self._drives, self._steps, self.push)
+        self._ticking.run()
+        self.plant.forces.check(self.push)
 
     def damp(self) -> None:
         """Simulate one tick with the drives in damping and no external force."""
         self._drives.damp()
         self.plant.clear_record()
-        self.plant.simulate(self._drives, self._steps)
+        self._damped.run()
 
     def freeze(self) -> None:
         """Copy the state of the simulator and the random streams to the declared state."""

@@ -14,15 +14,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...mathematics.arrays import Array
 from ...robots.description import RobotDescription
 from ...robots.link_poses import joints_above
 
 if TYPE_CHECKING:
     from mujoco import MjSpec
-
-Array = NDArray[np.float64]
 
 
 def joint_armature(robot: RobotDescription) -> Array:

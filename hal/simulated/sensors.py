@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...blocks.signals import ContactSwitches, ImuReading, JointState
+from ...mathematics.arrays import Array, Flags
 from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.kernel import kernel
 from ...robots.description import RobotDescription
@@ -16,8 +17,6 @@ from .parameters import SimulatorParameters
 from .random_streams import Purpose, RandomStreams, stream
 from .state import TickRecord
 
-Array = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 Counts = NDArray[np.int64]
 
 

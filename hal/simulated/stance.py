@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from ...mathematics.arrays import Array
 from ...robots.ball_feet import ball_feet
 from ...robots.description import RobotDescription
 from ...robots.link_poses import joints_above, standing_heights
@@ -21,7 +22,6 @@ from .mujoco_model import body_name
 if TYPE_CHECKING:
     from mujoco import MjData, MjModel
 
-Array = NDArray[np.float64]
 
 UNEVEN = 0.002
 """The largest difference in height of contact points in the standing pose [m]."""

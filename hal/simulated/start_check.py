@@ -6,8 +6,8 @@ import math
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...mathematics.arrays import Array
 from ...mathematics.constants import GRAVITY
 from ...mathematics.support_margin import support_margin
 from ...robots.description import RobotDescription
@@ -17,7 +17,6 @@ from .stance import StartError
 if TYPE_CHECKING:
     from mujoco import MjData, MjModel
 
-Array = NDArray[np.float64]
 
 LOAD_ERROR = 0.05
 """The largest difference of the feet's mean load from the robot's weight, as a share of it."""

@@ -8,12 +8,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ...mathematics.arrays import Array, Flags
 from ...mathematics.kernel import kernel
 from .actuator import raise_to
 from .sensors import watch_switches
 
-Array = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 Counts = NDArray[np.int64]
 
 
@@ -34,6 +33,7 @@ class StepSensors(NamedTuple):
 class StepRecord(NamedTuple):
     """Where it is noted: see ``TickRecord``."""
 
+    steps: Counts
     load: Array
     accelerometer: Array
     forbidden: Counts
@@ -73,6 +73,13 @@ def clear(steps: Counts, forbidden: Counts, saturated: Counts, record: Cleared) 
 
 
 @kernel
+def read_encoders(position: Array, offset: Array, reading: Array) -> None:
+    """What the drives' own encoders read [rad] of the joints' positions, each (n_joints,)."""
+    for joint in range(reading.shape[0]):
+        reading[joint] = float(position[joint]) + float(offset[joint])
+
+
+@kernel
 def note_step(
     step: Counts,
     sensors: StepSensors,
@@ -93,6 +100,7 @@ def note_step(
         int(step[()]), sensors.load, ground_force, bounce_steps, record.closed, record.bounce_end
     )
     step[()] = int(step[()]) + 1
+    record.steps[()] = int(record.steps[()]) + 1
     allowed = 0.0
     for point in range(sensors.load.shape[0]):
         allowed += float(sensors.load[point, 0])

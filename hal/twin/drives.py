@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from ...mathematics.arrays import Array
 from ...mathematics.compiling.kernel_call import KernelCall
 from ...robots.robot_description import RobotDescription
 from ...robots.transmission import Transmission
@@ -18,9 +19,6 @@ from ..simulated.motor_feedback import motor_feedback
 from ..simulated.state import TickRecord
 from .actuator import EmulatedActuator
 from .frozen import Part
-
-Array = NDArray[np.float64]
-
 
 _SLOTS = 8
 """How many sets of goals may be on their way."""

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from ...mathematics.arrays import Array
+
 Part = tuple[object, tuple[str, ...]]
 """An object, and the names of its attributes that change: arrays, numbers, or dictionaries of
 numbers whose keys do not change."""

@@ -5,12 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
-from ...blocks.signals import ExternalForce, RobotTruth
 from ...robots.description import RobotDescription
-from ...runtime.language.block import Context, Input, Metric, Misfit, Output, State
+from ...runtime.language.block import Context, Metric, Misfit, State
 from ...runtime.language.parameters import Parameters, parameter
 from ...runtime.language.signals import Field, Signal
-from ...runtime.language.terrain import Terrain
 from ..bear.command_queue import CommandQueue
 from ..bear.configuration import Hardware
 from ..bear.drive_law import DriveLaw
@@ -20,6 +18,7 @@ from ..drive_gains import joint_gains
 from ..simulated.parameters import SimulatorParameters
 from ..simulated.plant import Plant
 from ..simulated.rotors import unfit_motor
+from ..simulated.simulated_robot import SimulatedRobot
 from ..simulated.stance import uneven_contacts
 from ..simulated.state import DriveState, PhysicsState, TickRecord
 from .faults import Fault
@@ -44,7 +43,7 @@ class Registers(Signal):
     values = Field("n_kept", text="all numbers in a fixed order")
 
 
-class TwinRobot(DrivenRobot):
+class TwinRobot(SimulatedRobot, DrivenRobot):
     """The robot of the graph as its twin: the driver of ``BearRobot`` on emulated hardware.
 
     Every command and every measurement goes through the drivers of the real robot and the bytes of
@@ -62,14 +61,9 @@ class TwinRobot(DrivenRobot):
     ``bus_period``: the file of the hardware has it.
     """
 
-    outside = "simulated"
-
     Params = TwinParameters
     params: TwinParameters
 
-    push = Input(ExternalForce, default={}, text="a force from outside, held for the tick")
-    truth = Output(RobotTruth, truth=True, text="what only a simulator knows")
-    physics = State(PhysicsState, text="the simulator's state, written for a snapshot")
     gantry = State(DriveState, text="the gantry's hold on the robot")
     record = State(TickRecord, text="what happened in the physics steps of the last tick")
     rest = State(Registers, text="registers, counters and commands on their way, for a snapshot")
@@ -114,19 +108,6 @@ class TwinRobot(DrivenRobot):
                 )
 
     @classmethod
-    def terrain(cls, params: Parameters) -> Terrain | None:
-        """The scene's floor and boxes."""
-        assert isinstance(params, SimulatorParameters)
-        return params.build_scene().terrain()
-
-    @classmethod
-    def local_dimensions(
-        cls, params: Parameters, robot: RobotDescription | None
-    ) -> Mapping[str, int]:
-        """The seed is not a dimension."""
-        return {"n_points": len(robot.points) if robot is not None else 0}
-
-    @classmethod
     def state_dimensions(
         cls, params: Parameters, robot: RobotDescription | None
     ) -> Mapping[str, int]:
@@ -155,7 +136,7 @@ class TwinRobot(DrivenRobot):
             robot, params, hardware, self.period, self.physics, self.record, self.gantry,
             tuple(params.faults),
         )  # fmt: skip
-        self.twin.push = self.push
+        self.twin.push_by(self.push)
         self.twin.plant.truth.attach(self.truth)
         self._hardware = hardware
         self.driver = _driver(robot, params, hardware, self.twin)
@@ -192,7 +173,7 @@ class TwinRobot(DrivenRobot):
 
     def damp(self) -> None:
         """One tick with the drives in damping and no external force."""
-        self.twin.push = None
+        self.twin.push_by(None)
         self._pass_time(lambda: self._driver.damp(self._queue.cycles))
 
     def _pass_time(self, exchange: Callable[[], None]) -> None:

@@ -13,7 +13,6 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...robots.description import RobotDescription
 from ...robots.kinematics import quaternions_of_matrices
@@ -24,7 +23,6 @@ from ..viewing.scene_part import Moments
 from ..viewing.scene_ports import IMU, JOINTS, ScenePorts, port_of, ports_of, scene_ports
 from .cdr import DEFINITIONS, imu, joint_state, transforms, wrench
 
-Array = NDArray[np.float64]
 PICTURE_RATE = 100.0
 """Poses a second in ``/tf`` [Hz]: more than an eye sees."""
 WORLD = "world"

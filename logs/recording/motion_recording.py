@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...mathematics.arrays import Array
 from ...robots.description import RobotDescription
 from ...robots.kinematics import link_poses
 from ..viewing.robot_meshes import drawn_link, read_meshes
@@ -21,7 +21,6 @@ from ..viewing.robot_shapes import eye_controls, scale_of
 from ..viewing.scene_contacts import ARROW_RADIUS, force_arrows
 from ..viewing.scene_part import Colors
 
-Array = NDArray[np.float64]
 COLORS = Colors()
 
 

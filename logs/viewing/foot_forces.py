@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...mathematics.arrays import Array
 from ...robots.description import RobotDescription
 from ..file.changed_rows import ChangedRows
 from ..file.format import PLOTS, Header, RecordedRows
@@ -19,7 +20,6 @@ from ..file.thinned_rows import ThinnedRows
 from ..file.time_columns import time_columns
 from .scene_contacts import GRAVITY
 
-Array = NDArray[np.float64]
 FOOT_FORCE = f"{PLOTS}/foot_force"
 WEIGHT = f"{PLOTS}/weight"
 """The robot's weight, as a line in the same plot."""

@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...mathematics.arrays import Array
 from ...robots.description import Link, Look, Mesh, RobotDescription
 from ...robots.importing.mesh_triangles import mesh_triangles, simplified
 from ...robots.importing.packages import find_file
 from ...robots.kinematics import matrices_of_quaternions
 from .robot_shapes import capsules, shapes_of
 
-Array = NDArray[np.float64]
 MOST_TRIANGLES = 24_000
 """Of a whole robot. Such a robot takes half a megabyte in a recording."""
 BESIDE = "beside"

@@ -6,12 +6,11 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...mathematics.arrays import Array
 from ...robots.description import Link, RobotDescription, Shape
 from ...robots.kinematics import link_poses
 
-Array = NDArray[np.float64]
 USUAL_REACH = 0.4
 """The reach [m] of the robot that the sizes of marks and lines are given for."""
 

@@ -7,9 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from ...mathematics.arrays import Array
 from ...robots.description import RobotDescription
 from .robot_shapes import reach_of
-from .scene_part import Array, Moments, ScenePart
+from .scene_part import Moments, ScenePart
 
 GRAVITY = 9.81
 WEIGHT_ARROW = 0.6

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...mathematics.arrays import Array
 from ...robots.kinematics import quaternions_of_matrices
 from .scene_contacts import ABOVE_GROUND
-from .scene_part import Array, Moments, ScenePart
+from .scene_part import Moments, ScenePart
 
 
 class MassCentrePart(ScenePart):

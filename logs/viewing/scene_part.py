@@ -16,8 +16,6 @@ from .detail import Detail
 from .robot_shapes import scale_of
 from .scene_ports import PoseSource, ScenePorts
 
-Array = NDArray[np.float64]
-
 
 @dataclass(frozen=True)
 class Colors:

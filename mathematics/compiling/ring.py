@@ -8,10 +8,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Indices
 from ..kernel import kernel
 
 Octets = NDArray[np.uint8]
-Indices = NDArray[np.int64]
 
 
 @kernel

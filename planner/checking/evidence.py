@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from ...mathematics.arrays import Array
 from ...mathematics.constants import GRAVITY
 from ...robots.ball_feet import ball_feet
 from ...robots.description import Motors, RobotDescription
@@ -19,7 +20,6 @@ from ..task.plan import JumpPlan
 from .clearance import ground_height
 from .replay import Replay
 
-Array = NDArray[np.float64]
 DEGREE = math.pi / 180.0
 MILLIMETRE = 1e-3
 

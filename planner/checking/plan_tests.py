@@ -10,15 +10,13 @@ import math
 from collections.abc import Callable, Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...blocks.signals import Phase
+from ...mathematics.arrays import Array
 from ..models.exact_dynamics import ExactDynamics
 from .clearance import body_heights, leg_lack
 from .evidence import DEGREE, MILLIMETRE, Evidence, Found, worst
 from .replay import held_joints
-
-Array = NDArray[np.float64]
 
 SHORTEST_IMPACT = 0.004
 """s; as long as the feet's contact takes to stop them at least. What a motor can do in that time

@@ -14,12 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...blocks.signals import Phase
+from ...mathematics.arrays import Array
 from ...robots.description import RobotDescription
 from ..models.exact_dynamics import ExactDynamics, joint_motion, rotation_between
 from ..models.midpoint import midpoint_residuals
 from ..task.plan import JumpPlan
-
-Array = NDArray[np.float64]
 
 Row = tuple[float, int, Array, Array]
 """A time [s], its interval, and the state."""

@@ -12,7 +12,6 @@ from dataclasses import asdict, dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...robots.description import RobotDescription
 from ...runtime.language.errors import AloftError
@@ -20,8 +19,6 @@ from ..task.plan import ARRAYS, JumpPlan
 from .evidence import Evidence
 from .plan_tests import PLAN_TESTS
 from .replay import replay
-
-Array = NDArray[np.float64]
 
 
 class InvalidPlanError(AloftError):

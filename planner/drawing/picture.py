@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...mathematics.arrays import Array
 from ...plotting import COLOURS, FAINT, INK, draw_panels, new_figure, style, svg_text
 from ...robots.description import RobotDescription
 from ...robots.kinematics import link_poses
@@ -20,7 +20,6 @@ from .plan_charts import plan_panels
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-Array = NDArray[np.float64]
 
 POSTURES = 9
 """How many postures are shown."""

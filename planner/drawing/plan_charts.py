@@ -9,12 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...blocks.signals import Phase
+from ...mathematics.arrays import Array
 from ...plotting import Line, Panel, Shade
 from ..checking.evidence import Evidence
 from ..checking.plan_tests import allowed_motor_torque
 from ..task.plan import JumpPlan
-
-Array = NDArray[np.float64]
 
 OTHER = "#b4bdc6"
 """The colour of motors that have no name in a panel."""

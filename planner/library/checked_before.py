@@ -12,15 +12,13 @@ from __future__ import annotations
 import hashlib
 import os
 from collections.abc import Callable
-from functools import cache
-from importlib import metadata
 from pathlib import Path
 
+from ...mathematics.package_code import code_digest
 from ..task.whole_file import write_whole
 
 FOLDERS = ("planner/checking", "planner/models", "planner/task", "robots", "mathematics")
 """The code that decides what the check finds."""
-LIBRARIES = ("numpy", "pin")
 
 
 def noted_folder() -> Path:
@@ -46,16 +44,6 @@ def unless_passed(content: bytes, check: Callable[[], None]) -> None:
         return
 
 
-@cache
 def _code() -> bytes:
     """A digest of the code of the check and of the versions of what computes."""
-    root, digest = Path(__file__).parents[2], hashlib.blake2b(digest_size=16)
-    for folder in FOLDERS:
-        for path in sorted((root / folder).rglob("*.py")):
-            digest.update(path.relative_to(root).as_posix().encode() + b"\0" + path.read_bytes())
-    for name in LIBRARIES:
-        try:
-            digest.update(f"{name} {metadata.version(name)}\n".encode())
-        except metadata.PackageNotFoundError:
-            continue
-    return digest.digest()
+    return code_digest(*FOLDERS)

@@ -2,22 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...blocks.signals import JumpReference, Phase
+from ...mathematics.arrays import Array, Flags
 from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.kernel import kernel
 from ...mathematics.rotations import normalise
 
-Array = NDArray[np.float64]
-Flags = NDArray[np.bool_]
-
 _THRUST, _FLIGHT, _LANDING = int(Phase.THRUST), int(Phase.FLIGHT), int(Phase.LANDING)
 
+_COLUMN = "column "
+_MARKS = ("squat_time", "thrust_time", "lift_off_time", "touchdown_time", "recover_time")
 _FED_FORWARD = (
     "com_acceleration", "angular_momentum_rate", "joint_acceleration", "joint_torque",
 )  # fmt: skip
@@ -48,6 +49,31 @@ class JumpTable:
     recover_time: float
     later_jumps: tuple[tuple[float, float, float], ...] = ()
     contact: NDArray[np.bool_] | None = None
+
+    def as_arrays(self) -> Mapping[str, NDArray[Any]]:
+        """All of it as arrays, for a file; ``from_arrays`` is the way back."""
+        arrays: dict[str, NDArray[Any]] = {f"{_COLUMN}{n}": c for n, c in self.columns.items()}
+        arrays["time"] = self.time
+        arrays["marks"] = np.array([getattr(self, name) for name in _MARKS])
+        arrays["later_jumps"] = np.array(self.later_jumps, dtype=np.float64).reshape(-1, 3)
+        if self.contact is not None:
+            arrays["contact"] = self.contact
+        return arrays
+
+    @classmethod
+    def from_arrays(cls, arrays: Mapping[str, NDArray[Any]]) -> JumpTable:
+        """The table whose ``as_arrays`` these are."""
+        columns = {
+            name.removeprefix(_COLUMN): array
+            for name, array in arrays.items()
+            if name.startswith(_COLUMN)
+        }
+        squat, thrust, lift_off, touchdown, recover = arrays["marks"].tolist()
+        later = tuple((float(a), float(b), float(c)) for a, b, c in arrays["later_jumps"])
+        return cls(
+            arrays["time"], columns, squat, thrust, lift_off, touchdown, recover, later,
+            arrays.get("contact"),
+        )  # fmt: skip
 
 
 class Rows(NamedTuple):

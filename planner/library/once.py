@@ -1,8 +1,8 @@
-"""What follows from a plan and a robot alone, and is therefore computed once in a process.
+"""What follows from a plan and a robot alone, and is therefore computed once.
 
 A study runs the same jump many times in every worker; its plan is checked and turned into a table
-in the first of these runs only. What counts is the content of plan and robot, not where they are
-kept, so a file that changes between two runs is checked anew.
+in the first of these runs only, and both are kept for later processes. What counts is the content of
+plan and robot, not where they are kept, so a file that changes between two runs is checked anew.
 """
 
 from __future__ import annotations
@@ -12,15 +12,20 @@ from collections import OrderedDict
 from collections.abc import Callable, Hashable
 from typing import Generic, TypeVar
 
+from ...mathematics.kept_arrays import kept_arrays
+from ...mathematics.package_code import code_digest
 from ...robots.robot_description import RobotDescription
 from ..checking.validity import require_valid
 from ..task.plan import ARRAYS, JumpPlan
-from .checked_before import unless_passed
+from .checked_before import FOLDERS, unless_passed
 from .jump_table import JumpTable
 from .reference_table import reference_table
 
 KEPT = 32
 """How many results are kept, of the plans used last."""
+
+TABLE_FOLDERS = (*FOLDERS, "planner/library", "blocks/signals")
+"""The code that decides on a table."""
 
 _Result = TypeVar("_Result")
 
@@ -68,6 +73,14 @@ def require_valid_once(plan: JumpPlan, robot: RobotDescription) -> None:
 
 
 def reference_table_once(plan: JumpPlan, robot: RobotDescription, stand_time: float) -> JumpTable:
-    """As ``reference_table``, which is made once in a process. It is not to be written to."""
+    """As ``reference_table``, which is made once. It is not to be written to."""
     key = content(plan, robot), stand_time
-    return _tables.get(key, lambda: reference_table(plan, robot, stand_time))
+
+    def make() -> JumpTable:
+        decided_by = key[0] + repr(stand_time).encode() + code_digest(*TABLE_FOLDERS)
+        arrays = kept_arrays(
+            decided_by, lambda: reference_table(plan, robot, stand_time).as_arrays()
+        )
+        return JumpTable.from_arrays(arrays)
+
+    return _tables.get(key, make)

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...blocks.signals import Phase
+from ...mathematics.arrays import Array
 from ...mathematics.constants import GRAVITY
 from ...robots.description import RobotDescription
 from ..checking.replay import flight_knots
@@ -27,7 +28,6 @@ from ..models.midpoint import angular_motion, euler_angles, euler_rates, rotatio
 from ..task.plan import JumpPlan
 from .jump_table import JumpTable
 
-Array = NDArray[np.float64]
 State = tuple[float, int, Array, Array, Array]
 """Time, interval, q, v and the joints' accelerations."""
 

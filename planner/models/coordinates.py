@@ -13,12 +13,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...mathematics.arrays import Array
 from .symbolic_model import SymbolicModel
 from .symmetry import Pair, mirrored_pairs
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

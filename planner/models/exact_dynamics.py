@@ -17,11 +17,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...mathematics.arrays import Array
 from ...robots.ball_feet import ball_feet
 from ...robots.description import RobotDescription
 from ...robots.pinocchio_model import build_pinocchio_model
-
-Array = NDArray[np.float64]
 
 AFTER, BEFORE = [1, 2, 0], [2, 0, 1]
 """The axes after and before each one: for cross products, which NumPy's own makes slowly."""

@@ -8,13 +8,11 @@ over, here, is the constraint violation of a plan, found without anything of the
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...mathematics.arrays import Array
 from ...robots.kinematics import matrices_of_quaternions
 from ..task.plan import JumpPlan
 from .exact_dynamics import ExactDynamics
-
-Array = NDArray[np.float64]
 
 
 def euler_angles(quaternions: Array) -> Array:

@@ -5,12 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...mathematics.arrays import Array
 from .stance import Stance
 from .symbolic_model import SymbolicModel
-
-Array = NDArray[np.float64]
 
 STRAIGHT = 0.985
 """The longest leg by the length of a straight one, where the knee is singular."""

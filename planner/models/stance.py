@@ -7,16 +7,14 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...mathematics.arrays import Array
 from ...robots.ball_feet import ball_feet
 from ...robots.description import RobotDescription
 from ..task.errors import PlanError
 from ..task.task import JumpTask
 from .symbolic_model import SymbolicModel
 from .symmetry import Pair, symmetrised_angles
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

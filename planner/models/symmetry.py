@@ -13,11 +13,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...mathematics.arrays import Array
 from ...robots.description import ContactPoint, Joint, Link, RobotDescription
-
-Array = NDArray[np.float64]
 
 LENGTH = 1e-3
 """Limbs whose lengths differ by more [m] are no mirror images."""

@@ -13,11 +13,9 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...mathematics.arrays import Indices
 from .stage_functions import Piece
-
-Indices = NDArray[np.int64]
 
 
 @dataclass

@@ -13,13 +13,11 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...mathematics.arrays import Array, Indices
 from ...robots.description import RobotDescription
 from ..models.coordinates import Coordinates
 
-Indices = NDArray[np.int64]
-Array = NDArray[np.float64]
 LENGTH = 0.05
 """m; turns of a foot count as velocities at this distance."""
 TOLERANCE = 1e-2

@@ -4,14 +4,12 @@ displaced and turned as the task wants it."""
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...blocks.signals import Phase
+from ...mathematics.arrays import Array
 from ...mathematics.constants import GRAVITY
 from .layout import Stretch
 from .problem import Problem
-
-Array = NDArray[np.float64]
 
 USUAL_TIMES = {Phase.SQUAT: 0.4, Phase.THRUST: 0.2, Phase.LANDING: 0.15}
 """s; where the time of a phase is free."""

@@ -8,11 +8,9 @@ of the phase's mean.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...blocks.signals import Phase
-
-Array = NDArray[np.float64]
+from ...mathematics.arrays import Array
 
 GROWTH = {Phase.SQUAT: 0.5, Phase.THRUST: 0.4, Phase.LANDING: 5.0}
 """The last interval's length by the first's."""

@@ -11,15 +11,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...blocks.signals import Phase
+from ...mathematics.arrays import Array
 from ...robots.description import RobotDescription
 from ..task.sequence import PHASES
 from ..task.task import JumpTask, TaskError
 from .knot_spacing import spacing
-
-Array = NDArray[np.float64]
 
 SHORTEST_FLIGHT, LONGEST_FLIGHT = 0.04, 1.5
 """s; bounds of a flight time that is left to the planner."""

@@ -6,15 +6,13 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...blocks.signals import Phase
+from ...mathematics.arrays import Array
 from ...mathematics.constants import GRAVITY
 from ..models.exact_dynamics import ExactDynamics, joint_motion
 from ..task.errors import PlanError
 from ..task.task import JumpTask
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -20,9 +20,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...blocks.signals import Phase
+from ...mathematics.arrays import Array
 from ...mathematics.constants import GRAVITY
 from ..models.quaternions import pose_of
 from ..models.stance import Stance
@@ -33,9 +33,6 @@ from .assembly import Knot
 from .one_flight import Grid, ballistic_flight, uniform_grid
 from .program import Filler, Program
 from .stage_functions import Piece
-
-Array = NDArray[np.float64]
-
 
 FORCE_SCALE, RATE_SCALE = 100.0, 1e4
 """Q_f and Q_h by the task's weight of forces: of the size of the acceleration's term."""

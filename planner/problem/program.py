@@ -7,16 +7,14 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...mathematics.arrays import Array
 from ..models.stance import Stance
 from ..models.symbolic_model import SymbolicModel
 from ..task.task import JumpTask
 from .assembly import Assembly, Knot
 from .one_flight import Grid
 from .stage_functions import Piece
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

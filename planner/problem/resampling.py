@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from itertools import groupby
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from ...mathematics.arrays import Array
+
 Phases = Sequence[int]
 
 

@@ -11,9 +11,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...blocks.signals import Phase
+from ...mathematics.arrays import Array
 from ...mathematics.constants import GRAVITY
 from ..models.rigid_body import RigidBody, ankles
 from ..models.stance import Stance
@@ -25,7 +25,6 @@ from .one_flight import ballistic_flight, uniform_grid
 from .program import Filler, Program
 from .stage_functions import Piece
 
-Array = NDArray[np.float64]
 SHORTEST_FLIGHT, LONGEST_FLIGHT = 0.04, 1.5
 """s"""
 STATES = 12

@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from ...mathematics.arrays import Array
 from ..models.coordinates import Coordinates
 from ..models.stance import Stance
 from ..models.symbolic_model import SymbolicModel
@@ -22,7 +23,6 @@ from .layout import Stretch, layout
 from .obstacles import ObstacleRows
 from .stage_functions import Piece
 
-Array = NDArray[np.float64]
 STEP_UP_SHARE, STEP_DOWN_SHARE = 0.45, 0.5
 """Shares of the flight at which feet pass a step's edge. Feet that pass a high platform's edge later
 must be drawn up to the falling body first, and then stretched at once."""

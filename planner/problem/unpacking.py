@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...mathematics.arrays import Array
 from ..models.midpoint import angular_motion, euler_angles, euler_rates, rotation
 from ..models.quaternions import pose_of
 from ..models.symbolic_model import SymbolicModel
@@ -14,7 +14,6 @@ from ..task.plan import JumpPlan
 from .problem import Problem
 from .resampling import matching_times, means_over, same_phases, states_at
 
-Array = NDArray[np.float64]
 ORDER = [1, 0, 2]
 """The planner's pitch, roll, yaw from angles about x, y, z, and back."""
 

@@ -10,13 +10,12 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...mathematics.arrays import Array
 from ..problem.problem import Problem
 from ..task.plan import ARRAYS, JumpPlan
 from .solver import Solution, solve
 
-Array = NDArray[np.float64]
 EASES = (1.4, 2.0)
 """Times the real motor limits that a first motion is looked for with."""
 FIRST_STEP, LAST_STEP = 0.1, 0.02

@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...blocks.signals import Phase
+from ...mathematics.arrays import Array
 from ...robots.description import RobotDescription
 from ...robots.kinematics import matrices_of_quaternions
 from ..models.exact_dynamics import ExactDynamics
@@ -25,7 +25,6 @@ from .options import SolveOptions
 from .outcome import failure, statistics_of, versions
 from .solver import solve
 
-Array = NDArray[np.float64]
 LIMIT = 500
 """Iterations; without weights on accelerations the problem needs many."""
 

@@ -12,14 +12,13 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...mathematics.arrays import Array
 from ..models.rigid_body import BLEND
 from ..models.stance import Stance
 from ..models.symbolic_model import SymbolicModel
 from ..task.errors import PlanError
 
-Array = NDArray[np.float64]
 RATE_STEP = 1e-6
 """s, of the differences that give the feet's velocities."""
 

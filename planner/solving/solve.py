@@ -6,8 +6,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...mathematics.arrays import Array
 from ...robots.description import RobotDescription
 from ...robots.welding import welded
 from ..models.coordinates import Coordinates
@@ -35,9 +35,6 @@ from .refinement import asks_for_finer, finer_knots, with_knots
 from .rigid_body_plan import solve_rigid_body
 from .solver import LIMIT, Solution, solve
 from .whole_robot import for_all_joints, for_moving_joints
-
-Array = NDArray[np.float64]
-
 
 QUICK = 60
 """Iterations of a quick solve."""

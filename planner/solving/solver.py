@@ -9,13 +9,11 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...mathematics.arrays import Array
 from ..problem.assembly import Assembly
 from .bounded import cpu_time
 from .solver_process import call_bounded, call_solver, quiet
-
-Array = NDArray[np.float64]
 
 VIOLATION = 1e-6
 """What a solution may violate a constraint by, in the constraint's unit."""

@@ -24,11 +24,10 @@ from pathlib import Path
 from typing import IO, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...mathematics.arrays import Array
 from .bounded import bounded, count, cpu_time
 
-Array = NDArray[np.float64]
 Answer = tuple[Array, dict[str, Any]]
 
 KEPT = 12

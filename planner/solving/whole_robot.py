@@ -5,15 +5,13 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...mathematics.arrays import Array
 from ...robots.description import RobotDescription
 from ...robots.welding import WeldedRobot
 from ..models.exact_dynamics import ExactDynamics
 from ..problem.one_flight import joint_torques
 from ..task.plan import JumpPlan
-
-Array = NDArray[np.float64]
 
 
 def for_all_joints(plan: JumpPlan, part: WeldedRobot, robot: RobotDescription) -> JumpPlan:

@@ -20,11 +20,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...mathematics.arrays import Array
 from ...runtime.language.errors import AloftError
 from .task import JumpTask, TaskError, make_task
 from .whole_file import write_whole
-
-Array = NDArray[np.float64]
 
 FILE_FORMAT = "aloft jump plan 1"
 

@@ -5,14 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...mathematics.arrays import Array
 from ...robots.description import RobotDescription
 from ...robots.kinematics import link_poses
 from ...robots.limb import chain_to
 from .per_robot import per_robot
 
-Array = NDArray[np.float64]
 SAME_PLACE = 0.01
 """Contact points of a foot closer together than this [m], along it, are no heel and toe."""
 LEAST_CHANGE = 0.02

@@ -8,9 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ...mathematics.arrays import Array
 from .rigid_body import IdentificationError, Value
-
-Array = NDArray[np.float64]
 
 LONGEST = 20
 """Delays up to so many ticks are looked for."""

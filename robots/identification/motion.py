@@ -7,9 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ...mathematics.arrays import Array
 from ...mathematics.constants import GRAVITY
-
-Array = NDArray[np.float64]
 
 MARGIN = 8
 """Ticks before and after a change of the contacts that are not used: impacts, and switches that bounce."""

@@ -23,11 +23,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ...mathematics.arrays import Array
 from ..pinocchio_model import build_pinocchio_model
 from ..robot_description import RobotDescription
 from .motion import Motion
-
-Array = NDArray[np.float64]
 
 BLOCK = 8
 """Ticks that are averaged to one equation."""

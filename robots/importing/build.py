@@ -13,15 +13,13 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...mathematics.arrays import Array
 from ..validation import RobotError, RobotFault
 from ..validation.faults import listing
 from .bodies import Inertial, joined
 from .capsules import Capsule, coarse
 from .raw_model import RawBody, RawJoint, RawModel
-
-Array = NDArray[np.float64]
 
 GROUND = "ground"
 """The base link of a robot that is bolted to the world by a file's own world body."""

@@ -12,9 +12,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from ...mathematics.arrays import Array
 
 SHORTEST = 4e-4
 """The least length of a capsule between the centres of its ends [m]: a ball is that long."""

@@ -13,7 +13,8 @@ from xml.etree import ElementTree
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from ...mathematics.arrays import Array
+
 Element = ElementTree.Element
 DEEPEST = 32
 """Nodes inside nodes that are followed; a file may name a node within itself."""

@@ -6,8 +6,9 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from ...mathematics.arrays import Array
 from ..link_poses import link_poses, standing_heights
-from ..parts import Array, Shape
+from ..parts import Shape
 from ..robot_description import RobotDescription
 from ..standing_pose import find_standing_pose
 from .capsules import coarse

@@ -9,14 +9,12 @@ from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...mathematics.arrays import Array
 from ..kinematics import quaternions_of_matrices, rotations_about
 from . import capsules as fit
 from .packages import SCHEME, find_file
 from .urdf_text import XmlFile
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

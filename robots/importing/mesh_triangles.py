@@ -5,13 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...mathematics.arrays import Array, Indices
 from .collada import collada_triangles
 from .mesh_files import stl_corners
 
-Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
 DRAWABLE = (".stl", ".obj", ".dae")
 FINEST = 5000.0
 """Cells along the longest side of a mesh at first, which joins corners at nearly the same place."""

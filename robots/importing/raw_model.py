@@ -6,14 +6,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
-
+from ...mathematics.arrays import Array
 from .bodies import Inertial
 from .capsules import Capsule
 from .looks import NOTHING_SEEN, RawLook
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

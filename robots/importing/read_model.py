@@ -14,8 +14,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...mathematics.arrays import Array
 from . import capsules as fit
 from .bodies import NOTHING, Inertial, full_tensor
 from .looks import NOTHING_SEEN, RawLook, RawMesh, urdf_looks
@@ -23,8 +23,6 @@ from .mesh_files import READABLE, mesh_corners
 from .packages import find_file
 from .raw_model import RawBody, RawJoint, RawModel
 from .urdf_text import UrdfJoint, XmlFile, check_urdf, urdf_joints
-
-Array = NDArray[np.float64]
 
 
 def read_model(path: Path) -> RawModel:

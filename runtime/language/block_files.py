@@ -26,7 +26,7 @@ class WrittenClass:
     has_machine: bool
     """Whether it defines ``step`` or ``emit``."""
     is_abstract: bool
-    """Whether one of its methods is abstract."""
+    """Whether it says so: by ``ABC`` among its bases, or by an abstract method."""
 
 
 def classes_in(path: Path) -> tuple[WrittenClass, ...]:
@@ -45,8 +45,8 @@ def blocks_in_packages(root: Path, packages: Iterable[str]) -> Mapping[str, Path
     """The blocks that graphs can use as ``package.Class``, with their files, sorted by name.
 
     A class is a block if it derives from ``Block`` or ``KernelBlock``, also through other classes.
-    It can be used if it has or inherits a port and one of the methods ``step`` and ``emit``, it has
-    no abstract method, and its name does not begin with an underscore.
+    It can be used if it has or inherits a port and one of the methods ``step`` and ``emit``, it is
+    not written as an abstract class, and its name does not begin with an underscore.
     """
     classes = [
         (package, path, written)
@@ -110,13 +110,15 @@ def _some_files(folder: Path) -> Iterator[Path]:
 def _written(node: ast.ClassDef) -> WrittenClass:
     functions = [item for item in node.body if isinstance(item, ast.FunctionDef)]
     values = [item.value for item in node.body if isinstance(item, (ast.Assign, ast.AnnAssign))]
+    bases = tuple(filter(None, map(_last_name, node.bases)))
     return WrittenClass(
         node.name,
-        tuple(filter(None, map(_last_name, node.bases))),
+        bases,
         any(isinstance(value, ast.Call) and _last_name(value.func) in _PORTS for value in values)
         or any(function.name == "fitted" for function in functions),
         any(function.name in _MACHINE for function in functions),
-        any(
+        "ABC" in bases
+        or any(
             _last_name(decorator) == "abstractmethod"
             for function in functions
             for decorator in function.decorator_list

@@ -15,12 +15,12 @@ from numpy.typing import NDArray
 
 from ...hal.simulated.mujoco_model import mujoco_spec
 from ...hal.simulated.scenes import Scene
+from ...mathematics.arrays import Array
 from ...runtime.language.errors import AloftError
 
 if TYPE_CHECKING:
     from ...robots.description import RobotDescription
 
-Array = NDArray[np.float64]
 Pixels = NDArray[np.uint8]
 
 REMEDY = (

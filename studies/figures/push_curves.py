@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...mathematics.arrays import Array
 from ...plotting import COLOURS, Line, Panel, Shade
 from .canvas import Column, draw_columns
 from .trace import Trace, pitch_and_roll
@@ -15,7 +15,6 @@ from .trace import Trace, pitch_and_roll
 if TYPE_CHECKING:
     from PIL.Image import Image
 
-Array = NDArray[np.float64]
 
 RIGHT, LEFT = 0, 1
 """The feet in the robot's description."""

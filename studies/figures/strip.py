@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...mathematics.arrays import Array
 from ...plotting import FAINT, image, new_figure, style
 from .offscreen import Offscreen, View
 
@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from ...hal.simulated.scenes import Scene
     from ...robots.description import RobotDescription
 
-Array = NDArray[np.float64]
 
 FRAME = (2.3, 2.43)
 """The size of a frame [inch]."""

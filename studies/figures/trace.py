@@ -8,15 +8,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...mathematics.arrays import Array
 from ...runtime.graph import Graph
 from ...runtime.language.errors import AloftError
 from ..execution import outcome_of
 from ..expansion import Job, load_cell
 from ..journal import Outcome
-
-Array = NDArray[np.float64]
 
 TRUTH: tuple[str, ...] = (
     "base_position", "base_orientation", "joint_position", "joint_velocity", "com", "com_velocity",

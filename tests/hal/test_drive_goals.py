@@ -6,17 +6,16 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
 from aloft.blocks.signals import JointCommand
 from aloft.hal.drive_goals import DriveGoals
+from aloft.mathematics.arrays import Array
 from aloft.robots.description import find_robot
 from aloft.robots.transmission import Transmission, motor_gains
 
 ROBOT = find_robot("bruce")
 FLIGHT = np.array([40.0, 60.0, 60.0, 60.0, 15.0] * 2), np.array([1.0, 1.5, 1.5, 1.2, 0.3] * 2)
 STIFFNESS, DAMPING = (motor_gains(ROBOT, gains, "").motor for gains in FLIGHT)
-Array = NDArray[np.float64]
 
 
 def goals(lead: float = 0.0) -> DriveGoals:

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from aloft.mathematics.integration import Array, Implicit, RungeKutta
+from aloft.mathematics.arrays import Array
+from aloft.mathematics.integration import Implicit, RungeKutta
 from aloft.runtime.testing.allocations import count_array_allocations
 
 

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -60,3 +63,25 @@ def test_the_answer_depends_on_the_problem_alone():
     first = solver.solve(*problem(1))
     solver.solve(*problem(2))
     assert solver.solve(*problem(1)).tobytes() == first.tobytes()
+
+
+@given(st.integers(0, 10_000))
+def test_daqp_called_directly_gives_the_same_bits_as_through_qpsolvers(seed):
+    qpsolvers = pytest.importorskip("qpsolvers")
+    p, q, g, h, a, b = problem(seed)
+    through = qpsolvers.solve_problem(qpsolvers.Problem(p, q, g, h, a, b), "daqp")
+    assert QuadraticProgramSolver("daqp").solve(p, q, g, h, a, b).tobytes() == through.x.tobytes()
+
+
+def test_options_reach_daqp():
+    assert QuadraticProgramSolver("daqp", {"iter_limit": 1}).solve(*problem(3)) is None
+    assert QuadraticProgramSolver("daqp").solve(*problem(3)) is not None
+
+
+def test_daqp_needs_neither_qpsolvers_nor_scipy():
+    code = (
+        "import sys; from aloft.mathematics.quadratic_program import QuadraticProgramSolver as S;"
+        "S('daqp'); print([name for name in ('qpsolvers', 'scipy') if name in sys.modules])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ....mathematics.arrays import Array, Flags, Indices
 from ....mathematics.compiling.kernel_call import KernelCall
 from ....mathematics.kernel import kernel
 from ....mathematics.whole_body_qp import TaskRows
@@ -15,10 +15,6 @@ from ....runtime.language.parameters import Parameters, parameter
 from ...signals import Phase
 from .foot_joints import rolling_joint
 from .task import KernelTask, Situation
-
-Array = NDArray[np.float64]
-Flags = NDArray[np.bool_]
-Indices = NDArray[np.int64]
 
 _THRUST = int(Phase.THRUST)
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ....mathematics.arrays import Array
 from ....mathematics.compiling.kernel_call import KernelCall
 from ....mathematics.kernel import kernel
 from ....mathematics.whole_body_qp import TaskRows
@@ -14,7 +14,6 @@ from ....robots.description import RobotDescription
 from ....runtime.language.parameters import Parameters, parameter
 from .task import KernelTask, Situation
 
-Array = NDArray[np.float64]
 Vector = tuple[float, float, float]
 
 

@@ -7,8 +7,8 @@ from fnmatch import fnmatchcase
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ....mathematics.arrays import Array, Flags, Indices
 from ....mathematics.compiling.kernel_call import KernelCall
 from ....mathematics.kernel import kernel
 from ....mathematics.whole_body_qp import TaskRows
@@ -16,10 +16,6 @@ from ....robots.description import RobotDescription
 from ....runtime.language.parameters import Parameters, parameter
 from .foot_joints import leg_joints
 from .task import KernelTask, Situation
-
-Array = NDArray[np.float64]
-Flags = NDArray[np.bool_]
-Indices = NDArray[np.int64]
 
 
 class PostureGains(Parameters):

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ....mathematics.arrays import Array
 from ....mathematics.compiling.kernel_call import KernelCall
 from ....mathematics.kernel import kernel
 from ....mathematics.rotations import conjugate, from_matrix, logarithm, multiply
@@ -15,7 +15,6 @@ from ....robots.description import RobotDescription
 from ....runtime.language.parameters import Parameters, parameter
 from .task import KernelTask, Situation
 
-Array = NDArray[np.float64]
 Vector = tuple[float, float, float]
 
 

@@ -18,6 +18,7 @@ FLIGHT, EVERY, STRIDE = 2 * SPEED / 9.81, 0.55, 0.1
 LIFT_OFFS = [1.0 + EVERY * k for k in range(JUMPS)]
 FEET = np.array([[0.0425, -0.076], [-0.0425, -0.076], [0.0425, 0.076], [-0.0425, 0.076]])
 Fields = dict[str, Any]
+Change = Callable[[float, Fields], None]
 
 
 def state(time: float) -> tuple[int, float, float]:
@@ -66,12 +67,11 @@ def plan_at(time: float) -> Fields:
     }  # fmt: skip
 
 
-def run(
-    change: Callable[[float, Fields], None] = lambda time, truth: None, **params: Any
-) -> tuple[Mapping[str, Any], str]:
+def bench_of(change: Change, plain: bool, **params: Any) -> BlockBench[JumpScore]:
+    """The judge after all that it watches."""
     wired = ("truth", "reference")
     values = {"jumps": JUMPS} | params
-    bench = BlockBench(JumpScore, values, robot="bruce", rate=1 / PERIOD, wired=wired)
+    bench = BlockBench(JumpScore, values, robot="bruce", rate=1 / PERIOD, wired=wired, plain=plain)
     while bench.stop_reason is None and bench.clock.tick * PERIOD < 8.0:
         time = bench.clock.tick * PERIOD
         truth = truth_at(time)
@@ -79,6 +79,11 @@ def run(
         bench.set("truth", **truth)
         bench.set("reference", **plan_at(time))
         bench.step()
+    return bench
+
+
+def run(change: Change = lambda time, truth: None, **params: Any) -> tuple[Mapping[str, Any], str]:
+    bench = bench_of(change, False, **params)
     return bench.block.metrics(), str(bench.stop_reason)
 
 
@@ -99,6 +104,24 @@ def test_the_row_ends_with_its_last_jump() -> None:
     metrics, stopped = run(jumps=4)
     assert metrics["reason"] == "made 3 of 4 jumps"
     assert stopped == "no other jump 1.50 s after touchdown"
+
+
+def test_machine_code_follows_a_row_as_plain_python_does() -> None:
+    """Every byte of what is kept is the same, with steps, slides and a fall at the end."""
+
+    def change(time: float, truth: Fields) -> None:
+        astray(time, truth)
+        if time > LIFT_OFFS[-1] + FLIGHT + 0.3:
+            truth["contact_touched"] = np.array([time % 0.3 > 0.05] * 2 + [True] * 2)
+            truth["contact_position"] = truth["contact_position"] + [0.01 * time, 0.003, 0.0]
+        if time > LIFT_OFFS[-1] + FLIGHT + 1.0:
+            truth["base_position"] = [0.0, 0.0, 0.05]
+
+    benches = [bench_of(change, plain, steps=2) for plain in (True, False)]
+    assert benches[0].stop_reason == benches[1].stop_reason == "the robot fell"
+    kept = [bench.snapshot() for bench in benches]
+    assert kept[0] == kept[1]
+    assert benches[0].block.metrics() == benches[1].block.metrics()
 
 
 def within(start: float, end: float) -> Callable[[float], bool]:

@@ -160,12 +160,17 @@ def test_point_feet_turn_as_their_pattern_does():
     footing, truth = Footing(robot), standing(robot)
     middle, before, after = np.zeros((4, 2)), np.zeros((4, 2)), np.zeros((4, 2))
     upright = np.array([0.0, 0.0, 0.0, 1.0])
-    footing.measure(truth["contact_position"], upright, middle, before)
+    footing.measuring(truth["contact_position"], upright, middle, before).run()
     turn = np.array([[math.cos(0.3), -math.sin(0.3)], [math.sin(0.3), math.cos(0.3)]])
     points = truth["contact_position"].copy()
     points[:, :2] = points[:, :2] @ turn.T + [1.0, 2.0]
-    footing.measure(points, upright, middle, after)
+    footing.measuring(points, upright, middle, after).run()
     assert after == pytest.approx(before @ turn.T, abs=1e-12)
+
+
+def unroll(footing, joints, orientation, middle):
+    for call in footing.unrolling(joints, orientation, middle):
+        call.run()
 
 
 def test_a_ball_that_rolls_does_not_slide():
@@ -177,10 +182,10 @@ def test_a_ball_that_rolls_does_not_slide():
     for turn in (0.0, 0.1):
         pitch = np.array([0.0, math.sin(0.5 * turn), 0.0, math.cos(0.5 * turn)])
         middle = np.zeros((4, 2))
-        footing.unroll(lean, pitch, middle)
+        unroll(footing, lean, pitch, middle)
         places.append(middle.copy())
     # Turning the whole robot by 0.1 rad about y rolls every ball by its radius times that.
     radius = robot.contacts[0].radius
     assert places[1] - places[0] == pytest.approx(np.tile([-0.1 * radius, 0.0], (4, 1)), abs=1e-4)
-    footing.unroll(lean, upright, middle := np.ones((4, 2)))
+    unroll(footing, lean, upright, middle := np.ones((4, 2)))
     assert middle == pytest.approx(1.0 + places[0])

@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from aloft.blocks.signals import CommandMode, JointCommand
 from aloft.hal.bear.configuration import Hardware
@@ -18,12 +17,12 @@ from aloft.hal.simulated.mujoco_robot import MujocoRobot
 from aloft.hal.simulated.state import TickRecord
 from aloft.hal.twin.actuator import EmulatedActuator
 from aloft.hal.twin.drives import EmulatedDrives
+from aloft.mathematics.arrays import Array
 from aloft.robots.description import find_robot
 from aloft.robots.transmission import Transmission, motor_gains
 from aloft.runtime.language.errors import BlockError
 from aloft.runtime.testing.bench import BlockBench
 
-Array = NDArray[np.float64]
 ROBOT = find_robot("bruce")
 N = len(ROBOT.joints)
 FLIGHT = {

@@ -10,7 +10,8 @@ import pytest
 from aloft.planner.checking.validity import InvalidPlanError
 from aloft.planner.library import once
 from aloft.planner.library.library import PlanLibrary
-from aloft.planner.library.shipped import shipped_graphs
+from aloft.planner.library.reference_table import reference_table
+from aloft.planner.library.shipped import shipped_folder
 from aloft.planner.task.read_task import read_task
 from aloft.robots.description import find_robot
 
@@ -24,7 +25,7 @@ def _own_cache(tmp_path, monkeypatch):
 
 @pytest.fixture(scope="module")
 def plan():
-    found = PlanLibrary(ROBOT).find(read_task(shipped_graphs() / "tasks" / "in_situ_12cm.yaml"))
+    found = PlanLibrary(ROBOT).find(read_task(shipped_folder() / "tasks" / "in_situ_12cm.yaml"))
     assert found is not None
     return found
 
@@ -62,3 +63,25 @@ def test_only_the_results_used_last_are_kept():
         kept.get(key, lambda key=key: key)
     assert kept.get(0, lambda: -1) == -1
     assert kept.get(once.KEPT, lambda: -1) == once.KEPT
+
+
+@pytest.mark.parametrize("task", ["in_situ_12cm", "hops_forward_10"])
+def test_a_later_process_finds_the_very_table(task, monkeypatch):
+    plan = PlanLibrary(ROBOT).find(read_task(shipped_folder() / "tasks" / f"{task}.yaml"))
+    made = reference_table(plan, ROBOT, 0.2)
+    monkeypatch.setattr(once, "_tables", once.Kept())
+    once.reference_table_once(plan, ROBOT, 0.2)
+    monkeypatch.setattr(once, "_tables", once.Kept())
+    monkeypatch.setattr(once, "reference_table", None)  # not needed any more
+    found = once.reference_table_once(plan, ROBOT, 0.2)
+    assert {**vars(found), "time": 0, "columns": 0, "contact": 0} == {
+        **vars(made), "time": 0, "columns": 0, "contact": 0,
+    }  # fmt: skip
+    assert found.time.tobytes() == made.time.tobytes()
+    assert list(found.columns) == list(made.columns)
+    for name, values in made.columns.items():
+        assert found.columns[name].shape == values.shape
+        assert found.columns[name].tobytes() == values.tobytes()
+    assert bool(made.later_jumps) == (task == "hops_forward_10")
+    assert (found.contact is None) == (made.contact is None)
+    assert made.contact is None or np.array_equal(found.contact, made.contact)

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
+from aloft.mathematics.arrays import Array
 from aloft.robots.identification.delay import identify_delay
 from aloft.robots.identification.rigid_body import IdentificationError
 
 PERIOD = 0.002
 FINE = 20
-Array = NDArray[np.float64]
 
 
 def measured(commanded: Array, delay: float) -> Array:

@@ -27,6 +27,9 @@ class Unfinished(Base):
     @abstractmethod
     def emit(self): ...
 
+class Common(Whole, ABC):
+    """There is nothing to fill in, but it says that it is a base."""
+
 class NoPort(aloft.Block):
     def step(self): ...
 
@@ -48,6 +51,7 @@ def test_classes(tmp_path: Path) -> None:
     assert found["Base"].has_ports and not found["Base"].has_machine
     assert found["Whole"].bases == ("Base",) and found["Whole"].has_machine
     assert found["Late"].bases == ("Other", "Generic")
+    assert found["Common"].is_abstract and not found["Whole"].is_abstract
     assert found["Unfinished"].is_abstract and found["Unrelated"].has_ports
 
 

@@ -1,0 +1,114 @@
+"""Arrays are computed once for the same key, come back bit by bit, and are never needed."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from aloft.mathematics import kept_arrays as module
+from aloft.mathematics.kept_arrays import kept_arrays, kept_folder
+
+
+@pytest.fixture(autouse=True)
+def _own_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+
+
+class Computation:
+    """Gives arrays and counts how often."""
+
+    def __init__(self) -> None:
+        self.calls = 0
+        self.arrays = {
+            "file": np.array([0.1, -0.0, np.inf, 1e-310]),
+            "column b": np.eye(3)[:, ::-1],
+            "flags": np.array([[True, False]]),
+            "none": np.zeros((0, 3)),
+        }
+
+    def __call__(self) -> dict[str, np.ndarray]:
+        self.calls += 1
+        return self.arrays
+
+
+def same(found, expected) -> bool:
+    return list(found) == list(expected) and all(
+        found[name].dtype == array.dtype
+        and found[name].shape == array.shape
+        and found[name].tobytes() == array.tobytes()
+        for name, array in expected.items()
+    )
+
+
+def test_the_same_bits_come_back_without_computing_them_again() -> None:
+    compute = Computation()
+    for _ in range(3):
+        assert same(kept_arrays(b"key", compute), compute.arrays)
+    assert compute.calls == 1
+
+
+def test_another_key_or_processor_is_computed_by_itself(monkeypatch: pytest.MonkeyPatch) -> None:
+    compute = Computation()
+    kept_arrays(b"key", compute)
+    kept_arrays(b"other", compute)
+    monkeypatch.setattr(module, "processor", lambda: b"another one")
+    kept_arrays(b"key", compute)
+    assert compute.calls == 3
+
+
+def test_the_processor_is_known_by_what_numpy_may_use() -> None:
+    features = np._core._multiarray_umath.__cpu_features__
+    named = module.processor().decode()
+    assert all((f"'{name}'" in named) == present for name, present in features.items())
+
+
+@pytest.mark.parametrize("damage", [b"", b"damaged", None])
+def test_a_damaged_file_is_made_anew(damage: bytes | None) -> None:
+    compute = Computation()
+    kept_arrays(b"key", compute)
+    (file,) = kept_folder().iterdir()
+    content = bytearray(file.read_bytes())
+    content[200] ^= 1  # within the numbers of the first array, which the file's checksum covers
+    file.write_bytes(bytes(content) if damage is None else damage)
+    assert same(kept_arrays(b"key", compute), compute.arrays)
+    assert same(kept_arrays(b"key", compute), compute.arrays)
+    assert compute.calls == 2
+
+
+def test_without_a_place_they_are_computed_every_time(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "file").write_text("in the way")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
+    compute = Computation()
+    for _ in range(2):
+        assert same(kept_arrays(b"key", compute), compute.arrays)
+    assert compute.calls == 2
+
+
+def test_nothing_is_kept_of_an_error() -> None:
+    def fail() -> dict[str, np.ndarray]:
+        raise ValueError("no")
+
+    with pytest.raises(ValueError, match="no"):
+        kept_arrays(b"key", fail)
+    assert not kept_folder().exists()
+
+
+def test_those_used_last_are_kept(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "MOST_FILES", 3)
+    compute = Computation()
+    for number in range(3):
+        kept_arrays(b"%d" % number, compute)
+        for file in kept_folder().iterdir():  # a while passes
+            os.utime(file, (file.stat().st_atime, file.stat().st_mtime - 10.0))
+    kept_arrays(b"0", compute)
+    kept_arrays(b"3", compute)
+    assert compute.calls == 4
+    kept_arrays(b"0", compute)
+    assert compute.calls == 4
+    kept_arrays(b"1", compute)
+    assert compute.calls == 5
