@@ -45,3 +45,22 @@ def allocates(values: np.ndarray) -> None:
 
 def unmarked(values: np.ndarray) -> None:
     values[0] = 1.0
+
+
+@kernel
+def add_up_to(last: int, first: int, values: np.ndarray) -> float:
+    total = 0.0
+    for i in range(first, last):
+        total += float(values[i])
+    return total
+
+
+@kernel
+def total_of_positive(values: np.ndarray, out: np.ndarray) -> None:
+    count, first = 0, 0
+    for value in values:
+        if value > 0.0:
+            count += 1
+        elif count == 0:
+            first += 1
+        out[0] = add_up_to(count, first, values)
