@@ -9,6 +9,7 @@ the ground follow from the robot:
 - feet may hit the ground with speed, but the impulse has a high weight in the cost;
 - the torso's orientation and the forces have high weights, so that the robot squats no deeper than it must;
 - the last sixth of the thrust is done on the toes, which lengthens the legs by the foot;
+- until lift-off every contact point on the ground bears some load, so that the feet stay flat;
 - from touchdown on the torso leans little and the knees are bent; joints keep off their limits.
 
 A parameter that the task sets is kept: ``effort``, ``impact``, ``phases``, a time, or any single one of
@@ -48,6 +49,8 @@ LANDING_LEAN, KNEE_BEND, JOINTS = 0.1, 0.4, 0.06
 STEP, STEP_HEIGHT, FOOT_CLEARANCE = 0.012, 0.05, 0.12
 """m from a step, how much more for each m that it goes up or down, and the feet's height in the middle of
 the flight as a share of that of the centre of mass."""
+LOAD = 0.4
+"""The share of the weight that the ground bears until lift-off."""
 SQUAT_LEAN, FAR = 0.9, 1.2
 """rad, and from which distance ahead on, as a multiple of the centre of mass's height."""
 STEP_LEAN = 0.85
@@ -211,6 +214,10 @@ def _margins(task: Asked, robot: RobotDescription) -> Iterator[Choice]:
     elif "squat_lean" not in said and onto:
         why = "the torso lies down in front of a step, as the calves keep away from it"
         yield Choice("margins.squat_lean", STEP_LEAN, why)
+    if "load" not in said:
+        yield Choice(
+            "margins.load", LOAD, "it does not squat so fast that its feet lose the ground"
+        )
     if "landing_lean" not in said:
         yield Choice("margins.landing_lean", LANDING_LEAN, "it lands upright")
     knees = knee_limits(robot, KNEE_BEND)

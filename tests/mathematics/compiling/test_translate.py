@@ -17,5 +17,5 @@ def test_a_kernel_is_not_compiled_again_for_a_variable_that_begins_as_zero() -> 
     found = translator._dispatchers
     assert {name.rpartition(".")[2]: len(d.overloads) for name, d in found.items()} == {
         "total_of_positive": 1,
-        "add_up_to": 1,
+        "next_positive": 1,
     }

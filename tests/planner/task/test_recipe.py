@@ -35,7 +35,7 @@ def test_every_choice_says_why() -> None:
     found = choices(make_task(ASKED), BRUCE)
     assert [each.parameter for each in found] == [
         "impact", "effort", "knots", "phases", "weights.force", "weights.orientation", "weights.impulse",
-        "margins.landing_lean", "margins.landing_limits", "margins.joints",
+        "margins.load", "margins.landing_lean", "margins.landing_limits", "margins.joints",
     ]  # fmt: skip
     assert all(each.why for each in found)
     assert "asks for 0.75" in found[1].why

@@ -8,15 +8,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...blocks.signals import Phase
-from ...mathematics.arrays import Array
-from ...mathematics.constants import GRAVITY
-from ...robots.description import RobotDescription
-from ...robots.kinematics import matrices_of_quaternions
-from ..models.exact_dynamics import ExactDynamics
-from ..models.midpoint import angular_motion, euler_angles, euler_rates, rotation
-from ..models.quaternions import product
-from ..task.plan import JumpPlan
+from aloft.blocks.signals import Phase
+from aloft.mathematics.arrays import Array
+from aloft.mathematics.constants import GRAVITY
+from aloft.planner.models.exact_dynamics import ExactDynamics
+from aloft.planner.models.midpoint import angular_motion, euler_angles, euler_rates, rotation
+from aloft.planner.models.quaternions import product
+from aloft.planner.task.plan import JumpPlan
+from aloft.robots.description import RobotDescription
+from aloft.robots.kinematics import matrices_of_quaternions
 
 WEIGHT = np.array([0.0, 0.0, -GRAVITY])
 
