@@ -105,6 +105,23 @@ def svg_text(figure: Figure) -> str:
     return "\n".join(line.rstrip() for line in buffer.getvalue().splitlines()) + "\n"
 
 
+_DARK = {"#ffffff": "#14191f", INK: "#e6eaee", FAINT: "#9aa7b3", PALE: "#38424c"}
+"""What the colours of backgrounds, text and lines become on a dark screen."""
+
+
+def light_and_dark(text: str) -> str:
+    """An SVG file of ``svg_text`` that is dark where its reader's screen is."""
+    rules = [
+        f'[style*="{what}: {light}"]{{{what}:{dark}!important}}'
+        for light, dark in _DARK.items()
+        for what in ("fill", "stroke")
+    ]
+    rules.append(f"text:not([style*=fill]){{fill:{_DARK[INK]}}}")
+    sheet = f"<style>@media (prefers-color-scheme:dark){{{''.join(rules)}}}</style>"
+    head, end, rest = text.partition("<defs>")
+    return f"{head}{sheet}\n {end}{rest}"
+
+
 def image(figure: Figure) -> Image:
     """The figure as a picture of ``DPI`` pixels per inch."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg

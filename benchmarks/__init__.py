@@ -44,6 +44,8 @@ SEEDED = ("frontier", "link_delays")
 """Those that can be told the ``seeds`` of the trial to run with."""
 TIMED = ("recorder",)
 """Those that can be told how many ``seconds`` to run in real time."""
+PEERED = ("tick",)
+"""Those that can be told where TSID is (``tsid``), and ``since`` which commit to compare."""
 LINKED = ("link_delays",)
 """Those that can be told the ``jitter`` [s] of messages and the share of them that is lost (``loss``)."""
 
@@ -51,11 +53,12 @@ LINKED = ("link_delays",)
 def run_benchmarks(
     names: Iterable[str] | None = None, seconds: float | None = None,
     count: int | None = None, seed: int | None = None, seeds: Sequence[int] | None = None,
-    jitter: float | None = None, loss: float | None = None,
+    jitter: float | None = None, loss: float | None = None, tsid: str | None = None,
+    since: str | None = None,
 ) -> dict[str, Any]:  # fmt: skip
     """Run the named benchmarks, by default all but those in ``LONG``; ``seconds`` is for those in
     ``TIMED``, ``count`` and ``seed`` for those in ``COUNTED``, ``seeds`` for those in ``SEEDED``,
-    ``jitter`` [s] and ``loss`` for those in ``LINKED``.
+    ``jitter`` [s] and ``loss`` for those in ``LINKED``, ``tsid`` and ``since`` for those in ``PEERED``.
 
     Returns:
         ``machine``, ``load`` (averages before and after) and ``rows``, as plain data for JSON.
@@ -71,7 +74,8 @@ def run_benchmarks(
     rows = []
     for name in chosen:
         told = {"seconds": (seconds, TIMED), "count": (count, COUNTED), "seed": (seed, COUNTED),
-                "seeds": (seeds, SEEDED), "jitter": (jitter, LINKED), "loss": (loss, LINKED)}  # fmt: skip
+                "seeds": (seeds, SEEDED), "jitter": (jitter, LINKED), "loss": (loss, LINKED),
+                "tsid": (tsid, PEERED), "since": (since, PEERED)}  # fmt: skip
         given = {k: v for k, (v, known) in told.items() if v is not None and name in known}
         rows += BENCHMARKS[name](**given)
     return {

@@ -10,30 +10,42 @@ import gc
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from pathlib import Path
+from types import ModuleType
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..blocks.control.dynamics import Dynamics
 from ..blocks.control.whole_body_controller import WholeBodyController
 from ..blocks.control.whole_body_program import WholeBodyProgram
 from ..mathematics.whole_body_qp import joint_torque
-from ..runtime.running.timing import block_times
-from .rows import Row, compare
+from .rows import Row
 from .tick_controller import HandWrittenLoop, RecordedController, RecordedJump, record_jump
 from .tick_process import busy_wait_row, process_row
 from .tick_programs import DaqpProgram, OsqpController, OsqpProgram, PeerProgram
-
-PLAIN = "controller, plain Python"
-COMPILED = "controller, kernels one by one"
-FUSED = "controller, fused"
-OSQP = "controller, kernels one by one, whole-body program by OSQP"
-BARE = "controller, no times, checks or record"
-HAND = "hand-written loop of the same bodies"
-QP, QP_OSQP, QP_DAQP = "whole-body program", "the same by OSQP", "the same by DAQP"
-WHOLE_BODY = "state to torque"
-WHOLE_BODY_OSQP = "state to torque, OSQP"
-STATE_TO_TORQUE = ("dynamics", "wbc")
-"""The blocks from the estimated state to torques."""
+from .tick_rows import (
+    BARE,
+    COMPILED,
+    FUSED,
+    HAND,
+    OSQP,
+    PLAIN,
+    QP,
+    QP_DAQP,
+    QP_OSQP,
+    TSID,
+    Times,
+    block_rows,
+    controller_rows,
+    earlier_rows,
+    program_rows,
+    state_to_torque_rows,
+    tsid_rows,
+)  # fmt: skip
+from .tick_since import EarlierController
+from .tick_tsid import TsidController, TsidProgram, import_tsid
+from .tick_tsid_check import TsidCheck
 
 CHUNK = 50
 PLAIN_TICKS = 200
@@ -44,21 +56,31 @@ ROUNDS = 5
 """Turns of the solvers in each of these states, of which the median counts."""
 TORQUE_ERROR = 1e-6
 """How much the torques of two exact methods may differ [N m]."""
-Times = dict[str, NDArray[np.float64]]
 
 
-def tick(rounds: int = 3, ticks: int | None = None, process: bool = True) -> list[Row]:
+def tick(
+    rounds: int = 3,
+    ticks: int | None = None,
+    process: bool = True,
+    tsid: str = "",
+    since: str = "",
+) -> list[Row]:
     """The rows.
 
     Args:
         rounds: how often the jump is run again; plain Python takes part in the first ticks of the first round only.
         ticks: how much of the jump is used; by default all.
         process: whether the whole process and the loop in real time are measured as well.
+        tsid: a folder with the wheels of TSID, which is a peer then (``tick_tsid``).
+        since: a commit whose controller is a peer as well (``tick_since``).
 
     Raises:
+        AloftError: TSID or the commit is not there.
         AssertionError: the controller computes something else than in the recorded jump, or the
             methods that are exact do not agree.
     """
+    module = import_tsid(Path(tsid)) if tsid else None  # before anything imports Pinocchio
+    earlier = EarlierController(since) if since else None
     jump = record_jump(ticks)
     own, plain = RecordedController(jump, fuse=False), RecordedController(jump, plain=True)
     fused = RecordedController(jump)
@@ -68,23 +90,34 @@ def tick(rounds: int = 3, ticks: int | None = None, process: bool = True) -> lis
     programs = _programs(own, with_osqp=not missing)
     if not missing:
         cases[OSQP] = _osqp_controller(jump)
+    check = None
+    if module is not None:
+        cases[TSID], check = _tsid_controller(jump, module), TsidCheck(module, fused)
     for case in cases.values():  # warm, and what OSQP must know beforehand
-        case.run(jump.ticks, programs.learn if case is own else None)
+        shown = check.compare if check is not None and case is fused else None
+        case.run(jump.ticks, programs.learn if case is own else shown)
+    before: list[dict[str, float]] = []
     with _quiet():
         for number in range(rounds):
             running = {PLAIN: plain, **cases} if number == 0 else cases
             _one_round(jump, running, programs if number == 0 else None)
+            if earlier is not None:
+                before.append(earlier.run())
+    if earlier is not None:
+        earlier.close()
     times = {name: np.array(case.times[-rounds * jump.ticks :]) for name, case in cases.items()}
     of_first = {PLAIN: np.array(plain.times), COMPILED: times[COMPILED][: len(plain.times)]}
     rows = [
-        *_block_rows(own, "block "),
-        *_block_rows(fused, "fused block "),
-        *(_block_rows(cases[OSQP], "OSQP block ") if OSQP in cases else []),
-        *_controller_rows(times, of_first, missing),
+        *block_rows(own, "block "),
+        *block_rows(fused, "fused block "),
+        *(block_rows(cases[OSQP], "OSQP block ") if OSQP in cases else []),
+        *(block_rows(cases[TSID], "TSID block ") if TSID in cases else []),
+        *controller_rows(times, of_first, missing),
     ]
-    rows += _program_rows(programs.times, missing)
-    rows += _state_to_torque_rows(own, cases.get(OSQP), missing)
-    rows.append(Row("the controller in TSID", None, "us/tick", COMPILED, note="not measured here"))
+    rows += program_rows(programs.times, missing)
+    rows += state_to_torque_rows(fused, cases.get(OSQP), missing)
+    rows += tsid_rows(times, fused, cases.get(TSID), check)
+    rows += earlier_rows(times, before, since)
     if process:
         rows += [process_row(jump), busy_wait_row(jump)]
     return rows
@@ -185,6 +218,15 @@ def _osqp_controller(jump: RecordedJump) -> RecordedController:
     return controller
 
 
+def _tsid_controller(jump: RecordedJump, tsid: ModuleType) -> RecordedController:
+    """The controller with TSID, whose model has the described mass."""
+    controller = RecordedController(jump, fuse=False, instead={"wbc": TsidController})
+    block, dynamics = controller.bound.blocks["wbc"], controller.bound.blocks["dynamics"]
+    assert isinstance(block, TsidController) and isinstance(dynamics, Dynamics)
+    block.use(TsidProgram(tsid, block, dynamics.base.orientation))
+    return controller
+
+
 def _hot(body: Callable[[], object]) -> float:
     """Microseconds of a call that follows two others, as in a loop that does nothing else."""
     body()
@@ -192,96 +234,6 @@ def _hot(body: Callable[[], object]) -> float:
     start = time.perf_counter_ns()
     body()
     return (time.perf_counter_ns() - start) * 1e-3
-
-
-def _block_rows(controller: RecordedController, prefix: str) -> list[Row]:
-    """The median time of every block, in the order in which they run."""
-    programs = controller.ticker.programs
-    for program in programs:
-        program.fold()
-    order = controller.bound.graph.order
-    return [Row(f"{prefix}{p}", block_times(programs, p).p50_us, "us/tick") for p in order]
-
-
-def _controller_rows(times: Times, of_first: Times, missing: str) -> list[Row]:
-    rows = [
-        compare(PLAIN, of_first, COMPILED),
-        Row(COMPILED, float(np.median(times[COMPILED])), "us/tick"),
-        compare(FUSED, times, COMPILED),
-        Row(HAND, float(np.median(times[HAND])), "us/tick"),
-        compare(BARE, times, HAND, floor=1.05, goal=1.02, note="the scheduler's share"),
-    ]
-    if missing:
-        return [*rows, Row(OSQP, None, "us/tick", COMPILED, note=missing)]
-    limits = {COMPILED: (1 / 8, 1 / 12), FUSED: (1 / 20, 1 / 30)}
-    return [
-        *rows,
-        Row(OSQP, float(np.median(times[OSQP])), "us/tick"),
-        *(
-            compare(
-                f"{name}, beside OSQP",
-                {**times, f"{name}, beside OSQP": times[name]},
-                OSQP,
-                floor=floor,
-                goal=goal,
-            )
-            for name, (floor, goal) in limits.items()
-        ),
-    ]
-
-
-def _program_rows(times: Times, missing: str) -> list[Row]:
-    """From model terms to accelerations, forces and torques."""
-    if QP not in times:
-        return []
-    rows = [compare(f"{QP}, beside DAQP", {**times, f"{QP}, beside DAQP": times[QP]}, QP_DAQP,
-                    floor=1 / 1.8, goal=1 / 2.5, note="DAQP without its assembly, from its own answer")]  # fmt: skip
-    rows.append(Row(QP_DAQP, float(np.median(times[QP_DAQP])), "us/tick"))
-    if missing:
-        return [*rows, Row(QP_OSQP, None, "us/tick", QP, note=missing)]
-    name = f"{QP}, beside OSQP"
-    return [
-        *rows,
-        compare(
-            name,
-            {**times, name: times[QP]},
-            QP_OSQP,
-            floor=1 / 25,
-            goal=1 / 40,
-            note="OSQP at 1e-3 as in BRUCE's code, without its assembly, from its own answer",
-        ),
-        Row(QP_OSQP, float(np.median(times[QP_OSQP])), "us/tick"),
-    ]
-
-
-def _state_to_torque_rows(
-    own: RecordedController, osqp: RecordedController | None, missing: str
-) -> list[Row]:
-    """The dynamics and the whole-body controller, tasks included."""
-    value = _sum_of(own)
-    if osqp is None:
-        return [Row(WHOLE_BODY, value, "us/tick", WHOLE_BODY_OSQP, note=missing)]
-    other = _sum_of(osqp)
-    return [
-        Row(
-            WHOLE_BODY,
-            value,
-            "us/tick",
-            WHOLE_BODY_OSQP,
-            value / other,
-            1 / 55,
-            floor=1 / 30,
-            note="dynamics compiled in both",
-        ),
-        Row(WHOLE_BODY_OSQP, other, "us/tick"),
-    ]
-
-
-def _sum_of(controller: RecordedController) -> float:
-    programs = controller.ticker.programs
-    for program in programs:
-        program.fold()
-    return sum(block_times(programs, path).p50_us for path in STATE_TO_TORQUE)
 
 
 def _missing(package: str) -> str:

@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from ..plotting import COLOURS, FAINT, INK, PALE, new_figure, style, svg_text
+from ..plotting import COLOURS, FAINT, INK, PALE, light_and_dark, new_figure, style, svg_text
 
 BARS = (
     ("fused block ", "fused"),
     ("block ", "kernels one by one"),
+    ("TSID block ", "whole-body controller in TSID"),
     ("OSQP block ", "whole-body program by OSQP"),
+    ("old block ", "at an earlier commit"),
 )
 """The bars from the top down: how the names of their rows begin, and what is written beside them."""
 SMALL = 0.04
@@ -18,7 +20,7 @@ SMALL = 0.04
 
 
 def tick_chart(rows: Sequence[Mapping[str, Any]]) -> str:
-    """The chart as SVG text, from the rows of ``aloft bench tick``: a bar of stacked blocks for each
+    """The chart as SVG text, light or dark as its reader's screen is, from the rows of ``aloft bench tick``: a bar of stacked blocks for each
     way, those that take longest first, in microseconds; a broken bar has its sum beside it."""
     bars = [(label, _pieces(rows, prefix)) for prefix, label in BARS]
     bars = [(label, pieces) for label, pieces in bars if pieces]
@@ -34,9 +36,9 @@ def tick_chart(rows: Sequence[Mapping[str, Any]]) -> str:
             lefts, widths = [], []
             for _, pieces in bars:
                 before = named[: named.index(block)] if block else named
-                lefts.append(sum(pieces[b] for b in before))
+                lefts.append(sum(pieces.get(b, 0.0) for b in before))
                 rest = sum(pieces.values()) - lefts[-1]
-                widths.append(pieces[block] if block else rest)
+                widths.append(pieces.get(block, 0.0) if block else rest)
             axes.barh(
                 range(len(bars)), widths, 0.62, lefts, color=colours.get(block, PALE),
                 label=block or "the others",
@@ -53,7 +55,7 @@ def tick_chart(rows: Sequence[Mapping[str, Any]]) -> str:
         axes.margins(x=0.1)
         axes.set_xlabel("medians of the blocks [us]")
         axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=7, fontsize=8)
-        return svg_text(figure)
+        return light_and_dark(svg_text(figure))
 
 
 def _pieces(rows: Sequence[Mapping[str, Any]], prefix: str) -> dict[str, float]:

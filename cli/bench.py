@@ -38,12 +38,18 @@ def bench(
     loss: Annotated[
         str, typer.Option(help="The share of messages that 'link_delays' loses: '5 %'.")
     ] = "",
+    tsid: Annotated[
+        str, typer.Option(help="The folder with the wheels of TSID, a peer of 'tick'.")
+    ] = "",
+    since: Annotated[
+        str, typer.Option(help="A commit whose controller 'tick' measures as well: '65ca00c'.")
+    ] = "",
     as_json: Annotated[
         bool, typer.Option("--json", help="Tables go to standard error, one JSON object to output.")
     ] = False,
 ) -> None:
     """Measure the runtime beside hand-written loops and peers; exit with 1 if a goal is missed."""
-    from ..benchmarks import BENCHMARKS, COUNTED, LINKED, SEEDED, TIMED, run_benchmarks
+    from ..benchmarks import BENCHMARKS, COUNTED, LINKED, PEERED, SEEDED, TIMED, run_benchmarks
     from ..studies.batch.seeds import parse_seeds
 
     out = console(to_stderr=as_json)
@@ -62,12 +68,24 @@ def bench(
             raise AloftError(
                 f"--jitter and --loss are for {', '.join(LINKED)}, not for {name or 'all'}"
             )
+        if (tsid or since) and name not in PEERED:
+            raise AloftError(
+                f"--tsid and --since are for {', '.join(PEERED)}, not for {name or 'all'}"
+            )
         chosen = parse_seeds(seeds) if seeds else None
         longer = _number("--jitter", jitter, "s", 1.0, "'1 ms', up to a second")
         lost = _number("--loss", loss, "1", 0.999, "'5 %', less than all")
         with out.status("measuring"):
             results = run_benchmarks(
-                [name] if name else None, seconds, count, seed, chosen, longer, lost
+                [name] if name else None,
+                seconds,
+                count,
+                seed,
+                chosen,
+                longer,
+                lost,
+                tsid or None,
+                since or None,
             )
     print_results(out, results)
     if as_json:

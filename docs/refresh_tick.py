@@ -1,8 +1,8 @@
-"""Writes the table of one tick into the page of compiled kernels, and draws its picture.
+"""Writes the tables of one tick into the page of compiled kernels and into README, and draws the picture.
 
 ::
 
-    aloft bench tick --json > tick.json
+    aloft bench tick --tsid FOLDER --since 65ca00c --json > tick.json
     python docs/refresh_tick.py tick.json
 """
 
@@ -19,6 +19,7 @@ from marks import refresh
 from aloft.benchmarks.tick_chart import BARS, tick_chart
 
 PAGE = Path(__file__).parent / "compiled.md"
+README = PAGE.parent.parent / "README.md"
 PICTURE = "tick.svg"
 
 
@@ -41,7 +42,9 @@ def tick_tables(found: Mapping[str, Any]) -> str:
         "|---|" + "---|" * len(shown),
     ]
     for block in blocks["block "]:
-        cells = (f"{blocks[prefix][block]:.1f}" for prefix, _ in shown)
+        cells = (
+            f"{blocks[prefix][block]:.1f}" if block in blocks[prefix] else "" for prefix, _ in shown
+        )
         lines.append(f"| `{block}` | {' | '.join(cells)} |")
     lines += [
         "",
@@ -74,7 +77,20 @@ def _line(row: Mapping[str, Any]) -> str:
     return f"| {' | '.join([*cells, '; '.join(filter(None, (met, row['note'])))])} |"
 
 
+def short_table(found: Mapping[str, Any]) -> str:
+    """Only the ratios that have a goal, with the picture."""
+    lines = [
+        f"![The blocks of one tick beside its peers](docs/{PICTURE})",
+        "",
+        "| | median | as many times as fast as | times | floor | goal | |",
+        "|---|" + "---|" * 6,
+        *(_line(row) for row in found["rows"] if row["goal"] is not None),
+    ]
+    return "\n".join(lines) + "\n"
+
+
 if __name__ == "__main__":
     result = json.loads(Path(sys.argv[1]).read_text())
     refresh(PAGE, "tick", tick_tables(result))
+    refresh(README, "tick", short_table(result))
     PAGE.with_name(PICTURE).write_text(tick_chart(result["rows"]))

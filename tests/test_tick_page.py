@@ -41,10 +41,29 @@ def test_the_tables(script: ModuleType) -> None:
     assert "| period | 100 us |  |  | 250 us | 50 us | floor reached |" in page
 
 
+def test_readme_has_only_what_has_a_goal(script: ModuleType) -> None:
+    table = script.short_table(FOUND)
+    assert "![The blocks of one tick beside its peers](docs/tick.svg)" in table
+    assert "| controller, fused | 30 us | OSQP | 25 | 20 | 30 | floor reached |" in table
+    assert "| period | 100 us |" in table
+    assert "TSID" not in table and "`wbc`" not in table
+    page = script.README.read_text()
+    assert page.count("<!-- tick -->") == page.count("<!-- end of tick -->") == 1
+
+
+def test_an_earlier_commit_has_other_blocks(script: ModuleType) -> None:
+    rows = [*FOUND["rows"], Row("old block wbc", 200.0, "us/tick").to_json()]
+    assert "| `wbc` | 19.0 | 20.0 | 200.0 |" in script.tick_tables({**FOUND, "rows": rows})
+    assert "| `legs` | 9.0 | 10.0 |  |" in script.tick_tables({**FOUND, "rows": rows})
+    text = tick_chart(rows)
+    assert ">at an earlier commit<" in text and ">200 us<" in text
+
+
 def test_the_picture_has_every_large_block() -> None:
     text = tick_chart(FOUND["rows"])
     assert text == tick_chart(FOUND["rows"])
     for word in ("wbc", "legs", "the others", "kernels one by one", "28 us"):
         assert f">{word}<" in text
+    assert "prefers-color-scheme:dark" in text
     for word in ("step", "OSQP"):
         assert f">{word}<" not in text

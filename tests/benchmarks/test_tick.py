@@ -6,17 +6,7 @@ from importlib.util import find_spec
 import numpy as np
 import pytest
 
-from aloft.benchmarks.tick import (
-    BARE,
-    COMPILED,
-    FUSED,
-    HAND,
-    OSQP,
-    PLAIN,
-    QP_OSQP,
-    WHOLE_BODY,
-    tick,
-)  # fmt: skip
+from aloft.benchmarks.tick import tick
 from aloft.benchmarks.tick_controller import (
     OUTSIDE,
     HandWrittenLoop,
@@ -26,6 +16,17 @@ from aloft.benchmarks.tick_controller import (
 )  # fmt: skip
 from aloft.benchmarks.tick_process import late_share
 from aloft.benchmarks.tick_programs import OsqpController
+from aloft.benchmarks.tick_rows import (
+    BARE,
+    COMPILED,
+    FUSED,
+    HAND,
+    OSQP,
+    PLAIN,
+    QP_OSQP,
+    WHOLE_BODY,
+    WHOLE_BODY_TSID,
+)  # fmt: skip
 
 
 @pytest.fixture(scope="module")
@@ -40,6 +41,8 @@ def test_rows_are_complete_and_say_what_is_missing() -> None:
         assert rows[name].value or "not installed" in rows[name].note
     assert not {f"block {path}" for path in OUTSIDE} & set(rows)
     assert (rows[BARE].peer, rows[BARE].floor, rows[BARE].goal) == (HAND, 1.05, 1.02)
+    assert "aloft bench tick --tsid" in rows[WHOLE_BODY_TSID].note
+    assert "--since COMMIT" in rows["controller of an earlier commit"].note
     assert rows["whole-body program, beside DAQP"].floor == pytest.approx(1 / 1.8)
     installed = find_spec("osqp") is not None
     assert (rows[QP_OSQP].value is not None) == installed

@@ -45,3 +45,9 @@ def allocates(values: np.ndarray) -> None:
 
 def unmarked(values: np.ndarray) -> None:
     values[0] = 1.0
+
+
+@kernel
+def add_scaled(values: np.ndarray, factor: float, out: np.ndarray) -> None:
+    for i in range(out.shape[0]):
+        out[i] += float(values[i]) * factor
