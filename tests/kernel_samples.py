@@ -189,7 +189,7 @@ UNUSED = {
     ),
     "aloft.mathematics.flight_prediction.predict_tilt": (
         FLIGHT, np.array([0.1, -0.05, 0.02]), np.array([0.02, 0.03, -0.01]), NORMAL(12), 0.2,
-        np.array([1.0, 1.0, -1.0, -1.0]), np.zeros(2), np.zeros((2, 4)),
+        0.7, np.array([1.0, 1.0, -1.0, -1.0]), np.zeros(2), np.zeros((2, 4)),
     ),
     "aloft.mathematics.flight_prediction.choose_shift": (
         np.array([0.1, -0.05]), NORMAL((2, 4)), LANDING, np.zeros((4, 4)), np.zeros(4),
