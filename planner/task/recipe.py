@@ -28,6 +28,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from ...mathematics.constants import GRAVITY
+from ...mathematics.reproducible import product
 from ...robots.description import RobotDescription
 from ...runtime.language.parameters import Parameters
 from .margins import Margins
@@ -268,7 +269,7 @@ def demand(task: Asked, robot: RobotDescription) -> float:
         time = math.sqrt(2.0 * rise / GRAVITY) + math.sqrt(2.0 * (rise - up) / GRAVITY)
         speeds = np.array([hop.distance_x or 0.0, hop.distance_y or 0.0, hop.twist or 0.0]) / time
         shares = np.array([1.0, 3.0, (0.2 * height) ** 2])
-        along = float(shares @ speeds**2)
+        along = float(product(shares, speeds**2))
         found = max(found, (2.0 * GRAVITY * rise + along) / (GRAVITY * height))
     return found
 
