@@ -24,7 +24,7 @@ from contextlib import closing
 from pathlib import Path
 from typing import Any
 
-from ..planner.library.shipped import shipped_graphs
+from ..planner.library.shipped import shipped_folder
 from ..robots.description import find_robot
 from ..studies.batch.jobs import job_results
 from ..studies.expansion import load_cell
@@ -85,7 +85,7 @@ class _Keys:
     """What outcomes are kept under: code and graph, then the task by its hash."""
 
     def __init__(self) -> None:
-        graphs = shipped_graphs()
+        graphs = shipped_folder()
         trial = graphs / "trials" / "robust.yaml"
         graph = load_cell(graphs / "jump.yaml", [trial], {}, graphs / "bench.yaml")
         text = f"{code_fingerprint()}\n{graph.checked.text}"

@@ -19,7 +19,7 @@ import numpy as np
 
 from ..planner.checking.validity import InvalidPlanError
 from ..planner.library.library import PlanLibrary, solve_and_check
-from ..planner.library.shipped import shipped_graphs
+from ..planner.library.shipped import shipped_folder
 from ..planner.solving.bounded import cpu_time
 from ..planner.task.errors import PlanError, TaskError
 from ..planner.task.task import JumpTask
@@ -103,7 +103,7 @@ def plan_and_run(job: JumpJob) -> list[tuple[str, Outcome]]:
 
 def run_once(job: JumpJob, seed: int) -> Outcome:
     """One run of a planned task in the robust trial."""
-    graphs = shipped_graphs()
+    graphs = shipped_folder()
     given = job.task.model_dump(mode="json", exclude_unset=True)
     sets: dict[str, Any] = {
         "plan.task": given, "plan.library": str(job.folder.absolute()), "robot.seed": seed,

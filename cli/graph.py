@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -11,6 +11,7 @@ import typer
 from ..runtime.language.errors import AloftError
 from .completion import parameter_names
 from .output import SET_HELP, console, errors_reported, print_json, say, table
+from .top import As, Keys, Local
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -51,6 +52,9 @@ def graph(
     running: Annotated[
         str, typer.Option("--run", help="With --live: the name of the run, if there are several.")
     ] = "",
+    keys: Keys = None,
+    name: As = "viewer",
+    local: Local = 0,
     closed: Annotated[
         list[str] | None,
         typer.Option("--closed", help="A sub-graph whose box the diagram keeps closed, or 'all'."),
@@ -60,7 +64,8 @@ def graph(
 
     With --svg, --png or --web, draw the blocks with their ports and wires. The page of a recording
     (RUN.rrd --web) has a slider for the time, and shows the values that a chosen block reads and writes
-    then. With --live the page shows a running graph: values, times of blocks and what is late, now.
+    then. With --live the page shows a running graph: values, times of blocks and what is late, now; of a
+    graph on several machines all parts, with --keys, --as and --local as for `aloft top`.
     """
     from ..runtime.loading import load, picture
     from ..runtime.placement.picture import placement_json
@@ -70,7 +75,7 @@ def graph(
         if as_table + mermaid + flat + as_json + (web or live) > 1:
             raise AloftError("choose one of --table, --mermaid, --flat, --json and --web")
         if live:
-            serve_running(graph, running)
+            serve_running(graph, running, overrides or [], keys, name, local)
             return
         if graph is None or running:
             raise AloftError(
@@ -152,13 +157,25 @@ def serve(graph: CheckedGraph, values: Values | None = None) -> None:
         server.server_close()
 
 
-def serve_running(graph: Path | None, name: str) -> None:
-    """Show a running graph in a browser until Ctrl-C is pressed. Raises ``AloftError``."""
-    from .live import open_live_run, serve_live
+def serve_running(
+    graph: Path | None,
+    running: str,
+    overrides: Sequence[str],
+    keys: Path | None,
+    name: str,
+    local: int,
+) -> None:
+    """Show a running graph in a browser until Ctrl-C is pressed; see ``cli.live``.
+
+    Raises:
+        AloftError: it does not run.
+    """
+    from .live import Elsewhere, open_live_run, serve_live
 
     if graph is not None and graph.suffix not in (".yaml", ".yml"):
         raise AloftError(f"--live is for a graph that is running; {graph} is none")
-    serve_live(open_live_run(name or (graph.stem if graph is not None else "")))
+    elsewhere = None if graph is None else Elsewhere(graph, overrides, keys, name, local)
+    serve_live(open_live_run(running, elsewhere))
 
 
 def print_table(out: Console, graph: CheckedGraph) -> None:

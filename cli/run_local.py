@@ -116,7 +116,8 @@ def _run_processes(
         stack.enter_context(registered(path, settings))
         running: dict[str, subprocess.Popen[str]] = {}
         for number, (machine, file) in enumerate(files.items()):
-            params = wishes.params if wishes.params and number == 0 else "none"
+            # the first part answers for the run, which one in real time does by the graph's name
+            params = "none" if number else wishes.params
             command = [
                 sys.executable, "-m", "aloft", "run", str(path), *sets, "--machine", machine,
                 "--record", str(file), "--params", params, "--json", "--quiet",

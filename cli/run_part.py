@@ -12,6 +12,7 @@ from ..runtime.links.key_folder import check_endpoints, secured
 from ..runtime.links.part import BoundPart, run_part
 from ..runtime.links.showing import Showing
 from ..runtime.links.zenoh_transport import ZenohTransport
+from ..runtime.live.part_feed import PartFeed
 from ..runtime.placement.place import place
 from ..runtime.running.real_time import NO_WISHES, RealTime
 from ..runtime.running.run_result import RunResult
@@ -67,8 +68,9 @@ class Part:
         """Run the part once."""
         bound = self.bound
         showing = Showing(bound.machine, bound.transport, bound.others, bound.inboxes)
+        feed = PartFeed(bound.machine, bound.transport)
         self._result = run_part(
-            bound, sinks=[*sinks, showing], log=log, plain=plain, fuse=fuse,
+            bound, sinks=[*sinks, showing, feed], log=log, plain=plain, fuse=fuse,
             real_time=real_time,
         )  # fmt: skip
         return self._result

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from ..hal.simulated.parameters import SimulatorParameters
-from ..planner.library.shipped import shipped_graphs
+from ..planner.library.shipped import shipped_folder
 from ..runtime.language.errors import AloftError
 from ..runtime.loading.file_settings import settings_of
 
@@ -18,7 +18,7 @@ def trial_settings(trial: str, option: str = "--trial") -> dict[str, Any]:
     """
     if not trial:
         return {}
-    files = {file.stem: file for file in sorted((shipped_graphs() / "trials").glob("*.yaml"))}
+    files = {file.stem: file for file in sorted((shipped_folder() / "trials").glob("*.yaml"))}
     if trial not in files:
         raise AloftError(f"{option} {trial}: there is {', '.join(files)}")
     defaults = SimulatorParameters().model_dump(mode="json", round_trip=True)

@@ -142,7 +142,7 @@ class JumpPlan(KernelBlock):
     @classmethod
     def requires_of_graph(cls, params: Parameters, context: Context) -> Iterable[Misfit]:
         """Report a task that cannot be read, or is for another robot or actuator profile."""
-        from ...planner.library.shipped import shipped_graphs
+        from ...planner.library.shipped import shipped_tasks
         from ...planner.task.task import TaskError
 
         assert isinstance(params, cls.Params) and context.robot is not None
@@ -159,9 +159,7 @@ class JumpPlan(KernelBlock):
                 )
             return
         except LookupError as error:
-            there = sorted(
-                f"tasks/{path.name}" for path in (shipped_graphs() / "tasks").glob("*.yaml")
-            )
+            there = shipped_tasks()
             near = get_close_matches(str(params.task), there, 3)
             yield Misfit(
                 str(error.args[0]),
@@ -362,7 +360,7 @@ def read_or_make_task(wanted: str | Mapping[str, Any], context: Context) -> Jump
         LookupError: there is no file of that name beside the graph or among the shipped tasks.
         TaskError: it cannot be read as a task.
     """
-    from ...planner.library.shipped import shipped_graphs
+    from ...planner.library.shipped import find_task
     from ...planner.task.changed_task import changed_task, spoken_name
     from ...planner.task.read_task import read_task
     from ...planner.task.task import make_task
@@ -372,8 +370,5 @@ def read_or_make_task(wanted: str | Mapping[str, Any], context: Context) -> Jump
     if file is None:
         robot = {"robot": context.robot.name} if context.robot is not None else {}
         return spoken_name(make_task({"name": "", **robot, **changes}))
-    places = [folder / str(file) for folder in (context.folder, Path(), shipped_graphs())]
-    found = next((place for place in places if place.is_file()), None)
-    if found is None:
-        raise LookupError(f"there is no task {file!r} beside the graph or among the shipped ones")
+    found = find_task(str(file), context.folder, Path())
     return changed_task(found, changes) if changes else read_task(found)

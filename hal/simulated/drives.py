@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -39,8 +40,8 @@ class Commands(NamedTuple):
 
 
 class Joints(NamedTuple):
-    """What the drives of all joints read and give in a physics step: the count of the step, (1,),
-    whether a command has ``arrived`` in it, (1,), the ``position`` that their encoders read [rad], the ``velocity`` [rad/s] and the ``torque`` [N m],
+    """What the drives of all joints read and give in a physics step: the count of the step, without a
+    dimension, whether a command has ``arrived`` in it, (1,), the ``position`` that their encoders read [rad], the ``velocity`` [rad/s] and the ``torque`` [N m],
     each (n_joints,)."""
 
     step: Counts
@@ -61,7 +62,7 @@ def follow_commands(commands: Commands, released: Array, joints: Joints) -> None
     joints.arrived[0] = False
     while pending > 0:
         following = (active + 1) % commands.due.shape[0]
-        if commands.due[following] > joints.step[0]:
+        if commands.due[following] > joints.step[()]:
             break
         active, pending = following, pending - 1
         joints.arrived[0] = True
@@ -116,6 +117,55 @@ def drive_loops(
     drive_motors(joints.velocity, joints.torque, motors, scratch, record)
 
 
+class Given(NamedTuple):
+    """The fields of ``JointCommand``."""
+
+    mode: Counts
+    torque: Array
+    position: Array
+    velocity: Array
+    stiffness: Array
+    damping: Array
+
+
+class Way(NamedTuple):
+    """How long a command is on its way: ``shortest`` (1,) [s], and up to ``jitter`` [s] longer, as a
+    number ``drawn`` (1,) between zero and one says, in physics steps of ``timestep`` [s]."""
+
+    shortest: Array
+    jitter: float
+    drawn: Array
+    timestep: float
+
+
+@kernel
+def send_command(
+    given: Given, step: Counts, way: Way, commands: Commands, last_due: Counts
+) -> None:
+    """Put a command into the ring, behind those that are on their way.
+
+    ``step`` and ``last_due``, the arrival of the command sent last, have no dimension.
+    """
+    delay = float(way.shortest[0])
+    if way.jitter != 0.0:
+        delay += way.jitter * float(way.drawn[0])
+    due = int(step[()]) + math.ceil(delay / way.timestep - 1e-9)
+    due = max(due, int(last_due[()]))
+    pending = int(commands.pending[()])
+    slot = (int(commands.active[()]) + 1 + pending) % commands.due.shape[0]
+    targets = commands.targets
+    commands.mode[slot] = int(given.mode[()])
+    for k in range(given.torque.shape[0]):
+        targets.torque[slot, k] = given.torque[k]
+        targets.position[slot, k] = given.position[k]
+        targets.velocity[slot, k] = given.velocity[k]
+        targets.stiffness[slot, k] = given.stiffness[k]
+        targets.damping[slot, k] = given.damping[k]
+    commands.due[slot] = due
+    last_due[()] = due
+    commands.pending[()] = pending + 1
+
+
 class MotorLimits:
     """What ``drive_motors`` needs to limit joint torques to what the motors can do at their speed, and
     to record how near they come to it."""
@@ -135,16 +185,6 @@ class MotorLimits:
         self.record = MotorRecord(*(getattr(record, name) for name in MotorRecord._fields))
         self.motor_torque = self.scratch.torque
         """The motors' torques of the last step [N m], (n_joints,)."""
-
-
-class Row(NamedTuple):
-    """One command of the ring, each field (n_joints,)."""
-
-    torque: Array
-    stiffness: Array
-    damping: Array
-    position: Array
-    velocity: Array
 
 
 class Drives:
@@ -172,27 +212,27 @@ class Drives:
     ) -> None:
         self._feedback = feedback
         self._state = state
-        self._slots = len(state.due)
-        self._rows = [
-            Row(state.torque[k], state.stiffness[k], state.damping[k], state.position[k],
-                state.velocity[k])
-            for k in range(self._slots)
-        ]  # fmt: skip
         limits = MotorLimits(robot, record)
-        n = len(robot.joints)
-        joints = self._joints = Joints(
-            np.zeros(1, np.int64), np.zeros(1, np.bool_), *(np.zeros(n) for _ in range(3))
-        )
-        commands = Commands(
+        self._commands = Commands(
             state.active, state.pending, state.due, state.mode,
             Targets(*(getattr(state, name) for name in Targets._fields)),
         )  # fmt: skip
-        motors = limits.motors, limits.scratch, limits.record
-        if feedback is None:
-            self._drive = KernelCall(drive_joints, commands, damping, joints, *motors)
-        else:
-            loops = feedback.loops
-            self._drive = KernelCall(drive_loops, commands, damping, loops, joints, *motors)
+        self._damping = damping
+        self._motors = limits.motors, limits.scratch, limits.record
+
+    def torque_call(self, step: Counts, position: Array, velocity: Array, out: Array) -> KernelCall:
+        """Writes the joint torques [N m] during a physics step to ``out``, (n_joints,).
+
+        Args:
+            step: the count of the step, without a dimension.
+            position: the reading of the drives' own encoders [rad], (n_joints,).
+            velocity: the joint velocity [rad/s], (n_joints,).
+        """
+        joints = Joints(step, np.zeros(1, np.bool_), position, velocity, out)
+        first = self._commands, self._damping
+        if self._feedback is None:
+            return KernelCall(drive_joints, *first, joints, *self._motors)
+        return KernelCall(drive_loops, *first, self._feedback.loops, joints, *self._motors)
 
     def hold(self, position: Array, torque: Array, stiffness: Array, damping: Array) -> None:
         """Drop all commands and from now on hold the joints at a position with these gains.
@@ -219,32 +259,8 @@ class Drives:
         self._state.pending[()] = 0
         self._state.mode[int(self._state.active)] = CommandMode.DAMPING
 
-    def send(self, command: JointCommand, due: int) -> None:
-        """Send a command. It arrives at physics step ``due``, but not before earlier commands."""
-        state = self._state
-        due = max(due, int(state.last_due))
-        pending = int(state.pending)
-        slot = (int(state.active) + 1 + pending) % self._slots
-        torque, stiffness, damping, position, velocity = self._rows[slot]
-        state.mode[slot] = command.mode
-        torque[:] = command.torque
-        position[:] = command.position
-        velocity[:] = command.velocity
-        stiffness[:] = command.stiffness
-        damping[:] = command.damping
-        state.due[slot] = due
-        state.last_due[()] = due
-        state.pending[()] = pending + 1
-
-    def joint_torque(self, step: int, position: Array, velocity: Array, out: Array) -> None:
-        """Write the joint torques [N m] during physics step ``step`` to ``out``.
-
-        ``position`` is the reading of the drives' own encoders [rad], ``velocity`` the joint
-        velocity [rad/s].
-        """
-        joints = self._joints
-        joints.step[0] = step
-        joints.position[...] = position
-        joints.velocity[...] = velocity
-        self._drive.run()
-        out[...] = joints.torque
+    def sending(self, command: JointCommand, step: Counts, way: Way) -> KernelCall:
+        """Sends a command in the physics step ``step``, a count without a dimension. It arrives as
+        late as its ``way`` is long, but not before earlier commands."""
+        given = Given(*(getattr(command, name) for name in Given._fields))
+        return KernelCall(send_command, given, step, way, self._commands, self._state.last_due)

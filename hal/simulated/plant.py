@@ -13,20 +13,31 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 
 from ...blocks.signals import ExternalForce, ImuReading, JointState
-from ...mathematics.arrays import Array
+from ...mathematics.arrays import Array, Indices
+from ...mathematics.compiling.call_sequence import Call, CallSequence
 from ...mathematics.compiling.kernel_call import KernelCall
 from ...robots.description import RobotDescription
 from ...runtime.language.block import Metric
 from .base import BASES
+from .external_force import ExternalForces
 from .holding import holding_gains, passive_joints
 from .mujoco_model import Variation, body_name
 from .parameters import SimulatorParameters
 from .random_streams import WORDS, Purpose, RandomStreams, stream
 from .sensors import Sensors
+from .simulator_calls import step_calls
 from .stance import centre_on_origin, holding_torque, place_standing
 from .start_check import StartCheck
 from .state import PhysicsState, TickRecord
-from .step_record import Cleared, StepRecord, StepSensors, clear, note_step
+from .step_record import (
+    Cleared,
+    StepRecord,
+    StepSensors,
+    clear,
+    mean_over_steps,
+    note_step,
+    read_encoders,
+)
 from .truth import TruthReport
 from .world import build_world, draw_variation
 
@@ -43,9 +54,10 @@ OBSERVED_TIME = 0.02
 class JointTorques(Protocol):
     """The drives of a plant, as its physics sees them."""
 
-    def joint_torque(self, step: int, position: Array, velocity: Array, out: Array) -> None:
-        """Write the joint torques [N m] during physics step ``step`` to ``out``, from the reading
-        of the drives' encoders [rad] and the true joint velocities [rad/s]."""
+    def torque_call(self, step: Indices, position: Array, velocity: Array, out: Array) -> Call:
+        """The call that writes the joint torques [N m] during the physics step ``step``, a count
+        without a dimension, to ``out``, from the reading of the drives' encoders [rad] and the true
+        joint velocities [rad/s]. All arrays keep their place in memory."""
 
 
 class Plant:
@@ -68,6 +80,8 @@ class Plant:
         sensors: what makes readings of the true motion.
         stiffness, damping: the gains [N m/rad, N m s/rad] (n_joints,) that hold the standing pose.
         position, velocity: the true joint motion [rad, rad/s], views of the simulator's memory.
+        clearing: begins a new record, except for the memory of the switches.
+        forces: what acts on the robot from outside.
         late: by how much [s] the physics steps begin after the control clock's ticks.
     """
 
@@ -85,16 +99,13 @@ class Plant:
         self.variation = draw_variation(params)
         self.model = build_world(params, robot, self.variation)
         self._robot, self._params, self._period = robot, params, period
-        self._step1, self._step2 = mujoco.mj_step1, mujoco.mj_step2
         self.streams = RandomStreams(params.seed)
         self.sensors = Sensors(robot, params, self.streams)
         self.stiffness, self.damping = holding_gains(self.model, robot)
         self._passive = passive_joints(robot)
         self._limits = (robot.joint_limits[:, 0].copy(), robot.joint_limits[:, 1].copy())
-        n = len(robot.joints)
-        self._encoder = np.zeros(n)
-        self._mean_force, self._mean_torque = np.zeros(3), np.zeros(n)
-        self._clear = KernelCall(
+        self._encoder = np.zeros(len(robot.joints))
+        self.clearing = KernelCall(
             clear, *(getattr(record, name) for name in ("steps", "forbidden", "saturated")),
             Cleared(*(getattr(record, name) for name in Cleared._fields)),
         )  # fmt: skip
@@ -116,7 +127,6 @@ class Plant:
         self.data = data
         base = self._base = BASES[self._robot.base_joint](data)
         self.position, self.velocity = data.qpos[base.positions :], data.qvel[base.velocities :]
-        self._ctrl, self._external = data.ctrl, data.xfrc_applied
         self._sampled = (data.sensor("accelerometer").data, data.sensor("contacts").data)
         # The sensors of the contact points are the model's last.
         first = model.nsensordata - 4 * len(self._robot.contacts)
@@ -128,18 +138,18 @@ class Plant:
             *self._limits, sensors.ground_force, sensors.bounce_steps,
             StepRecord(*(getattr(record, name) for name in StepRecord._fields)),
         )  # fmt: skip
-        self._points = []
-        for point, (link, _) in self._robot.points.items():
-            body = model.body(body_name(link)).id
-            place, centre = data.site(f"point/{point}").xpos, data.xipos[body]
-            self._points.append((place, centre, self._external[body]))
+        self._encoding = KernelCall(
+            read_encoders, self.position, sensors.encoder_offset, self._encoder
+        )
+        self._step1, self._step2 = step_calls(model, data)
+        self.forces = ExternalForces(model, data, self._robot)
 
-    def stand(self, drives: JointTorques, hold: Callable[[Array, Array], None]) -> None:
+    def stand(self, step: CallSequence, hold: Callable[[Array, Array], None]) -> None:
         """Stand on the ground and settle, up to the first instant of the control clock.
 
         Args:
-            drives: what gives the torques meanwhile.
-            hold: called with the joint angles [rad] and the static torques [N m] that ``drives``
+            step: simulates one physics step, with the drives that give the torques meanwhile.
+            hold: called with the joint angles [rad] and the static torques [N m] that the drives
                 are to hold.
 
         Raises:
@@ -147,6 +157,7 @@ class Plant:
         """
         import mujoco
 
+        step.prepare()
         params = self._params
         attitude = stream(params.seed, Purpose.ATTITUDE).standard_normal(3)
         mujoco.mj_resetData(self.model, self.data)
@@ -161,11 +172,11 @@ class Plant:
             phase = float(stream(params.seed, Purpose.START_PHASE).random()) * self._period
         early = math.floor(phase / params.timestep)
         self.late = phase - early * params.timestep
-        self._step1(self.model, self.data)
+        self._step1.run()
         observed = math.ceil(OBSERVED_TIME / params.timestep)
-        self._settle(drives, math.ceil(SETTLING_TIME / params.timestep) + early - observed)
+        self._settle(step, math.ceil(SETTLING_TIME / params.timestep) + early - observed)
         self.clear_record()
-        self._settle(drives, observed)
+        self._settle(step, observed)
         load = self.record.load[:, 3] / -observed
         StartCheck(model, data, base, robot).check(load, pose, torque, rotation)
         centre_on_origin(data, base, robot)
@@ -173,90 +184,58 @@ class Plant:
         steps = round(self._period / params.timestep)
         self.physics.step[()] = -steps
         self.record.bounce_end.fill(-steps)
-        self._step1(self.model, self.data)
+        self._step1.run()
         self.clear_record()
-        self._settle(drives, steps)
+        self._settle(step, steps)
 
-    def _settle(self, drives: JointTorques, steps: int) -> None:
+    def _settle(self, step: CallSequence, steps: int) -> None:
         """Simulate physics steps in which joints that no motor can move stay in the standing pose,
         as if held by hand."""
-        if not len(self._passive):
-            self.simulate(drives, steps)
-            return
         for _ in range(steps):
-            self.simulate(drives, 1)
-            self.position[self._passive] = self._robot.standing_position[self._passive]
-            self.velocity[self._passive] = 0.0
-            self._step1(self.model, self.data)
+            step.run()
+            if len(self._passive):
+                self.position[self._passive] = self._robot.standing_position[self._passive]
+                self.velocity[self._passive] = 0.0
+                self._step1.run()
 
-    def simulate(self, drives: JointTorques, steps: int, push: ExternalForce | None = None) -> None:
-        """Simulate physics steps; afterwards all derived quantities are up to date.
+    def simulating(
+        self, drives: JointTorques, steps: int, push: ExternalForce | None = None
+    ) -> CallSequence:
+        """Calls that simulate physics steps; afterwards all derived quantities are up to date.
 
-        ``push`` is a force from outside, held for all these steps.
-
-        Raises:
-            IndexError: the push acts at a point that the robot does not have.
+        ``push`` is a force from outside, held for all these steps; see ``forces.check``.
         """
-        model, data, record = self.model, self.data, self.record
-        step = int(self.physics.step)
-        self._external.fill(0.0)
-        for _ in range(steps):
-            np.add(self.position, self.sensors.encoder_offset, out=self._encoder)
-            drives.joint_torque(step, self._encoder, self.velocity, self._ctrl)
-            if push is not None:
-                self._apply_push(push)
-            self._step2(model, data)
-            self._note.run()
-            self._step1(model, data)
-            step += 1
-        record.steps += steps
+        one: list[Call] = [
+            self._encoding,
+            drives.torque_call(self.physics.step, self._encoder, self.velocity, self.data.ctrl),
+            *([] if push is None else [self.forces.pushing(push)]),
+            self._step2, self._note, self._step1,
+        ]  # fmt: skip
+        return CallSequence([self.forces.releasing(), *(one * steps)])
 
-    def _apply_push(self, push: ExternalForce) -> None:
-        """Apply the external force at its point of its body, which moves with the body."""
-        force = push.force
-        fx, fy, fz = force.item(0), force.item(1), force.item(2)
-        if fx == fy == fz == 0.0:
-            return
-        index = int(push.point)
-        if not 0 <= index < len(self._points):
-            raise IndexError(
-                f"push at point {index}; {self._robot.name} has {len(self._points)}: "
-                + ", ".join(self._robot.points)
-            )
-        place, centre, wrench = self._points[index]
-        x, y, z = (place.item(k) - centre.item(k) for k in range(3))
-        wrench[0], wrench[1], wrench[2] = fx, fy, fz
-        wrench[3], wrench[4], wrench[5] = y * fz - z * fy, z * fx - x * fz, x * fy - y * fx
-
-    def attach(self, imu: ImuReading, joints: JointState) -> None:
-        """From now on ``read`` writes to these signals."""
-        sensors = self.sensors
-        self._read_imu = sensors.imu_call(self._base.angular_velocity, self._mean_force, imu)
-        self._read_joints = sensors.joint_call(
-            self.position, self.velocity, self._mean_torque, joints
-        )
-
-    def read(self) -> None:
+    def reading(self, imu: ImuReading, joints: JointState) -> list[Call]:
         """Write a sample of the IMU, the gyroscope of this instant and the mean of the accelerometer
-        since ``clear_record``, and one of the joints with their mean torques."""
-        record = self.record
-        steps = int(record.steps)
-        np.divide(record.accelerometer, steps, out=self._mean_force)
-        np.divide(record.joint_torque, steps, out=self._mean_torque)
-        self._base.refresh()
-        self.sensors.draw_imu()
-        self._read_imu.run()
-        self.sensors.draw_joints()
-        self._read_joints.run()
+        since ``clearing``, and one of the joints with their mean torques."""
+        record, sensors = self.record, self.sensors
+        force, torque = np.zeros(3), np.zeros(len(self._robot.joints))
+        return [
+            KernelCall(mean_over_steps, record.accelerometer, record.steps, force),
+            KernelCall(mean_over_steps, record.joint_torque, record.steps, torque),
+            *self.reading_imu(force, imu),
+            *sensors.reading_joints(self.position, self.velocity, torque, joints),
+        ]
 
-    def angular_velocity(self) -> Array:
-        """The base's true angular velocity now [rad/s, body]."""
-        self._base.refresh()
-        return self._base.angular_velocity
+    def reading_imu(self, force: Array, imu: ImuReading) -> list[Call]:
+        """Write a sample of the IMU: the gyroscope of this instant, and this specific ``force``
+        [m/s^2, body] as the accelerometer's."""
+        base = self._base
+        return [
+            *base.refreshing(), *self.sensors.reading_imu(base.angular_velocity, force, imu)
+        ]  # fmt: skip
 
     def clear_record(self) -> None:
         """Begin a new record, except for the memory of the switches."""
-        self._clear.run()
+        self.clearing.run()
 
     def save(self) -> None:
         """Copy the state of the simulator and of the random streams to ``physics``."""
@@ -275,7 +254,7 @@ class Plant:
             self.model, self.data, self.physics.integration, mujoco.mjtState.mjSTATE_INTEGRATION
         )
         self.streams.load(self.physics.random)
-        self._step1(self.model, self.data)
+        self._step1.run()
 
     def metrics(self) -> Mapping[str, Metric]:
         """The values that were drawn from the seed."""

@@ -33,6 +33,7 @@ class StepSensors(NamedTuple):
 class StepRecord(NamedTuple):
     """Where it is noted: see ``TickRecord``."""
 
+    steps: Counts
     load: Array
     accelerometer: Array
     forbidden: Counts
@@ -72,6 +73,20 @@ def clear(steps: Counts, forbidden: Counts, saturated: Counts, record: Cleared) 
 
 
 @kernel
+def mean_over_steps(total: Array, steps: Counts, mean: Array) -> None:
+    """The ``mean`` (n,) of what has been summed up over ``steps``, a count without a dimension."""
+    for k in range(mean.shape[0]):
+        mean[k] = float(total[k]) / int(steps[()])
+
+
+@kernel
+def read_encoders(position: Array, offset: Array, reading: Array) -> None:
+    """What the drives' own encoders read [rad] of the joints' positions, each (n_joints,)."""
+    for joint in range(reading.shape[0]):
+        reading[joint] = float(position[joint]) + float(offset[joint])
+
+
+@kernel
 def note_step(
     step: Counts,
     sensors: StepSensors,
@@ -92,6 +107,7 @@ def note_step(
         int(step[()]), sensors.load, ground_force, bounce_steps, record.closed, record.bounce_end
     )
     step[()] = int(step[()]) + 1
+    record.steps[()] = int(record.steps[()]) + 1
     allowed = 0.0
     for point in range(sensors.load.shape[0]):
         allowed += float(sensors.load[point, 0])

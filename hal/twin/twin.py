@@ -7,7 +7,9 @@ import math
 import numpy as np
 
 from ...blocks.signals import ExternalForce, ImuReading, JointState
-from ...mathematics.arrays import Array
+from ...mathematics.arrays import Array, Indices
+from ...mathematics.compiling.call_sequence import CallSequence
+from ...mathematics.compiling.library_call import LibraryCall
 from ...robots.robot_description import RobotDescription
 from ..bear.configuration import Hardware
 from ..bear.frames import BROADCAST, Instruction, frame_bytes
@@ -71,7 +73,6 @@ class Twin:
         self.board = EmulatedBoard()
         self.drives = EmulatedDrives(robot, hardware, self.actuators, record, BRAKING)
         self.faults = Faults(faults, params.seed)
-        self.push: ExternalForce | None = None
         self.lockstep = True
         """Whether time goes on with the exchanges; else only by ``advance``."""
         self.released = False
@@ -79,6 +80,11 @@ class Twin:
         self.zero = 0
         """The exchange in which the gantry let go."""
         self._gantry = Drives(robot, self.plant.damping, gantry, record)
+        self._held = np.zeros(len(robot.joints))
+        self._standing = self.plant.simulating(self._gantry, 1)
+        self._step = self.plant.simulating(self, 1)
+        self._pushed = self._step
+        self._push: ExternalForce | None = None
         self._record, self._params, self._hardware = record, params, hardware
         self._steps = round(period / params.timestep)
         self._period = period
@@ -92,7 +98,15 @@ class Twin:
         self._packet_closed = np.zeros(len(self._order), dtype=np.bool_)
         self.before, self._force = np.zeros(3), np.zeros(3)
         self.counted = 0
-        self._current, self._held, self._nothing = np.zeros(n), np.zeros(n), np.zeros(n)
+        self._current, self._nothing = np.zeros(n), np.zeros(n)
+        plant, sensors = self.plant, self.plant.sensors
+        self._reading_joints = CallSequence(
+            sensors.reading_joints(plant.position, plant.velocity, self._nothing, self._sample)
+        )
+        self._reading_imu = CallSequence(plant.reading_imu(self._force, self._imu))
+        self._reading_switches = CallSequence(
+            sensors.reading_switches(physics.step, record, self.closed)
+        )
         self._packet = b""
         self._to_board = b""
         self._late = b""
@@ -106,7 +120,7 @@ class Twin:
         """
         plant = self.plant
         plant.stand(
-            self._gantry,
+            self._standing,
             lambda pose, torque: self._gantry.hold(pose, torque, plant.stiffness, plant.damping),
         )
         for actuator in self.actuators:
@@ -175,20 +189,34 @@ class Twin:
         self.faults.now = (self.exchanges - self.zero) * self._period if self.released else -1.0
         self._befall()
         for _ in range(self._steps):
-            self.plant.simulate(self, 1, self.push if self.released else None)
+            (self._pushed if self.released else self._step).run()
+            if self._push is not None:
+                self.plant.forces.check(self._push)
         for actuator in self.actuators:
             actuator.advance(self._period)
         self.drives.take_states()
         self._sense()
         self._send_packet()
 
-    def joint_torque(self, step: int, position: Array, velocity: Array, out: Array) -> None:
+    def push_by(self, push: ExternalForce | None) -> None:
+        """From now on this force from outside acts, once the gantry has let go; ``None``: none."""
+        self._push = push
+        self._pushed = self._step if push is None else self.plant.simulating(self, 1, push)
+
+    def torque_call(
+        self, step: Indices, position: Array, velocity: Array, out: Array
+    ) -> LibraryCall:
         """The torques of the drives, and of the gantry until it lets go."""
-        self.drives.joint_torque(step, position, velocity, out)
-        self._let_go()
-        if not self.released:
-            self._gantry.joint_torque(step, position, velocity, self._held)
-            np.add(out, self._held, out=out)
+        holding = self._gantry.torque_call(step, position, velocity, self._held)
+
+        def write() -> None:
+            self.drives.joint_torque(int(step), position, velocity, out)
+            self._let_go()
+            if not self.released:
+                holding.run()
+                np.add(out, self._held, out=out)
+
+        return LibraryCall(write, 0)
 
     def clear_record(self) -> None:
         """Begin a new record of torques, loads and limits; packets go on."""
@@ -206,8 +234,8 @@ class Twin:
 
     def _sense(self) -> None:
         """Put what the drives measure now into their registers."""
-        plant, sample, drives = self.plant, self._sample, self.drives
-        plant.sensors.read_joints(plant.position, plant.velocity, self._nothing, sample)
+        sample, drives = self._sample, self.drives
+        self._reading_joints.run()
         drives.sense(sample.position, sample.velocity)
         drives.mean_current(self._current)
         for k, actuator in enumerate(self.actuators):
@@ -222,12 +250,12 @@ class Twin:
 
     def _send_packet(self) -> None:
         """A packet of the IMU and the switches: the accelerometer's mean since the last one."""
-        plant, record = self.plant, self._record
+        record = self._record
         np.subtract(record.accelerometer, self.before, out=self._force)
         np.divide(self._force, int(record.steps) - self.counted, out=self._force)
         self._begin_packet()
         imu = self._imu
-        plant.sensors.read_imu(plant.angular_velocity(), self._force, imu)
+        self._reading_imu.run()
         self._read_switches()
         if self.faults.active("frozen_imu"):
             imu.specific_force[:], imu.angular_velocity[:] = self.last_packet
@@ -239,8 +267,7 @@ class Twin:
 
     def _read_switches(self) -> None:
         closed = self.closed
-        plant = self.plant
-        plant.sensors.read_closed(int(plant.physics.step), self._record, closed)
+        self._reading_switches.run()
         if self.faults:
             for k, name in enumerate(self._points):
                 if self.faults.of(name, "stuck_switch"):

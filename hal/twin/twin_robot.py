@@ -136,8 +136,8 @@ class TwinRobot(SimulatedRobot, DrivenRobot):
             robot, params, hardware, self.period, self.physics, self.record, self.gantry,
             tuple(params.faults),
         )  # fmt: skip
-        self.twin.push = self.push
-        self.twin.plant.truth.attach(self.truth)
+        self.twin.push_by(self.push)
+        self._reporting = self.twin.plant.truth.reporting(self.truth)
         self._hardware = hardware
         self.driver = _driver(robot, params, hardware, self.twin)
         self._queue = CommandQueue(self.driver.loop, robot, params.latency, self.period)
@@ -160,7 +160,8 @@ class TwinRobot(SimulatedRobot, DrivenRobot):
     def read(self) -> None:
         """Publish the newest measurements, and the truth."""
         super().read()
-        self.twin.plant.truth.publish()
+        for call in self._reporting:
+            call.run()
 
     def write(self) -> None:
         """Send the command on its way to the drives."""
@@ -173,7 +174,7 @@ class TwinRobot(SimulatedRobot, DrivenRobot):
 
     def damp(self) -> None:
         """One tick with the drives in damping and no external force."""
-        self.twin.push = None
+        self.twin.push_by(None)
         self._pass_time(lambda: self._driver.damp(self._queue.cycles))
 
     def _pass_time(self, exchange: Callable[[], None]) -> None:

@@ -128,11 +128,6 @@ def _has(fields: Mapping[str, RecordedField], role: Role) -> bool:
     )
 
 
-def port_with_pose(header: Header) -> str | None:
-    """The first output, as ``block.port``, whose signal says where every link truly is."""
-    return port_of(ports_of(header), TRUTH) if header.robot is not None else None
-
-
 def scene_ports(header: Header) -> ScenePorts | None:
     """What can be drawn of a graph; ``None`` where nothing says where the robot is."""
     robot = header.robot

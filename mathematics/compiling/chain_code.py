@@ -8,14 +8,16 @@ LLVM's language here, because it calls functions by their addresses, which kerne
 from __future__ import annotations
 
 import ctypes
-import hashlib
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cache
-from typing import Any
+from typing import Any, Protocol
 
-from . import store
-from .machine_code import ENTRY, MachineCode, assemble, tools
+import numpy as np
+from numpy.typing import NDArray
+
+from .machine_code import ENTRY
+from .written_code import written_code
 
 ERROR_CHECK, CLOCK, ENTRIES, NEXT, RUNNING, CURSOR = range(6)
 """The words at the beginning of a table: the address of Python's function that tells whether an
@@ -43,19 +45,51 @@ def chain_function() -> Callable[[ctypes.c_size_t], int]:
     entries made so far, and goes on behind it when it is called again. A Python error that a call
     has set is raised; then ``NEXT`` is the entry that failed.
     """
-    text = str(_module())
-    name = hashlib.blake2b(f"{tools()}|{text}".encode(), digest_size=16).hexdigest()
-    kept = store.load(name)
-    if kept is None:
-        kept = assemble(text)
-        store.save(name, kept)
-    code = MachineCode(kept)
-    _alive.append(code)
+    code = written_code(_module())
     function: Any = ctypes.PYFUNCTYPE(ctypes.c_int64, ctypes.c_size_t)(code.address)
     return function  # type: ignore[no-any-return]
 
 
-_alive: list[MachineCode] = []
+class HasAddresses(Protocol):
+    """A call that machine code can make."""
+
+    when: NDArray[np.int64] | None
+
+    @property
+    def addresses(self) -> tuple[int, int]:
+        """The addresses of machine code and of its arguments."""
+
+
+def call_table(
+    calls: Sequence[HasAddresses], running: NDArray[np.int64], cursor: NDArray[np.int64]
+) -> NDArray[np.int64]:
+    """The table of calls without owners, attention and time stamps. Keep the calls and arrays alive.
+
+    Args:
+        calls: what is called, in this order.
+        running: (1,), where it is written who runs.
+        cursor: (1,), the address of the present row of time stamps.
+
+    Raises:
+        ValueError: a call has no machine code.
+    """
+    table = np.zeros(HEAD + WIDTH * len(calls), np.int64)
+    for row, call in zip(rows_of(table), calls, strict=True):
+        row[:2] = call.addresses
+        row[STAMP] = -1
+        if call.when is not None:
+            row[WHEN] = call.when.ctypes.data
+    table[ERROR_CHECK] = error_check_address()
+    table[CLOCK] = clock_address()
+    table[ENTRIES] = len(calls)
+    table[RUNNING] = running.ctypes.data
+    table[CURSOR] = cursor.ctypes.data
+    return table
+
+
+def rows_of(table: NDArray[np.int64]) -> NDArray[np.int64]:
+    """The entries of a table, (n, ``WIDTH``), in its memory."""
+    return table[HEAD:].reshape(-1, WIDTH)
 
 
 @cache

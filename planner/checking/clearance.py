@@ -16,6 +16,9 @@ from ...robots.kinematics import LinkPoses, from_base_outwards
 from ..task.sequence import edge_of
 from ..task.task import JumpTask
 
+BALLS = 13
+"""Along a capsule, where the ground has edges."""
+
 
 def step_edge(task: JumpTask, jump: int = 0) -> float | None:
     """The x at which the ground changes height under one of the task's jumps; see ``edge_of``."""
@@ -61,17 +64,25 @@ def capsule_ends(
 def body_heights(
     robot: RobotDescription, task: JumpTask, poses: LinkPoses, progress: Array
 ) -> dict[str, Array]:
-    """By link, except for feet, the lowest height [m] of its capsules above the ground, (n,)."""
+    """By link, except for feet, the lowest height [m] of its capsules above the ground, (n,).
+
+    Balls along a capsule stand for it, close enough that no edge of a step passes between two. Where
+    the ground has edges, a ball's height is that of its lower side above the ground right below it.
+    """
     feet = {foot.link for foot in robot.feet}
+    uneven = any(hop.landing_height or hop.gap for hop in task.hops())
+    shares = np.linspace(0.0, 1.0, BALLS if uneven else 2)[:, None, None]
+    aside = np.linspace(-0.95, 0.95, 7)[:, None, None] if uneven else np.zeros((1, 1, 1))
     found = {}
     for link in robot.links:
         if link.name in feet or not link.shapes:
             continue
-        heights = [
-            end[:, 2] - radius - ground_height(task, end[:, 0], progress)
-            for start, stop, radius in capsule_ends(robot, poses, link.name)
-            for end in (start, 0.5 * (start + stop), stop)
-        ]
+        heights = []
+        for start, stop, radius in capsule_ends(robot, poses, link.name):
+            centres = start + shares * (stop - start)
+            x = centres[:, :, 0] + radius * aside
+            below = centres[:, :, 2] - radius * np.sqrt(1.0 - aside**2)
+            heights.append((below - ground_height(task, x, progress)).min(axis=(0, 1)))
         found[link.name] = np.min(heights, axis=0)
     return found
 
@@ -98,14 +109,6 @@ def leg_lack(robot: RobotDescription, poses: LinkPoses, wanted: float) -> Array 
         found = np.minimum(wanted, gap[0]) - gap
         lack = found if lack is None else np.maximum(lack, found)
     return lack
-
-
-def leg_gap(robot: RobotDescription, poses: LinkPoses) -> Array:
-    """The least distance [m] between links of different legs, (n,); negative where they overlap."""
-    nearest = np.full(len(poses.position), np.inf)
-    for gap in _gaps(robot, poses):
-        nearest = np.minimum(nearest, gap)
-    return nearest
 
 
 def _gaps(robot: RobotDescription, poses: LinkPoses) -> Iterator[Array]:

@@ -15,9 +15,9 @@ from ...robots.description import RobotDescription
 from ..task.errors import PlanError
 from ..task.plan import JumpPlan, PlanFileError, read_plan, task_of_header, write_plan
 from ..task.task import JumpTask, TaskError
-from .shipped import shipped_graphs
+from .shipped import shipped_folder
 
-SHIPPED = shipped_graphs() / "plans"
+SHIPPED = shipped_folder() / "plans"
 """The plans that come with aloft; ``make plans`` makes them anew."""
 
 INVALID = "invalid"

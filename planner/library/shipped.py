@@ -5,10 +5,8 @@ from __future__ import annotations
 from importlib.resources import files
 from pathlib import Path
 
-from ..task.task import TaskError
 
-
-def shipped_graphs() -> Path:
+def shipped_folder() -> Path:
     """The folder of the graphs that ship with aloft, with their ``tasks`` and ``plans``."""
     return Path(str(files(__package__.partition(".planner")[0]) / "graphs"))
 
@@ -17,14 +15,14 @@ def find_task(name: str, *folders: Path) -> Path:
     """The task's file of that name in the first folder that has it, or among the shipped graphs.
 
     Raises:
-        TaskError: there is none; the message names the shipped ones.
+        LookupError: there is none.
     """
-    shipped = shipped_graphs()
-    for folder in (*folders, shipped):
+    for folder in (*folders, shipped_folder()):
         if (folder / name).is_file():
             return folder / name
-    there = sorted(path.stem for path in (shipped / "tasks").glob("*.yaml"))
-    raise TaskError(
-        f"there is no task {name!r} beside the graph or among the shipped ones: "
-        + ", ".join(f"tasks/{stem}.yaml" for stem in there)
-    )
+    raise LookupError(f"there is no task {name!r} beside the graph or among the shipped ones")
+
+
+def shipped_tasks() -> list[str]:
+    """The shipped tasks by the names that graphs give them, such as ``tasks/in_situ.yaml``."""
+    return sorted(f"tasks/{path.name}" for path in (shipped_folder() / "tasks").glob("*.yaml"))

@@ -23,6 +23,8 @@ from .layout import Stretch
 
 Vector3 = tuple[float, float, float]
 Point = tuple[str, tuple[str, tuple[float, float, float]], float]
+SHARES = (0.125, 0.25, 0.375, 0.625, 0.75, 0.875)
+"""Where the points between a calf's ends and its middle are."""
 ROUNDING = 0.01
 """m; how long before the edge the rounded step has half its height."""
 
@@ -30,7 +32,8 @@ ROUNDING = 0.01
 def obstacle_points(model: SymbolicModel, coordinates: Coordinates) -> list[Point]:
     """Of the base and the computed limbs (kind, (link, place), radius): contact points, of kind
     ``foot``, then ends and middles of the capsules, of kind ``calf`` for the links that carry a
-    foot and ``body`` for all others. The feet's own capsules are left to their contact points."""
+    foot and ``body`` for all others. Between those of a calf there are more, of kind ``shin``, or a step's
+    edge could pass between two of them. The feet's own capsules are left to their contact points."""
     robot = model.robot
     link_of = {foot.name: foot.link for foot in robot.feet}
     carriers = {joint.parent for joint in robot.joints if joint.child in link_of.values()}
@@ -50,7 +53,17 @@ def obstacle_points(model: SymbolicModel, coordinates: Coordinates) -> list[Poin
                 (kind, (link.name, (place[0], place[1], place[2])), shape.radius)
                 for place in (shape.start, middle, shape.end)
             ]
+            if kind == "calf":
+                found += [
+                    ("shin", (link.name, _between(shape.start, shape.end, share)), shape.radius)
+                    for share in SHARES
+                ]
     return found
+
+
+def _between(start: Vector3, end: Vector3, share: float) -> Vector3:
+    x, y, z = (a + share * (b - a) for a, b in zip(start, end, strict=True))
+    return x, y, z
 
 
 def touching_sphere(robot: RobotDescription, contact: int) -> tuple[Vector3, float]:
@@ -89,7 +102,7 @@ class ObstacleRows:
         kinds = [kind for kind, _, _ in obstacle_points(model, coordinates)]
         self._of_kind = {
             name: np.flatnonzero(np.array(kinds) == name).astype(np.int64)
-            for name in ("foot", "calf", "body")
+            for name in ("foot", "calf", "shin", "body")
         }
         self.feet = len(self._of_kind["foot"])
         self.count = len(kinds)
@@ -101,7 +114,8 @@ class ObstacleRows:
         if edge is None and not turns:
             return np.zeros(0, np.int64)
         # Off a step the legs may give way until the hips are near the ground.
-        kinds = ["calf", *(["body"] if turns or landed else [])]
+        kinds = ["calf"] if turns else ["calf", "shin"]
+        kinds += ["body"] if turns or landed else []
         if turns and stretch.flies and not first:
             kinds = ["foot", *kinds]
         return np.concatenate([self._of_kind[kind] for kind in kinds])

@@ -15,6 +15,7 @@ import numpy as np
 
 from ...blocks.signals import Phase
 from ...mathematics.arrays import Array
+from ...mathematics.constants import GRAVITY
 from ..models.coordinates import Coordinates
 from ..models.stance import Stance
 from ..models.symbolic_model import SymbolicModel
@@ -197,10 +198,17 @@ class ProblemBuilder:
             every, idle = len(self.coordinates.axes), self.structure.idle(stretch)
             for point in range(len(self.coordinates.contacts)):
                 if point not in idle:
-                    self.lower[control + n + point * every + every - 1] = 0.0
+                    self.lower[control + n + point * every + every - 1] = self._least_load(stretch)
         following = self.of_knot[k + 1] if knot.hold is not None else None
         if following is not None and following.time is None and knot.hold is not None:
             self.lower[control + knot.hold], self.upper[control + knot.hold] = following.bounds
+
+    def _least_load(self, stretch: Stretch) -> float:
+        """The least upward force of every contact point on the ground [N]."""
+        if not self.margins.load or stretch.impact or stretch.phase == Phase.LANDING:
+            return 0.0
+        robot = self.model.robot
+        return self.margins.load * robot.total_mass * GRAVITY / max(1, len(stretch.contacts))
 
     def _most_lean(self, k: int) -> float:
         """How far the torso may lean away from the nominal posture at a knot."""

@@ -46,6 +46,11 @@ class Margins(Parameters):
     pressure: float = parameter(
         0.0, ge=0.0, lt=0.5, text="least share of a foot's load on each of its contact points"
     )
+    load: float | None = parameter(
+        None, ge=0.0, lt=1.0,
+        text="least share of the robot's weight that the ground bears until lift-off, alike at every contact "
+        "point that touches it; None: a contact point may bear nothing",
+    )  # fmt: skip
     touchdown_speed: float | None = parameter(
         None, unit="m/s", gt=0.0, le=20.0,
         text="largest downward speed of a contact point where it hits the ground with an impact; "

@@ -12,7 +12,7 @@ from ..language.errors import AloftError
 from ..placement.placed import PlacedGraph
 from .identity import Identity
 from .showing import read_row
-from .transport import rows_key, status_key
+from .transport import rows_key, status_key, window_key
 from .zenoh_transport import as_chunk, prefix_of, session_config
 
 STALE = 2.0
@@ -73,6 +73,10 @@ class Observer:
                 take(*found)
 
         self._subscribe(rows_key(machine), heard)
+
+    def windows(self, machine: str, take: Callable[[bytes], None]) -> None:
+        """Have what a part shows of itself for a page taken as it comes; see ``live.part_feed``."""
+        self._subscribe(window_key(machine), take)
 
     def seconds_since(self, machine: str) -> float | None:
         """How long ago a machine was heard [s]; ``None`` if it never was."""

@@ -58,6 +58,11 @@ def rows_key(machine: str) -> str:
     return f"watch/{machine}/rows"
 
 
+def window_key(machine: str) -> str:
+    """The key under which a machine shows its signals and the times of its blocks to a page."""
+    return f"watch/{machine}/window"
+
+
 def tick_key(sender: str, receiver: str) -> str:
     """The key under which a machine says how a tick ended."""
     return f"tick/{sender}/{receiver}"

@@ -52,7 +52,7 @@ function fieldsOf(port) {
 
 // What the run is doing, a few times a second.
 const words = {running: "running", starting: "starting", still: "stands still", ended: "has ended",
-  gone: "is gone", other: "another graph", lost: "this page's program has ended"};
+  gone: "is gone", unheard: "not heard", partly: "in part", other: "another graph", lost: "this page's program has ended"};
 function say(state, said) {
   badge.className = state; badge.textContent = words[state] || state;
   line.textContent = said;
@@ -67,6 +67,22 @@ function lateLately(late) {
     return moment - counted.get(path).at < RECENT;
   });
 }
+// Of a graph on several machines: the state of each part, and what is said of it.
+let parts = {};
+const partLine = document.getElementById("parts");
+const partOf = path => data.blocks[path] ? data.blocks[path].machine : "";
+const absent = path => ["ended", "gone", "unheard"].includes((parts[partOf(path)] || [""])[0]);
+function sayParts() {
+  partLine.replaceChildren(...Object.entries(parts).map(([name, [state, said]]) => {
+    const badge = make("span", name + " " + (words[state] || state), "part " + state);
+    badge.title = said;
+    return badge;
+  }));
+}
+shown.push(path => {
+  const [state, said] = parts[partOf(path)] || ["", ""];
+  if (said) panel.append(make("p", partOf(path) + " " + said, "part " + state));
+});
 function draw(found) {
   now = found.values; times = {};
   for (const [path, text] of took) {
@@ -75,6 +91,8 @@ function draw(found) {
     if (time) times[path] = time[1];
   }
   const late = lateLately(found.late);
+  parts = found.parts || {};
+  for (const [path, node] of nodes) node.classList.toggle("absent", absent(path));
   for (const [path, node] of nodes)
     node.classList.toggle("late", late.some(name => name === path || name.startsWith(path + "/")));
   for (const [port, texts] of beside) for (const text of texts) text.textContent = found.brief[port] || "";
@@ -87,6 +105,7 @@ async function look() {
     const found = await call("now");
     if (found.state === "other") { location.reload(); return; }
     if (found.values) draw(found);
+    sayParts();
     say(found.state, [found.said, found.line].filter(Boolean).join("; "));
     if (found.state === "ended" || found.state === "gone") wait = SLOWER;
   } catch (error) { say("lost", String(error.message)); wait = SLOWER; }

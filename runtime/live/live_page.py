@@ -42,7 +42,7 @@ def live_page(
     addition = Addition(
         "live",
         data,
-        f'{_CONTROLS}{button}<output id="line"></output>',
+        f'{_CONTROLS}{button}<output id="parts"></output><output id="line"></output>',
         (_HERE / "live.css").read_text(encoding="utf-8"),
         _script(),
     )

@@ -29,16 +29,22 @@ PATIENCE = 10.0
 
 
 class Watched(Protocol):
-    """A running graph that the page shows; see ``LiveRun``."""
+    """A running graph that the page shows; see ``LiveRun`` and ``SpreadRun``."""
 
     graph: CheckedGraph
-    has_parameters: bool
+
+    @property
+    def has_parameters(self) -> bool:
+        """Whether parameters can be changed."""
 
     def now(self) -> dict[str, Any]:
         """What there is to say of this moment."""
 
     def refresh(self) -> None:
         """Look at the graph that runs now."""
+
+    def close(self) -> None:
+        """Look no more."""
 
     def parameters(self) -> list[dict[str, Any]]:
         """The live parameters as they are now."""

@@ -58,6 +58,11 @@ class WindowReader:
 
     def look(self) -> Look | None:
         """What the window shows now; ``None`` where its writer was stopped while it wrote."""
+        copy = self.copy()
+        return None if copy is None else look_of(copy, self.shape)
+
+    def copy(self) -> bytes | None:
+        """The window's bytes as they are now; ``None`` as for ``look``."""
         for _ in range(TRIES):
             before = self._sequence()
             with self._fence:
@@ -66,7 +71,7 @@ class WindowReader:
             with self._fence:
                 pass
             if before % 2 == 0 and self._sequence() == before:
-                return self._read(copy)
+                return copy
             time.sleep(1e-3)
         return None
 
@@ -77,27 +82,29 @@ class WindowReader:
     def _sequence(self) -> int:
         return int.from_bytes(self._map[8 * SEQUENCE : 8 * SEQUENCE + 8], "little", signed=True)
 
-    def _read(self, copy: bytes) -> Look:
-        shape = self.shape
-        words = np.frombuffer(copy, np.int64, shape.text_start // 8)
-        length = min(int(words[SAID]), TEXT)
-        said = copy[shape.text_start : shape.text_start + length].decode(errors="replace")
-        return Look(
-            tick=int(words[TICK]),
-            state=int(words[STATE]),
-            overruns=int(words[OVERRUNS]),
-            skipped=int(words[SKIPPED]),
-            changes=int(words[CHANGES]),
-            late=dict(zip(shape.blocks, words[HEAD : shape.cursors].tolist(), strict=True)),
-            said=said,
-            bus=np.frombuffer(copy, np.uint8, shape.bus, shape.bus_start),
-            stamps=[self._stamps(copy, words, number) for number in range(len(shape.programs))],
-        )
 
-    def _stamps(self, copy: bytes, words: NDArray[np.int64], number: int) -> NDArray[np.int64]:
-        """The rows of a program that hold stamps, the oldest first, each in the order of time."""
-        ticks, newest = words[self.shape.cursors + 2 * number :][:2].tolist()
-        first, last = self.shape.stamps(number)
-        rows = np.frombuffer(copy[first:last], np.int64).reshape(STAMPED_TICKS, -1)
-        rows = rows[:, self.shape.orders[number]]
-        return np.concatenate([rows[newest:], rows[:newest]]) if ticks else rows[:newest]
+def look_of(copy: bytes, shape: Shape) -> Look:
+    """What the bytes of a window say, which must be as many as its shape has."""
+    words = np.frombuffer(copy, np.int64, shape.text_start // 8)
+    length = min(int(words[SAID]), TEXT)
+    said = copy[shape.text_start : shape.text_start + length].decode(errors="replace")
+    return Look(
+        tick=int(words[TICK]),
+        state=int(words[STATE]),
+        overruns=int(words[OVERRUNS]),
+        skipped=int(words[SKIPPED]),
+        changes=int(words[CHANGES]),
+        late=dict(zip(shape.blocks, words[HEAD : shape.cursors].tolist(), strict=True)),
+        said=said,
+        bus=np.frombuffer(copy, np.uint8, shape.bus, shape.bus_start),
+        stamps=[_stamps(copy, shape, words, number) for number in range(len(shape.programs))],
+    )
+
+
+def _stamps(copy: bytes, shape: Shape, words: NDArray[np.int64], number: int) -> NDArray[np.int64]:
+    """The rows of a program that hold stamps, the oldest first, each in the order of time."""
+    ticks, newest = words[shape.cursors + 2 * number :][:2].tolist()
+    first, last = shape.stamps(number)
+    rows = np.frombuffer(copy[first:last], np.int64).reshape(STAMPED_TICKS, -1)
+    rows = rows[:, shape.orders[number]]
+    return np.concatenate([rows[newest:], rows[:newest]]) if ticks else rows[:newest]

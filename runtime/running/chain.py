@@ -16,20 +16,12 @@ from numpy.typing import NDArray
 
 from ...mathematics.compiling.chain_code import (
     ATTENTION,
-    CLOCK,
-    CURSOR,
-    ENTRIES,
-    ERROR_CHECK,
-    HEAD,
     NEXT,
     OWNER,
-    RUNNING,
     STAMP,
-    WHEN,
-    WIDTH,
+    call_table,
     chain_function,
-    clock_address,
-    error_check_address,
+    rows_of,
 )  # fmt: skip
 from ...mathematics.compiling.kernel_call import KernelCall
 from ..language.block import Block
@@ -83,24 +75,15 @@ class Chain:
         self._calls = [(call.compiled, call.when) for _, call in entries]
         """Keeps machine code and arguments alive."""
         self._places = [place for place, _ in entries]
-        table = np.zeros(HEAD + WIDTH * len(entries), np.int64)
-        rows = table[HEAD:].reshape(-1, WIDTH)
-        for row, (place, call) in zip(rows, entries, strict=True):
-            row[:2] = call.addresses
-            row[OWNER], row[STAMP] = self._numbers[place], -1
-            if call.when is not None:
-                row[WHEN] = call.when.ctypes.data
+        table = call_table([call for _, call in entries], self._running, self._cursor)
+        rows = rows_of(table)
+        rows[:, OWNER] = [self._numbers[place] for place in self._places]
         for place, block in enumerate(self.blocks):
             last = rows[len(self._places) - 1 - self._places[::-1].index(place)]
             if block.attention is not None:
                 last[ATTENTION] = block.attention.ctypes.data
             if self._now is not None and place < len(self.blocks) - 1:
                 last[STAMP] = 8 * (self._first_stamp + place)
-        table[ERROR_CHECK] = error_check_address()
-        table[CLOCK] = clock_address()
-        table[ENTRIES] = len(entries)
-        table[RUNNING] = self._running.ctypes.data
-        table[CURSOR] = self._cursor.ctypes.data
         self._table = table
         self._address = ctypes.c_size_t(table.ctypes.data)
 

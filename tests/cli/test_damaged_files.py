@@ -15,7 +15,7 @@ from pathlib import Path
 import pytest
 
 from aloft.cli import main
-from aloft.planner.library.shipped import shipped_graphs
+from aloft.planner.library.shipped import shipped_folder
 
 TRIES = int(os.environ.get("ALOFT_FUZZ", "12"))
 
@@ -98,7 +98,7 @@ def test_a_damaged_recording(
 
 def test_a_damaged_plan(folder: Path) -> None:
     draw = random.Random("plan")
-    plan = min((shipped_graphs() / "plans").glob("*.npz"))
+    plan = min((shipped_folder() / "plans").glob("*.npz"))
     data, kept = plan.read_bytes(), folder / "kept"
     kept.mkdir()
     for number in range(TRIES):

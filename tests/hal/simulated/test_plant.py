@@ -7,7 +7,8 @@ from aloft.hal.simulated.parameters import SimulatorParameters
 from aloft.hal.simulated.plant import Plant
 from aloft.hal.simulated.random_streams import Purpose
 from aloft.hal.simulated.state import PhysicsState, TickRecord
-from aloft.mathematics.arrays import Array
+from aloft.mathematics.arrays import Array, Indices
+from aloft.mathematics.compiling.library_call import LibraryCall
 from aloft.robots.description import RobotDescription, find_robot
 
 ROBOT = find_robot("bruce")
@@ -24,10 +25,15 @@ class Held:
     def hold(self, position: Array, torque: Array) -> None:
         self.position, self.torque = position.copy(), torque.copy()
 
-    def joint_torque(self, step: int, position: Array, velocity: Array, out: Array) -> None:
-        self.steps.append(step)
-        out[:] = self.torque + self.plant.stiffness * (self.position - position)
-        out -= self.plant.damping * velocity
+    def torque_call(
+        self, step: Indices, position: Array, velocity: Array, out: Array
+    ) -> LibraryCall:
+        def write() -> None:
+            self.steps.append(int(step))
+            out[:] = self.torque + self.plant.stiffness * (self.position - position)
+            out[:] -= self.plant.damping * velocity
+
+        return LibraryCall(write, 0)
 
 
 def plant_of(robot: RobotDescription, **params: object) -> Plant:
@@ -39,11 +45,12 @@ def plant_of(robot: RobotDescription, **params: object) -> Plant:
 def test_stands_with_any_drives_and_counts_its_steps() -> None:
     plant = plant_of(ROBOT, timestep=0.001)
     drives = Held(plant)
-    plant.stand(drives, drives.hold)
+    step = plant.simulating(drives, 1)
+    plant.stand(step, drives.hold)
     assert plant.physics.step == 0
     assert drives.steps[-2:] == [-2, -1]
     plant.clear_record()
-    plant.simulate(drives, 50)
+    plant.simulating(drives, 50).run()
     assert plant.physics.step == 50 and plant.record.steps == 50
     assert float(-plant.record.load[:, 3].sum()) / 50 == pytest.approx(
         ROBOT.total_mass * 9.81, rel=0.01
@@ -54,15 +61,16 @@ def test_stands_with_any_drives_and_counts_its_steps() -> None:
 def test_loaded_it_goes_on_bit_for_bit() -> None:
     plant = plant_of(ROBOT, seed=3, timestep=0.001, gyro_noise=0.02, joint_velocity_noise=0.05)
     drives = Held(plant)
-    plant.stand(drives, drives.hold)
-    plant.simulate(drives, 10)
+    step = plant.simulating(drives, 1)
+    plant.stand(step, drives.hold)
+    plant.simulating(drives, 10).run()
     plant.save()
     kept = {name: view.copy() for name, view in plant.physics}
-    plant.simulate(drives, 30)
+    plant.simulating(drives, 30).run()
     first = plant.data.qpos.copy(), plant.streams[Purpose.GYRO].random()
     for name, view in plant.physics:
         view[...] = kept[name]
     plant.load()
-    plant.simulate(drives, 30)
+    plant.simulating(drives, 30).run()
     np.testing.assert_array_equal(plant.data.qpos, first[0])
     assert plant.streams[Purpose.GYRO].random() == first[1]

@@ -16,7 +16,7 @@ from aloft.logs.recording.finished_run import write_recording
 from aloft.logs.recording.whole_view import write_view
 from aloft.logs.viewing.flights import Flights
 from aloft.logs.viewing.robot_shapes import quaternion_from_z
-from aloft.logs.viewing.scene_ports import port_with_pose
+from aloft.logs.viewing.scene_ports import scene_ports
 from aloft.logs.viewing.signal_names import element_names
 from aloft.robots.description import RobotDescription
 from aloft.robots.kinematics import matrices_of_quaternions
@@ -211,7 +211,8 @@ def test_the_robot_is_posed_in_space(
     graph, result, _ = recorded
     path = drawn
     assert result.log is not None and result.log.layout is not None
-    assert port_with_pose(make_header(graph, result.log.layout, b"")) == "robot.truth"
+    ports = scene_ports(make_header(graph, result.log.layout, b""))
+    assert ports is not None and ports.pose.base_position == "robot.truth.base_position"
     found = batches(path, "/world/**")
     links = {f"world/robot/{name}" for name in ("body", "thigh", "shank")}
     others = ("contact_forces", "com", "com_projection", "eye", "support_polygon")

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from aloft.planner.checking.clearance import (
+    _gaps,
     body_heights,
     ground_height,
-    leg_gap,
     legs,
     segment_distance,
     step_edge,
@@ -57,7 +57,8 @@ def test_the_standing_robot() -> None:
     assert "right_foot" not in heights
     assert heights["torso"][0] == pytest.approx(0.3796 + 0.03 - 0.055)
     # The hips' capsules, of radius 30 mm, are the nearest: 151.7 mm from axis to axis.
-    assert leg_gap(robot, pose)[0] == pytest.approx(0.151711 - 0.06, abs=1e-3)
+    nearest = min(gap[0] for gap in _gaps(robot, pose))
+    assert nearest == pytest.approx(0.151711 - 0.06, abs=1e-3)
     assert legs(robot)[0] == [
         "right_hip", "right_hip_shaft", "right_thigh", "right_calf", "right_foot",
     ]  # fmt: skip

@@ -11,7 +11,7 @@ from aloft.planner.checking.validity import InvalidPlanError
 from aloft.planner.library import once
 from aloft.planner.library.library import PlanLibrary
 from aloft.planner.library.reference_table import reference_table
-from aloft.planner.library.shipped import shipped_graphs
+from aloft.planner.library.shipped import shipped_folder
 from aloft.planner.task.read_task import read_task
 from aloft.robots.description import find_robot
 
@@ -25,7 +25,7 @@ def _own_cache(tmp_path, monkeypatch):
 
 @pytest.fixture(scope="module")
 def plan():
-    found = PlanLibrary(ROBOT).find(read_task(shipped_graphs() / "tasks" / "in_situ_12cm.yaml"))
+    found = PlanLibrary(ROBOT).find(read_task(shipped_folder() / "tasks" / "in_situ_12cm.yaml"))
     assert found is not None
     return found
 
@@ -67,7 +67,7 @@ def test_only_the_results_used_last_are_kept():
 
 @pytest.mark.parametrize("task", ["in_situ_12cm", "hops_forward_10"])
 def test_a_later_process_finds_the_very_table(task, monkeypatch):
-    plan = PlanLibrary(ROBOT).find(read_task(shipped_graphs() / "tasks" / f"{task}.yaml"))
+    plan = PlanLibrary(ROBOT).find(read_task(shipped_folder() / "tasks" / f"{task}.yaml"))
     made = reference_table(plan, ROBOT, 0.2)
     monkeypatch.setattr(once, "_tables", once.Kept())
     once.reference_table_once(plan, ROBOT, 0.2)

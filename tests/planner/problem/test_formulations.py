@@ -9,11 +9,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from aloft.planner.checking.own_equations import (
-    own_residuals,
-    standing_inertia,
-    unmodelled_momentum,
-)
 from aloft.planner.checking.validity import broken_array, check_plan
 from aloft.planner.models.exact_dynamics import ExactDynamics
 from aloft.planner.solving.solve import FORMULATIONS, solve_jump
@@ -21,6 +16,12 @@ from aloft.planner.task.errors import PlanError
 from aloft.planner.task.plan import ARRAYS, JumpPlan
 from aloft.planner.task.task import make_task
 from aloft.robots.description import find_robot
+
+from .own_equations import (
+    own_residuals,
+    standing_inertia,
+    unmodelled_momentum,
+)
 
 ROBOT = find_robot("bruce")
 DYNAMICS = ExactDynamics(ROBOT)

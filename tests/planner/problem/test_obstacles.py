@@ -50,7 +50,8 @@ def test_points_are_contacts_then_capsules_of_the_computed_limbs() -> None:
     full = [kind for kind, _, _ in obstacle_points(MODEL, full_coordinates(MODEL))]
     assert full[:4] == ["foot"] * 4
     assert full.count("calf") == 6
-    assert full.count("body") == len(full) - 10 == 3 * 5
+    assert full.count("shin") == 12
+    assert full.count("body") == len(full) - 22 == 3 * 5
     plane = sagittal_coordinates(MODEL)
     assert plane is not None
     half = [kind for kind, _, _ in obstacle_points(MODEL, plane)]
@@ -75,7 +76,7 @@ def test_which_points_are_watched() -> None:
     rows = ObstacleRows(MODEL, full_coordinates(MODEL))
     for values, in_flight, on_ground in (
         ({}, 0, 0),
-        ({"landing_height": 0.05, "distance_x": 0.1}, 6, 6),
+        ({"landing_height": 0.05, "distance_x": 0.1}, 18, 18),
         ({"rotation": "360 deg"}, 25, 21),
     ):
         task = make_task({"recipe": "paper", "name": "jump", "rise": 0.15, **values})
