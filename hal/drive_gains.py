@@ -8,6 +8,7 @@ from typing import Literal
 import numpy as np
 
 from ..mathematics.arrays import Array
+from ..mathematics.reproducible import product
 from ..robots.robot_description import RobotDescription
 from ..robots.transmission import MotorGains, motor_gains
 from ..runtime.language.block import Misfit
@@ -42,7 +43,7 @@ class DriveGains(Parameters):
 
 def joint_gains(params: DriveGains, robot: RobotDescription) -> tuple[Array, Array]:
     """The joints' gains that are to run in the drives [N m/rad, N m s/rad], each (n_joints,)."""
-    peak = np.abs(robot.joint_to_motor).T @ robot.motors.peak_torque
+    peak = product(np.abs(robot.joint_to_motor).T, robot.motors.peak_torque)
     default = motor_gains(robot, peak / _REACH, "N m/rad")
     own = np.diag(default.joint).copy()
     stiffness = own if params.stiffness is None else params.stiffness.resolve(robot)

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from typing import Any, ClassVar, Literal
+from functools import cached_property
+from typing import Any, ClassVar, Literal, NamedTuple
 
 from ..blocks.signals import (
     ContactSwitches,
@@ -15,9 +16,45 @@ from ..blocks.signals import (
     RobotHealth,
 )
 from ..blocks.signals.drive_conditions import HEALTHY
+from ..mathematics.arrays import Array, Counts, Flags
+from ..mathematics.compiling.kernel_call import KernelCall
+from ..mathematics.kernel import kernel
 from ..robots.description import RobotDescription
 from ..runtime.language.block import Block, Context, Input, Output
 from ..runtime.language.parameters import Parameters
+
+_DRIVING = int(DrivePhase.DRIVING)
+
+
+class Health(NamedTuple):
+    """The fields of ``RobotHealth``."""
+
+    state: Counts
+    voltage: Array
+    temperature: Array
+    current: Array
+    condition: Counts
+    age: Array
+    imu_age: Array
+    stamp: Array
+    joints_valid: Flags
+    imu_valid: Flags
+    contacts_valid: Flags
+    late_cycles: Counts
+    lost_answers: Counts
+
+
+@kernel
+def report_well(tick: Counts, base_period: float, health: Health) -> None:
+    """Drives and sensors are well in a ``tick``, (1,), of ``base_period`` [s]; nothing is measured."""
+    health.state[()] = _DRIVING
+    for k in range(health.condition.shape[0]):
+        health.condition[k] = HEALTHY
+        health.voltage[k] = health.temperature[k] = health.current[k] = health.age[k] = 0.0
+    health.imu_age[()] = 0.0
+    health.late_cycles[()] = health.lost_answers[()] = 0
+    health.stamp[()] = int(tick[0]) * base_period
+    health.joints_valid[()] = health.imu_valid[()] = health.contacts_valid[()] = True
 
 
 class Robot(Block, ABC):
@@ -125,15 +162,17 @@ class Robot(Block, ABC):
 
     def report(self) -> None:
         """Write how the drives and the sensors are; here that all is well."""
-        health = self.health
-        health.state[()] = DrivePhase.DRIVING
-        health.condition.fill(HEALTHY)
-        for unmeasured in (health.voltage, health.temperature, health.current, health.age):
-            unmeasured.fill(0.0)
-        health.imu_age[()] = 0.0
-        health.late_cycles[()] = health.lost_answers[()] = 0
-        health.stamp[()] = self.tick * self.context.clock.base_period
-        health.joints_valid[()] = health.imu_valid[()] = health.contacts_valid[()] = True
+        self._well.run()
+
+    @cached_property
+    def _well(self) -> KernelCall:
+        return self.reporting()
+
+    def reporting(self) -> KernelCall:
+        """Writes to ``health`` that all is well, at the tick's own time."""
+        clock = self.context.clock
+        health = Health(*(getattr(self.health, name) for name in Health._fields))
+        return KernelCall(report_well, clock.present, clock.base_period, health)
 
     @abstractmethod
     def write(self) -> None:

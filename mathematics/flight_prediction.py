@@ -117,6 +117,7 @@ def predict_tilt(
     momentum: Array,
     way: Array,
     time: float,
+    later: float,
     side: Array,
     goal: Array,
     turn: Array,
@@ -128,30 +129,33 @@ def predict_tilt(
         momentum: the angular momentum that was not planned, (3,).
         way: how far the contact points still have to go to their planned places, as seen from the
             centre of mass [m], (3 n_contacts,).
-        time: left until touchdown [s].
+        time: left until touchdown without a shift [s].
+        later: by how much a shift of the feet upwards delays touchdown [s/m].
         side: 1 for contact points of a left foot, -1 of a right one, 0 in the middle, (n_contacts,).
         goal: becomes the rotation about x and y at touchdown if the feet land as planned, (2,).
         turn: becomes its change [rad/m] per shift of the feet ahead, to the left, apart and
             upwards, (2, 4).
     """
     for j in range(2):
-        value = float(tilt[j])
+        value, rate = float(tilt[j]), 0.0
         for k in range(3):
-            value += time * float(flight.drift[j, k]) * float(momentum[k])
+            rate += float(flight.drift[j, k]) * float(momentum[k])
         turn[j, :] = 0.0
         for i in range(way.shape[0]):
-            left = float(way[i])
+            carried = 0.0
             for k in range(3):
-                left -= time * float(flight.carried[i, k]) * float(momentum[k])
+                carried += float(flight.carried[i, k]) * float(momentum[k])
             per_way = float(flight.turn[j, i])
-            value += per_way * left
+            value += per_way * float(way[i])
+            rate -= per_way * carried
             if i % 3 == 2:
                 turn[j, 3] += per_way
             else:
                 turn[j, i % 3] += per_way
             if i % 3 == 1:
                 turn[j, 2] += float(side[i // 3]) * per_way
-        goal[j] = value
+        goal[j] = value + time * rate
+        turn[j, 3] += later * rate
 
 
 class LandingCost(NamedTuple):

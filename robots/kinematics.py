@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..mathematics.arrays import Array
+from ..mathematics.reproducible import product
 from .parts import Joint
 from .robot_description import RobotDescription
 
@@ -75,7 +76,7 @@ def rotations_about(axis: tuple[float, float, float], angles: Array) -> Array:
     x, y, z = axis
     cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
     sine, cosine = np.sin(angles)[:, None, None], np.cos(angles)[:, None, None]
-    turns: Array = np.eye(3) + sine * cross + (1.0 - cosine) * (cross @ cross)
+    turns: Array = np.eye(3) + sine * cross + (1.0 - cosine) * product(cross, cross)
     return turns
 
 
@@ -124,10 +125,10 @@ def link_poses(
         if joint.kind == "slide":
             offset = offset + joint_position[:, k, None] * np.array(joint.axis)
             position[:, child] = position[:, parent]
-            position[:, child] += (rotation[:, parent] @ offset[:, :, None])[:, :, 0]
+            position[:, child] += product(rotation[:, parent], offset[:, :, None])[:, :, 0]
             rotation[:, child] = rotation[:, parent]
             continue
-        position[:, child] = position[:, parent] + rotation[:, parent] @ offset
+        position[:, child] = position[:, parent] + product(rotation[:, parent], offset)
         turn = rotations_about(joint.axis, joint_position[:, k])
-        rotation[:, child] = rotation[:, parent] @ turn
+        rotation[:, child] = product(rotation[:, parent], turn)
     return LinkPoses(names, position, rotation)

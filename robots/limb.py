@@ -14,6 +14,7 @@ import numpy as np
 
 from ..mathematics.arrays import Array
 from ..mathematics.kernel import kernel
+from ..mathematics.reproducible import product
 from .robot_description import RobotDescription
 
 _COLLINEAR = 1e-6
@@ -92,7 +93,7 @@ def foot_shape(robot: RobotDescription, foot: int) -> tuple[FootKind, Array]:
     if line[0] < -1e-9 or (abs(line[0]) <= 1e-9 and line[1] < 0.0):
         line = -line
     offsets = points - points[first]
-    aside = offsets - np.outer(offsets @ line, line)
+    aside = offsets - np.outer(product(offsets, line), line)
     if np.sqrt((aside**2).sum(axis=1)).max() < _COLLINEAR:
         return FootKind.LINE, line + 0.0
     return FootKind.FLAT, ahead

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..mathematics.arrays import Array
+from ..mathematics.reproducible import product
 
 if TYPE_CHECKING:
     from .robot_description import RobotDescription
@@ -27,11 +28,11 @@ def link_poses(robot: RobotDescription, position: Array) -> Mapping[str, tuple[A
     poses = {robot.base: (np.eye(3), np.zeros(3))}
     for joint, value in zip(robot.joints, position.tolist(), strict=True):
         turn, place = poses[joint.parent]
-        origin = place + turn @ np.array(joint.origin)
+        origin = place + product(turn, np.array(joint.origin))
         if joint.kind == "slide":
-            poses[joint.child] = (turn, origin + turn @ (np.array(joint.axis) * value))
+            poses[joint.child] = (turn, origin + product(turn, np.array(joint.axis) * value))
         else:
-            poses[joint.child] = (turn @ axis_rotation(joint.axis, value), origin)
+            poses[joint.child] = (product(turn, axis_rotation(joint.axis, value)), origin)
     return poses
 
 
@@ -71,9 +72,9 @@ def standing_heights(robot: RobotDescription) -> Array:
     for k, contact in enumerate(robot.contacts):
         turn, place = poses[links[contact.foot]]
         if owners.count(owners[k]) == 1:  # a ball: straight below its centre
-            heights[k] = (place + turn @ centres[k])[2] - contact.radius
+            heights[k] = (place + product(turn, centres[k]))[2] - contact.radius
         else:
-            heights[k] = (place + turn @ np.array(contact.position))[2]
+            heights[k] = (place + product(turn, np.array(contact.position)))[2]
     return heights
 
 
@@ -83,7 +84,7 @@ def standing_com(robot: RobotDescription) -> Array:
     total = np.zeros(3)
     for link in robot.links:
         turn, place = poses[link.name]
-        total += link.mass * (place + turn @ np.array(link.com))
+        total += link.mass * (place + product(turn, np.array(link.com)))
     return np.asarray(total / robot.total_mass)
 
 

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..mathematics.arrays import Array
+from ..mathematics.reproducible import inverse, product
 from .parts import (
     ActuatorProfile,
     ContactPoint,
@@ -133,7 +134,7 @@ class RobotDescription(Part):
     def rotor_matrix(self) -> Array:
         """The rotors' inertia as seen by the joints [kg m^2], (n_joints, n_joints)."""
         matrix = self.joint_to_motor
-        return np.asarray((matrix.T * self.motors.rotor_inertia) @ matrix)
+        return product(matrix.T * self.motors.rotor_inertia, matrix)
 
     @cached_property
     def joint_to_motor(self) -> NDArray[np.float64]:
@@ -143,7 +144,7 @@ class RobotDescription(Part):
     @cached_property
     def torque_to_motor(self) -> NDArray[np.float64]:
         """Motor torque = this (n_joints, n_joints) times joint torque."""
-        return np.ascontiguousarray(np.linalg.inv(self.joint_to_motor).T)
+        return np.ascontiguousarray(inverse(self.joint_to_motor).T)
 
     @cached_property
     def standing_position(self) -> NDArray[np.float64]:

@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from ..mathematics.arrays import Array
+from ..mathematics.reproducible import product
 from .description import RobotDescription
 from .kinematics import link_poses
 
@@ -18,10 +19,10 @@ def standing_feet(robot: RobotDescription) -> Array:
     com, feet = np.zeros(3), np.zeros((len(robot.feet), 3))
     for link in robot.links:
         place, turn = poses.of(link.name)
-        com += link.mass / robot.total_mass * (place[0] + turn[0] @ np.array(link.com))
+        com += link.mass / robot.total_mass * (place[0] + product(turn[0], np.array(link.com)))
     for number, foot in enumerate(robot.feet):
         place, turn = poses.of(foot.link)
-        feet[number] = place[0] + turn[0] @ np.array(foot.sole) - com
+        feet[number] = place[0] + product(turn[0], np.array(foot.sole)) - com
     return feet
 
 

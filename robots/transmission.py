@@ -18,6 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..mathematics.arrays import Array
+from ..mathematics.reproducible import inverse, product
 from .robot_description import RobotDescription
 
 _SWEEPS = 10_000
@@ -36,7 +37,7 @@ class Transmission:
     def __init__(self, robot: RobotDescription) -> None:
         matrix = robot.joint_to_motor
         self._to_motor = np.ascontiguousarray(matrix)
-        self._to_joint = np.ascontiguousarray(np.linalg.inv(matrix))
+        self._to_joint = inverse(matrix)
         self._torque_to_motor = robot.torque_to_motor
         self._torque_to_joint = np.ascontiguousarray(matrix.T)
 
@@ -101,7 +102,7 @@ def motor_gains(robot: RobotDescription, wanted: Array, unit: str) -> MotorGains
     columns = np.stack([np.outer(row, row).ravel() for row in scaled], axis=1)
     target = np.diag(wanted * scale**2).ravel()
     motor = _non_negative_least_squares(columns, target)
-    joint = (matrix.T * motor) @ matrix
+    joint = product(matrix.T * motor, matrix)
     losses = _losses(robot, wanted, joint, unit, floor)
     return MotorGains(motor, joint, wanted.copy(), losses)
 
@@ -109,13 +110,13 @@ def motor_gains(robot: RobotDescription, wanted: Array, unit: str) -> MotorGains
 def _non_negative_least_squares(columns: Array, target: Array) -> Array:
     """The ``x >= 0`` with the least ``|columns x - target|``, one element after the other in turn;
     the problem is convex and its columns are independent, so this ends at the minimum."""
-    products, slope = columns.T @ columns, columns.T @ target
+    products, slope = product(columns.T, columns), product(columns.T, target)
     found = np.zeros(len(slope))
     for _ in range(_SWEEPS):
         largest = 0.0
         for k in range(len(found)):
             if products[k, k] > 0.0:
-                rest = slope[k] - products[k] @ found + products[k, k] * found[k]
+                rest = slope[k] - product(products[k], found) + products[k, k] * found[k]
                 value = max(0.0, float(rest / products[k, k]))
                 largest = max(largest, abs(value - found[k]))
                 found[k] = value

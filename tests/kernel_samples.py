@@ -5,6 +5,7 @@ import numpy as np
 from aloft.blocks.control import balance_law
 from aloft.blocks.jumping import capture_law
 from aloft.blocks.scoring import footing, jump_following, jump_series, stand_following, stand_score
+from aloft.hal.simulated import base, external_force
 from aloft.mathematics.body_tree import BodyMotion
 from aloft.mathematics.flight_prediction import LandingCost, flight_map
 from aloft.mathematics.joint_feedback import Feedback, Motion, SoftStops
@@ -124,6 +125,7 @@ SERIES = jump_series.Series(
     np.array(1), np.array(0.02), np.array(1), np.array(0.01), np.array(0.02), np.array(1),
     np.array(0.05), np.array(0.03), np.array(1),
 )  # fmt: skip
+BASE = base.BaseTruth(np.ones(3), np.ones(4), np.ones(3), np.ones(3))
 TIMES = jump_following.Times(0.02, 0.5, 0.1, 0.15, 3, True)
 UNUSED = {
     "aloft.blocks.control.balance_law.correct_place": PLACE,
@@ -165,6 +167,16 @@ UNUSED = {
         stand_score.Squat(np.array(0.31), np.array(0.31), np.array(0.29)), STAND_LIMITS, 0.3, 1.0,
         np.zeros(1, np.int64),
     ),
+    "aloft.hal.simulated.base.report_fixed": (BASE,),
+    "aloft.hal.simulated.base.report_planar": (POSE[0], POSE[3], BASE),
+    "aloft.hal.simulated.base.read_pitch_rate": (POSE[0], np.zeros(3)),
+    "aloft.hal.simulated.external_force.push_point": (
+        np.array([3.0, -2.0, 1.0]), np.array(1),
+        external_force.Points(
+            np.array([2, 0]), np.array([1, 1]), DRAW((3, 3)), DRAW((2, 3)), np.zeros((2, 6)),
+            np.zeros(1, np.bool_),
+        ),
+    ),
     "aloft.mathematics.capture_step.approach": (0.1, -0.3, 0.2, 0.05),
     "aloft.mathematics.capture_step.swing_points": (
         1, np.array([0, 0, 1, 1]), np.array([[0.045, 0.0, 0.0], [-0.045, 0.0, 0.0]] * 2),
@@ -177,7 +189,7 @@ UNUSED = {
     ),
     "aloft.mathematics.flight_prediction.predict_tilt": (
         FLIGHT, np.array([0.1, -0.05, 0.02]), np.array([0.02, 0.03, -0.01]), NORMAL(12), 0.2,
-        np.array([1.0, 1.0, -1.0, -1.0]), np.zeros(2), np.zeros((2, 4)),
+        0.7, np.array([1.0, 1.0, -1.0, -1.0]), np.zeros(2), np.zeros((2, 4)),
     ),
     "aloft.mathematics.flight_prediction.choose_shift": (
         np.array([0.1, -0.05]), NORMAL((2, 4)), LANDING, np.zeros((4, 4)), np.zeros(4),

@@ -36,6 +36,7 @@ NOT_HOT = {
     "hal.bear.supervision._first_lasting": "of plain numbers, in the driver's own Python",
     "blocks.estimation.mass_estimator._scratch": "memory, when a block is set up",
     "mathematics.compiling.chain_code.rows_of": "a view, when calls are bound",
+    "mathematics.compiling.library_call._caller": "makes machine code, when calls are bound",
     "mathematics.compiling.compile_calls._tell": "says how far compiling is, before a run",
     "mathematics.body_dynamics.inertias": "memory, when a block is set up",
     "mathematics.body_tree.body_motion": "memory, when a block is set up",

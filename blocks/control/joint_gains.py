@@ -7,6 +7,7 @@ import numpy as np
 from ...mathematics.arrays import Array
 from ...mathematics.kept_arrays import kept_arrays
 from ...mathematics.package_code import code_digest
+from ...mathematics.reproducible import product
 from ...robots.description import RobotDescription
 from ...robots.pinocchio_model import build_pinocchio_model
 
@@ -25,10 +26,10 @@ def default_gains(robot: RobotDescription) -> tuple[Array, Array]:
     and D = 2 ``DAMPING_RATIO`` sqrt(K I).
     """
     inertia = kept_arrays(
-        robot.model_dump_json().encode() + code_digest("robots", "blocks/control"),
+        robot.model_dump_json().encode() + code_digest("mathematics", "robots", "blocks/control"),
         lambda: {"inertia": _joint_inertia(robot)},
     )["inertia"]
-    peak = np.abs(robot.joint_to_motor).T @ robot.motors.peak_torque
+    peak = product(np.abs(robot.joint_to_motor).T, robot.motors.peak_torque)
     stiffness = np.minimum(inertia * NATURAL_FREQUENCY**2, peak / SATURATION_ERROR)
     return stiffness, 2.0 * DAMPING_RATIO * np.sqrt(stiffness * inertia)
 

@@ -8,6 +8,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from ...mathematics.compiling.kernel_call import KernelCall
+from ...mathematics.reproducible import inverse, product
 from ...runtime.language.block import Input, Metric, Output, State
 from ...runtime.language.kernel_block import KernelBlock
 from ...runtime.language.parameters import live_parameter, parameter
@@ -142,8 +143,8 @@ class SafetyMonitor(KernelBlock):
         self._lower = robot.joint_limits[:, 0] - p.limit_margin
         self._upper = robot.joint_limits[:, 1] + p.limit_margin
         motors, matrix = robot.motors, robot.joint_to_motor
-        self._peak = np.abs(matrix).T @ motors.peak_torque
-        fastest = np.abs(np.linalg.inv(matrix)) @ motors.no_load_speed
+        self._peak = product(np.abs(matrix).T, motors.peak_torque)
+        fastest = product(np.abs(inverse(matrix)), motors.no_load_speed)
         given = p.speed_limit, p.torque_limit
         self._speed_limit = 2.0 * fastest if given[0] is None else given[0].resolve(robot)
         torque_limit = 10.0 * self._peak if given[1] is None else given[1].resolve(robot)

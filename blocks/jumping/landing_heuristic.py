@@ -47,6 +47,7 @@ class LandingMemory(Signal):
     origin = Field(3, unit="m", frame="world", text="position of the plan's origin")
     lift_off_time = Field(unit="s", text="planned lift-off of the flight under way or next")
     wished = Field(3, unit="m", frame="world", text="planned place of the com at touchdown")
+    due = Field(unit="s", text="touchdown with the planned length of the legs, from lift-off")
 
 
 class LandingHeuristic(KernelBlock):
@@ -80,8 +81,9 @@ class LandingHeuristic(KernelBlock):
             + sum over roll and pitch of (tilt_cost h (tilt - free))^2
 
     where tilt is the deviation from the planned orientation at touchdown, linear in s, of which up
-    to ``free_tilt`` costs nothing. s_z is within ``height_range`` h, but drawn up legs must keep
-    the stroke in which ``stop_acceleration`` g stops the fall. The goal g is the capture point of
+    to ``free_tilt`` costs nothing. Drawn up legs touch down later, by s_z over the speed of the
+    fall, and the base turns until then. s_z is within ``height_range`` h, but drawn up legs must
+    keep the stroke in which ``stop_acceleration`` g stops the fall. The goal g is the capture point of
     the linear inverted pendulum of the standing height h, w^2 = g / h, times the gains::
 
         g_x = capture l^x / (m w) + capture_turn k^y w / (m g),

@@ -46,7 +46,7 @@ class PredictionGains(Parameters):
         text="cost of a rad of roll and pitch at touchdown, in standing heights off the best place",
     )
     free_tilt: tuple[float, float, float] = live_parameter(
-        (0.35, 0.1, 0.6),
+        (0.35, 0.1, 0.5),
         unit="rad",
         text="tilt that costs nothing: to either side, back and ahead",
     )
@@ -54,7 +54,7 @@ class PredictionGains(Parameters):
         0.25, gt=0.0, text="cost of landing with longer or shorter legs, per way off the place"
     )
     height_range: tuple[float, float] = live_parameter(
-        (-0.01, 0.25), text="shift of the feet down and up, in standing heights"
+        (-0.01, 0.2), text="shift of the feet down and up, in standing heights"
     )
     stop_acceleration: float = live_parameter(
         3.0, gt=0.0, text="stops the fall in the stroke that drawn up legs must keep, in g"
@@ -213,6 +213,7 @@ def choose_shift_of_feet(
     angular: Array,
     miss: Array,
     left: float,
+    speed: float,
     prediction: Prediction,
     shift: Array,
 ) -> None:
@@ -224,10 +225,10 @@ def choose_shift_of_feet(
         orientation: the planned one, quaternion x, y, z, w.
         linear, angular: the momenta that were not planned.
         miss: by how much unshifted feet will miss their planned place in the world [m], (3,).
-        left: time until touchdown [s].
+        left: time until touchdown with the planned length of the legs [s]; shorter legs may fall on
+            when it is over.
+        speed: of the fall then [m/s]; by 1 / speed does every metre of shorter legs delay touchdown.
     """
-    if left < LAST:
-        return
     soles, gains, scratch = prediction.soles, prediction.gains, prediction.scratch
     cost = gains.cost
     map_flight(
@@ -240,11 +241,10 @@ def choose_shift_of_feet(
     multiply(scratch.quaternion, scratch.turned, scratch.turned)
     logarithm(scratch.turned, scratch.vector)
     predict_tilt(
-        scratch.flight, scratch.vector, angular, scratch.way, left, soles.side, scratch.tilt,
-        scratch.turn,
+        scratch.flight, scratch.vector, angular, scratch.way, left, 1.0 / speed, soles.side,
+        scratch.tilt, scratch.turn,
     )  # fmt: skip
-    fall = GRAVITY * left - float(terms.com_velocity[2])
-    cost.bounds[1] = max(float(gains.highest[0]) - fall * fall * float(gains.stroke[0]), 0.0)
+    cost.bounds[1] = max(float(gains.highest[0]) - speed * speed * float(gains.stroke[0]), 0.0)
     ahead = float(gains.per_linear[0]) * float(linear[0])
     cost.goal[0] = ahead + float(gains.per_angular[0]) * float(angular[1])
     aside = float(gains.per_linear[1]) * float(linear[1])

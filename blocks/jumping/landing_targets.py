@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 from ...mathematics.arrays import Array, Flags, Indices
@@ -30,7 +31,7 @@ from ...mathematics.rotations import (
     yaw,
 )
 from ..signals import Phase
-from .landing_prediction import Prediction, Terms, choose_shift_of_feet
+from .landing_prediction import LAST, Prediction, Terms, choose_shift_of_feet
 
 _SLOWEST = 0.3
 """The least speed of descent [m/s] by which a change of the legs' length changes the time."""
@@ -78,6 +79,7 @@ class Memory(NamedTuple):
     origin: Array
     lift_off_time: Array
     wished: Array
+    due: Array
 
 
 class Targets(NamedTuple):
@@ -171,7 +173,7 @@ def aim_feet(
     memory.flying[()] = flying
     elapsed, left = float(now.time_in_phase[()]), float(now.time_to_touchdown[()])
     if law.predicts and flying:
-        left = predict(plan, terms, left, prediction, memory, scratch)
+        left = predict(plan, terms, elapsed, left, prediction, memory, scratch)
     reach = float(settings.reach_share[0]) * max(elapsed + left, law.period)
     share, rate, _ = minimum_jerk(elapsed / reach)
     lift, lift_rate = retraction(
@@ -268,6 +270,7 @@ def feed_back(terms: Terms, law: Law, memory: Memory, scratch: Scratch) -> None:
 @kernel
 def lift_off(terms: Terms, memory: Memory) -> None:
     """Begin a flight: note how far the feet are from their plan."""
+    memory.due[()] = 0.0
     for k in range(4):
         memory.shift[k] = 0.0
     for foot in range(memory.offset.shape[0]):
@@ -278,18 +281,43 @@ def lift_off(terms: Terms, memory: Memory) -> None:
 
 @kernel
 def predict(
-    plan: Plan, terms: Terms, left: float, prediction: Prediction, memory: Memory, scratch: Scratch
+    plan: Plan,
+    terms: Terms,
+    elapsed: float,
+    left: float,
+    prediction: Prediction,
+    memory: Memory,
+    scratch: Scratch,
 ) -> float:
-    """Choose the shift; returns the time [s] to a touchdown with the legs that much shorter."""
+    """Choose the shift; returns the time [s] to a touchdown with the legs that much shorter.
+
+    ``left`` is the time to touchdown with the planned legs, which ends at zero. Shorter legs fall on.
+    """
+    if left > 0.0:
+        memory.due[()] = elapsed + left
+    left = float(memory.due[()]) - elapsed
     for k in range(3):
         place = float(terms.com_velocity[k]) * left + float(terms.com[k])
         scratch.miss[k] = place - float(memory.wished[k])
-    choose_shift_of_feet(
-        terms, plan.foot_yaw, memory.planned, memory.orientation, scratch.linear, scratch.angular,
-        scratch.miss, left, prediction, memory.shift,
-    )  # fmt: skip
     speed = max(GRAVITY * left - float(terms.com_velocity[2]), _SLOWEST)
-    return max(left + float(memory.shift[3]) / speed, 0.0)
+    later = fall_time(speed, float(memory.shift[3]))
+    if left + later >= LAST:
+        choose_shift_of_feet(
+            terms, plan.foot_yaw, memory.planned, memory.orientation, scratch.linear,
+            scratch.angular, scratch.miss, left, speed, prediction, memory.shift,
+        )  # fmt: skip
+        later = fall_time(speed, float(memory.shift[3]))
+    return max(left + later, 0.0)
+
+
+@kernel
+def fall_time(speed: float, height: float) -> float:
+    """The time [s] in which a body falls by ``height`` [m] from the downward ``speed`` [m/s].
+
+    For a negative height it is that since the body was so much higher, at the latest its apex.
+    """
+    square = speed * speed + 2.0 * GRAVITY * height
+    return (math.sqrt(max(square, 0.0)) - speed) / GRAVITY
 
 
 @kernel

@@ -3,15 +3,68 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 
 from ...blocks.signals import RobotTruth
 from ...mathematics.arrays import Array
+from ...mathematics.compiling.kernel_call import KernelCall
+from ...mathematics.kernel import kernel
 
 if TYPE_CHECKING:
     from mujoco import MjData
+
+
+class BaseTruth(NamedTuple):
+    """The fields of ``RobotTruth`` of the base."""
+
+    base_position: Array
+    base_orientation: Array
+    base_linear_velocity: Array
+    base_angular_velocity: Array
+
+
+def _base_truth(truth: RobotTruth) -> BaseTruth:
+    return BaseTruth(*(getattr(truth, name) for name in BaseTruth._fields))
+
+
+@kernel
+def report_fixed(truth: BaseTruth) -> None:
+    """The pose and velocity of a base at the world's origin."""
+    for axis in range(3):
+        truth.base_position[axis] = truth.base_orientation[axis] = 0.0
+        truth.base_linear_velocity[axis] = truth.base_angular_velocity[axis] = 0.0
+    truth.base_orientation[3] = 1.0
+
+
+@kernel
+def report_planar(position: Array, velocity: Array, truth: BaseTruth) -> None:
+    """The same of a base whose coordinates in the simulator are x, z and the pitch."""
+    half = 0.5 * float(position[2])
+    report_fixed(truth)
+    truth.base_position[0], truth.base_position[2] = float(position[0]), float(position[1])
+    truth.base_orientation[1], truth.base_orientation[3] = math.sin(half), math.cos(half)
+    truth.base_linear_velocity[0] = float(velocity[0])
+    truth.base_linear_velocity[2] = float(velocity[1])
+    truth.base_angular_velocity[1] = float(velocity[2])
+
+
+@kernel
+def report_floating(position: Array, velocity: Array, truth: BaseTruth) -> None:
+    """The same of a base whose coordinates are position and quaternion w, x, y, z."""
+    for axis in range(3):
+        truth.base_position[axis] = position[axis]
+        truth.base_orientation[axis] = position[4 + axis]
+        truth.base_linear_velocity[axis] = velocity[axis]
+        truth.base_angular_velocity[axis] = velocity[3 + axis]
+    truth.base_orientation[3] = position[3]
+
+
+@kernel
+def read_pitch_rate(velocity: Array, rate: Array) -> None:
+    """The angular velocity (3,) [rad/s, body] of a planar base, from the simulator's velocities."""
+    rate[1] = velocity[2]
 
 
 class FixedBase:
@@ -45,13 +98,13 @@ class FixedBase:
     def refresh(self) -> None:
         """Bring ``angular_velocity`` up to date."""
 
-    def publish(self, truth: RobotTruth) -> None:
-        """Write the base's pose and velocity."""
-        truth.base_position.fill(0.0)
-        truth.base_orientation[:3] = 0.0
-        truth.base_orientation[3] = 1.0
-        truth.base_linear_velocity.fill(0.0)
-        truth.base_angular_velocity.fill(0.0)
+    def refreshing(self) -> list[KernelCall]:
+        """The same as calls."""
+        return []
+
+    def publishing(self, truth: RobotTruth) -> KernelCall:
+        """Writes the base's pose and velocity."""
+        return KernelCall(report_fixed, _base_truth(truth))
 
 
 class PlanarBase(FixedBase):
@@ -85,20 +138,16 @@ class PlanarBase(FixedBase):
 
     def refresh(self) -> None:
         """Bring ``angular_velocity`` up to date."""
-        self.angular_velocity[1] = self._data.qvel[2]
+        read_pitch_rate(self._data.qvel, self.angular_velocity)
 
-    def publish(self, truth: RobotTruth) -> None:
-        """Write the base's pose and velocity."""
-        position, velocity = self._data.qpos, self._data.qvel
-        half = 0.5 * position.item(2)
-        truth.base_position[0], truth.base_position[1] = position.item(0), 0.0
-        truth.base_position[2] = position.item(1)
-        truth.base_orientation.fill(0.0)
-        truth.base_orientation[1], truth.base_orientation[3] = math.sin(half), math.cos(half)
-        truth.base_linear_velocity[0], truth.base_linear_velocity[1] = velocity.item(0), 0.0
-        truth.base_linear_velocity[2] = velocity.item(1)
-        truth.base_angular_velocity.fill(0.0)
-        truth.base_angular_velocity[1] = velocity.item(2)
+    def refreshing(self) -> list[KernelCall]:
+        """The same as calls."""
+        return [KernelCall(read_pitch_rate, self._data.qvel, self.angular_velocity)]
+
+    def publishing(self, truth: RobotTruth) -> KernelCall:
+        """Writes the base's pose and velocity."""
+        data = self._data
+        return KernelCall(report_planar, data.qpos, data.qvel, _base_truth(truth))
 
 
 class FloatingBase(FixedBase):
@@ -134,14 +183,10 @@ class FloatingBase(FixedBase):
         """Move the base by ``offset`` [m, world]."""
         self._data.qpos[:3] += offset
 
-    def publish(self, truth: RobotTruth) -> None:
-        """Write the base's pose and velocity."""
+    def publishing(self, truth: RobotTruth) -> KernelCall:
+        """Writes the base's pose and velocity."""
         data = self._data
-        truth.base_position[:] = data.qpos[:3]
-        truth.base_orientation[:3] = data.qpos[4:7]
-        truth.base_orientation[3] = data.qpos[3]
-        truth.base_linear_velocity[:] = data.qvel[:3]
-        truth.base_angular_velocity[:] = data.qvel[3:6]
+        return KernelCall(report_floating, data.qpos, data.qvel, _base_truth(truth))
 
 
 BASES: dict[Literal["floating", "planar", "fixed"], type[FixedBase]] = {

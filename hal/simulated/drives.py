@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -116,6 +117,55 @@ def drive_loops(
     drive_motors(joints.velocity, joints.torque, motors, scratch, record)
 
 
+class Given(NamedTuple):
+    """The fields of ``JointCommand``."""
+
+    mode: Counts
+    torque: Array
+    position: Array
+    velocity: Array
+    stiffness: Array
+    damping: Array
+
+
+class Way(NamedTuple):
+    """How long a command is on its way: ``shortest`` (1,) [s], and up to ``jitter`` [s] longer, as a
+    number ``drawn`` (1,) between zero and one says, in physics steps of ``timestep`` [s]."""
+
+    shortest: Array
+    jitter: float
+    drawn: Array
+    timestep: float
+
+
+@kernel
+def send_command(
+    given: Given, step: Counts, way: Way, commands: Commands, last_due: Counts
+) -> None:
+    """Put a command into the ring, behind those that are on their way.
+
+    ``step`` and ``last_due``, the arrival of the command sent last, have no dimension.
+    """
+    delay = float(way.shortest[0])
+    if way.jitter != 0.0:
+        delay += way.jitter * float(way.drawn[0])
+    due = int(step[()]) + math.ceil(delay / way.timestep - 1e-9)
+    due = max(due, int(last_due[()]))
+    pending = int(commands.pending[()])
+    slot = (int(commands.active[()]) + 1 + pending) % commands.due.shape[0]
+    targets = commands.targets
+    commands.mode[slot] = int(given.mode[()])
+    for k in range(given.torque.shape[0]):
+        targets.torque[slot, k] = given.torque[k]
+        targets.position[slot, k] = given.position[k]
+        targets.velocity[slot, k] = given.velocity[k]
+        targets.stiffness[slot, k] = given.stiffness[k]
+        targets.damping[slot, k] = given.damping[k]
+    commands.due[slot] = due
+    last_due[()] = due
+    commands.pending[()] = pending + 1
+
+
 class MotorLimits:
     """What ``drive_motors`` needs to limit joint torques to what the motors can do at their speed, and
     to record how near they come to it."""
@@ -135,16 +185,6 @@ class MotorLimits:
         self.record = MotorRecord(*(getattr(record, name) for name in MotorRecord._fields))
         self.motor_torque = self.scratch.torque
         """The motors' torques of the last step [N m], (n_joints,)."""
-
-
-class Row(NamedTuple):
-    """One command of the ring, each field (n_joints,)."""
-
-    torque: Array
-    stiffness: Array
-    damping: Array
-    position: Array
-    velocity: Array
 
 
 class Drives:
@@ -172,12 +212,6 @@ class Drives:
     ) -> None:
         self._feedback = feedback
         self._state = state
-        self._slots = len(state.due)
-        self._rows = [
-            Row(state.torque[k], state.stiffness[k], state.damping[k], state.position[k],
-                state.velocity[k])
-            for k in range(self._slots)
-        ]  # fmt: skip
         limits = MotorLimits(robot, record)
         self._commands = Commands(
             state.active, state.pending, state.due, state.mode,
@@ -225,19 +259,8 @@ class Drives:
         self._state.pending[()] = 0
         self._state.mode[int(self._state.active)] = CommandMode.DAMPING
 
-    def send(self, command: JointCommand, due: int) -> None:
-        """Send a command. It arrives at physics step ``due``, but not before earlier commands."""
-        state = self._state
-        due = max(due, int(state.last_due))
-        pending = int(state.pending)
-        slot = (int(state.active) + 1 + pending) % self._slots
-        torque, stiffness, damping, position, velocity = self._rows[slot]
-        state.mode[slot] = command.mode
-        torque[:] = command.torque
-        position[:] = command.position
-        velocity[:] = command.velocity
-        stiffness[:] = command.stiffness
-        damping[:] = command.damping
-        state.due[slot] = due
-        state.last_due[()] = due
-        state.pending[()] = pending + 1
+    def sending(self, command: JointCommand, step: Counts, way: Way) -> KernelCall:
+        """Sends a command in the physics step ``step``, a count without a dimension. It arrives as
+        late as its ``way`` is long, but not before earlier commands."""
+        given = Given(*(getattr(command, name) for name in Given._fields))
+        return KernelCall(send_command, given, step, way, self._commands, self._state.last_due)

@@ -8,16 +8,17 @@ from typing import Any
 
 import numpy as np
 
+from ...mathematics.compiling.call_sequence import CallSequence
 from ...robots.description import RobotDescription
 from ...runtime.language.block import Context, Metric, Misfit, State
 from ...runtime.language.parameters import Parameters
 from ..drive_gains import gain_misfits, lost_gains
-from .drives import Drives
+from .drives import Drives, Way
 from .holding import RELEASED
 from .motor_feedback import FeedbackState, MotorFeedback
 from .parameters import SimulatorParameters
 from .plant import Plant
-from .random_streams import Purpose
+from .random_streams import Purpose, uniform_call
 from .rotors import unfit_motor
 from .simulated_robot import SimulatedRobot
 from .stance import uneven_contacts
@@ -159,10 +160,7 @@ class MujocoRobot(SimulatedRobot):
         """Draw the world from the seed and build it."""
         robot, params = self.robot, self.params
         plant = self.plant = Plant(robot, params, self.period, self.physics, self.record)
-        plant.attach(self.imu, self.joints)
-        plant.truth.attach(self.truth)
         steps = round(self.period / params.timestep)
-        self._jitter = plant.streams[Purpose.JITTER]
         damping = RELEASED * plant.damping
         if params.drive_damping is not None:
             damping = np.full(len(robot.joints), params.drive_damping)
@@ -171,6 +169,17 @@ class MujocoRobot(SimulatedRobot):
             exchange = round(params.bus_period / params.timestep)
             feedback = MotorFeedback(robot, params, params.bus_period, exchange, self.feedback)
         drives = self._drives = Drives(robot, damping, self.drives, self.record, feedback)
+        self._reading = CallSequence([
+            *plant.reading(self.imu, self.joints),
+            *plant.sensors.reading_switches(self.physics.step, self.record, self.contacts.closed),
+            *plant.truth.reporting(self.truth), self.reporting(),
+        ])  # fmt: skip
+        way = self._way = Way(np.zeros(1), float(params.jitter), np.zeros(1), params.timestep)
+        jitter, _ = uniform_call(plant.streams[Purpose.JITTER], way.drawn)
+        self._sending = CallSequence([
+            *([jitter] if params.jitter else []),
+            drives.sending(self.command, self.physics.step, way),
+        ])  # fmt: skip
         self._settling = plant.simulating(drives, 1)
         self._ticking = plant.simulating(drives, steps, self.push)
         self._damped = plant.simulating(drives, steps)
@@ -178,28 +187,24 @@ class MujocoRobot(SimulatedRobot):
     def open(self) -> None:
         """Stand on the ground, settle, and wait for the first command."""
         plant, drives = self.plant, self._drives
-        self._ticking.prepare()
-        self._damped.prepare()
+        for sequence in (self._reading, self._sending, self._ticking, self._damped):
+            sequence.prepare()
         plant.stand(
             self._settling,
             lambda pose, torque: drives.hold(pose, torque, plant.stiffness, plant.damping),
         )
+        self._way.shortest[0] = self.params.latency + plant.late
 
     def read(self) -> None:
-        """Publish the sensors and the truth at the present instant."""
-        plant = self.plant
-        plant.read()
-        plant.sensors.read_switches(int(self.physics.step), self.record, self.contacts)
-        plant.truth.publish()
+        """Publish the sensors, the truth at the present instant, and that all is well."""
+        self._reading.run()
+
+    def report(self) -> None:
+        """Nothing: ``read`` has said that all is well."""
 
     def write(self) -> None:
         """Send the command on its way to the drives."""
-        params = self.params
-        delay = params.latency + self.plant.late
-        if params.jitter:
-            delay += params.jitter * self._jitter.random()
-        arrival = int(self.physics.step) + math.ceil(delay / params.timestep - 1e-9)
-        self._drives.send(self.command, arrival)
+        self._sending.run()
 
     def advance(self) -> None:
         """Simulate to the next tick."""

@@ -29,7 +29,15 @@ from .simulator_calls import step_calls
 from .stance import centre_on_origin, holding_torque, place_standing
 from .start_check import StartCheck
 from .state import PhysicsState, TickRecord
-from .step_record import Cleared, StepRecord, StepSensors, clear, note_step, read_encoders
+from .step_record import (
+    Cleared,
+    StepRecord,
+    StepSensors,
+    clear,
+    mean_over_steps,
+    note_step,
+    read_encoders,
+)
 from .truth import TruthReport
 from .world import build_world, draw_variation
 
@@ -72,6 +80,7 @@ class Plant:
         sensors: what makes readings of the true motion.
         stiffness, damping: the gains [N m/rad, N m s/rad] (n_joints,) that hold the standing pose.
         position, velocity: the true joint motion [rad, rad/s], views of the simulator's memory.
+        clearing: begins a new record, except for the memory of the switches.
         forces: what acts on the robot from outside.
         late: by how much [s] the physics steps begin after the control clock's ticks.
     """
@@ -95,10 +104,8 @@ class Plant:
         self.stiffness, self.damping = holding_gains(self.model, robot)
         self._passive = passive_joints(robot)
         self._limits = (robot.joint_limits[:, 0].copy(), robot.joint_limits[:, 1].copy())
-        n = len(robot.joints)
-        self._encoder = np.zeros(n)
-        self._mean_force, self._mean_torque = np.zeros(3), np.zeros(n)
-        self._clear = KernelCall(
+        self._encoder = np.zeros(len(robot.joints))
+        self.clearing = KernelCall(
             clear, *(getattr(record, name) for name in ("steps", "forbidden", "saturated")),
             Cleared(*(getattr(record, name) for name in Cleared._fields)),
         )  # fmt: skip
@@ -206,35 +213,29 @@ class Plant:
         ]  # fmt: skip
         return CallSequence([self.forces.releasing(), *(one * steps)])
 
-    def attach(self, imu: ImuReading, joints: JointState) -> None:
-        """From now on ``read`` writes to these signals."""
-        sensors = self.sensors
-        self._read_imu = sensors.imu_call(self._base.angular_velocity, self._mean_force, imu)
-        self._read_joints = sensors.joint_call(
-            self.position, self.velocity, self._mean_torque, joints
-        )
-
-    def read(self) -> None:
+    def reading(self, imu: ImuReading, joints: JointState) -> list[Call]:
         """Write a sample of the IMU, the gyroscope of this instant and the mean of the accelerometer
-        since ``clear_record``, and one of the joints with their mean torques."""
-        record = self.record
-        steps = int(record.steps)
-        np.divide(record.accelerometer, steps, out=self._mean_force)
-        np.divide(record.joint_torque, steps, out=self._mean_torque)
-        self._base.refresh()
-        self.sensors.draw_imu()
-        self._read_imu.run()
-        self.sensors.draw_joints()
-        self._read_joints.run()
+        since ``clearing``, and one of the joints with their mean torques."""
+        record, sensors = self.record, self.sensors
+        force, torque = np.zeros(3), np.zeros(len(self._robot.joints))
+        return [
+            KernelCall(mean_over_steps, record.accelerometer, record.steps, force),
+            KernelCall(mean_over_steps, record.joint_torque, record.steps, torque),
+            *self.reading_imu(force, imu),
+            *sensors.reading_joints(self.position, self.velocity, torque, joints),
+        ]
 
-    def angular_velocity(self) -> Array:
-        """The base's true angular velocity now [rad/s, body]."""
-        self._base.refresh()
-        return self._base.angular_velocity
+    def reading_imu(self, force: Array, imu: ImuReading) -> list[Call]:
+        """Write a sample of the IMU: the gyroscope of this instant, and this specific ``force``
+        [m/s^2, body] as the accelerometer's."""
+        base = self._base
+        return [
+            *base.refreshing(), *self.sensors.reading_imu(base.angular_velocity, force, imu)
+        ]  # fmt: skip
 
     def clear_record(self) -> None:
         """Begin a new record, except for the memory of the switches."""
-        self._clear.run()
+        self.clearing.run()
 
     def save(self) -> None:
         """Copy the state of the simulator and of the random streams to ``physics``."""

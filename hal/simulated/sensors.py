@@ -8,13 +8,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ...blocks.signals import ContactSwitches, ImuReading, JointState
+from ...blocks.signals import ImuReading, JointState
 from ...mathematics.arrays import Array, Flags
+from ...mathematics.compiling.call_sequence import Call
 from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.kernel import kernel
 from ...robots.description import RobotDescription
 from .parameters import SimulatorParameters
-from .random_streams import Purpose, RandomStreams, stream
+from .random_streams import Purpose, RandomStreams, normal_call, stream, uniform_call
 from .state import TickRecord
 
 Counts = NDArray[np.int64]
@@ -125,6 +126,35 @@ def sample_joints(
         read_torque[joint] = torque[joint]
 
 
+@kernel
+def count_bouncing(step: Counts, bounce_end: Counts, count: Counts) -> None:
+    """How many switches chatter in a physics step: ``step`` without a dimension, ``count`` (1,)."""
+    count[0] = 0
+    for point in range(bounce_end.shape[0]):
+        if step[()] < bounce_end[point]:
+            count[0] += 1
+
+
+@kernel
+def sample_switches(
+    present: bool, step: Counts, pressed: Flags, bounce_end: Counts, draws: Array, closed: Flags
+) -> None:
+    """A sample of the switches that the robot may have (``present``).
+
+    Args:
+        step, bounce_end: as for ``count_bouncing``.
+        pressed: the switches before bounce, (n_contacts,).
+        draws: a random number between zero and one for each switch that chatters, in their order.
+        closed: what the switches read, (n_contacts,).
+    """
+    drawn = 0
+    for point in range(closed.shape[0]):
+        closed[point] = present and bool(pressed[point])
+        if present and step[()] < bounce_end[point]:
+            closed[point] = draws[drawn] < 0.5
+            drawn += 1
+
+
 class Sensors:
     """Makes readings of true quantities. Biases, offsets and switch thresholds are drawn once from
     the seed; noise and bounce come from the running ``streams``."""
@@ -166,63 +196,52 @@ class Sensors:
         self.ground_force = -self.switch_threshold
         """The vertical force on the ground up to which every switch is closed [N]."""
 
-    def draw_imu(self) -> None:
-        """Draw the noise of the next sample of the IMU."""
-        if self._params.gyro_noise:
-            self._gyro.standard_normal(out=self._imu_errors.gyro_noise)
-        if self._params.accelerometer_noise:
-            self._accelerometer.standard_normal(out=self._imu_errors.accelerometer_noise)
-
-    def draw_joints(self) -> None:
-        """Draw the noise of the next sample of the joints."""
-        if self._params.joint_velocity_noise:
-            self._velocity.standard_normal(out=self._joint_errors.noise)
-
-    def imu_call(self, rate: Array, force: Array, out: ImuReading) -> KernelCall:
-        """Writes a sample of the IMU, after ``draw_imu``: arguments as for ``read_imu``."""
-        return KernelCall(
-            sample_imu, rate, force, self._imu_errors, out.angular_velocity, out.specific_force
-        )
-
-    def joint_call(
-        self, position: Array, velocity: Array, torque: Array, out: JointState
-    ) -> KernelCall:
-        """Writes a sample of the joints, after ``draw_joints``: arguments as for ``read_joints``."""
-        return KernelCall(
-            sample_joints, position, velocity, torque, self._joint_errors, out.position,
-            out.velocity, out.torque,
-        )  # fmt: skip
-
-    def read_imu(self, angular_velocity: Array, specific_force: Array, out: ImuReading) -> None:
+    def reading_imu(self, rate: Array, force: Array, out: ImuReading) -> list[Call]:
         """Write a sample of the IMU from the true values [rad/s, m/s^2, body]; zero without IMU."""
-        self.draw_imu()
-        sample_imu(
-            angular_velocity, specific_force, self._imu_errors, out.angular_velocity,
-            out.specific_force,
-        )  # fmt: skip
+        errors, params = self._imu_errors, self._params
+        calls: list[Call] = []
+        if params.gyro_noise:
+            calls.append(normal_call(self._gyro, errors.gyro_noise))
+        if params.accelerometer_noise:
+            calls.append(normal_call(self._accelerometer, errors.accelerometer_noise))
+        return [
+            *calls,
+            KernelCall(sample_imu, rate, force, errors, out.angular_velocity, out.specific_force),
+        ]
 
-    def read_joints(self, position: Array, velocity: Array, torque: Array, out: JointState) -> None:
+    def reading_joints(
+        self, position: Array, velocity: Array, torque: Array, out: JointState
+    ) -> list[Call]:
         """Write a sample of encoders and currents from the joints' true motion and torques."""
-        self.draw_joints()
-        sample_joints(
-            position, velocity, torque, self._joint_errors, out.position, out.velocity, out.torque
+        errors = self._joint_errors
+        calls: list[Call] = []
+        if self._params.joint_velocity_noise:
+            calls.append(normal_call(self._velocity, errors.noise))
+        sampling = KernelCall(
+            sample_joints,
+            position,
+            velocity,
+            torque,
+            errors,
+            out.position,
+            out.velocity,
+            out.torque,
         )
+        return [*calls, sampling]
 
-    def read_switches(self, step: int, record: TickRecord, out: ContactSwitches) -> None:
-        """Write a sample of the switches; a switch that has just changed reads either way at
-        random. Without switches none is closed."""
-        self.read_closed(step, record, out.closed)
-
-    def read_closed(self, step: int, record: TickRecord, closed: Flags) -> None:
-        """The same as an array, (n_contacts,)."""
-        if not self._has_switches:
-            closed.fill(False)
-            return
-        closed[:] = record.closed
-        if self.bounce_steps:
-            for k, end in enumerate(record.bounce_end.tolist()):
-                if step < end:
-                    closed[k] = self._bounce.random() < 0.5
+    def reading_switches(self, step: Counts, record: TickRecord, closed: Flags) -> list[Call]:
+        """Write a sample of the switches, (n_contacts,); a switch that has just changed reads either
+        way at random. Without switches none is closed. ``step`` is a count without a dimension."""
+        draws = np.zeros(len(closed))
+        drawing, count = uniform_call(self._bounce, draws)
+        return [
+            KernelCall(count_bouncing, step, record.bounce_end, count),
+            *([drawing] if self.bounce_steps else []),
+            KernelCall(
+                sample_switches, self._has_switches, step, record.closed, record.bounce_end,
+                draws, closed,
+            ),
+        ]  # fmt: skip
 
 
 def _limit(limit: float | None) -> float:

@@ -9,6 +9,7 @@ import numpy as np
 
 from ...mathematics.arrays import Array
 from ...mathematics.constants import GRAVITY
+from ...mathematics.reproducible import product
 from ...mathematics.support_margin import support_margin
 from ...robots.description import RobotDescription
 from .base import FixedBase
@@ -117,7 +118,7 @@ class StartCheck:
     def _too_weak(self, torque: Array) -> list[str]:
         """Report motors that are too weak to hold the robot; joints without motors do not count."""
         robot = self._robot
-        needed = np.abs(robot.torque_to_motor @ torque)
+        needed = np.abs(product(robot.torque_to_motor, torque))
         found = []
         for k, peak in enumerate(robot.motors.peak_torque.tolist()):
             if peak > 0.0 and float(needed[k]) > peak:

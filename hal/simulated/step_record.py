@@ -73,6 +73,13 @@ def clear(steps: Counts, forbidden: Counts, saturated: Counts, record: Cleared) 
 
 
 @kernel
+def mean_over_steps(total: Array, steps: Counts, mean: Array) -> None:
+    """The ``mean`` (n,) of what has been summed up over ``steps``, a count without a dimension."""
+    for k in range(mean.shape[0]):
+        mean[k] = float(total[k]) / int(steps[()])
+
+
+@kernel
 def read_encoders(position: Array, offset: Array, reading: Array) -> None:
     """What the drives' own encoders read [rad] of the joints' positions, each (n_joints,)."""
     for joint in range(reading.shape[0]):

@@ -172,13 +172,10 @@ class TruthReport:
         )
         self._peaks = Peaks(*(getattr(record, name) for name in Peaks._fields))
 
-    def attach(self, truth: RobotTruth) -> None:
-        """From now on ``publish`` writes to ``truth``."""
-        self._truth = truth
-        report = Report(*(getattr(truth, name) for name in Report._fields))
-        self._report = KernelCall(report_truth, self._instant, self._peaks, report)
-
-    def publish(self) -> None:
+    def reporting(self, truth: RobotTruth) -> tuple[KernelCall, KernelCall]:
         """Write all fields of the truth."""
-        self._base.publish(self._truth)
-        self._report.run()
+        report = Report(*(getattr(truth, name) for name in Report._fields))
+        return (
+            self._base.publishing(truth),
+            KernelCall(report_truth, self._instant, self._peaks, report),
+        )

@@ -8,6 +8,7 @@ import numpy as np
 
 from ...blocks.signals import ExternalForce, ImuReading, JointState
 from ...mathematics.arrays import Array, Indices
+from ...mathematics.compiling.call_sequence import CallSequence
 from ...mathematics.compiling.library_call import LibraryCall
 from ...robots.robot_description import RobotDescription
 from ..bear.configuration import Hardware
@@ -98,6 +99,14 @@ class Twin:
         self.before, self._force = np.zeros(3), np.zeros(3)
         self.counted = 0
         self._current, self._nothing = np.zeros(n), np.zeros(n)
+        plant, sensors = self.plant, self.plant.sensors
+        self._reading_joints = CallSequence(
+            sensors.reading_joints(plant.position, plant.velocity, self._nothing, self._sample)
+        )
+        self._reading_imu = CallSequence(plant.reading_imu(self._force, self._imu))
+        self._reading_switches = CallSequence(
+            sensors.reading_switches(physics.step, record, self.closed)
+        )
         self._packet = b""
         self._to_board = b""
         self._late = b""
@@ -225,8 +234,8 @@ class Twin:
 
     def _sense(self) -> None:
         """Put what the drives measure now into their registers."""
-        plant, sample, drives = self.plant, self._sample, self.drives
-        plant.sensors.read_joints(plant.position, plant.velocity, self._nothing, sample)
+        sample, drives = self._sample, self.drives
+        self._reading_joints.run()
         drives.sense(sample.position, sample.velocity)
         drives.mean_current(self._current)
         for k, actuator in enumerate(self.actuators):
@@ -241,12 +250,12 @@ class Twin:
 
     def _send_packet(self) -> None:
         """A packet of the IMU and the switches: the accelerometer's mean since the last one."""
-        plant, record = self.plant, self._record
+        record = self._record
         np.subtract(record.accelerometer, self.before, out=self._force)
         np.divide(self._force, int(record.steps) - self.counted, out=self._force)
         self._begin_packet()
         imu = self._imu
-        plant.sensors.read_imu(plant.angular_velocity(), self._force, imu)
+        self._reading_imu.run()
         self._read_switches()
         if self.faults.active("frozen_imu"):
             imu.specific_force[:], imu.angular_velocity[:] = self.last_packet
@@ -258,8 +267,7 @@ class Twin:
 
     def _read_switches(self) -> None:
         closed = self.closed
-        plant = self.plant
-        plant.sensors.read_closed(int(plant.physics.step), self._record, closed)
+        self._reading_switches.run()
         if self.faults:
             for k, name in enumerate(self._points):
                 if self.faults.of(name, "stuck_switch"):

@@ -137,7 +137,7 @@ class TwinRobot(SimulatedRobot, DrivenRobot):
             tuple(params.faults),
         )  # fmt: skip
         self.twin.push_by(self.push)
-        self.twin.plant.truth.attach(self.truth)
+        self._reporting = self.twin.plant.truth.reporting(self.truth)
         self._hardware = hardware
         self.driver = _driver(robot, params, hardware, self.twin)
         self._queue = CommandQueue(self.driver.loop, robot, params.latency, self.period)
@@ -160,7 +160,8 @@ class TwinRobot(SimulatedRobot, DrivenRobot):
     def read(self) -> None:
         """Publish the newest measurements, and the truth."""
         super().read()
-        self.twin.plant.truth.publish()
+        for call in self._reporting:
+            call.run()
 
     def write(self) -> None:
         """Send the command on its way to the drives."""

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from ...blocks.signals import Phase
 from ...mathematics.arrays import Array
 from ...mathematics.constants import GRAVITY
+from ...mathematics.reproducible import product
 from ...robots.description import RobotDescription
 from ..checking.replay import flight_knots
 from ..models.exact_dynamics import ExactDynamics, JointMotion, joint_motion
@@ -129,7 +130,7 @@ def _base_motion(
     for knot in (k, k + 1):
         turn = dynamics.pin.Quaternion(plan.position[knot, 3:7]).toRotationMatrix()
         v = plan.velocity[knot]
-        ends.append(np.concatenate([turn @ v[:3], euler_rates(angles[knot], v[3:6])]))
+        ends.append(np.concatenate([product(turn, v[:3]), euler_rates(angles[knot], v[3:6])]))
     places = [np.concatenate([plan.position[i, :3], angles[i]]) for i in (k, k + 1)]
     return JointMotion(places[0], places[1], ends[0], ends[1], h)
 
@@ -145,7 +146,7 @@ def _between(
     quaternion = dynamics.pin.Quaternion(turn).coeffs()
     return (
         np.concatenate([place[:3], quaternion, position]),
-        np.concatenate([turn.T @ rate[:3], spin, velocity]),
+        np.concatenate([product(turn.T, rate[:3]), spin, velocity]),
         acceleration,
     )
 

@@ -73,7 +73,9 @@ def coast(base: Array, twist: Array, side: JointSide, step: float) -> tuple[Arra
     """
     count = len(side.com) // 2
     inverse = np.linalg.inv(side.inertia)
-    own: list[Vector] = [(x, y, z) for x, y, z in np.einsum("nij,nj->ni", inverse, side.momentum).tolist()]
+    own: list[Vector] = [
+        (x, y, z) for x, y, z in np.einsum("nij,nj->ni", inverse, side.momentum).tolist()
+    ]
     inverses = inverse.reshape(-1, 9).tolist()
     turn = matrices_of_quaternions(base[None, 3:7])[0]
     carried = turn @ (side.inertia[0] @ twist[3:6] + side.momentum[0])
@@ -133,4 +135,3 @@ def _around_com(
     places = flown - np.einsum("nij,nj->ni", turns, com)
     linear = np.einsum("nji,nj->ni", turns, flying) - np.cross(spins, com) - rate
     return np.hstack([places, quaternions])[1:], np.hstack([linear, spins])[1:]
-

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...mathematics.arrays import Array
+from ...mathematics.reproducible import product
 from ...robots.ball_feet import ball_feet
 from ...robots.description import RobotDescription
 from ...robots.pinocchio_model import build_pinocchio_model
@@ -125,11 +126,11 @@ class ExactDynamics:
         jacobians = [
             pin.getFrameJacobian(self.model, self.data, frame, axes) for frame in self.sole_frames
         ]
-        rates = np.array([jacobian[:3] @ v for jacobian in jacobians])
+        rates = np.array([product(jacobian[:3], v) for jacobian in jacobians])
         for ball in self.balls:
             # The lowest point moves as the centre does, which is above the sole at the zero pose.
             up = self.data.oMf[self.sole_frames[ball.foot]].rotation[:, 2]
-            turn = jacobians[ball.foot][3:] @ v
+            turn = product(jacobians[ball.foot][3:], v)
             rates[ball.foot] += ball.radius * np.cross(turn, up)
         return rates
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...mathematics.arrays import Array
+from ...mathematics.reproducible import product
 from ...robots.kinematics import matrices_of_quaternions
 from ..task.plan import JumpPlan
 from .exact_dynamics import ExactDynamics
@@ -40,7 +41,7 @@ def rotation(angles: Array) -> Array:
     about_x = np.array([[1.0, 0.0, 0.0], [0.0, cx, -sx], [0.0, sx, cx]])
     about_y = np.array([[cy, 0.0, sy], [0.0, 1.0, 0.0], [-sy, 0.0, cy]])
     about_z = np.array([[cz, -sz, 0.0], [sz, cz, 0.0], [0.0, 0.0, 1.0]])
-    return np.asarray(about_y @ about_x @ about_z)
+    return product(product(about_y, about_x), about_z)
 
 
 def angular_motion(angles: Array, rates: Array, accelerations: Array) -> tuple[Array, Array]:
@@ -48,7 +49,7 @@ def angular_motion(angles: Array, rates: Array, accelerations: Array) -> tuple[A
     x, _, z = angles
     back = np.array([[np.cos(z), np.sin(z), 0.0], [-np.sin(z), np.cos(z), 0.0], [0.0, 0.0, 1.0]])
     sine, cosine = np.sin(x), np.cos(x)
-    turning = back @ np.array([rates[0], rates[1] * cosine, -rates[1] * sine])
+    turning = product(back, np.array([rates[0], rates[1] * cosine, -rates[1] * sine]))
     bend = np.array(
         [
             accelerations[0],
@@ -57,7 +58,7 @@ def angular_motion(angles: Array, rates: Array, accelerations: Array) -> tuple[A
         ]
     )
     about_z = np.array([0.0, 0.0, rates[2]])
-    change = back @ bend - cross(about_z, turning) + np.array([0.0, 0.0, accelerations[2]])
+    change = product(back, bend) - cross(about_z, turning) + np.array([0.0, 0.0, accelerations[2]])
     return turning + about_z, change
 
 
@@ -101,8 +102,8 @@ def _generalised(place: Array, rate: Array, bend: Array) -> tuple[Array, Array, 
 
     turn = rotation(place[3:6])
     spin, spin_rate = angular_motion(place[3:6], rate[3:6], bend[3:6])
-    linear = turn.T @ rate[:3]
+    linear = product(turn.T, rate[:3])
     quaternion = pinocchio.Quaternion(turn).coeffs()
     q = np.concatenate([place[:3], quaternion / np.linalg.norm(quaternion), place[6:]])
     v = np.concatenate([linear, spin, rate[6:]])
-    return q, v, np.concatenate([turn.T @ bend[:3] - cross(spin, linear), spin_rate])
+    return q, v, np.concatenate([product(turn.T, bend[:3]) - cross(spin, linear), spin_rate])

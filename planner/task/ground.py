@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from ...mathematics.reproducible import product
 from ...robots.description import RobotDescription
 from ...robots.link_poses import contact_centres, link_poses
 from .errors import TaskError
@@ -129,7 +130,7 @@ def _soles(robot: RobotDescription, place: Place) -> list[tuple[float, float]]:
     links = {foot.name: foot.link for foot in robot.feet}
     points = np.array(
         [
-            poses[links[contact.foot]][1] + poses[links[contact.foot]][0] @ centre
+            poses[links[contact.foot]][1] + product(poses[links[contact.foot]][0], centre)
             for contact, centre in zip(robot.contacts, contact_centres(robot), strict=True)
         ]
     )[:, :2]

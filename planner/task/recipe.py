@@ -10,6 +10,7 @@ the ground follow from the robot:
 - the torso's orientation and the forces have high weights, so that the robot squats no deeper than it must;
 - the last sixth of the thrust is done on the toes, which lengthens the legs by the foot;
 - until lift-off every contact point on the ground bears some load, so that the feet stay flat;
+- feet come down slowly, and more slowly still along the ground, except from high up;
 - from touchdown on the torso leans little and the knees are bent; joints keep off their limits.
 
 A parameter that the task sets is kept: ``effort``, ``impact``, ``phases``, a time, or any single one of
@@ -27,6 +28,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from ...mathematics.constants import GRAVITY
+from ...mathematics.reproducible import product
 from ...robots.description import RobotDescription
 from ...runtime.language.parameters import Parameters
 from .margins import Margins
@@ -51,6 +53,10 @@ STEP, STEP_HEIGHT, FOOT_CLEARANCE = 0.012, 0.05, 0.12
 the flight as a share of that of the centre of mass."""
 LOAD = 0.4
 """The share of the weight that the ground bears until lift-off."""
+TOUCHDOWN_SPEED, TOUCHDOWN_SLIDE, FALL = 1.7, 0.6, 0.9
+"""m/s of the feet at touchdown, downwards and along the ground, for a robot of BRUCE's size; and up to
+which fall from the apex, as a multiple of the centre of mass's height, they are asked for. From
+higher up the motors stop the robot only if its legs are nearly stretched, and then feet are fast."""
 SQUAT_LEAN, FAR = 0.9, 1.2
 """rad, and from which distance ahead on, as a multiple of the centre of mass's height."""
 STEP_LEAN = 0.85
@@ -223,6 +229,7 @@ def _margins(task: Asked, robot: RobotDescription) -> Iterator[Choice]:
     knees = knee_limits(robot, KNEE_BEND)
     if "landing_limits" not in said and knees:
         yield Choice("margins.landing_limits", knees, "it lands on bent knees, which can give way")
+    yield from _slow_feet(task, robot, said)
     fall = max(0.0, *(-(hop.landing_height or 0.0) for hop in hops))
     if "step" not in said and any(hop.landing_height for hop in hops):
         gap = rounded(STEP + STEP_HEIGHT * max(fall, onto))
@@ -230,6 +237,23 @@ def _margins(task: Asked, robot: RobotDescription) -> Iterator[Choice]:
     if "joints" not in said:
         room = math.floor(100.0 * min(JOINTS, 0.5 * least_distance_to_limits(robot))) / 100.0
         yield Choice("margins.joints", max(Margins().joints, room), "joints keep off their limits")
+
+
+def _slow_feet(task: Asked, robot: RobotDescription, said: set[str]) -> Iterator[Choice]:
+    """How slowly the feet come down, where the motors can stop the robot all the same."""
+    size = size_of(robot)
+    if max(_rise(hop) - (hop.landing_height or 0.0) for hop in task.hops()) > FALL * size.height:
+        return
+    for name, speed, why in (
+        ("touchdown_speed", TOUCHDOWN_SPEED, "fast feet sink into soft ground"),
+        (
+            "touchdown_slide",
+            TOUCHDOWN_SLIDE,
+            "feet that swing on miss their place if they land early",
+        ),
+    ):
+        if name not in said:
+            yield Choice(f"margins.{name}", rounded(speed * size.slow), why)
 
 
 def demand(task: Asked, robot: RobotDescription) -> float:
@@ -245,7 +269,7 @@ def demand(task: Asked, robot: RobotDescription) -> float:
         time = math.sqrt(2.0 * rise / GRAVITY) + math.sqrt(2.0 * (rise - up) / GRAVITY)
         speeds = np.array([hop.distance_x or 0.0, hop.distance_y or 0.0, hop.twist or 0.0]) / time
         shares = np.array([1.0, 3.0, (0.2 * height) ** 2])
-        along = float(shares @ speeds**2)
+        along = float(product(shares, speeds**2))
         found = max(found, (2.0 * GRAVITY * rise + along) / (GRAVITY * height))
     return found
 

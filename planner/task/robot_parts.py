@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from ...mathematics.arrays import Array
+from ...mathematics.reproducible import product
 from ...robots.description import RobotDescription
 from ...robots.kinematics import link_poses
 from ...robots.limb import chain_to
@@ -106,4 +107,4 @@ def _lengths(
     )
     hip, _ = poses.of(robot.joints[first].child)
     place, rotation = poses.of(link)
-    return np.asarray(np.linalg.norm(place + rotation @ np.array(sole) - hip, axis=1))
+    return np.asarray(np.linalg.norm(place + product(rotation, np.array(sole)) - hip, axis=1))

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from ...mathematics.reproducible import product
 from ...robots.description import RobotDescription
 from ...robots.kinematics import link_poses
 from ...runtime.language.parameters import Parameters
@@ -36,7 +37,7 @@ def standing_height(robot: RobotDescription) -> float:
 
     def height(link: str, place: Any) -> float:
         position, rotation = poses.of(link)
-        return float((position[0] + rotation[0] @ np.array(place))[2])
+        return float((position[0] + product(rotation[0], np.array(place)))[2])
 
     com = sum(link.mass * height(link.name, link.com) for link in robot.links) / robot.total_mass
     link_of = {foot.name: foot.link for foot in robot.feet}

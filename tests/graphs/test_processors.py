@@ -1,4 +1,4 @@
-"""The kernels' machine code gives the same bytes whichever processor it is made for."""
+"""A run has the same bytes whichever processor its kernels and NumPy's BLAS are made for."""
 
 from __future__ import annotations
 
@@ -24,14 +24,23 @@ print(machine_code.processor()[0], result.run_hash)
 
 def run_for(processor: str, folder: Path | None) -> str:
     """The hash of a jump whose kernels are for a processor, compiled into a folder."""
-    environment = {name: value for name, value in os.environ.items() if "NUMBA" not in name}
+    changed = {}
     if folder is not None:
-        environment |= {"XDG_CACHE_HOME": str(folder), "NUMBA_CPU_NAME": processor}
-    command = [sys.executable, "-c", RUN, str(ROOT / "graphs" / "jump.yaml")]
-    found = subprocess.run(command, env=environment, check=True, capture_output=True, text=True)
-    name, run_hash = found.stdout.split()
+        changed = {"XDG_CACHE_HOME": str(folder), "NUMBA_CPU_NAME": processor}
+    name, run_hash = run_with(changed, "jump.yaml")
     assert (name == processor) == (folder is not None)
     return run_hash
+
+
+def run_with(changed: dict[str, str], graph: str) -> list[str]:
+    """The processor of the kernels and the hash of a run, with those variables set."""
+    ours = ("NUMBA", "OPENBLAS_CORETYPE")
+    environment = {name: value for name, value in os.environ.items() if not name.startswith(ours)}
+    command = [sys.executable, "-c", RUN, str(ROOT / "graphs" / graph)]
+    found = subprocess.run(
+        command, env=environment | changed, check=True, capture_output=True, text=True
+    )
+    return found.stdout.split()
 
 
 def instructions(folder: Path) -> int:
@@ -46,3 +55,13 @@ def test_a_jump_has_the_same_bytes_on_another_processor(tmp_path, processor):
     assert run_for(processor, tmp_path) == run_for("this one", None)
     count = instructions(tmp_path)
     assert count > 10_000 if processor == "haswell" else count < 10_000
+
+
+@pytest.mark.long
+@pytest.mark.skipif(platform.machine() not in {"x86_64", "AMD64"}, reason="names of x86 processors")
+@pytest.mark.parametrize("graph", ["jump.yaml", "turn_60deg.yaml"])
+def test_a_jump_has_the_same_bytes_with_the_blas_of_another_processor(graph):
+    """Preparing a run multiplies matrices by ``mathematics.reproducible``, not by BLAS."""
+    types = ("Haswell", "Nehalem")
+    hashes = {run_with({"OPENBLAS_CORETYPE": each}, graph)[1] for each in types}
+    assert len(hashes) == 1

@@ -65,7 +65,7 @@ def test_momentum_and_the_feet_tell_how_fast_the_base_turns(seed):
 def test_tucked_legs_turn_bruces_torso_forward_and_so_do_feet_ahead():
     shift = np.zeros((2, 4))
     predict_tilt(
-        mapped(in_flight(0), 0.02), np.zeros(3), np.zeros(3), np.zeros(12), 0.2,
+        mapped(in_flight(0), 0.02), np.zeros(3), np.zeros(3), np.zeros(12), 0.2, 0.0,
         np.array([-1.0, -1.0, 1.0, 1.0]), np.zeros(2), shift,
     )  # fmt: skip
     assert shift[1, 0] > 2.0  # rad/m
@@ -77,14 +77,25 @@ def test_the_tilt_at_touchdown_grows_with_momentum_and_time():
     flight, side = mapped(in_flight(1), 0.02), np.array([-1.0, -1.0, 1.0, 1.0])
     tilt, momentum, way = np.array([0.1, -0.2, 0.0]), np.array([0.01, 0.05, 0.0]), np.zeros(12)
     early, late, shift = np.zeros(2), np.zeros(2), np.zeros((2, 4))
-    predict_tilt(flight, tilt, momentum, way, 0.0, side, early, shift)
-    predict_tilt(flight, tilt, momentum, way, 0.1, side, late, shift)
+    predict_tilt(flight, tilt, momentum, way, 0.0, 0.0, side, early, shift)
+    predict_tilt(flight, tilt, momentum, way, 0.1, 0.0, side, late, shift)
     assert early == pytest.approx(tilt[:2])
     per_time = flight.drift[:2] @ momentum - flight.turn @ (flight.carried @ momentum)
     assert late == pytest.approx(tilt[:2] + 0.1 * per_time)
     way[2::3] = -0.01  # the feet have to go down by 1 cm
-    predict_tilt(flight, tilt, momentum, way, 0.0, side, late, shift)
+    predict_tilt(flight, tilt, momentum, way, 0.0, 0.0, side, late, shift)
     assert late == pytest.approx(tilt[:2] - 0.01 * shift[:, 3])
+
+
+def test_shorter_legs_touch_down_later_so_the_base_turns_for_longer():
+    flight, side = mapped(in_flight(1), 0.02), np.array([-1.0, -1.0, 1.0, 1.0])
+    tilt, momentum, way = np.array([0.1, -0.2, 0.0]), np.array([0.01, 0.05, 0.0]), np.zeros(12)
+    begin, end, soon, late = np.zeros(2), np.zeros(2), np.zeros((2, 4)), np.zeros((2, 4))
+    predict_tilt(flight, tilt, momentum, way, 0.1, 0.0, side, begin, soon)
+    predict_tilt(flight, tilt, momentum, way, 0.1 + 0.02 * 0.8, 0.0, side, end, soon)
+    predict_tilt(flight, tilt, momentum, way, 0.1, 0.8, side, begin, late)
+    assert 0.02 * (late - soon)[:, 3] == pytest.approx(end - begin, abs=1e-12)
+    assert np.array_equal(late[:, :3], soon[:, :3])
 
 
 def cost(goal, lowest=-1.0, highest=1.0, free=(0.0, 0.0)):

@@ -108,6 +108,24 @@ def test_predicted_tucks_the_legs_where_the_torso_falls_back_and_stretches_them_
     assert moved[:, 2] == pytest.approx([0.2 * height - stroke] * 2, abs=1e-6)
 
 
+def test_predicted_reaches_the_touchdown_of_tucked_legs_after_that_of_the_planned_ones():
+    """The feet come upwards at the last, at ``retraction``, also where shorter legs land late."""
+    params = {"tilt_cost": [0.0, 0.3], "free_tilt": [0.0, 0.0, 0.0], "stop_acceleration": 100.0}
+    bench, planned = predicting(**params, retraction=0.5)
+    bench.set("terms", com_velocity=[0.0, 0.0, -1.5])
+    tucked = pushed(bench, [-3.0, 0.0, 0.0], [0.0, -0.5, 0.0])
+    up = float((tucked - planned)[0, 2])
+    assert up > 0.03
+    # When the planned legs would touch down it is 1.5 + 0.2 g fast: so much later do the shorter ones.
+    fast = 1.5 + 0.2 * GRAVITY
+    later = (math.sqrt(fast**2 + 2.0 * GRAVITY * up) - fast) / GRAVITY
+    fall = -fast - later * GRAVITY
+    bench.set("terms", com_velocity=[0.0, 0.0, fall])
+    rising = [float(fly(bench, now, 0.0).velocity[0, 2]) - fall for now in (0.2, 0.2 + later)]
+    assert rising[1] == pytest.approx(0.5, abs=1e-3)
+    assert rising[0] < 0.4
+
+
 def test_predicted_is_mirror_symmetric():
     bench, planned = predicting()
     left = pushed(bench, [0.1, 0.4, 0.0], [-0.05, 0.02, 0.0], (-0.1, 0.05, 0.0)) - planned

@@ -35,7 +35,8 @@ def test_every_choice_says_why() -> None:
     found = choices(make_task(ASKED), BRUCE)
     assert [each.parameter for each in found] == [
         "impact", "effort", "knots", "phases", "weights.force", "weights.orientation", "weights.impulse",
-        "margins.load", "margins.landing_lean", "margins.landing_limits", "margins.joints",
+        "margins.load", "margins.landing_lean", "margins.landing_limits",
+        "margins.touchdown_speed", "margins.touchdown_slide", "margins.joints",
     ]  # fmt: skip
     assert all(each.why for each in found)
     assert "asks for 0.75" in found[1].why
@@ -126,6 +127,20 @@ def test_a_step_is_kept_away_from_and_not_lain_down_in_front_of(
     assert (margins.squat_lean, margins.step) == (lean, gap)
     row = resolved(landing_height=height, repeat=2).margins
     assert row is not None and row.squat_lean is None, "in a row nothing squats in front of a step"
+
+
+@pytest.mark.parametrize(
+    ("rise", "height", "speed", "slide"),
+    [("25 cm", "0 cm", 1.7, 0.6), ("8 cm", "-20 cm", 1.7, 0.6), ("8 cm", "-35 cm", None, None)],
+)
+def test_feet_come_down_slowly_except_from_high_up(
+    rise: str, height: str, speed: float | None, slide: float | None
+) -> None:
+    margins = resolved(rise=rise, distance_x="25 cm", landing_height=height).margins
+    assert margins is not None
+    assert (margins.touchdown_speed, margins.touchdown_slide) == (speed, slide)
+    said = resolved(rise=rise, landing_height=height, margins={"touchdown_slide": 2.0}).margins
+    assert said is not None and said.touchdown_slide == 2.0
 
 
 def test_a_robot_without_soles_has_no_toe_phase() -> None:
