@@ -85,8 +85,10 @@ class UnitBlock(Block):
         if not cls.described.kept:
             return {"fmu_state": 1}
         instance = Instance(cls.described, params.start, 0.0)
-        size = len(instance.state())
-        instance.close()
+        try:
+            size = len(instance.state())
+        finally:
+            instance.close()
         return {"fmu_state": (size + size // 2 + _ROOM) // 8}
 
     described: ClassVar[Description]

@@ -77,8 +77,9 @@ def _write(place: Path, arrays: Arrays) -> None:
     handle, temporary = tempfile.mkstemp(dir=place.parent, suffix=".part")
     try:
         with os.fdopen(handle, "wb") as file:
+            save: Any = np.savez
             # marked, as an array may be called like a parameter of savez
-            np.savez(file, **{f"{_MARK}{name}": array for name, array in arrays.items()})
+            save(file, **{f"{_MARK}{name}": array for name, array in arrays.items()})
         os.replace(temporary, place)
     except BaseException:
         Path(temporary).unlink(missing_ok=True)

@@ -116,8 +116,11 @@ class RunningGraph:
 
     def restore(self, data: bytes) -> None:
         """Go back to a state. Raises ``ValueError`` if it is of another graph."""
-        tick, bus, state, inputs = _HEAD.unpack_from(data)
-        if len(data) != _HEAD.size + bus + state + inputs:
+        sizes = _HEAD.unpack_from(data) if len(data) >= _HEAD.size else (0, 0, 0, 0)
+        tick, bus, state, inputs = sizes
+        before, kept = self._before, sum(view.nbytes for view in self._values.values())
+        own = (len(before.bus), len(before.state), kept)
+        if (bus, state, inputs) != own or len(data) != _HEAD.size + sum(own):
             raise ValueError("this is no state of this FMU")
         first = _HEAD.size
         self._before = Snapshot(

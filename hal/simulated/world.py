@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections import deque
+from copy import copy
+from typing import TYPE_CHECKING, NamedTuple
 
 from ...robots.description import RobotDescription
 from .mujoco_model import Variation, build_mujoco_model
 from .parameters import SimulatorParameters
 from .random_streams import Purpose, stream
+from .scenes import Scene
 
 if TYPE_CHECKING:
     from mujoco import MjModel
@@ -43,11 +46,29 @@ def build_world(
     Raises:
         ValueError: the simulator cannot express the robot; see ``build_mujoco_model``.
     """
+    scene = params.build_scene()
+    for kept in _kept:
+        if kept.robot is robot and kept[1:4] == (scene, params.timestep, variation):
+            return copy(kept.model)
     import mujoco
 
-    model = build_mujoco_model(
-        robot, scene=params.build_scene(), timestep=params.timestep, variation=variation
-    )
+    model = build_mujoco_model(robot, scene=scene, timestep=params.timestep, variation=variation)
     # A state that has become NaN must be noticed, and not be replaced by the initial state.
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
+    _kept.append(_Kept(robot, scene, params.timestep, variation, copy(model)))
     return model
+
+
+class _Kept(NamedTuple):
+    """A model that has been built, and what it was built from."""
+
+    robot: RobotDescription
+    scene: Scene
+    timestep: float
+    variation: Variation
+    model: MjModel
+
+
+_kept: deque[_Kept] = deque(maxlen=4)
+"""The models built last. The runs of a study mostly differ by what is not in the model, and building
+it takes longer than anything else before a run. Nobody is given the kept model itself."""

@@ -346,11 +346,12 @@ def _fields(body: bytes) -> Iterator[tuple[int, Any]]:
 
 
 def _number(body: bytes, place: int) -> tuple[int, int]:
-    value = shift = 0
-    while True:
+    """A whole number of variable length, and the place behind it."""
+    value = 0
+    for shift in range(0, 64, 7):
         byte = body[place]
         place += 1
         value |= (byte & 127) << shift
-        shift += 7
         if byte < 128:
             return value, place
+    raise IndexError("a number is longer than 64 bits")

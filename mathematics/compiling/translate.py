@@ -59,7 +59,7 @@ class Translator:
                     scope[used] = self._prepare(scope[used])
             copy = python_types.FunctionType(kernel.__code__, scope, kernel.__name__)
             copy.__module__ = kernel.__module__
-            self._dispatchers[name] = self._numba.njit(
+            self._dispatchers[name] = dispatcher = self._numba.njit(
                 copy,
                 fastmath=False,
                 error_model="python",
@@ -68,6 +68,7 @@ class Translator:
                 no_cfunc_wrapper=True,
                 pipeline_class=kernel_pipeline(),
             )
+            dispatcher.get_call_template = _for_any_value(dispatcher.get_call_template)
         return self._dispatchers[name]
 
     def _compile(self, dispatcher: Any, name: str, signature: tuple[ArgumentType, ...]) -> bytes:
@@ -98,6 +99,24 @@ class Translator:
             return numba.types.Array(dtype, part.dimensions, part.order)
         parts = [self._numba_type(inner) for inner in part.parts]
         return numba.types.BaseTuple.from_types(parts, part.kind)
+
+
+def _for_any_value(find: Callable[..., Any]) -> Callable[..., Any]:
+    """``get_call_template`` of a dispatcher for arguments of which numba knows the value.
+
+    A variable that begins as zero is that zero for numba until it has met all that is assigned to it.
+    By itself it compiles a kernel for the zero first and for any number later, and all that the
+    kernel calls with it; of several such arguments every combination.
+    """
+
+    def find_for_any(args: Any, kws: Any) -> Any:
+        from numba.core.types import unliteral
+
+        return find(
+            tuple(unliteral(arg) for arg in args), {k: unliteral(arg) for k, arg in kws.items()}
+        )
+
+    return find_for_any
 
 
 def _reason(error: Exception) -> str:

@@ -83,10 +83,16 @@ class Conductor(Block):
         moves: bool = False,
         elsewhere: Mapping[str, str] | None = None,
     ) -> None:
-        """Take what it needs: the other parts, the ends of all links (senders by the link's name),
-        the clock, what declares the links once the transport is open, and how long to wait for a message and for the other parts to start [s].
-        ``watch`` watches the links that bring commands, ``moves`` says whether this part has
-        actuators, and ``elsewhere`` which machine runs each block that is not here."""
+        """Take what it needs: the other parts, and the ends of all links, senders by the link's name.
+
+        Args:
+            on_open: declares the links; it is called once the transport is open.
+            patience: the seconds to wait for a message.
+            connect_time: the seconds to wait for the other parts to start.
+            watch: watches the links that bring commands.
+            moves: whether this part has actuators.
+            elsewhere: which machine runs each block that is not here.
+        """
         self.moves, self.elsewhere = moves, elsewhere or {}
         self._watch = watch
         self.others = others

@@ -136,7 +136,7 @@ class Others:
 
     def are_running(self) -> bool:
         """Whether some other part is past its start."""
-        return any(heard["phase"] >= Phase.STARTED for heard in self._heard.values())
+        return any(heard["phase"] >= Phase.STARTED for heard in tuple(self._heard.values()))
 
     def ended(self) -> str:
         """Why this part is to end, where another has ended in order; else empty.
@@ -144,11 +144,15 @@ class Others:
         Raises:
             PeerError: another part failed.
         """
-        for _, error in self._failed.values():
+        for _, error in self._failures():
             if error.heard:
                 raise error
             return str(error)
         return ""
+
+    def _failures(self) -> tuple[tuple[int, PeerError], ...]:
+        """A copy, as a thread of the network may add one at any time."""
+        return tuple(self._failed.values())
 
     def clock_of(self, name: str) -> ClockOffset:
         """The estimate of another machine's clock."""
@@ -157,7 +161,7 @@ class Others:
     @property
     def heard_fault(self) -> bool:
         """Whether another part has said that it failed."""
-        return any(error.heard for _, error in self._failed.values())
+        return any(error.heard for _, error in self._failures())
 
     def has_checked(self, name: str, link: str) -> bool:
         """Whether another part has received a message through this link."""
@@ -176,7 +180,7 @@ class Others:
         Raises:
             PeerError: another part failed at this tick or before, or is gone.
         """
-        for at, error in self._failed.values():
+        for at, error in self._failures():
             if tick is None or at <= tick:
                 raise error
 

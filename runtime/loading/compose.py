@@ -159,7 +159,8 @@ class _Composer:
         """Add the pieces of one of the reader's fields."""
         field = self.signal.fields[name]
         shape: tuple[int, ...] = ()
-        start, types = 0, {}  # type: int, dict[str, Item]
+        start = 0
+        types: dict[str, Item] = {}
         for item in part.items:
             if item.literal is not None:
                 values = self._numbers(name, field, item)

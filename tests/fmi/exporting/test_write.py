@@ -3,6 +3,7 @@
 import json
 import subprocess
 import sys
+import zipfile
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,7 @@ import numpy as np
 import pytest
 
 import aloft
+from aloft.fmi.exporting.running_graph import RunningGraph
 from aloft.fmi.exporting.write import export
 from aloft.runtime.language.errors import AloftError
 
@@ -144,6 +146,21 @@ def test_a_snapshot_goes_through_the_fmu(folder: Path) -> None:
         second = [run["plant.place.value"] for _ in range(20) if run.step()]
     assert np.array_equal(first, second)
     assert np.ptp(first) > 0.0
+
+
+def test_a_state_that_is_not_its_own_is_refused(folder: Path, tmp_path: Path) -> None:
+    export(str(folder / "rail.yaml"), folder / "plant.fmu", "plant")
+    with zipfile.ZipFile(folder / "plant.fmu") as file:
+        file.extractall(tmp_path / "plant")
+    running = RunningGraph(tmp_path / "plant" / "resources" / "graph")
+    kept = running.state()
+    shifted = kept[:8] + kept[16:24] + kept[8:16] + kept[24:]  # as long, of other parts
+    for wrong in (b"", kept[:-1], kept + b" ", bytes(32), shifted):
+        with pytest.raises(ValueError, match="this is no state of this FMU"):
+            running.restore(wrong)
+    running.restore(kept)
+    assert running.state() == kept
+    running.close()
 
 
 def test_a_whole_graph_has_its_external_blocks_as_inputs_and_vectors(folder: Path) -> None:

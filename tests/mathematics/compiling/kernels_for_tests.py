@@ -51,3 +51,20 @@ def unmarked(values: np.ndarray) -> None:
 def add_scaled(values: np.ndarray, factor: float, out: np.ndarray) -> None:
     for i in range(out.shape[0]):
         out[i] += float(values[i]) * factor
+
+
+@kernel
+def next_positive(after: int, values: np.ndarray) -> int:
+    for i in range(after, values.shape[0]):
+        if values[i] > 0.0:
+            return i + 1
+    return -1
+
+
+@kernel
+def total_of_positive(values: np.ndarray, out: np.ndarray) -> None:
+    place = 0
+    while place >= 0:
+        place = next_positive(place, values)
+        if place > 0:
+            out[0] += float(values[place - 1])
