@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from .agreement import agreement
 from .driver import driver
 from .frontier import frontier
 from .link_delays import link_delays
@@ -32,13 +33,14 @@ BENCHMARKS: Mapping[str, Callable[..., list[Row]]] = {
     "links": links,
     "driver": driver,
     "link_delays": link_delays,
+    "agreement": agreement,
     "jumps": jumps,
     "frontier": frontier,
 }
 """All benchmarks by name; each returns its rows."""
-LONG = ("jumps", "frontier", "link_delays")
+LONG = ("agreement", "jumps", "frontier", "link_delays")
 """Those that take minutes or hours and run only where they are named."""
-COUNTED = ("jumps",)
+COUNTED = ("agreement", "jumps")
 """Those that can be told how many cases to draw (``count``), and with which ``seed``."""
 SEEDED = ("frontier", "link_delays")
 """Those that can be told the ``seeds`` of the trial to run with."""
