@@ -23,10 +23,12 @@ from .random_jumps import jumps
 from .recorder import recorder
 from .rows import Row
 from .scheduler import scheduler
+from .startup import startup
 from .tick import tick
 
 BENCHMARKS: Mapping[str, Callable[..., list[Row]]] = {
     "tick": tick,
+    "startup": startup,
     "scheduler": scheduler,
     "planner": planner,
     "recorder": recorder,
