@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from .agreement import agreement
 from .driver import driver
 from .frontier import frontier
 from .link_delays import link_delays
@@ -22,23 +23,26 @@ from .random_jumps import jumps
 from .recorder import recorder
 from .rows import Row
 from .scheduler import scheduler
+from .startup import startup
 from .tick import tick
 
 BENCHMARKS: Mapping[str, Callable[..., list[Row]]] = {
     "tick": tick,
+    "startup": startup,
     "scheduler": scheduler,
     "planner": planner,
     "recorder": recorder,
     "links": links,
     "driver": driver,
     "link_delays": link_delays,
+    "agreement": agreement,
     "jumps": jumps,
     "frontier": frontier,
 }
 """All benchmarks by name; each returns its rows."""
-LONG = ("jumps", "frontier", "link_delays")
+LONG = ("agreement", "jumps", "frontier", "link_delays")
 """Those that take minutes or hours and run only where they are named."""
-COUNTED = ("jumps",)
+COUNTED = ("agreement", "jumps")
 """Those that can be told how many cases to draw (``count``), and with which ``seed``."""
 SEEDED = ("frontier", "link_delays")
 """Those that can be told the ``seeds`` of the trial to run with."""

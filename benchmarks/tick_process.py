@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import json
-import os
-import subprocess
-import sys
 import tempfile
 import time
+from pathlib import Path
 
+from .aloft_process import time_process
 from .rows import Row
 from .tick_controller import GRAPH, RecordedController, RecordedJump
 
@@ -22,26 +21,14 @@ SECONDS = 1.0
 def process_row(jump: RecordedJump, repeats: int = 3) -> Row:
     """The shortest whole process of ``aloft run graphs/jump.yaml`` of a few, with its recording, as
     a share of the time that the jump takes in the world."""
-    walls, lasted = [], 0.0
-    command = [sys.executable, "-m", "aloft", "run", str(GRAPH), "--json"]
-    threads = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")
     with tempfile.TemporaryDirectory() as folder:
-        for _ in range(repeats):
-            start = time.perf_counter()
-            done = subprocess.run(
-                command, check=False, cwd=folder, capture_output=True, text=True,
-                timeout=300, env={**os.environ, **threads},
-            )  # fmt: skip
-            walls.append(time.perf_counter() - start)
-            if done.returncode:
-                raise AssertionError(
-                    f"aloft run ended with {done.returncode}: {done.stderr[-500:]}"
-                )
-            lasted = json.loads(done.stdout)["ticks"] * jump.graph.base_period
-    wall = min(walls)
+        found = time_process(["run", str(GRAPH), "--json"], Path(folder), repeats)
+    lasted = json.loads(found.output)["ticks"] * jump.graph.base_period
+    wall = found.wall
     return Row(
         "aloft run graphs/jump.yaml, whole process", wall, "s", "real time", wall / lasted,
-        goal=1 / 5, floor=1 / 2, note=f"with its recording; the jump takes {lasted:.2f} s",
+        goal=1 / 5, floor=1 / 2, note=f"with its recording; the jump takes {lasted:.2f} s, "
+        f"the processors {found.user:.2f} s",
     )  # fmt: skip
 
 

@@ -24,10 +24,13 @@ def bench(
         typer.Option(help="Length of the run in real time of 'recorder'; by default 60.", min=1.0),
     ] = None,
     count: Annotated[
-        int | None, typer.Option(help="How many tasks 'jumps' draws; by default 200.", min=1)
+        int | None,
+        typer.Option(
+            help="How many tasks 'jumps' draws (200), or programs 'agreement' (50000).", min=1
+        ),
     ] = None,
     seed: Annotated[
-        int | None, typer.Option(help="The seed that 'jumps' draws them by.", min=0)
+        int | None, typer.Option(help="The seed by which they are drawn.", min=0)
     ] = None,
     seeds: Annotated[
         str, typer.Option(help="Seeds of the trial for 'frontier' and 'link_delays'.")

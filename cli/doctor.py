@@ -1,4 +1,4 @@
-"""``aloft doctor``: what this machine allows a control loop, and what would make it better."""
+"""``aloft doctor``: whether this machine can run a graph, and what it allows a control loop."""
 
 from __future__ import annotations
 
@@ -12,11 +12,12 @@ from .output import console, print_json, say, table
 def doctor(
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
 ) -> None:
-    """Say what this machine allows a control loop in real time, and what to change; nothing is
-    changed."""
+    """Say whether all libraries load, what this machine allows a control loop in real time, and what
+    to change; nothing is changed."""
+    from ..runtime.running.library_check import examine_libraries
     from ..runtime.running.machine_check import examine_machine
 
-    findings = examine_machine()
+    findings = [examine_libraries(), *examine_machine()]
     if as_json:
         ready = all(finding.good for finding in findings)
         print_json({"ready": ready, "findings": [finding.as_json() for finding in findings]})

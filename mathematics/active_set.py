@@ -93,17 +93,32 @@ def solve_program(n: int, m: int, program: Program, memory: ActiveSetMemory, x: 
         memory.size[i] = math.sqrt(square)
     for i in range(memory.is_active.shape[0]):
         memory.is_active[i] = False
-    count, limit = 0, 10 * (n + m)
+    return int(fulfil(n, m, 0, program, memory, x)[0])
+
+
+@kernel
+def fulfil(
+    n: int, m: int, count: int, program: Program, memory: ActiveSetMemory, x: Array
+) -> tuple[int, int]:
+    """Add violated constraints to the ``count`` active ones until x fulfils all.
+
+    Constraints that have been added to the program, or changed while they were not active, since the
+    last call only need their ``memory.size``: with them x is the start of the next search.
+
+    Returns:
+        What ``solve_program`` returns, and the number of active constraints.
+    """
+    limit = 10 * (n + m)
     for added in range(limit):
         new = most_violated(n, m, program, memory, x)
         if new < 0:
-            return added
+            return added, count
         price = 0.0
         excess = violation(n, program, new, x)
         for _ in range(limit):
             blocking, dual, primal = find_step(n, count, new, excess, program, memory)
             if dual < 0.0 and primal < 0.0:
-                return INFEASIBLE
+                return INFEASIBLE, count
             full = dual < 0.0 or 0.0 <= primal <= dual
             length = primal if full else dual
             for j in range(count):
@@ -120,8 +135,8 @@ def solve_program(n: int, m: int, program: Program, memory: ActiveSetMemory, x: 
             count = drop_constraint(n, count, blocking, memory)
             excess = violation(n, program, new, x)
         else:
-            return TOO_LONG
-    return TOO_LONG
+            return TOO_LONG, count
+    return TOO_LONG, count
 
 
 @kernel
@@ -192,6 +207,25 @@ def polish(n: int, gradient: Array, memory: ActiveSetMemory, x: Array) -> None:
         for j in range(count, n):
             value += float(memory.inverse[i, j]) * float(memory.along[j])
         x[i] = float(x[i]) - value
+
+
+@kernel
+def price_again(n: int, count: int, gradient: Array, memory: ActiveSetMemory) -> None:
+    """Compute the multipliers of the ``count`` active constraints from the gradient at the solution.
+
+    They are as exact as the gradient is, so more so than those of the search where P has lost digits.
+
+    Args:
+        gradient: of the cost at the solution, (n,).
+        memory: as ``solve_program`` has left it.
+    """
+    for j in range(count - 1, -1, -1):
+        value = 0.0
+        for k in range(n):
+            value += float(memory.inverse[k, j]) * float(gradient[k])
+        for k in range(j + 1, count):
+            value -= float(memory.triangle[j, k]) * float(memory.multipliers[k])
+        memory.multipliers[j] = value / float(memory.triangle[j, j])
 
 
 @kernel

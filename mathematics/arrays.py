@@ -11,3 +11,4 @@ Array: TypeAlias = NDArray[np.float64]
 Flags: TypeAlias = NDArray[np.bool_]
 Indices: TypeAlias = NDArray[np.int64]
 Counts: TypeAlias = NDArray[np.int64]
+"""As ``Indices``, for numbers that say how many."""

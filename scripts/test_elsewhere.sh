@@ -4,7 +4,7 @@
 #   sh scripts/test_elsewhere.sh newest [PYTHON]   another Python, the newest packages that are allowed
 #   sh scripts/test_elsewhere.sh oldest [PYTHON]   the oldest minor versions that pyproject.toml allows
 #
-# Without PYTHON, `newest` takes the first one it finds whose version is not that of .venv, and does
+# Without PYTHON, `newest` takes the newest one it finds whose version is not that of .venv, and does
 # nothing if there is none; `oldest` takes the one that .venv was made with. The environment goes to
 # build/ and is used again. `.ci/run` runs the first; run the second after a change of the lower bounds and
 # before a release. LIMIT bounds the seconds of the installation and of the tests, each.
@@ -19,13 +19,15 @@ python=$2
 if [ -z "$python" ] && [ "$which" = oldest ]; then
     python=.venv/bin/python
 elif [ -z "$python" ]; then
-    for candidate in python3.14 python3.13 python3.12 python3.11 "$HOME"/.pyenv/versions/3.1[1-4]*/bin/python; do
-        found=$("$candidate" -c "$version; import ensurepip" 2>/dev/null) || continue
-        case $found in 3.11 | 3.12 | 3.13 | 3.14) ;; *) continue ;; esac
-        if [ "$found" != "$ours" ]; then
-            python=$candidate
-            break
-        fi
+    for wanted in 3.14 3.13 3.12 3.11; do
+        [ "$wanted" != "$ours" ] || continue
+        for candidate in "python$wanted" "$HOME/.pyenv/versions/$wanted".*/bin/python; do
+            found=$("$candidate" -c "$version; import ensurepip" 2>/dev/null) || continue
+            if [ "$found" = "$wanted" ]; then
+                python=$candidate
+                break 2
+            fi
+        done
     done
 fi
 if [ -z "$python" ]; then
@@ -53,7 +55,7 @@ if ! timeout "$limit" $pip -r "$folder/wanted.txt" || ! $pip --no-deps --no-buil
     echo "the packages could not be installed within $limit s: nothing is tested with $which on $python"
     exit 0
 fi
-echo "$("$folder/bin/python" --version), the $which packages:"
+echo "all tests run on Python $ours of .venv; these run on $("$folder/bin/python" --version), the $which packages:"
 OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 timeout "$limit" "$folder/bin/python" -m pytest \
     --numprocesses auto -m "not long" -p no:cacheprovider \
     tests/runtime/language tests/runtime/running tests/runtime/loading/test_examine.py \

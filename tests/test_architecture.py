@@ -337,6 +337,12 @@ def test_nothing_listens_beyond_the_loopback() -> None:
     assert not wrong
 
 
+def test_the_types_of_arrays_are_named_once() -> None:
+    again = re.compile(r"^(Array|Flags|Indices|Counts)\b.* = NDArray\[np\.", re.MULTILINE)
+    found = [p for p in project_files() if again.search(p.read_text(encoding="utf-8"))]
+    assert found == [ROOT / "mathematics" / "arrays.py"], "import it from mathematics/arrays.py"
+
+
 def environment_reads(path: Path) -> Iterator[str]:
     """The environment variables that a file reads, as far as they are written out."""
     for node in ast.walk(ast.parse(path.read_text("utf-8"))):

@@ -44,6 +44,9 @@ NOT_HOT = {
     "mathematics.flight_prediction.flight_map": "memory, when a block is set up",
     "mathematics.whole_body_reduction.reduction_memory": "memory, when a block is set up",
     "mathematics.whole_body_solution.solution_memory": "memory, when a block is set up",
+    "blocks.control.round_program.rows_without_pyramids": "of the program that Clarabel gets",
+    "mathematics.friction_cones.cone_memory": "memory, when a block is set up",
+    "mathematics.whole_body_cones.cone_solution_memory": "memory, when a block is set up",
     "hal.simulated.scenes.step": "makes a scene, when a run is loaded",
     "hal.simulated.scenes.platform": "makes a scene, when a run is loaded",
     "hal.simulated.stance._solve_positive": "before a run, by MuJoCo's linear algebra",
@@ -123,6 +126,7 @@ def calls():
         aloft.load(ROOT / "graphs/jump.yaml", other).run(duration=0.02)
         weak = {"wbc.torque_margin": 0.15, "wbc.friction": 0.05}  # constraints come and go
         aloft.load(ROOT / "graphs/jump.yaml", weak).run(duration=0.1)
+        aloft.load(ROOT / "graphs/jump.yaml", {**weak, "wbc.cones": "round"}).run(duration=0.1)
     for name, arguments in UNUSED.items():
         samples[name].append(arguments)
     return samples

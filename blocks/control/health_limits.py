@@ -5,16 +5,13 @@ from __future__ import annotations
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ...mathematics.arrays import Array, Flags
+from ...mathematics.arrays import Array, Counts, Flags
 from ...mathematics.kernel import kernel
 from ...runtime.language.parameters import Parameters, parameter
 from ..signals import RobotHealth
 from ..signals.drive_conditions import describe
 from .safety_faults import Fault
-
-Counts = NDArray[np.int64]
 
 _CRITICAL = 0x7C
 """The bits of a drive's condition with which it has switched its torque off."""

@@ -5,17 +5,12 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
-from ...mathematics.arrays import Array, Flags
+from ...mathematics.arrays import Array, Counts, Flags
 from ...mathematics.kernel import kernel
 from ...mathematics.rotations import tilt
 from ..signals import CommandMode, DrivePhase, SwitchFault
 from .health_limits import Health, judge_health, measured
 from .safety_faults import Fault
-
-Counts = NDArray[np.int64]
 
 # What a compiled kernel can return.
 _TILT, _JOINT_LIMIT, _JOINT_SPEED = int(Fault.TILT), int(Fault.JOINT_LIMIT), int(Fault.JOINT_SPEED)

@@ -10,6 +10,7 @@ import numpy as np
 from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.constants import GRAVITY
 from ...mathematics.quadratic_program import QuadraticProgramSolver
+from ...mathematics.whole_body_cones import cone_solution_memory, solve_whole_body_cones
 from ...mathematics.whole_body_qp import (
     Bounds,
     RigidBodyTerms,
@@ -42,6 +43,7 @@ from ..signals import (
     WholeBodyCommand,
     WholeBodyTarget,
 )
+from .round_program import RoundProgram
 from .task_gains import TaskGains
 from .tasks.choose import OWN_TASKS, PHASE_KINDS, ChosenTask, TaskChoiceError, choose_tasks
 from .tasks.task import KernelTask, Situation, Task, TaskChoice
@@ -68,6 +70,7 @@ class WholeBodyController(KernelBlock):
         minimise    sum_i |J_i a - d_i|^2_{W_i} + sum_j |f_j|^2_{W_f} + |a|^2_{W_a}
         subject to  H_b a + C_b v + G_b - sum_j J_{c_j,b}' f_j = 0            (base_dyn)
                     |f_x| <= mu f_z, |f_y| <= mu f_z, f_min <= f_z <= f_max   (cone)
+                    or, with ``cones: round``, |(f_x, f_y)| <= mu f_z
                     torque limits, if any
 
     then the torque is tau = H_j a + C_j v + G_j - sum_j J_{c_j,j}' f_j (opt_torque).
@@ -93,7 +96,9 @@ class WholeBodyController(KernelBlock):
     a program in the contact forces, and a dual active-set method solves it from a cold start, so
     the solution is exact up to rounding and depends on the inputs alone
     (``mathematics/whole_body_reduction``). Where it finds none, the whole program is given to DAQP.
-    With another ``solver`` every tick's whole program is given to that one.
+    With another ``solver`` every tick's whole program is given to that one. With ``cones: round`` the
+    own method solves the program with the cones themselves, as exactly (``mathematics/friction_cones``), and
+    where it finds no solution Clarabel gets the whole program; of the other solvers only Clarabel takes it.
 
     Without a point in stance there is nothing to solve: torque, force and acceleration are zero,
     and the command counts as solved.
@@ -120,11 +125,14 @@ class WholeBodyController(KernelBlock):
         solver: str = parameter(
             OWN_SOLVER, text="active_set, or any dense solver that qpsolvers finds installed"
         )
+        cones: Literal["pyramid", "round"] = parameter(
+            "pyramid", text="shape of the friction cones; the paper's are pyramids"
+        )
         limits: Literal["none", "joint", "motor"] = parameter("motor", text="torque limits")
         torque_margin: float = live_parameter(
             0.97, gt=0.0, le=1.0, text="share of the limits that is used"
         )
-        friction: float = live_parameter(0.5, gt=0.0, le=2.0, text="mu_c of the friction pyramid")
+        friction: float = live_parameter(0.5, gt=0.0, le=2.0, text="mu_c of the friction cones")
         force_min: float = live_parameter(
             0.0, unit="N", ge=0.0, text="least normal force of a point"
         )
@@ -187,6 +195,11 @@ class WholeBodyController(KernelBlock):
             yield Misfit(
                 str(error), parameter="solver", found=params.solver, fix=f"solver: {OWN_SOLVER}"
             )
+        if params.cones == "round" and params.solver not in (OWN_SOLVER, "clarabel"):
+            yield Misfit(
+                f"{params.solver} cannot solve a program with round cones; {OWN_SOLVER} and clarabel can",
+                parameter="solver", found=params.solver, fix=f"solver: {OWN_SOLVER}",
+            )  # fmt: skip
         for foot in robot.feet:
             if foot.link == robot.base:
                 yield Misfit(f"foot {foot.name} of {robot.name} is part of the base, not of a leg")
@@ -229,9 +242,11 @@ class WholeBodyController(KernelBlock):
         )
         self._build_tasks(robot, n)
         self._code = np.zeros(1, dtype=np.int64)
+        is_round = p.cones == "round"
         self._solve = KernelCall(
-            solve_whole_body, self._rows, self._model, self.phase.stance, self.joints.velocity,
-            self._weights, limits, self._motors, solution_memory(n, n_contacts),
+            solve_whole_body_cones if is_round else solve_whole_body,
+            self._rows, self._model, self.phase.stance, self.joints.velocity, self._weights, limits,
+            self._motors, (cone_solution_memory if is_round else solution_memory)(n, n_contacts),
             Solution(command.torque, command.acceleration, command.force, self._code),
         )  # fmt: skip
         self._limit = KernelCall(limit_motors, self.joints.velocity, limits, self._motors)
@@ -244,7 +259,7 @@ class WholeBodyController(KernelBlock):
             Kept(*(getattr(self.memory, name) for name in Kept._fields)), self._unsolved,
         )  # fmt: skip
         self._own = p.solver == OWN_SOLVER
-        self._other = FullProgram(
+        self._other = (RoundProgram if is_round else FullProgram)(
             "daqp" if self._own else p.solver, self._rows, self._model, self._motors,
             self._weights, limited=limited, n_contacts=n_contacts,
         )  # fmt: skip

@@ -86,7 +86,7 @@ class FullProgram:
     ) -> None:
         n = rows.jacobian.shape[1]
         total = rows.jacobian.shape[0]
-        self._solver = QuadraticProgramSolver(solver)
+        self._prepare(solver)
         self._rows, self._model, self._motors, self._weights = rows, model, motors, weights
         self._limited, self._n = limited, n
         self._scratch = CostScratch(np.zeros((total, n)), np.zeros((n, n)), np.zeros(n))
@@ -94,6 +94,10 @@ class FullProgram:
         self.programs = [
             WholeBodyProgram.of_size(n, count, limit_rows) for count in range(n_contacts + 1)
         ]
+
+    def _prepare(self, solver: str) -> None:
+        """Make what solves the program."""
+        self._solver = QuadraticProgramSolver(solver)
 
     def assemble(self, active: Indices) -> WholeBodyProgram:
         """The program for the points ``active`` in stance; the torques' bounds are up to date."""

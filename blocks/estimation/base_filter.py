@@ -5,10 +5,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
-from ...mathematics.arrays import Array, Flags
+from ...mathematics.arrays import Array, Counts, Flags
 from ...mathematics.constants import GRAVITY
 from ...mathematics.inertial_filter import (
     StandingPoints,
@@ -21,8 +18,6 @@ from ...mathematics.inertial_filter import (
 from ...mathematics.kernel import kernel
 from ...mathematics.rotations import rotate
 from ...robots.contact_kinematics import Contacts, Measured, Rigid, Seen, see_contacts
-
-Counts = NDArray[np.int64]
 
 _FASTEST_TURN = 100.0
 _STRONGEST_FORCE = 1000.0

@@ -5,9 +5,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ...mathematics.arrays import Array, Flags
+from ...mathematics.arrays import Array, Counts, Flags
 from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.constants import GRAVITY
 from ...mathematics.inertial_filter import misalignment, right_up, turn, weigh
@@ -28,8 +27,6 @@ from .base_filter import (
     use_contacts,
 )
 from .inertial_estimator import InertialEstimator, InertialParameters
-
-Counts = NDArray[np.int64]
 
 
 class GroundTrust(Signal):

@@ -5,9 +5,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ...mathematics.arrays import Array, Flags
+from ...mathematics.arrays import Array, Counts, Flags
 from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.kernel import kernel
 from ...runtime.language.block import Input, Output, State
@@ -15,8 +14,6 @@ from ...runtime.language.kernel_block import KernelBlock
 from ...runtime.language.parameters import Parameters, parameter
 from ...runtime.language.signals import Field, Signal
 from ..signals import ContactSwitches, Phase, PhaseState, SwitchFault, SwitchHealth
-
-Counts = NDArray[np.int64]
 
 _CLOSED, _OPEN = int(SwitchFault.STUCK_CLOSED), int(SwitchFault.STUCK_OPEN)
 _BOUNCING = int(SwitchFault.BOUNCING)

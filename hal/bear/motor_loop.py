@@ -38,6 +38,7 @@ class MotorLoop:
         bus: the drives' bus.
         board: the sensor board.
         goals: how commands become goals.
+        motor_stiffness: the gains of the drives' position loops [N m/rad], (n_motors,).
 
     Attributes:
         measured: what was measured last.

@@ -11,14 +11,9 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
-from ...mathematics.arrays import Array
+from ...mathematics.arrays import Array, Counts
 from ...mathematics.kernel import kernel
 from ...mathematics.linear import multiply_vector
-
-Counts = NDArray[np.int64]
 
 
 class Motors(NamedTuple):

@@ -6,10 +6,9 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...blocks.signals import CommandMode, JointCommand
-from ...mathematics.arrays import Array, Flags
+from ...mathematics.arrays import Array, Counts, Flags
 from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.kernel import kernel
 from ...robots.description import RobotDescription
@@ -23,8 +22,6 @@ from .actuator import (
 )
 from .motor_feedback import Loops, MotorFeedback, close_loops
 from .state import DriveState, TickRecord
-
-Counts = NDArray[np.int64]
 
 _ACTIVE, _DAMPING = int(CommandMode.ACTIVE), int(CommandMode.DAMPING)
 

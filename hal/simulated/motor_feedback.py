@@ -10,9 +10,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ...mathematics.arrays import Array, Flags
+from ...mathematics.arrays import Array, Counts, Flags
 from ...mathematics.kernel import kernel
 from ...mathematics.linear import multiply_vector
 from ...robots.robot_description import RobotDescription
@@ -29,8 +28,6 @@ from ..drive_goals import (
     gears_of,
     make_goals,
 )
-
-Counts = NDArray[np.int64]
 
 _LEAD = 1.5
 """From a measurement to the middle of the time in which the goals made from it act, in periods."""

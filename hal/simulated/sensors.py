@@ -6,10 +6,9 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...blocks.signals import ImuReading, JointState
-from ...mathematics.arrays import Array, Flags
+from ...mathematics.arrays import Array, Counts, Flags
 from ...mathematics.compiling.call_sequence import Call
 from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.kernel import kernel
@@ -17,8 +16,6 @@ from ...robots.description import RobotDescription
 from .parameters import SimulatorParameters
 from .random_streams import Purpose, RandomStreams, normal_call, stream, uniform_call
 from .state import TickRecord
-
-Counts = NDArray[np.int64]
 
 
 @kernel

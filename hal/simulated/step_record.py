@@ -5,15 +5,10 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
-from ...mathematics.arrays import Array, Flags
+from ...mathematics.arrays import Array, Counts, Flags
 from ...mathematics.kernel import kernel
 from .actuator import raise_to
 from .sensors import watch_switches
-
-Counts = NDArray[np.int64]
 
 
 class StepSensors(NamedTuple):

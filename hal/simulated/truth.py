@@ -5,10 +5,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...blocks.signals import RobotTruth
-from ...mathematics.arrays import Array, Flags
+from ...mathematics.arrays import Array, Counts, Flags
 from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.kernel import kernel
 from ...robots.description import RobotDescription
@@ -19,8 +18,6 @@ from .state import TickRecord
 
 if TYPE_CHECKING:
     from mujoco import MjData
-
-Counts = NDArray[np.int64]
 
 
 class Instant(NamedTuple):

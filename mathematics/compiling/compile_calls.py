@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import subprocess
+import threading
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from functools import partial
@@ -27,19 +28,23 @@ LONGEST_WAIT = 300.0
 """How long [s] another process may take; what it has not done then is done here."""
 _BETWEEN_LOOKS = 0.2
 
+_one_at_a_time = threading.Lock()
+"""Held while kernels are compiled: ``linked_once`` changes numba for the whole process, so a second
+thread would have its kernels linked, or put in memory, in a mixture of both ways."""
 _loaded: dict[str, MachineCode] = {}
 _names: dict[tuple[Callable[..., None], tuple[ArgumentType, ...]], str] = {}
 
 
 def compile_calls(calls: Sequence[KernelCall]) -> str:
-    """Let calls run as machine code.
+    """Let calls run as machine code; threads that ask for it at the same time wait for each other.
 
     Returns:
         Why some or all of them run as plain Python instead; empty where all are compiled. The
         results are the same bits either way.
     """
     try:
-        return _Compilation(calls).finish()
+        with _one_at_a_time:
+            return _Compilation(calls).finish()
     except (ImportError, CompileError, OSError, RuntimeError, TypeError, ValueError) as error:
         for call in calls:
             call.use_plain()

@@ -195,7 +195,8 @@ def _sample(plan: JumpPlan, dynamics: ExactDynamics, between: list[Row]) -> Samp
         if plan.time[k + 1] > plan.time[k]:
             joints = joint_motion(plan.position, plan.velocity, plan.time, k)
             acceleration = joints.at(time - float(plan.time[k]))[2]
-            torque.append(dynamics.joint_torque(q, v, acceleration, plan.contact_force[k]))
+            force = plan.contact_force[k]
+            torque.append(dynamics.joint_torque(q, v, acceleration, force, jacobian))
         else:
             torque.append(np.zeros(plan.joint_torque.shape[1]))
     return Samples(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 import re
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -47,14 +47,34 @@ def task_distance(first: JumpTask, second: JumpTask) -> float | None:
     alike = set(JumpTask.model_fields) - {"name", "recipe", *SCALES}
     if any(getattr(first, name) != getattr(second, name) for name in alike):
         return None
+    return _scaled_distance(first.__dict__, second.__dict__)
+
+
+def _scaled_distance(first: Mapping[str, Any], second: Mapping[str, Any]) -> float | None:
+    """The distance between two tasks in the parameters of ``SCALES``, by their names."""
     total = 0.0
     for name, scale in SCALES.items():
-        one, other = getattr(first, name), getattr(second, name)
+        one, other = first.get(name), second.get(name)
         if (one is None) != (other is None):
             return None
-        if one is not None:
+        if one is not None and other is not None:
             total += ((one - other) / scale) ** 2
     return float(np.sqrt(total))
+
+
+def _other_parameters(task: Mapping[str, Any]) -> dict[str, Any]:
+    """Of a task as plain data what must be the same for a start from its plan; what says nothing is
+    left out."""
+    given = {name: x for name, x in task.items() if name not in {"name", "recipe", *SCALES}}
+    return _without_none(given)
+
+
+def _without_none(data: dict[str, Any]) -> dict[str, Any]:
+    return {
+        name: _without_none(x) if isinstance(x, dict) else x
+        for name, x in data.items()
+        if x is not None
+    }
 
 
 def kept_name(task: JumpTask, robot: RobotDescription) -> str:
@@ -149,9 +169,19 @@ class PlanLibrary:
 
     def nearest(self, task: JumpTask) -> tuple[JumpPlan, float] | None:
         """The valid plan of the nearest task that can be started from, and how far it is."""
-        found, task = [], task.resolved(self.robot)
-        for path, kept in self.tasks():
-            distance = task_distance(task, kept.resolved(self.robot))
+        # The files hold whole tasks, so plain data is compared: to make a task of each takes longer
+        # than to plan one.
+        wanted = task.resolved(self.robot).model_dump(mode="json")
+        others = _other_parameters(wanted)
+        found = []
+        for path, header in self.headers():
+            kept = header.get("task") if isinstance(header, dict) else None
+            if not isinstance(kept, dict) or _other_parameters(kept) != others:
+                continue
+            try:
+                distance = _scaled_distance(wanted, kept)
+            except TypeError:  # a damaged header
+                continue
             if distance is not None:
                 found.append((distance, str(path)))
         for distance, name in sorted(found):

@@ -22,7 +22,10 @@ from ...mathematics.reproducible import product
 from ...robots.ball_feet import ball_feet
 from ...robots.description import RobotDescription
 from ...robots.pinocchio_model import build_pinocchio_model
+from .coasting import coast, joint_side
 
+Motion = tuple[Array, Array, Array]
+"""Joint angles, velocities and accelerations."""
 AFTER, BEFORE = [1, 2, 0], [2, 0, 1]
 """The axes after and before each one: for cross products, which NumPy's own makes slowly."""
 
@@ -40,8 +43,9 @@ class JointMotion:
     end_velocity: Array
     duration: float
 
-    def at(self, time: float) -> tuple[Array, Array, Array]:
-        """Angles, velocities and accelerations [rad] at ``time`` since the first knot [s]."""
+    def at(self, time: float | Array) -> Motion:
+        """Angles, velocities and accelerations [rad] at ``time`` since the first knot [s]; at n
+        times (n, 1) each is (n, n_joints)."""
         t, u = self.duration, time / self.duration
         way = self.end - self.start
         bend = 3.0 * way - t * (2.0 * self.start_velocity + self.end_velocity)
@@ -165,7 +169,12 @@ class ExactDynamics:
     def base_acceleration(self, q: Array, v: Array, joints: Array, force: Array) -> Array:
         """How the base accelerates (6,) if the joints do as given [rad/s^2] under these contact
         forces [N, world], (n_contacts, 3)."""
-        return self._base_acceleration(q, v, joints, self._pushed(q, force))
+        return self._base_acceleration(q, v, joints, self._pushed_base(q, force))
+
+    def base_residual(self, q: Array, v: Array, acceleration: Array, force: Array) -> Array:
+        """What is left over of the base's six equations of motion [N or N m, its axes], (6,)."""
+        moved = self.pin.rnea(self.model, self.data, q, v, acceleration)[:6]
+        return np.asarray(moved - self._pushed_base(q, force))
 
     def _base_acceleration(self, q: Array, v: Array, joints: Array, pushed: Array) -> Array:
         self._known[6:] = joints
@@ -174,13 +183,23 @@ class ExactDynamics:
         inertia = self.pin.crba(self.model, self.data, q)[:6, :6]
         return np.asarray(np.linalg.solve(inertia, pushed[:6] - bias))
 
-    def joint_torque(self, q: Array, v: Array, joints: Array, force: Array) -> Array:
-        """The torques [N m] of that motion, (n_joints,), without friction."""
-        pushed = self._pushed(q, force)
+    def joint_torque(
+        self, q: Array, v: Array, joints: Array, force: Array, jacobian: Array | None = None
+    ) -> Array:
+        """The torques [N m] of that motion, (n_joints,), without friction. ``jacobian`` is that of
+        ``contact_jacobians``, if it is known."""
+        pushed = self._pushed(q, force) if jacobian is None else force.ravel() @ jacobian
         base = self._base_acceleration(q, v, joints, pushed)
         acceleration = np.concatenate([base, joints])
         whole = self.pin.rnea(self.model, self.data, q, v, acceleration)
         return np.asarray((whole + self._rotor_coupling @ acceleration - pushed)[6:])
+
+    def _pushed_base(self, q: Array, force: Array) -> Array:
+        """The base's part of J' F, (6,): the force and its moment about the base, in its axes."""
+        arms = self.points(q) - q[:3]
+        moments = arms[:, AFTER] * force[:, BEFORE] - arms[:, BEFORE] * force[:, AFTER]
+        whole = np.array([force.sum(axis=0), moments.sum(axis=0)])
+        return np.asarray((whole @ self.data.oMi[1].rotation).ravel())
 
     def _pushed(self, q: Array, force: Array) -> Array:
         """J' F: the generalised force of the contacts."""
@@ -217,28 +236,42 @@ class ExactDynamics:
         self, q: Array, v: Array, joints: JointMotion, force: Array, longest_step: float
     ) -> list[tuple[float, Array, Array]]:
         """The motion over one interval from the state (q, v): the base's by Runge and Kutta's
-        method of order four under constant contact forces.
+        method of order four under constant contact forces; without forces see ``coasting``.
 
         Returns time since the interval began [s], q and v after every step; ``q`` is followed as
         position and quaternion, and the joints' part of both is the planned one.
         """
         count = max(1, int(np.ceil(joints.duration / longest_step - 1e-9)))
         h = joints.duration / count
-        base, twist = q[:7].copy(), v[:6].copy()
-        out = []
+        # The joints at the beginning, in the middle and at the end of every step.
+        moved = joints.at(0.5 * h * np.arange(2 * count + 1)[:, None])
+        if force.any():
+            bases, twists = self._push(q[:7], v[:6], moved, force, h)
+        else:
+            side = joint_side(self.pin, self.model, self.data, moved[0], moved[1])
+            bases, twists = coast(q[:7], v[:6], side, h)
+        places = np.hstack([bases, moved[0][2::2]])
+        speeds = np.hstack([twists, moved[1][2::2]])
+        return [(h * (i + 1), places[i], speeds[i]) for i in range(count)]
+
+    def _push(
+        self, base: Array, twist: Array, moved: Motion, force: Array, h: float
+    ) -> tuple[Array, Array]:
+        """The base's places and twists after every step under contact forces."""
+        count = len(moved[0]) // 2
+        bases, twists = np.empty((count, 7)), np.empty((count, 6))
+        at = list(zip(*moved, strict=True))
         for i in range(count):
-            t = i * h
-            d1 = self._rates(base, twist, joints.at(t), force)
-            middle = joints.at(t + 0.5 * h)
+            middle = at[2 * i + 1]
+            d1 = self._rates(base, twist, at[2 * i], force)
             d2 = self._rates(base + 0.5 * h * d1[:7], twist + 0.5 * h * d1[7:], middle, force)
             d3 = self._rates(base + 0.5 * h * d2[:7], twist + 0.5 * h * d2[7:], middle, force)
-            d4 = self._rates(base + h * d3[:7], twist + h * d3[7:], joints.at(t + h), force)
+            d4 = self._rates(base + h * d3[:7], twist + h * d3[7:], at[2 * i + 2], force)
             change = h / 6.0 * (d1 + 2.0 * d2 + 2.0 * d3 + d4)
             base, twist = base + change[:7], twist + change[7:]
             base[3:7] /= np.linalg.norm(base[3:7])
-            position, velocity, _ = joints.at(t + h)
-            out.append((t + h, np.concatenate([base, position]), np.concatenate([twist, velocity])))
-        return out
+            bases[i], twists[i] = base, twist
+        return bases, twists
 
     def _rates(
         self, base: Array, twist: Array, joints: tuple[Array, Array, Array], force: Array

@@ -58,10 +58,14 @@ def angular_motion(angles: Array, rates: Array, accelerations: Array) -> tuple[A
         ]
     )
     about_z = np.array([0.0, 0.0, rates[2]])
-    change = (
-        product(back, bend) - np.cross(about_z, turning) + np.array([0.0, 0.0, accelerations[2]])
-    )
+    change = product(back, bend) - cross(about_z, turning) + np.array([0.0, 0.0, accelerations[2]])
     return turning + about_z, change
+
+
+def cross(a: Array, b: Array) -> Array:
+    """The cross product of two vectors (3,); NumPy's own takes ten times as long."""
+    (ax, ay, az), (bx, by, bz) = a.tolist(), b.tolist()
+    return np.array([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx])
 
 
 def midpoint_residuals(plan: JumpPlan, dynamics: ExactDynamics) -> tuple[Array, Array]:
@@ -87,9 +91,8 @@ def midpoint_residuals(plan: JumpPlan, dynamics: ExactDynamics) -> tuple[Array, 
         middle = places[k] + 0.5 * h * rates[k] + 0.125 * h * h * bend
         moving = rates[k] + 0.5 * h * bend
         q, v, base = _generalised(middle, moving, bend)
-        exact = dynamics.base_acceleration(q, v, bend[6:], plan.contact_force[k])
-        inertia = dynamics.mass_matrix(q)[:6, :6]
-        wrench[k] = np.abs(inertia @ (exact - base)).max()
+        whole = np.concatenate([base, bend[6:]])
+        wrench[k] = np.abs(dynamics.base_residual(q, v, whole, plan.contact_force[k])).max()
     return gap, wrench
 
 
@@ -103,4 +106,4 @@ def _generalised(place: Array, rate: Array, bend: Array) -> tuple[Array, Array, 
     quaternion = pinocchio.Quaternion(turn).coeffs()
     q = np.concatenate([place[:3], quaternion / np.linalg.norm(quaternion), place[6:]])
     v = np.concatenate([linear, spin, rate[6:]])
-    return q, v, np.concatenate([product(turn.T, bend[:3]) - np.cross(spin, linear), spin_rate])
+    return q, v, np.concatenate([product(turn.T, bend[:3]) - cross(spin, linear), spin_rate])

@@ -137,7 +137,8 @@ class ProblemBuilder:
         self.steps = np.concatenate(
             [s.lengths * (1.0 if s.timed else (s.time or 0.0) / s.count) for s in self.stretches]
         )
-        self.pieces = pieces
+        self.pieces, self.free_base = pieces, coordinates.free_base
+        self._nominal: dict[int, Array] = {}
 
     def build(self) -> Problem:
         """The problem with its bounds and parameters."""
@@ -178,7 +179,7 @@ class ProblemBuilder:
     def _bound_state(self, k: int) -> None:
         """Start and end are given, joints stay within their limits, feet only push."""
         n, start = self.n, int(self.assembly.state_start[k])
-        base = len(self.coordinates.free_base)
+        base = len(self.free_base)
         if k == len(self.of_knot):
             return
         stretch, knot = self.of_knot[k], self.assembly.knots[k]
@@ -188,7 +189,7 @@ class ProblemBuilder:
             self.lower[start + base : start + n] = limits[:, 0]
             self.upper[start + base : start + n] = limits[:, 1]
             lean = self._most_lean(k)
-            pitch = start + self.coordinates.free_base.index(3)
+            pitch = start + self.free_base.index(3)
             nominal = float(self.nominal(k)[pitch - start])
             self.lower[pitch], self.upper[pitch] = nominal - lean, nominal + lean
         if k == 0 and stretch.timed:
@@ -277,7 +278,7 @@ class ProblemBuilder:
         return np.asarray(slope[chosen])
 
     def _interval(self, k: int) -> dict[str, Any]:
-        weights, base = self.task.weights, self.coordinates.free_base
+        weights, base = self.task.weights, self.free_base
         share, moving = float(self.coordinates.share), len(self.coordinates.moving)
         posture = [weights.orientation if i >= 3 else 0.0 for i in base]
         return {
@@ -291,7 +292,9 @@ class ProblemBuilder:
 
     def nominal(self, k: int) -> Array:
         """The posture that the cost prefers."""
-        return self.coordinates.reduce(self.problem.posture(k))
+        if k not in self._nominal:
+            self._nominal[k] = self.coordinates.reduce(self.problem.posture(k))
+        return self._nominal[k]
 
     def _fill_stance(self, k: int) -> None:
         weights, share, stretch = self.task.weights, self.coordinates.share, self.of_knot[k]

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from ...mathematics.arrays import Array
-from ..models.midpoint import angular_motion, euler_angles, euler_rates, rotation
+from ..models.midpoint import angular_motion, cross, euler_angles, euler_rates, rotation
 from ..models.quaternions import pose_of
 from ..models.symbolic_model import SymbolicModel
 from ..task.plan import JumpPlan
@@ -143,23 +143,24 @@ def pack(problem: Problem, plan: JumpPlan, guess: Array) -> Array:
         steps = np.diff(instants)
     means = {s: float(instants[s.stop] - instants[s.first]) / s.count for s in problem.stretches}
     values = guess.copy()
+    place, rate = coordinates.reduce(q), coordinates.reduce(v)
+    pushes = coordinates.reduce_forces(force)
     for k in range(problem.knots):
         start, control = assembly.state_start[k], assembly.control_start[k]
-        values[start : start + n] = coordinates.reduce(q[k])
-        values[start + n : start + 2 * n] = coordinates.reduce(v[k])
+        values[start : start + n] = place[k]
+        values[start + n : start + 2 * n] = rate[k]
         if k == problem.knots - 1:
             break
         stretch = problem.stretch_at(k)
-        bend = (v[k + 1] - v[k]) / (1.0 if stretch.impact else steps[k])
-        values[control : control + n] = coordinates.reduce(bend)
+        bend = (rate[k + 1] - rate[k]) / (1.0 if stretch.impact else steps[k])
+        values[control : control + n] = bend
         if stretch.timed:
             values[start + 2 * n] = means[stretch]
         if not stretch.flies:
-            pushed = coordinates.reduce_forces(force[k])
-            values[control + n : control + n + coordinates.forces] = pushed
+            values[control + n : control + n + coordinates.forces] = pushes[k]
         elif k + 1 < problem.knots:
-            turned = coordinates.reduce(q[k + 1] - q[k]) / steps[k]
-            rates = 1.5 * turned - 0.25 * coordinates.reduce(v[k] + v[k + 1])
+            turned = (place[k + 1] - place[k]) / steps[k]
+            rates = 1.5 * turned - 0.25 * (rate[k] + rate[k + 1])
             own = list(coordinates.turning)
             values[control + n : control + n + len(own)] = rates[own]
         hold = assembly.knots[k].hold
@@ -174,7 +175,7 @@ def twist(q: Array, v: Array, bend: Array) -> tuple[Array, Array]:
     spin, turn = angular_motion(angles, v[3:6][ORDER], bend[3:6][ORDER])
     back = rotation(angles).T
     speed = back @ v[:3]
-    pull = back @ bend[:3] - np.cross(spin, speed)
+    pull = back @ bend[:3] - cross(spin, speed)
     return np.concatenate([speed, spin, v[6:]]), np.concatenate([pull, turn, bend[6:]])
 
 

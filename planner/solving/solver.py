@@ -25,6 +25,8 @@ finds it often where it does not."""
 PATIENCE = 3e-5
 """s of processor time for each iteration and state of the problem, about three times what one takes:
 a solver that restores feasibility without counting, or looks for a step for ever, is given up."""
+FAR, NEAR = 10.0, 1e-4
+"""The barrier's parameter to begin with, far from a solution and near one."""
 KEPT = 12
 """Solvers kept for problems of the same structure."""
 
@@ -88,6 +90,7 @@ def solve(
     guess: Array,
     *,
     warm: bool = False,
+    barrier: float = NEAR,
     solver: str = "",
     limit: int = LIMIT,
     other_guess: Callable[[], Array | None] = lambda: None,
@@ -95,7 +98,8 @@ def solve(
     """The first solution found, or the least violated attempt: fatrop from the other guess, which is
     nearer, fatrop from the guess, IPOPT from the guess.
 
-    ``warm`` says that the guess is near the solution; ``solver`` insists on one of them.
+    ``warm`` says that the guess is near the solution, and ``barrier`` is the parameter of the logarithmic
+    barrier to begin with near it; ``solver`` insists on one of them.
     """
     tries = [solver] if solver else ["other", "fatrop", "ipopt"]
     best: Solution | None = None
@@ -106,7 +110,8 @@ def solve(
         start = nearer if other else guess
         if start is None or (name == "fatrop" and nearer is not None):
             continue  # what fatrop does not find from near it does not find from afar
-        found = _run(problem, start, "fatrop" if other else name, warm or other, limit)
+        begin = barrier if warm or other else FAR
+        found = _run(problem, start, "fatrop" if other else name, begin, limit)
         if best is None or found.solved or found.violation < best.violation:
             best = found
         if best.solved:
@@ -115,9 +120,9 @@ def solve(
     return best
 
 
-def _run(problem: Problem, guess: Array, name: str, warm: bool, limit: int) -> Solution:
+def _run(problem: Problem, guess: Array, name: str, barrier: float, limit: int) -> Solution:
     started = cpu_time()
-    function, evaluate, constraint = _solver(problem.assembly, name, warm, limit)
+    function, evaluate, constraint = _solver(problem.assembly, name, barrier, limit)
 
     arguments = {
         "x0": guess, "p": problem.parameters, "lbx": problem.lower, "ubx": problem.upper,
@@ -164,20 +169,20 @@ def violation_of(problem: Problem, values: Array, constraint: Any) -> tuple[floa
 _solvers: OrderedDict[object, tuple[Any, Any, Any]] = OrderedDict()
 
 
-def _solver(assembly: Assembly, name: str, warm: bool, limit: int) -> tuple[Any, Any, Any]:
+def _solver(assembly: Assembly, name: str, barrier: float, limit: int) -> tuple[Any, Any, Any]:
     """A solver for problems of this structure, with the functions of cost and constraints."""
-    key = (assembly.signature, name, warm, limit)
+    key = (assembly.signature, name, barrier, limit)
     if key in _solvers:
         _solvers.move_to_end(key)
         return _solvers[key]
-    made = _make_solver(assembly, name, warm, limit)
+    made = _make_solver(assembly, name, barrier, limit)
     _solvers[key] = made
     if len(_solvers) > KEPT:
         _solvers.popitem(last=False)
     return made
 
 
-def _make_solver(assembly: Assembly, name: str, warm: bool, limit: int) -> tuple[Any, Any, Any]:
+def _make_solver(assembly: Assembly, name: str, barrier: float, limit: int) -> tuple[Any, Any, Any]:
     import casadi as ca
 
     functions = assembly.functions()
@@ -187,9 +192,9 @@ def _make_solver(assembly: Assembly, name: str, warm: bool, limit: int) -> tuple
     options: dict[str, Any] = {"print_time": False, "calc_lam_p": False, "error_on_fail": False}
     if name == "fatrop":
         # Its own tolerance takes the short intervals' small coefficients for a lack of rank.
-        own |= {"linsol_lu_fact_tol": 1e-7, "mu_init": 10.0}
-        if warm:
-            own |= {"mu_init": 1e-4, "bound_push": 1e-6, "bound_frac": 1e-6}
+        own |= {"linsol_lu_fact_tol": 1e-7, "mu_init": barrier}
+        if barrier < FAR:
+            own |= {"bound_push": 1e-6, "bound_frac": 1e-6}
         given = ("nlp_f", "nlp_g", "nlp_grad_f", "nlp_jac_g", "nlp_hess_l", "nlp_grad")
         options |= {
             "structure_detection": "manual", "nx": assembly.nx, "nu": assembly.nu,
@@ -197,10 +202,10 @@ def _make_solver(assembly: Assembly, name: str, warm: bool, limit: int) -> tuple
             "cache": {key: functions[key] for key in given}, "fatrop": own,
         }  # fmt: skip
     else:
-        own |= {"sb": "yes", "mu_init": 10.0}
+        own |= {"sb": "yes", "mu_init": barrier}
         own["max_cpu_time"] = max(2.0, 2.0 * PATIENCE * limit * sum(assembly.nx))
-        if warm:
-            own |= {"mu_init": 1e-4, "bound_push": 1e-6, "bound_frac": 1e-6,
+        if barrier < FAR:
+            own |= {"bound_push": 1e-6, "bound_frac": 1e-6,
                     "slack_bound_push": 1e-6, "slack_bound_frac": 1e-6}  # fmt: skip
         options |= {
             "hess_lag": functions["hess_lag"], "jac_g": functions["nlp_jac_g"],

@@ -12,7 +12,13 @@ CallJson = Callable[..., dict[str, Any]]
 def test_it_tells_what_the_machine_allows(folder: Path, call: Call, call_json: CallJson) -> None:
     result = call_json("doctor")
     names = {finding["name"] for finding in result["findings"]}
-    assert {"kernel", "real-time priority", "locked memory", "isolated processors"} <= names
+    assert {
+        "libraries",
+        "kernel",
+        "real-time priority",
+        "locked memory",
+        "isolated processors",
+    } <= names
     assert result["ready"] == all(finding["good"] for finding in result["findings"])
     told = call("doctor").stdout
     for finding in result["findings"]:

@@ -5,7 +5,6 @@ import json
 import os
 import signal
 import subprocess
-import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -15,21 +14,10 @@ import pytest
 
 from aloft.planner.task.plan import read_plan
 
+from ..local_cluster import local_cluster
+
 CallJson = Callable[..., dict[str, Any]]
 Start = Callable[..., subprocess.Popen[str]]
-
-CLUSTER = """
-import sys
-from distributed import LocalCluster
-if __name__ == "__main__":
-    with LocalCluster(
-        n_workers=2, threads_per_worker=1, host="127.0.0.1", dashboard_address=None,
-        worker_dashboard_address=None, silence_logs=50,
-    ) as cluster:
-        print(cluster.scheduler_address, flush=True)
-        sys.stdin.read()
-"""
-
 
 MANY = 16
 """Tasks, so that some are left when a busy machine lets the test see the first plan."""
@@ -72,15 +60,8 @@ def test_any_number_of_workers_and_a_cluster_make_the_same_bytes(
     assert len(one) == 2
     assert one == contents(folder / "3")
     pytest.importorskip("distributed")
-    (folder / "cluster.py").write_text(CLUSTER)
-    with subprocess.Popen(
-        [sys.executable, "cluster.py"], text=True,
-        stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
-    ) as cluster:  # fmt: skip
-        assert cluster.stdout is not None
-        address = cluster.stdout.readline().strip()
+    with local_cluster(folder) as address:
         call_json("plan", "--library", "grid.yaml", "--keep", "dask", "--cluster", address)
-        cluster.terminate()
     assert one == contents(folder / "dask")
 
 

@@ -1,7 +1,5 @@
 """A study on a real Dask cluster makes the same table as on this machine's processes."""
 
-import subprocess
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -14,32 +12,16 @@ from aloft.studies.journal import Journal
 from aloft.studies.reading import read_study
 from aloft.studies.table import make_table, write_table
 
-pytest.importorskip("distributed")
+from ..local_cluster import local_cluster
 
-CLUSTER = """
-import sys
-from distributed import LocalCluster
-if __name__ == "__main__":
-    with LocalCluster(
-        n_workers=2, threads_per_worker=1, host="127.0.0.1", dashboard_address=None,
-        worker_dashboard_address=None, silence_logs=50,
-    ) as cluster:
-        print(cluster.scheduler_address, flush=True)
-        sys.stdin.read()
-"""
+pytest.importorskip("distributed")
 
 
 @pytest.fixture
 def cluster(folder: Path) -> Iterator[str]:
     """The address of a scheduler with two worker processes."""
-    script = folder / "cluster.py"
-    script.write_text(CLUSTER)
-    with subprocess.Popen(
-        [sys.executable, script], text=True, stdin=subprocess.PIPE, stdout=subprocess.PIPE,
-    ) as process:  # fmt: skip
-        assert process.stdout is not None
-        yield process.stdout.readline().strip()
-        process.communicate(timeout=240)  # the end of its input ends it
+    with local_cluster(folder) as address:
+        yield address
 
 
 def test_the_table_is_the_same_on_a_cluster(folder: Path, cluster: str) -> None:

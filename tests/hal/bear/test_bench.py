@@ -14,43 +14,25 @@ from aloft.hal.twin.actuator import EmulatedActuator
 from aloft.hal.twin.bus import EmulatedBus
 from aloft.robots.description import find_robot
 
+from .virtual_wire import VirtualWire
+
 ROBOT = find_robot("bruce")
 
 
-class Wire:
-    """A port to emulated actuators whose motors are where they are told to be, in virtual time."""
+class Wire(VirtualWire):
+    """A port to emulated actuators whose motors are where they are told to be."""
 
     def __init__(self, bus: EmulatedBus) -> None:
-        self.bus, self.timeout = bus, None
+        super().__init__(bus)
         self.sent: list[int] = []
-        self._waiting, self._now = b"", 0.0
-
-    def now(self) -> float:
-        return self._now
-
-    @property
-    def in_waiting(self) -> int:
-        return len(self._waiting)
 
     def write(self, data: bytes | bytearray) -> int:
         self.sent += [frame.code for frame in FrameReader().feed(data)]
-        self._waiting += self.bus.receive(bytes(data))
+        count = super().write(data)
         for actuator in self.bus.actuators.values():
             if actuator.driving:
                 actuator.status["present_position"] = actuator.status["goal_position"]
-        return len(data)
-
-    def read(self, size: int = 1) -> bytes:
-        if not self._waiting:
-            self._now += self.timeout or 0.0
-        part, self._waiting = self._waiting[:size], self._waiting[size:]
-        return part
-
-    def reset_input_buffer(self) -> None:
-        self._waiting = b""
-
-    def close(self) -> None:
-        pass
+        return count
 
 
 @pytest.fixture

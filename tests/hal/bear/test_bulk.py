@@ -10,53 +10,20 @@ from aloft.hal.twin.actuator import EmulatedActuator
 from aloft.hal.twin.bus import EmulatedBus
 from aloft.runtime.testing.allocations import count_array_allocations
 
+from .virtual_wire import VirtualWire
+
 READ = ("present_position", "present_velocity", "present_iq")
 WRITE = ("goal_iq", "goal_position", "goal_velocity")
 
 
-class Wire:
-    """A serial port whose other end answers at once, in virtual time."""
-
-    def __init__(self, bus: EmulatedBus) -> None:
-        self.bus = bus
-        self.timeout: float | None = None
-        self.sent = b""
-        self._waiting = b""
-        self._now = 0.0
-
-    def now(self) -> float:
-        return self._now
-
-    @property
-    def in_waiting(self) -> int:
-        return len(self._waiting)
-
-    def write(self, data: bytes | bytearray) -> int:
-        self.sent = bytes(data)
-        self._waiting += self.bus.receive(self.sent)
-        return len(data)
-
-    def read(self, size: int = 1) -> bytes:
-        if not self._waiting:
-            self._now += self.timeout or 0.0
-        part, self._waiting = self._waiting[:size], self._waiting[size:]
-        return part
-
-    def reset_input_buffer(self) -> None:
-        self._waiting = b""
-
-    def close(self) -> None:
-        pass
-
-
 def exchange(
     devices: int = 10, read: tuple[str, ...] = READ, write: tuple[str, ...] = WRITE
-) -> tuple[BulkExchange, EmulatedBus, Wire]:
+) -> tuple[BulkExchange, EmulatedBus, VirtualWire]:
     emulated = EmulatedBus(EmulatedActuator(k + 1) for k in range(devices))
     for actuator in emulated.actuators.values():
         actuator.config["limit_i_max"] = 30.0
         actuator.status["present_position"] = 0.25 * actuator.device
-    wire = Wire(emulated)
+    wire = VirtualWire(emulated)
     bulk = BulkExchange(BearBus(wire, reply_time=1e-3), range(1, devices + 1), read, write)
     return bulk, emulated, wire
 
@@ -67,10 +34,10 @@ def test_the_frame_is_as_published() -> None:
     assert bulk.exchange() == 2
     head = bytes((0xFF, 0xFF, 0xFE, 4 + 1 + 1 + 2 + 8, 0x12, 2, 0x11, 0x09, 0x03))
     assert (
-        wire.sent[:-1]
+        wire.last[:-1]
         == head + b"\x01" + np.float32(1).tobytes() + b"\x02" + np.float32(-2).tobytes()
     )
-    (frame,) = FrameReader().feed(wire.sent)
+    (frame,) = FrameReader().feed(wire.last)
     assert frame.code == Instruction.BULK
     assert bulk.values.tolist() == [[0.25], [0.5]]
 
@@ -80,7 +47,7 @@ def test_goals_arrive_and_measurements_come_back() -> None:
     rng = np.random.default_rng(1)
     bulk.goals[:] = rng.uniform(-10, 10, bulk.goals.shape).astype(np.float32)
     assert bulk.exchange() == 10
-    assert len(wire.sent) == 144  # so many bytes go out at 3 registers each way, and 180 come back
+    assert len(wire.last) == 144  # so many bytes go out at 3 registers each way, and 180 come back
     for row, actuator in enumerate(emulated.actuators.values()):
         assert [actuator.status[name] for name in WRITE] == bulk.goals[row].tolist()
     assert bulk.values[:, 0].tolist() == [0.25 * k for k in range(1, 11)]
@@ -170,4 +137,4 @@ def test_what_is_refused() -> None:
     bulk.goals[1, 0] = np.inf
     with pytest.raises(BusError, match="the goal goal_iq of actuator 2 is inf: nothing was sent"):
         bulk.exchange()
-    assert wire.sent == b""
+    assert wire.last == b""

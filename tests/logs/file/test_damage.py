@@ -10,7 +10,7 @@ from aloft.blocks.general.constant import Constant
 from aloft.logs import RecordingError, read
 from aloft.logs.file.contents import DamagedError
 from aloft.logs.file.header import header_of
-from aloft.logs.file.messages import CLOSING, FILE_HEAD, HEAD, Content, _checked
+from aloft.logs.file.messages import CLOSING, FILE_HEAD, HEAD, Content, _checked, table_of
 from aloft.logs.file.repair import repair
 from aloft.logs.recording.writer import RecordingWriter
 from aloft.runtime.running.memory import BoundGraph, Snapshot
@@ -181,3 +181,9 @@ def test_packed_rows_are_handed_to_rerun_without_an_object_a_byte() -> None:
     began = time.perf_counter()
     assert _bytes(data).to_numpy().tobytes() == data
     assert time.perf_counter() - began < 0.5
+
+
+@pytest.mark.parametrize("body", [b"\x80" * 1_000_000, b"\x08" + b"\xff" * 30, b"\x12\xff\x01a"])
+def test_numbers_without_an_end_are_no_table(body: bytes) -> None:
+    with pytest.raises(ValueError, match="a message holds no table"):
+        table_of(body)

@@ -3,6 +3,7 @@
 import importlib.util
 import subprocess
 import sys
+import threading
 from pathlib import Path
 
 import numpy as np
@@ -49,6 +50,32 @@ def test_machine_code_computes_the_same_bits(order):
     call.arguments[0][:] *= 2.0
     call.run()
     np.testing.assert_array_equal(call.arguments[-1], 2.0 * expected[-1])
+
+
+def test_threads_that_compile_at_the_same_time_wait_for_each_other(monkeypatch):
+    inside, most, translate = [], [], module.Translator.object_code
+
+    def watched(translator, kernel, signature):
+        inside.append(kernel)
+        most.append(len(inside))
+        code = translate(translator, kernel, signature)
+        inside.remove(kernel)
+        return code
+
+    monkeypatch.setattr(module.Translator, "object_code", watched)
+    calls = [KernelCall(ours.mix, *arguments(order)) for order in ("C", "F", "A", "C")]
+    said: list[str] = []
+    threads = [
+        threading.Thread(target=lambda call=call: said.append(compile_calls([call])))
+        for call in calls
+    ]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert said == [""] * 4
+    assert most == [1] * 3  # the fourth found what the first had made
+    assert all(call.compiled is not None for call in calls)
 
 
 def test_the_second_process_finds_the_machine_code_in_the_cache(monkeypatch):
