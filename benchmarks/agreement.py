@@ -45,6 +45,8 @@ TORQUE_ERROR = 1e-6
 """How far a torque may be from the proved one [N m]."""
 LARGE = 10.0
 """Torques larger than this [N m] may have that error as a share of themselves in units of it."""
+CLARABEL_TOLERANCE = 1e-12
+"""So that its slacks and multipliers tell what is active."""
 NO_PLACES = np.zeros(0, np.int64)
 STATES = 5_000
 """The states of recorded jumps that are wanted at least."""
@@ -90,8 +92,8 @@ def _stances(states: Iterable[State]) -> Iterable[State]:
 class Found:
     """What came out of a set of programs.
 
-    ``errors`` [N m] by method; ``unsolved`` counts programs with a proved minimum for which a method had none,
-    ``impossible`` those for which every method says that there is none, ``unproved`` those left."""
+    ``errors`` [N m] by method; ``by_own`` counts the minima that only the own method has proposed,
+    ``unsolved`` programs with a proved minimum for which a method had none, ``impossible`` those for which every method says that there is none, ``unproved`` those left."""
 
     programs: int = 0
     limited: int = 0
@@ -99,6 +101,7 @@ class Found:
     unsolved: dict[str, int] = field(default_factory=dict)
     impossible: dict[str, int] = field(default_factory=dict)
     unproved: dict[str, int] = field(default_factory=dict)
+    by_own: dict[str, int] = field(default_factory=dict)
 
     def rows(self, what: str) -> list[Row]:
         """The rows of these programs."""
@@ -112,11 +115,15 @@ class Found:
         ]
         for name, errors in self.errors.items():
             kind = "round" if name in (CONES, CLARABEL) else "pyramids"
-            note = (
-                f"median {np.median(errors):.1g}, {len(errors)} programs; "
-                f"{self.impossible.get(kind, 0)} without a solution, which the method says"
-                + (f"; {self.unproved[kind]} left out: no proof" if self.unproved.get(kind) else "")
-            )
+            parts = [
+                f"median {np.median(errors):.1g}, {len(errors)} programs",
+                f"{self.impossible.get(kind, 0)} without a solution, which the method says",
+            ]
+            if self.by_own.get(kind):
+                parts.append(f"{self.by_own[kind]} of the minima proposed by the own method only")
+            if self.unproved.get(kind):
+                parts.append(f"{self.unproved[kind]} left out: no proof")
+            note = "; ".join(parts)
             goal = None if name == CLARABEL else TORQUE_ERROR
             rows.append(
                 Row(f"{what}: {name}, largest error", max(errors), "N m", goal=goal, note=note)
@@ -152,7 +159,8 @@ class Methods:
         refused = compile_calls([self._own, self._cones])
         if refused:
             raise AssertionError(f"the kernels are not compiled: {refused}")
-        self._clarabel = ConeProgramSolver()
+        self._clarabel = ConeProgramSolver(CLARABEL_TOLERANCE)
+        self._coarser = ConeProgramSolver()
         self._force, self._product = np.zeros((contacts, 3)), np.zeros(n - 6)
 
     def compare(self, states: Iterable[State]) -> Found:
@@ -180,6 +188,7 @@ class Methods:
         if best is None and code == SOLVED:
             held = memory.memory.is_active[: len(pressed)].copy()
             best = proved_minimum(program, Proposal(guess, held, NO_PLACES), 0.0)
+            found.by_own["pyramids"] = found.by_own.get("pyramids", 0) + (best is not None)
         if best is None:
             nothing = x is None and code == INFEASIBLE
             counts = found.impossible if nothing else found.unproved
@@ -199,15 +208,18 @@ class Methods:
         guess = np.hstack((self._solution.acceleration, self._solution.force[active].ravel()))
         (p, q), (a, b), (g, h) = program.cost, program.equality, program.inequality
         kept = rows_without_pyramids(len(active), len(h))
-        answer = self._clarabel.answer(p, q, g[kept], h[kept], a, b, friction, len(active))
+        problem = p, q, g[kept], h[kept], a, b, friction, len(active)
+        answer = self._clarabel.answer(*problem)
         solved = str(answer.status) in CLARABEL_SOLVED
         best = None
-        if solved:
-            best = proved_minimum(
-                program, self._from_clarabel(answer, len(b), len(active)), friction
-            )
+        for solver in (self._clarabel, self._coarser):
+            if solved and best is None:
+                again = answer if solver is self._clarabel else solver.answer(*problem)
+                proposal = self._from_clarabel(again, len(b), len(active))
+                best = proved_minimum(program, proposal, friction)
         if best is None and code == SOLVED:
             best = self._from_cones(program, guess, friction, len(active))
+            found.by_own["round"] = found.by_own.get("round", 0) + (best is not None)
         if best is None:
             nothing = not solved and code == INFEASIBLE
             counts = found.impossible if nothing else found.unproved

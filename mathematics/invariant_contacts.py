@@ -11,18 +11,18 @@ robot state estimation, IJRR 2020.
 
 from __future__ import annotations
 
-import numpy as np
-
 from .arrays import Array, Flags, Indices
 from .kernel import kernel
+from .linear import multiply_sparse, multiply_transposed
 
 
 @kernel
 def remove_contact(point: int, covariance: Array) -> None:
     """Remove a contact point from the state: set its covariances to zero."""
     first = 9 + 3 * point
-    covariance[first : first + 3, :] = 0.0
-    covariance[:, first : first + 3] = 0.0
+    for i in range(first, first + 3):
+        for k in range(covariance.shape[0]):
+            covariance[i, k] = covariance[k, i] = 0.0
 
 
 @kernel
@@ -40,7 +40,8 @@ def place_jacobian(world_jacobian: Array, offsets: int, sensitivity: Array) -> N
         for k in range(offsets):
             sensitivity[i, k] = 0.0
         sensitivity[i, 6 + i] = -1.0
-    sensitivity[:, offsets : offsets + world_jacobian.shape[1]] = world_jacobian
+        for k in range(world_jacobian.shape[1]):
+            sensitivity[i, offsets + k] = world_jacobian[i, k]
 
 
 @kernel
@@ -55,16 +56,20 @@ def add_contact(
         rows, corner: scratch, (3, n) and (3, 3).
     """
     first = 9 + 3 * point
-    np.dot(sensitivity, covariance, rows)
-    np.dot(rows, sensitivity.T, corner)
-    np.add(corner, noise, corner)
+    multiply_sparse(sensitivity, covariance, rows)
+    multiply_transposed(rows, sensitivity, corner)
     for i in range(3):
         for k in range(covariance.shape[0]):
             rows[i, k] = -float(rows[i, k])
         for k in range(3):
-            rows[i, first + k] = corner[i, k]
-    covariance[first : first + 3, :] = rows
-    covariance[:, first : first + 3] = rows.T
+            mean = 0.5 * (float(corner[i, k]) + float(corner[k, i]))  # symmetric to the last bit
+            rows[i, first + k] = mean + float(noise[i, k])
+    for i in range(3):
+        for k in range(covariance.shape[0]):
+            covariance[first + i, k] = rows[i, k]
+    for i in range(3):
+        for k in range(covariance.shape[0]):
+            covariance[k, first + i] = rows[i, k]
 
 
 @kernel

@@ -15,10 +15,9 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from .arrays import Array, Flags, Indices
 from .kernel import kernel
+from .linear import make_symmetric, multiply_sparse, transpose
 
 
 @kernel
@@ -83,7 +82,8 @@ def propagate_covariance(
 ) -> None:  # fmt: skip
     """Propagate the covariance P (n, n) over one period: F P F' + W W'.
 
-    W is ``reach`` with its columns scaled by the noise of the IMU's samples.
+    W is ``reach`` with its columns scaled by the noise of the IMU's samples. P must be symmetric to the
+    last bit, and is so afterwards.
 
     Args:
         transition: F; ``reach`` is written into its columns of the biases.
@@ -92,14 +92,23 @@ def propagate_covariance(
         noise: standard deviations of angular velocity and specific force, (6,).
         scaled, product: scratch, (n, 6) and (n, n).
     """
-    transition[:bias, bias : bias + 6] = reach[:bias]
-    np.dot(transition, covariance, product)
-    np.dot(product, transition.T, covariance)
-    np.multiply(reach, noise, scaled)
-    np.dot(scaled, scaled.T, product)
-    np.add(covariance, product, covariance)
-    np.add(covariance, covariance.T, product)  # symmetric to the last bit
-    np.multiply(product, 0.5, covariance)
+    n = covariance.shape[0]
+    for i in range(bias):
+        for k in range(6):
+            transition[i, bias + k] = reach[i, k]
+    multiply_sparse(transition, covariance, product)
+    transpose(product)
+    multiply_sparse(transition, product, covariance)
+    for i in range(n):
+        for k in range(6):
+            scaled[i, k] = float(reach[i, k]) * float(noise[k])
+    for i in range(n):
+        for j in range(n):
+            total = 0.0
+            for k in range(6):
+                total += float(scaled[i, k]) * float(scaled[j, k])
+            covariance[i, j] += total
+    make_symmetric(covariance)
 
 
 @kernel

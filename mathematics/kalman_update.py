@@ -7,10 +7,15 @@ zero in H and r and have a noise of one. No function here allocates memory.
 
 from __future__ import annotations
 
-import numpy as np
-
 from .arrays import Array
 from .kernel import kernel
+from .linear import (
+    make_symmetric,
+    multiply_matrices,
+    multiply_sparse,
+    multiply_transposed,
+    multiply_vector,
+)
 
 
 @kernel
@@ -42,9 +47,11 @@ def weigh(
         seen, inverse: become P H' (n, 3) and S^-1 (3, 3), for ``correct``.
         spare: scratch (3, 3).
     """
-    np.dot(covariance, sensitivity.T, seen)
-    np.dot(sensitivity, seen, spare)
-    np.add(spare, noise, spare)
+    multiply_transposed(covariance, sensitivity, seen)
+    multiply_sparse(sensitivity, seen, spare)
+    for i in range(3):
+        for k in range(3):
+            spare[i, k] += noise[i, k]
     invert(spare, inverse)
     total = 0.0
     for i in range(3):
@@ -56,7 +63,7 @@ def weigh(
 @kernel
 def correct(
     covariance: Array, sensitivity: Array, noise: Array, residual: Array,
-    seen: Array, inverse: Array, gain: Array, product: Array, correction: Array,
+    seen: Array, inverse: Array, gain: Array, correction: Array,
 ) -> None:  # fmt: skip
     """Update the covariance in Joseph's form, (I - K H) P (I - K H)' + K N K', after ``weigh``.
 
@@ -65,18 +72,23 @@ def correct(
 
     Args:
         seen, inverse: from ``weigh``; the first is overwritten.
-        gain: becomes K, (n, 3). product: scratch (n, n).
+        gain: becomes K, (n, 3).
         correction: becomes K r, (n,).
     """
-    np.dot(seen, inverse, gain)
-    np.dot(gain, residual, correction)
-    np.dot(gain, seen.T, product)
-    np.subtract(covariance, product, covariance)  # (I - K H) P
-    np.dot(covariance, sensitivity.T, seen)
-    np.dot(seen, gain.T, product)
-    np.subtract(covariance, product, covariance)
-    np.dot(gain, noise, seen)
-    np.dot(seen, gain.T, product)
-    np.add(covariance, product, covariance)
-    np.add(covariance, covariance.T, product)
-    np.multiply(product, 0.5, covariance)
+    multiply_matrices(seen, inverse, gain)
+    multiply_vector(gain, residual, correction)
+    add_outer(-1.0, gain, seen, covariance)  # (I - K H) P
+    multiply_transposed(covariance, sensitivity, seen)
+    add_outer(-1.0, seen, gain, covariance)
+    multiply_matrices(gain, noise, seen)
+    add_outer(1.0, seen, gain, covariance)
+    make_symmetric(covariance)
+
+
+@kernel
+def add_outer(sign: float, a: Array, b: Array, out: Array) -> None:
+    """Add ``sign`` times ``a`` (n, 3) times the transpose of ``b`` (n, 3) to ``out`` (n, n)."""
+    for i in range(out.shape[0]):
+        x, y, z = sign * float(a[i, 0]), sign * float(a[i, 1]), sign * float(a[i, 2])
+        for j in range(out.shape[1]):
+            out[i, j] += x * float(b[j, 0]) + y * float(b[j, 1]) + z * float(b[j, 2])

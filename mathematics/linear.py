@@ -35,3 +35,48 @@ def multiply_matrices(a: Array, b: Array, out: Array) -> None:
             for k in range(a.shape[1]):
                 total += float(a[i, k]) * float(b[k, j])
             out[i, j] = total
+
+
+@kernel
+def multiply_sparse(a: Array, b: Array, out: Array) -> None:
+    """The same for an ``a`` with many zeros, which are left out."""
+    for i in range(a.shape[0]):
+        for j in range(b.shape[1]):
+            out[i, j] = 0.0
+        for k in range(a.shape[1]):
+            factor = float(a[i, k])
+            if factor != 0.0:
+                for j in range(b.shape[1]):
+                    out[i, j] += factor * float(b[k, j])
+
+
+@kernel
+def multiply_transposed(a: Array, b: Array, out: Array) -> None:
+    """``a`` (l, m) times the transpose of ``b`` (n, m), which has many zeros, into ``out`` (l, n)."""
+    for j in range(b.shape[0]):
+        for i in range(a.shape[0]):
+            out[i, j] = 0.0
+        for k in range(b.shape[1]):
+            factor = float(b[j, k])
+            if factor != 0.0:
+                for i in range(a.shape[0]):
+                    out[i, j] += float(a[i, k]) * factor
+
+
+@kernel
+def transpose(matrix: Array) -> None:
+    """Transpose a square matrix in place."""
+    for i in range(matrix.shape[0]):
+        for j in range(i):
+            above = float(matrix[j, i])
+            matrix[j, i] = matrix[i, j]
+            matrix[i, j] = above
+
+
+@kernel
+def make_symmetric(matrix: Array) -> None:
+    """Make a square matrix the mean of itself and its transpose, symmetric to the last bit."""
+    for i in range(matrix.shape[0]):
+        for j in range(i):
+            mean = 0.5 * (float(matrix[i, j]) + float(matrix[j, i]))
+            matrix[i, j] = matrix[j, i] = mean

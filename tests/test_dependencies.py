@@ -17,6 +17,7 @@ BY = {
     "dask": "distributed",
     "llvmlite": "numba",
     "mujoco": "mujoco-core",
+    "fmu_manipulation_toolbox": "fmu-manipulation-toolbox",
     "pinocchio": "pin",
     "pydantic_core": "pydantic",
     "pydrake": "drake",

@@ -244,16 +244,17 @@ def _slow_feet(task: Asked, robot: RobotDescription, said: set[str]) -> Iterator
     size = size_of(robot)
     if max(_rise(hop) - (hop.landing_height or 0.0) for hop in task.hops()) > FALL * size.height:
         return
-    for name, speed, why in (
-        ("touchdown_speed", TOUCHDOWN_SPEED, "fast feet sink into soft ground"),
-        (
-            "touchdown_slide",
-            TOUCHDOWN_SLIDE,
+    if "touchdown_speed" not in said:
+        speed = rounded(TOUCHDOWN_SPEED * size.slow)
+        yield Choice("margins.touchdown_speed", speed, "fast feet sink into soft ground")
+    # Jumps back go 1 cm too far with that bound.
+    back = any((hop.distance_x or 0.0) < 0.0 for hop in task.hops())
+    if "touchdown_slide" not in said and not back:
+        slide, why = (
+            rounded(TOUCHDOWN_SLIDE * size.slow),
             "feet that swing on miss their place if they land early",
-        ),
-    ):
-        if name not in said:
-            yield Choice(f"margins.{name}", rounded(speed * size.slow), why)
+        )
+        yield Choice("margins.touchdown_slide", slide, why)
 
 
 def demand(task: Asked, robot: RobotDescription) -> float:

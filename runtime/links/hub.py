@@ -57,6 +57,7 @@ class HubTransport:
     def __init__(self, hub: Hub) -> None:
         self.hub = hub
         self.machine = ""
+        self._farewells: list[Callable[[], None]] = []
 
     def open(self, machine: str, lost: Callable[[str], None]) -> None:
         """Enter the hub."""
@@ -81,6 +82,10 @@ class HubTransport:
         """What shows something to observers: a hub has no priorities."""
         return self.publisher(key)
 
+    def before_close(self, call: Callable[[], None]) -> None:
+        """Have this called before it leaves the hub."""
+        self._farewells.append(call)
+
     def subscribe(self, key: str, take: Take) -> None:
         """Have messages taken until this end is closed."""
 
@@ -92,6 +97,9 @@ class HubTransport:
 
     def close(self) -> None:
         """Leave the hub."""
+        farewells, self._farewells = self._farewells, []
+        for call in farewells:
+            call()
         machine, self.machine = self.machine, ""
         if machine:
             self.hub.leave(machine)

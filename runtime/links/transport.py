@@ -31,6 +31,9 @@ class Transport(Protocol):
         """What shows something under ``key`` to observers: at the lowest priority, and dropped where
         a queue is full."""
 
+    def before_close(self, call: Callable[[], None]) -> None:
+        """Have this called when it is about to disconnect, while everything can still be sent."""
+
     def subscribe(self, key: str, take: Take) -> None:
         """Have every message under ``key`` taken."""
 

@@ -94,6 +94,7 @@ class ZenohTransport:
         self._wait = wait
         self._session: Any = None
         self._kept: list[Any] = []
+        self._farewells: list[Callable[[], None]] = []
 
     def open(self, machine: str, lost: Callable[[str], None]) -> None:
         """Open the session and say that the machine is there."""
@@ -153,6 +154,10 @@ class ZenohTransport:
         put: Take = publisher.put
         return put
 
+    def before_close(self, call: Callable[[], None]) -> None:
+        """Have this called before the session is closed."""
+        self._farewells.append(call)
+
     def publisher(self, key: str) -> Take:
         """A publisher whose messages go out at once."""
         import zenoh
@@ -186,6 +191,10 @@ class ZenohTransport:
 
     def close(self) -> None:
         """Close the session; a session that stays open would keep the process from ending."""
+        farewells, self._farewells = self._farewells, []
+        for call in farewells if self._session is not None else ():
+            with suppress(Exception):  # whatever somebody wants to say, a part ends
+                call()
         session, self._session = self._session, None
         self._kept.clear()
         if session is not None:

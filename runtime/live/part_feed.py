@@ -10,6 +10,7 @@ from __future__ import annotations
 import json
 import os
 import threading
+import time
 from contextlib import suppress
 from dataclasses import asdict, dataclass
 from struct import Struct
@@ -26,6 +27,8 @@ from .window_reader import Look, WindowReader, look_of
 
 RATE = 5.0
 """How often the window is sent [Hz]."""
+FAREWELL = 0.05
+"""Seconds that the last message has to leave before the part disconnects."""
 _HEAD = Struct("<II")
 LONGEST = 1 << 26
 """Bytes of a message that is read at most."""
@@ -44,7 +47,8 @@ class PartFeed:
         self._window = Window()
         self._reader: WindowReader | None = None
         self._thread: threading.Thread | None = None
-        self._wake, self._ended = threading.Event(), threading.Event()
+        self._ended = threading.Event()
+        self._put: Take | None = None
         self._fault = ""
         self._about: dict[str, Any] = {}
 
@@ -68,37 +72,44 @@ class PartFeed:
         self._window.record(tick)
 
     def note(self, note: Note) -> None:
-        """Say why the run ends while the links are still there."""
+        """Keep why the run ends, for the last message."""
         if note.kind == "fault":
             self._fault = self._fault or note.text
         elif note.kind == "life" and note.text.startswith("stopping: "):
             self._about["ended"] = self._fault or note.text.removeprefix("stopping: ")
-            self._wake.set()
 
     def close(self) -> None:
         """Send no more."""
         self._window.close()
-        self._ended.set()
-        self._wake.set()
-        if self._thread is not None:
-            self._thread.join(1.0)
+        self._end()
 
     def finish(self, result: RunResult) -> list[str]:
         """Let the memory go."""
         return self._window.finish(result)
 
+    def _end(self) -> None:
+        self._ended.set()
+        if self._thread is not None:
+            self._thread.join(1.0)
+
     def _run(self) -> None:
-        put: Take | None = None
-        while not self._ended.is_set():
-            self._wake.wait(1.0 / RATE)
-            self._wake.clear()
+        while not self._ended.wait(1.0 / RATE):
             with suppress(Exception):  # whatever a network does, the run goes on
-                if put is None and self._transport.is_open:
-                    put = self._transport.shower(window_key(self._machine))
-                if put is not None and self._reader is not None:
-                    copy = self._reader.copy()
-                    if copy is not None:
-                        put(packed(self._about, copy))
+                if self._put is None and self._transport.is_open:
+                    self._put = self._transport.shower(window_key(self._machine))
+                    self._transport.before_close(self._say_farewell)
+                self._send()
+
+    def _send(self) -> None:
+        copy = self._reader.copy() if self._reader is not None else None
+        if self._put is not None and copy is not None:
+            self._put(packed(self._about, copy))
+
+    def _say_farewell(self) -> None:
+        """Say why the run ends: the actuators rest, and the session is still there."""
+        self._end()
+        self._send()
+        time.sleep(FAREWELL)
 
 
 @dataclass(frozen=True)

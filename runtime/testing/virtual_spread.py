@@ -91,6 +91,9 @@ class _VirtualTransport:
     def shower(self, key: str) -> Take:
         return self.publisher(key)
 
+    def before_close(self, call: Callable[[], None]) -> None:
+        """Nothing to do: it does not close."""
+
     def subscribe(self, key: str, take: Take) -> None:
         self._network.takers[key] = take
 

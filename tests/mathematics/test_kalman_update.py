@@ -15,9 +15,7 @@ def update(covariance, sensitivity, noise, residual):
     seen, inverse, gain = np.empty((n, 3)), np.empty((3, 3)), np.empty((n, 3))
     correction = np.empty(n)
     likelihood = weigh(covariance, sensitivity, noise, residual, seen, inverse, np.empty((3, 3)))
-    correct(
-        covariance, sensitivity, noise, residual, seen, inverse, gain, np.empty((n, n)), correction
-    )
+    correct(covariance, sensitivity, noise, residual, seen, inverse, gain, correction)
     return likelihood, covariance, correction
 
 

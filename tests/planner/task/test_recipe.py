@@ -166,3 +166,9 @@ def test_the_time_on_the_ground_that_is_said_is_kept() -> None:
     assert [span.time for span in spans[4:7]] == [0.2, 0.16, 0.04]
     free = make_task({"name": "a", "rise": "6 cm", "repeat": 2, "contact_time": "free"})
     assert free.resolved(BRUCE).phases is None, "a free time is found on flat feet"
+
+
+def test_backwards_feet_may_slide_at_touchdown() -> None:
+    margins = resolved(distance_x="-10 cm").margins
+    assert margins is not None
+    assert (margins.touchdown_speed, margins.touchdown_slide) == (1.7, None)

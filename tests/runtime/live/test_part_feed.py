@@ -3,6 +3,7 @@
 import json
 import threading
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 from zlib import crc32
@@ -26,9 +27,14 @@ class Kept:
         self.keys: list[str] = []
         self.messages: list[bytes] = []
 
+        self.farewells: list[Callable[[], None]] = []
+
     def shower(self, key: str) -> Any:
         self.keys.append(key)
         return self.messages.append
+
+    def before_close(self, call: Callable[[], None]) -> None:
+        self.farewells.append(call)
 
 
 def wait_until(holds: Any) -> None:
@@ -43,7 +49,16 @@ def messages(graph_file: Path) -> tuple[BoundGraph, Kept]:
     """What a run sends that is told to end."""
     bound, transport = BoundGraph(load(graph_file)), Kept()
     sender: Any = transport
-    executor = Executor(bound, log=False, plain=True, sinks=[PartFeed("near", sender)])
+
+    class Disconnecting(PartFeed):
+        """Its transport closes when the run has ended, as that of a part does."""
+
+        def close(self) -> None:
+            for call in transport.farewells:
+                call()
+            super().close()
+
+    executor = Executor(bound, log=False, plain=True, sinks=[Disconnecting("near", sender)])
     thread = threading.Thread(target=executor.run)
     thread.start()
     transport.is_open = True  # as once the links are there

@@ -1,0 +1,75 @@
+"""Exported FMUs keep the standard by a second validator, which is not FMPy's.
+
+FMU Manipulation Toolbox checks the model description against the standard's XML schema, and the rules
+of FMI 3.0.2, section 2.4, that a schema cannot express.
+"""
+
+import logging
+import zipfile
+from pathlib import Path
+
+import pytest
+
+from aloft.fmi.exporting.write import export
+
+checker = pytest.importorskip("fmu_manipulation_toolbox.checker", reason="no second validator")
+pytest.importorskip("fmpy")
+pytest.importorskip("pythonfmu3")
+
+PART = """\
+inputs: {wish: }
+outputs: {force: gain.y, wound: sum.y}
+blocks:
+  gain: {use: blocks.Gain, with: {n: 3, gain: 20 N/m}, in: {u: inputs.wish}}
+  sum: {use: blocks.Integrator, with: {n: 3}, in: {u: gain.y}}
+"""
+RAIL = """\
+rate: 100 Hz
+duration: 1 s
+blocks:
+  wish: {use: blocks.SineWave, with: {n: 3, amplitude: 1 m, frequency: 1 Hz}}
+  part: {use: part.yaml, in: {wish: wish.y}}
+"""
+
+
+def remarks(file: Path, caplog: pytest.LogCaptureFixture) -> list[str]:
+    """What both checks of the toolbox have to say against an FMU."""
+    from fmu_manipulation_toolbox.operations import FMU
+
+    caplog.clear()
+    with caplog.at_level(logging.WARNING, "fmu_manipulation_toolbox"), FMU(str(file)) as fmu:
+        fmu.apply_operation(checker.OperationGenericCheck())
+        fmu.apply_operation(checker.OperationSemanticCheck())
+    return [record.getMessage() for record in caplog.records]
+
+
+@pytest.fixture
+def exported(tmp_path: Path) -> Path:
+    (tmp_path / "part.yaml").write_text(PART)
+    (tmp_path / "rail.yaml").write_text(RAIL)
+    export(str(tmp_path / "rail.yaml"), tmp_path / "part.fmu", "part")
+    return tmp_path / "part.fmu"
+
+
+def changed(file: Path, old: str, new: str) -> Path:
+    """A copy of an FMU with another text in its model description."""
+    copy = file.with_name("changed.fmu")
+    with zipfile.ZipFile(file) as source, zipfile.ZipFile(copy, "w") as target:
+        for name in source.namelist():
+            data = source.read(name)
+            if name == "modelDescription.xml":
+                assert old.encode() in data
+                data = data.replace(old.encode(), new.encode())
+            target.writestr(name, data)
+    return copy
+
+
+def test_it_has_no_remark(exported: Path, caplog: pytest.LogCaptureFixture) -> None:
+    assert remarks(exported, caplog) == []
+
+
+def test_it_would_have_some(exported: Path, caplog: pytest.LogCaptureFixture) -> None:
+    wrong = changed(exported, 'causality="output"', 'causality="out"')
+    assert any("does not validate with FMI standard" in each for each in remarks(wrong, caplog))
+    wrong = changed(exported, 'name="force"', 'name="wound"')
+    assert any("wound" in each for each in remarks(wrong, caplog))
