@@ -119,15 +119,13 @@ def run(
     ] = False,
 ) -> None:
     """Run a graph; print its metrics and the time each block took; write a recording."""
-    from ..logs.recording.process_ahead import recorder_ahead
     from ..runtime.graph import load
     from ..runtime.running.real_time import NO_WISHES, RealTime
     from ..studies.batch.seeds import parse_seeds
 
     settings = [*(overrides or []), *([f"duration={duration}"] if duration else [])]
     out = console(to_stderr=as_json, quiet=quiet)
-    ahead = recorder_ahead(wanted=not (no_record or seeds or local))
-    with errors_reported(as_json, traceback=traceback), ahead:
+    with errors_reported(as_json, traceback=traceback):
         if seeds and record is not None:
             raise AloftError("--record is for one run; with --seeds nothing is recorded")
         if seeds and rerun is not Live.NONE:

@@ -26,10 +26,12 @@ from ...runtime.running.memory import BoundGraph
 from ...runtime.running.notes import Note, parameter_note
 from ...runtime.running.run_result import RunResult
 from ..file.header import header_of
+from ..file.reader import read
+from ..viewing.robot_meshes import missing_meshes
 from . import recorder_link
 from .place import part_of, replaced, take_place
 from .recorder_link import RecorderLink
-from .recorder_task import KEYFRAME, NOTE, ROW, Report
+from .recorder_process import KEYFRAME, NOTE, ROW, Report
 from .ring import space_of
 
 WhenFull = Literal["wait", "drop"]
@@ -122,9 +124,7 @@ class Recorder:
         if self.link is None:
             self._warn(f"no recording: {problem}")
             return
-        if bound.graph.robot is not None and bound.graph.robot.looks:
-            from ..viewing.robot_meshes import missing_meshes
-
+        if bound.graph.robot is not None:
             for missing in missing_meshes(bound.graph.robot):
                 self._warn(missing)
         self._write = self.link.ring.write
@@ -286,8 +286,6 @@ class Recorder:
 
     def _ticks_found(self, path: Path) -> tuple[int, Path]:
         """The ticks in the files that the process left, and the name of the last of them."""
-        from ..file.reader import read
-
         count = 0
         while self._split:
             try:

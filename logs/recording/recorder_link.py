@@ -4,17 +4,24 @@ from __future__ import annotations
 
 import json
 import os
+import subprocess
+import sys
 import time
 from collections.abc import Callable
 from contextlib import suppress
+from dataclasses import asdict
+from pathlib import Path
 from select import select
 from typing import Any
 
 from .place import Place
-from .process_ahead import writer_process
-from .recorder_task import HEADER, Report, Task
+from .recorder_process import HEADER, Report, Task
 from .ring import ALIGNMENT, RingWriter, make_memory, space_of
 
+_MAIN = (
+    "import sys, json; sys.path[:] = json.loads(sys.argv[2]); "
+    "from aloft.logs.recording.recorder_process import main; main(sys.argv[1])"
+)
 START_TIME = 30.0
 """Seconds the process may take to be ready for a run in real time."""
 STALL_TIME = 60.0
@@ -58,14 +65,22 @@ class RecorderLink:
             task = Task(
                 descriptor, capacity, path, file, keep, flush_period, sync_period, live, split
             )
-            writer = writer_process()
-            writer.begin(task, [descriptor, *([file] if file >= 0 else [])])
+            folders = json.dumps([str(Path(folder).absolute()) for folder in sys.path])
+            # not forked, as a copy of this process would hold its robot; and in a session of its
+            # own, so that nobody's Ctrl-C ends it before the run has come to rest
+            self._process = subprocess.Popen(
+                [sys.executable, "-c", _MAIN, json.dumps(asdict(task)), folders],
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                pass_fds=[descriptor, *([file] if file >= 0 else [])],
+                start_new_session=True,
+            )
         finally:
             os.close(descriptor)
             if place is not None:
                 place.close()  # the process holds the file and its lock
-        self._process = writer.process
-        self._input, self._output = writer.pipes
+        assert self._process.stdin is not None and self._process.stdout is not None
+        self._input, self._output = self._process.stdin, self._process.stdout
         self._said = b""
         self._seen, self._since = 0, time.monotonic()
 

@@ -1,8 +1,7 @@
 """The process beside the robot that writes the recording; see ``recorder`` for the other side.
 
-It is told what to do by a ``Task``, which comes by a socket together with the files of the ring and
-of the recording, and by the first record in the ring, the header. It imports what it needs before, so
-it may be started before there is anything to write. On its standard input comes the outcome of the run. The end of the input says that nothing
+It is told what to do by a ``Task`` on its command line and by the first record in the ring, the
+header. On its standard input comes the outcome of the run. The end of the input says that nothing
 more will come, also when the process that runs the graph was killed: then what is in the ring is
 written, and the file is closed and gets its name. On its standard output it says, in lines of JSON,
 that it is ready and, at the end, a ``Report``.
@@ -14,13 +13,12 @@ import json
 import os
 import select
 import signal
-import socket
 import sys
 import threading
 import time
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import asdict, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -32,10 +30,11 @@ from ...runtime.running.notes import Note
 from ..file.format import Header
 from .live_feed import LiveFeed
 from .place import Place, split_name, take_place
-from .recorder_task import KEYFRAME, NOTE, ROW, Report, Task, receive_task
 from .ring import Record, RingReader
 from .writer import RecordingWriter, warm_up
 
+HEADER, ROW, KEYFRAME, NOTE = 1, 2, 3, 4
+"""The kinds of records in the ring; a keyframe is the bytes of the bus, then of the state."""
 POLL = 0.02
 """Seconds between two looks at the ring."""
 LIVE_PERIOD = 0.1
@@ -48,6 +47,59 @@ SLOW_FLUSH = 4.0
 """How many flush periods ticks may wait that are fewer than those of one period of the graph."""
 DRAW_PERIOD = 10.0
 """Seconds between two pieces of what the viewer shows: each costs the viewer time and memory."""
+
+
+@dataclass(frozen=True)
+class Task:
+    """What to write.
+
+    Attributes:
+        descriptor, capacity: of the ring.
+        path: the name that the recording gets; empty if no file is written.
+        file: the descriptor of the file, which is locked; see ``place``.
+        keep: the number of earlier recordings of that name that are kept.
+        flush_period: seconds after which what has come is handed to the operating system; four times
+            as many where it is less than a period of the graph's time.
+        sync_period: seconds after which that is told to put it on the disk.
+        live: where a viewer listens that shows the run while it goes on, if one does.
+        split: ticks after which the recording goes on in a new file, at the next keyframe; zero for
+            never.
+    """
+
+    descriptor: int
+    capacity: int
+    path: str
+    file: int
+    keep: int
+    flush_period: float
+    sync_period: float
+    live: str = ""
+    split: int = 0
+
+
+@dataclass
+class Report:
+    """What was done.
+
+    Attributes:
+        rows: the number of ticks in the file, or in all files together.
+        size: the size of the file or of all files [bytes].
+        files: the files, if there are several.
+        memory: the most memory used [bytes].
+        problem: what went wrong with the file, if anything.
+        lost: the number of ticks that were taken from the ring and are not in the file.
+        odd: what the user must know although the recording is whole.
+        live_problem: why the viewer did not show all of the run.
+    """
+
+    rows: int = 0
+    size: int = 0
+    memory: int = 0
+    problem: str = ""
+    lost: int = 0
+    odd: str = ""
+    live_problem: str = ""
+    files: tuple[str, ...] = ()
 
 
 class RecorderProcess:
@@ -73,6 +125,7 @@ class RecorderProcess:
         self._writer: RecordingWriter | None = None
         self._failed: RecordingWriter | None = None
         self._place: Place | None = None
+        warm_up()
         if task.path:
             self._place = Place(Path(task.path), task.file, task.keep)
             self._guard(lambda: self._open(header))
@@ -278,18 +331,12 @@ def _memory() -> int:
     return most if sys.platform == "darwin" else most * 1024
 
 
-def main(number: int) -> None:
-    """Wait for the task that comes by the socket of that file number, and do what it says, until
-    standard input ends."""
+def main(task: str) -> None:
+    """Do what the task says, until standard input ends."""
     # Whoever stops the graph means the graph: this process ends with it, and not before.
-    for ignored in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(ignored, signal.SIG_IGN)
-    warm_up()
-    with socket.socket(fileno=number) as connection:
-        task = receive_task(connection)
-    if task is None:
-        return
-    recorder = RecorderProcess(task)
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, signal.SIG_IGN)
+    recorder = RecorderProcess(Task(**json.loads(task)))
     _say({"ready": True})
     told: set[str] = set()
     text, source = b"", sys.stdin.fileno()

@@ -20,8 +20,7 @@ import pytest
 from aloft.logs import RecordedRun, RecordingError, read
 from aloft.logs.recording import recorder_link
 from aloft.logs.recording.recorder import Recorder
-from aloft.logs.recording.recorder_process import RecorderProcess
-from aloft.logs.recording.recorder_task import Task
+from aloft.logs.recording.recorder_process import RecorderProcess, Task
 from aloft.runtime.language.block import Block, Output, State
 from aloft.runtime.language.signals import Field, Signal
 from aloft.runtime.language.stages import CheckedGraph, ClockSpec
