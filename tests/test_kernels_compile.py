@@ -35,6 +35,8 @@ NOT_HOT = {
     "hal.simulated.mujoco_robot._nearest_step": "for the text of an error, when a graph is loaded",
     "hal.bear.supervision._first_lasting": "of plain numbers, in the driver's own Python",
     "blocks.estimation.mass_estimator._scratch": "memory, when a block is set up",
+    "mathematics.reproducible.inverse": "before a run, when tables are made",
+    "mathematics.reproducible.product": "before a run, when tables are made",
     "mathematics.compiling.chain_code.rows_of": "a view, when calls are bound",
     "mathematics.compiling.library_call._caller": "makes machine code, when calls are bound",
     "mathematics.compiling.compile_calls._tell": "says how far compiling is, before a run",

@@ -244,7 +244,7 @@ class ExactDynamics:
         count = max(1, int(np.ceil(joints.duration / longest_step - 1e-9)))
         h = joints.duration / count
         # The joints at the beginning, in the middle and at the end of every step.
-        moved = joints.at(0.5 * h * np.arange(2 * count + 1)[:, None])
+        moved = joints.at(np.asarray(0.5 * h * np.arange(2 * count + 1)[:, None]))
         if force.any():
             bases, twists = self._push(q[:7], v[:6], moved, force, h)
         else:
