@@ -73,6 +73,9 @@ class RecorderLink:
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 pass_fds=[descriptor, *([file] if file >= 0 else [])],
+                # What fails, a viewer or the disk, this process says in a line of its own; Rerun's log
+                # would say it again several times, as raw lines. Who wants them sets RUST_LOG.
+                env={"RUST_LOG": "off", **os.environ},
                 start_new_session=True,
             )
         finally:

@@ -66,6 +66,7 @@ def check_parameters(
             at=flat.path,
         )
         return None
+    ok &= _refuse_beyond_64_bits(flat, block_type, params, problems)
     return params if ok else None
 
 
@@ -83,6 +84,33 @@ def _refuse_truth_values(flat: FlatBlock, model: type[Parameters], problems: Pro
                 entry.value.where,
                 at=f"{flat.path}.{entry.key}",
                 expected=_with_text("a number", model, entry.key),
+                found=text_of(value),
+            )
+    return ok
+
+
+def _refuse_beyond_64_bits(
+    flat: FlatBlock, block_type: type[Block], params: Parameters, problems: Problems
+) -> bool:
+    """Report whole numbers that no 64 bits hold, where signals and kernels keep numbers.
+
+    Seeds may have any size. The size of a signal is refused far earlier, by ``sizes``.
+    """
+    ports = (*block_type.inputs.values(), *block_type.outputs.values(), *block_type.states.values())
+    sizes = {size for port in ports for f in port.signal.fields.values() for size in f.shape}
+    ok = True
+    for entry in flat.parameters:
+        value = getattr(params, entry.key, None)
+        if entry.key in sizes | {"seed"} or not isinstance(value, int):
+            continue
+        if not -(2**63) <= value < 2**63:
+            ok = False
+            problems.add(
+                Code.BAD_PARAMETER,
+                f"{flat.path}.{entry.key} does not fit into 64 bits",
+                entry.value.where,
+                at=f"{flat.path}.{entry.key}",
+                expected=_with_text("a whole number below 2^63", block_type.Params, entry.key),
                 found=text_of(value),
             )
     return ok

@@ -1,4 +1,4 @@
-"""``aloft view``: what it refuses; what it shows is tested in tests/logs/test_viewer.py."""
+"""``aloft view``: what it refuses; what it shows is tested in tests/logs/viewing/test_viewer.py."""
 
 import json
 from pathlib import Path

@@ -49,7 +49,9 @@ class Strike:
 
 
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP])
-def test_a_viewer_that_fails_is_a_warning(tmp_path: Path, number: signal.Signals) -> None:
+def test_a_viewer_that_fails_is_a_warning(
+    tmp_path: Path, number: signal.Signals, capfd: pytest.CaptureFixture[str]
+) -> None:
     viewer = start_viewer("web")
     try:
         recorder = Recorder(tmp_path / "a.rrd", live=viewer.source)
@@ -60,6 +62,9 @@ def test_a_viewer_that_fails_is_a_warning(tmp_path: Path, number: signal.Signals
             clock=ClockSpec("paced"),
         )
         assert result.success and result.ticks == 1000 and recorder.dropped == 0
+        said = capfd.readouterr()
+        assert said.out == "" and said.err.count("\n") <= 1  # Rerun writes no lines of its own
+        assert said.err.startswith("warning: nothing more is shown live: ") or not said.err
         recorded = read(tmp_path / "a.rrd")
         assert recorded.outcome is not None
         np.testing.assert_array_equal(recorded["count.numbers.value"][:, 0], np.arange(1000.0))
@@ -74,10 +79,15 @@ def test_a_viewer_that_fails_is_a_warning(tmp_path: Path, number: signal.Signals
         viewer.stop()
 
 
-def test_a_viewer_that_is_not_there_is_a_warning(tmp_path: Path) -> None:
+def test_a_viewer_that_is_not_there_is_a_warning(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
     recorder = Recorder(tmp_path / "a.rrd", live="rerun+http://127.0.0.1:9/proxy")
     result = run(checked_graph({"count": Use(Count)}, ticks=100), sinks=[recorder])
     assert result.success
     (warning,) = result.warnings
     assert warning.startswith("the viewer did not show all of the run: ")
+    said = capfd.readouterr()
+    assert said.out == "" and said.err.count("\n") <= 1
+    assert said.err.startswith("warning: nothing more is shown live: ") or not said.err
     assert len(read(tmp_path / "a.rrd").ticks) == 100

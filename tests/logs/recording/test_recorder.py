@@ -219,7 +219,7 @@ def test_the_run_goes_on_when_the_recorder_is_killed(tmp_path: Path) -> None:
     assert recorded.outcome is None
 
 
-def test_a_full_disk_is_a_warning(tmp_path: Path) -> None:
+def test_a_full_disk_is_a_warning(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     told: list[str] = []
     recorder = Recorder(tmp_path / "a.rrd", on_warning=told.append)
 
@@ -232,6 +232,9 @@ def test_a_full_disk_is_a_warning(tmp_path: Path) -> None:
     assert told == list(result.warnings)
     (warning,) = result.warnings
     assert "a.rrd cannot be written any further" in warning
+    said = capfd.readouterr()  # one line of the recorder's process at once, and none of Rerun's
+    assert said.out == "" and said.err.count("\n") == 1
+    assert said.err.startswith("warning: nothing more is recorded: ")
     assert recorder.report is not None
     assert recorder.report.rows + recorder.report.lost == 20_000 and recorder.report.lost > 0
     recorded = read(tmp_path / "a.rrd")
