@@ -182,8 +182,8 @@ def flat(arguments, result):
 
 @pytest.mark.filterwarnings("ignore::numba.core.errors.NumbaPerformanceWarning")
 def test_all_kernels_compile_and_compute_the_same(calls, compiler):
-    ours = ("kernels_for_tests.", "tests.")  # other tests of the same process define some of these
-    missing = [n for n, samples in calls.items() if not samples and not n.startswith(ours)]
+    # other tests of the same process define kernels of their own, which are none of the package's
+    missing = [n for n, samples in calls.items() if not samples and n.startswith("aloft.")]
     assert not missing, f"not called by the jump; add arguments to UNUSED: {missing}"
     random = np.random.default_rng(1)
     for name, function in kernels().items():

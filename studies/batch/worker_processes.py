@@ -186,6 +186,7 @@ def _work(pipe: Connection, function: Callable[[Any], Any]) -> None:
     SIGTERM raises an exception in the job under way, so that the job can clean up. A running graph
     handles the signal itself, and its robot comes to rest.
     """
+    global _stopping
     try:
         signal.signal(signal.SIGTERM, _on_terminate)
         threading.Thread(target=_end_with_parent, daemon=True).start()
@@ -200,14 +201,19 @@ def _work(pipe: Connection, function: Callable[[Any], Any]) -> None:
     except (EOFError, OSError, _StoppedError):
         pass  # the process that wants the results has ended, or wants no more of them
     finally:
-        signal.signal(signal.SIGTERM, signal.SIG_IGN)  # this process ends anyway
+        # This process ends anyway. Python complains of a signal that arrives while its handler is taken away, so
+        # none may arrive then.
+        _stopping = True
+        signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGTERM})
+        signal.signal(signal.SIGTERM, signal.SIG_IGN)
 
 
 def _on_terminate(number: int, frame: object) -> None:
+    """The first signal ends the job under way; a further one changes nothing."""
     global _stopping
-    _stopping = True
-    signal.signal(signal.SIGTERM, signal.SIG_IGN)
-    raise _StoppedError
+    if not _stopping:
+        _stopping = True
+        raise _StoppedError
 
 
 def _end_with_parent() -> None:

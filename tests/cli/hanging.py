@@ -1,6 +1,7 @@
 """Blocks that hang in tick 3: in Python, in compiled code that keeps the interpreter, in a kernel."""
 
 import ctypes
+import time
 
 import numpy as np
 
@@ -21,13 +22,18 @@ class Hanging(Block):
         n: int = parameter(1, text="the number of elements")
         compiled: bool = parameter(False, text="whether the interpreter is kept")
 
+    def setup(self) -> None:
+        # PyDLL keeps the interpreter during a call. A signal does not end the wait for a lock.
+        self._wait = ctypes.PyDLL(None).pthread_mutex_timedlock
+        self._lock = ctypes.create_string_buffer(64)  # an open one, as all zeros
+        ctypes.PyDLL(None).pthread_mutex_lock(self._lock)
+
     def step(self) -> None:
         if self.tick != 3:
             return
         if self.params.compiled:
-            # PyDLL keeps the interpreter during a call; libc sleeps again when a signal wakes it
-            while ctypes.PyDLL(None).sleep(120):
-                pass
+            until = (ctypes.c_long * 2)(int(time.time()) + 120, 0)
+            self._wait(self._lock, until)
         while True:
             pass
 

@@ -69,7 +69,7 @@ def test_code_that_keeps_the_interpreter(
     )
     assert result["exit_code"] == 128 + signal.SIGKILL
     assert (result["success"], result["error"]["block"]) == (False, "arm")
-    assert result["error"]["where"] == f"{Path.cwd()}/hanging.py:{line_of('PyDLL(None)')}"
+    assert result["error"]["where"] == f"{Path.cwd()}/hanging.py:{line_of('self._wait(')}"
 
 
 @pytest.mark.parametrize("options", [[], ["--no-fuse"]])
