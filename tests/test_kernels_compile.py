@@ -180,6 +180,7 @@ def flat(arguments, result):
     return [np.asarray(a) for a in (*leaves(arguments), *returned)]
 
 
+@pytest.mark.long
 @pytest.mark.filterwarnings("ignore::numba.core.errors.NumbaPerformanceWarning")
 def test_all_kernels_compile_and_compute_the_same(calls, compiler):
     # other tests of the same process define kernels of their own, which are none of the package's
