@@ -31,6 +31,9 @@ $(READY): pyproject.toml scripts/find_python.sh
 	"$$python" -m venv $(VENV)
 	@$(PIP) --upgrade 'pip>=25.1'
 	@$(PIP) --editable .
+	@# pip compiles what it copies; what stays where it is would be compiled at each start until Python
+	@# has written the bytecode, which some environments forbid it
+	@$(BIN)/python -m compileall -q -x '/(\.venv|build|tests)/' .
 	@touch $@
 
 $(COMPLETE): $(READY)
