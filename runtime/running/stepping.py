@@ -159,7 +159,7 @@ class SteppedRun:
                 f"{name!r} is no block blocks.External, which alone can be set; "
                 f"there is {', '.join(external) or 'none'}"
             )
-        target: NDArray[np.float64] = block.x.value  # type: ignore[attr-defined]
+        target: NDArray[np.float64] = block.x.value  # type: ignore[attr-defined]  # of blocks.External
         array = np.asarray(value, np.float64)
         if array.shape not in ((), target.shape):
             raise ValueError(f"{path} has shape {target.shape}, not {array.shape}")
