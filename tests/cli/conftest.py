@@ -27,8 +27,8 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-def run_here(*arguments: str, code: int = 0) -> subprocess.CompletedProcess[str]:
-    """Run the command line in this process and check how it would leave."""
+def outcome(*arguments: str, columns: int = 160) -> subprocess.CompletedProcess[str]:
+    """Run the command line in this process; how it would leave, and what it printed."""
     output, errors = io.StringIO(), io.StringIO()
     with (
         pytest.MonkeyPatch.context() as patch,
@@ -37,10 +37,19 @@ def run_here(*arguments: str, code: int = 0) -> subprocess.CompletedProcess[str]
         pytest.raises(SystemExit) as left,
     ):
         patch.setattr(sys, "argv", ["aloft", *arguments])
-        patch.setenv("COLUMNS", "160")
+        patch.setenv("COLUMNS", str(columns))
         main()
-    assert left.value.code == code, output.getvalue() + errors.getvalue()
-    return subprocess.CompletedProcess(arguments, code, output.getvalue(), errors.getvalue())
+    assert isinstance(left.value.code, int)
+    return subprocess.CompletedProcess(
+        arguments, left.value.code, output.getvalue(), errors.getvalue()
+    )
+
+
+def run_here(*arguments: str, code: int = 0) -> subprocess.CompletedProcess[str]:
+    """As ``outcome``, and check how it would leave."""
+    done = outcome(*arguments)
+    assert done.returncode == code, done.stdout + done.stderr
+    return done
 
 
 def run_for_json(*arguments: str, code: int = 0) -> dict[str, Any]:
