@@ -152,6 +152,13 @@ def reacting(tick: int) -> Inputs:
     return {**inputs, "terms": {**inputs["terms"], **turned, **matrices}}
 
 
+def leaning(tick: int) -> Inputs:
+    """The same with a torso that tilts the other way."""
+    inputs = reacting(tick)
+    turned = {"base_rotation": [[0.8, 0.0, -0.6], [0.0, 1.0, 0.0], [0.6, 0.0, 0.8]]}
+    return {**inputs, "terms": {**inputs["terms"], **turned}}
+
+
 SCENES: Mapping[str, list[Scene]] = {
     "blocks.Step": [Scene({"at": 0.1})],
     "blocks.Timer": [Scene({"duration": 0.1}, lambda tick: {"u": {"value": True}})],
@@ -177,6 +184,7 @@ SCENES: Mapping[str, list[Scene]] = {
         Scene({}, pushed),
         Scene({"law": "predicted"}, reacting),
         Scene({"law": "predicted", "height_range": (0.0, 0.0)}, reacting),
+        Scene({"law": "predicted", "height_range": (-0.5, 0.0)}, leaning),
     ],
     "blocks.CaptureStep": [
         Scene({"steps": 1, "after": 0.01, "duration": 0.05, "settle": 0.02}, tottering(-0.8, 0.1)),
