@@ -200,7 +200,7 @@ UNUSED = {
         np.array([0.1, -0.05]), NORMAL((2, 4)), LANDING, np.zeros((4, 4)), np.zeros(4),
     ),
     "aloft.mathematics.flight_prediction.invert": (REGULAR, np.zeros((3, 3))),
-    "aloft.mathematics.flight_prediction.solve_rows": (
+    "aloft.mathematics.least_squares.solve_rows": (
         REGULAR + REGULAR.T, np.array([[0.3, -0.2, 0.5], [1.0, 0.4, -0.7]]),
     ),
     "aloft.blocks.control.balance_law.pattern_turn": (
