@@ -27,6 +27,18 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
+@pytest.fixture(scope="session")
+def counted(tmp_path_factory: pytest.TempPathFactory) -> bytes:
+    """The recording of ``count.yaml`` as it stands: made once, as that takes a second."""
+    folder = tmp_path_factory.mktemp("counted")
+    for name in ("counter.py", "count.yaml"):
+        shutil.copy(HERE / name, folder)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(folder)
+        run_here("run", "count.yaml", "--record", "count.rrd", "--quiet")
+    return (folder / "count.rrd").read_bytes()
+
+
 def outcome(*arguments: str, columns: int = 160) -> subprocess.CompletedProcess[str]:
     """Run the command line in this process; how it would leave, and what it printed."""
     output, errors = io.StringIO(), io.StringIO()

@@ -40,14 +40,6 @@ def damaged(data: bytes, draw: random.Random) -> bytes:
     return data[:at] + draw.randbytes(draw.randrange(1, 64)) + data[at:]
 
 
-@pytest.fixture
-def recording(folder: Path) -> Path:
-    """A small recording."""
-    code, printed = left("run", "count.yaml", "--record", "run.rrd", "--quiet")
-    assert code == 0, printed
-    return folder / "run.rrd"
-
-
 @pytest.mark.parametrize(
     "command",
     [
@@ -63,9 +55,9 @@ def recording(folder: Path) -> Path:
     ids="-".join,
 )
 def test_a_damaged_recording(
-    command: list[str], recording: Path, folder: Path, capfd: pytest.CaptureFixture[str]
+    command: list[str], counted: bytes, folder: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    data, draw = recording.read_bytes(), random.Random(" ".join(command))
+    data, draw = counted, random.Random(" ".join(command))
     (folder / "whole.rrd").write_bytes(data)
     good, said = left(*(part.format("whole.rrd") for part in command))
     assert good == 0, said
