@@ -3,7 +3,6 @@
 import io
 import json
 import os
-import shutil
 import subprocess
 import sys
 from collections.abc import Callable
@@ -15,14 +14,13 @@ import pytest
 
 from aloft.cli import main
 
-HERE = Path(__file__).parent
+from ..counting import copy_counting
 
 
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A folder with a graph and its block, which is where commands run."""
-    for name in ("counter.py", "count.yaml"):
-        shutil.copy(HERE / name, tmp_path)
+    copy_counting(tmp_path)
     monkeypatch.chdir(tmp_path)
     return tmp_path
 
@@ -31,8 +29,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def counted(tmp_path_factory: pytest.TempPathFactory) -> bytes:
     """The recording of ``count.yaml`` as it stands: made once, as that takes a second."""
     folder = tmp_path_factory.mktemp("counted")
-    for name in ("counter.py", "count.yaml"):
-        shutil.copy(HERE / name, folder)
+    copy_counting(folder)
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(folder)
         run_here("run", "count.yaml", "--record", "count.rrd", "--quiet")
