@@ -212,7 +212,9 @@ class PlanLibrary:
         found = []
         for path, header in self.headers():
             kept = header.get("task") if isinstance(header, dict) else None
-            value = kept.get(parameter) if isinstance(kept, dict) else None
+            if not isinstance(kept, dict):
+                continue
+            value = kept.get(parameter)
             if not isinstance(value, float) or not 0.0 < (value - modest) / (asked - modest) < 1.0:
                 continue
             there = task.model_copy(update={parameter: value}).resolved(self.robot)
