@@ -152,6 +152,11 @@ def reacting(tick: int) -> Inputs:
     return {**inputs, "terms": {**inputs["terms"], **turned, **matrices}}
 
 
+def nearly_landed(tick: int) -> Inputs:
+    """A plan in flight, 50 ms before its touchdown."""
+    return {"reference": {"phase": int(Phase.FLIGHT), "time": 0.35, "touchdown_time": 0.4}}
+
+
 SCENES: Mapping[str, list[Scene]] = {
     "blocks.Step": [Scene({"at": 0.1})],
     "blocks.Timer": [Scene({"duration": 0.1}, lambda tick: {"u": {"value": True}})],
@@ -190,7 +195,14 @@ SCENES: Mapping[str, list[Scene]] = {
             for k in np.linspace(-0.3, 0.3, 7)
         ),
     ],
-    "blocks.LegInverseKinematics": [Scene({"speed_limit": 0.5}), Scene({"level": 0.9})],
+    "blocks.LegInverseKinematics": [
+        Scene({"speed_limit": 0.5}),
+        Scene({"level": 0.9}),
+        *(
+            Scene({"follow": "plan", "level_time": 0.1, "turn_gain": gain}, nearly_landed)
+            for gain in (0.5, 0.002)
+        ),
+    ],
     "blocks.WholeBodyController": [
         Scene({"force_max": 20.0, "force_min": 1.0}),
         Scene({"tasks": ["ContactPoints", {"task": "Posture", "gains": {"joints": ["*"]}}]}),
