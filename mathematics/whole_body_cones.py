@@ -37,26 +37,20 @@ from .kernel import kernel
 from .whole_body_qp import PYRAMID_ROWS, RigidBodyTerms, TaskRows
 from .whole_body_reduction import (
     Reduction,
-    eliminate,
     force_gradient,
     force_program,
-    free_motions,
-    friction_rows,
     recover_acceleration,
     recover_torque,
     reduction_memory,
-    torque_rows,
-    within_limits,
 )
 from .whole_body_solution import (
-    ILL_POSED,
-    NO_CONTACT,
-    NO_LIMITS,
-    SOLVED,
     Motors,
     Solution,
     Weights,
-    limit_motors,
+    exceeds_limits,
+    limit_rows,
+    reduce_program,
+    write_forces,
 )
 
 CUTS = 60
@@ -114,41 +108,19 @@ def solve_whole_body_cones(
     solution: Solution,
 ) -> None:
     """``solve_whole_body`` with the round cone |f_t| <= mu f_z in the place of the pyramid."""
-    active, reduction = memory.active, memory.reduction
-    count = 0
-    for point in range(stance.shape[0]):
-        if stance[point]:
-            active[count] = point
-            count += 1
+    reduction, active = memory.reduction, memory.active
+    count = reduce_program(
+        tasks, terms, stance, joint_velocity, weights, limits, motors, reduction, active, solution
+    )
     if count == 0:
-        solution.code[0] = NO_CONTACT
         return
-    if not eliminate(tasks, terms, active, count, float(weights.acceleration[0]), reduction):
-        solution.code[0] = ILL_POSED
-        return
-    if limits != NO_LIMITS:
-        limit_motors(joint_velocity, limits, motors)
     for point in range(count):
         memory.cones.used[point] = 0
     code = solve_cone_forces(terms, weights, motors, count, 0, memory, solution)
-    if (
-        code >= 0
-        and limits != NO_LIMITS
-        and not within_limits(solution.torque, motors.to_torque, motors.bounds)
-    ):
-        free_motions(reduction)
+    if code >= 0 and exceeds_limits(limits, motors, reduction, solution):
         joints = solution.torque.shape[0]
         code = solve_cone_forces(terms, weights, motors, count, joints, memory, solution)
-    if code < 0:
-        solution.code[0] = code
-        return
-    for point in range(stance.shape[0]):
-        for axis in range(3):
-            solution.force[point, axis] = 0.0
-    for j in range(count):
-        for axis in range(3):
-            solution.force[active[j], axis] = memory.unknowns[3 * j + axis]
-    solution.code[0] = SOLVED
+    write_forces(code, active, count, memory.unknowns, solution)
 
 
 @kernel
@@ -167,15 +139,7 @@ def solve_cone_forces(
     )  # fmt: skip
     friction, force_weight = float(weights.friction[0]), float(weights.force[0])
     n, x = 3 * count + extra, memory.unknowns
-    first = friction_rows(
-        count, extra, friction, float(weights.force_min[0]), float(weights.force_max[0]),
-        program.matrix, program.bound,
-    )  # fmt: skip
-    if extra > 0:
-        first = torque_rows(
-            reduction, terms, active, count, motors.to_torque, motors.bounds, first,
-            program.matrix, program.bound,
-        )  # fmt: skip
+    first = limit_rows(terms, weights, motors, count, extra, reduction, active, program)
     tolerance, code, solved = FIRST, TOO_LONG, False
     for _ in range(APPROACHES):
         force_program(reduction, 3 * count, extra, force_weight, program.hessian, program.gradient)

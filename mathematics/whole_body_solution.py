@@ -133,7 +133,37 @@ def solve_whole_body(
         joint_velocity: (n_joints,) [rad/s], for the motors' limits.
         limits: one of the kinds of torque limits.
     """
-    active, reduction = memory.active, memory.reduction
+    reduction, active = memory.reduction, memory.active
+    count = reduce_program(
+        tasks, terms, stance, joint_velocity, weights, limits, motors, reduction, active, solution
+    )
+    if count == 0:
+        return
+    code = solve_forces(terms, weights, motors, count, 0, memory, solution)
+    if code >= 0 and exceeds_limits(limits, motors, reduction, solution):
+        joints = solution.torque.shape[0]
+        code = solve_forces(terms, weights, motors, count, joints, memory, solution)
+    write_forces(code, active, count, memory.unknowns, solution)
+
+
+@kernel
+def reduce_program(
+    tasks: TaskRows,
+    terms: RigidBodyTerms,
+    stance: Flags,
+    joint_velocity: Array,
+    weights: Weights,
+    limits: int,
+    motors: Motors,
+    reduction: Reduction,
+    active: Indices,
+    solution: Solution,
+) -> int:
+    """Eliminate the accelerations and compute the motors' limits of this tick.
+
+    Writes the points in stance to ``active`` and returns their number; it returns 0, and writes the
+    reason to ``solution.code``, where there is nothing to solve.
+    """
     count = 0
     for point in range(stance.shape[0]):
         if stance[point]:
@@ -141,30 +171,38 @@ def solve_whole_body(
             count += 1
     if count == 0:
         solution.code[0] = NO_CONTACT
-        return
+        return 0
     if not eliminate(tasks, terms, active, count, float(weights.acceleration[0]), reduction):
         solution.code[0] = ILL_POSED
-        return
+        return 0
     if limits != NO_LIMITS:
         limit_motors(joint_velocity, limits, motors)
-    code = solve_forces(terms, weights, motors, count, 0, memory, solution)
-    if (
-        code >= 0
-        and limits != NO_LIMITS
-        and not within_limits(solution.torque, motors.to_torque, motors.bounds)
-    ):
-        free_motions(reduction)
-        joints = solution.torque.shape[0]
-        code = solve_forces(terms, weights, motors, count, joints, memory, solution)
+    return count
+
+
+@kernel
+def exceeds_limits(limits: int, motors: Motors, reduction: Reduction, solution: Solution) -> bool:
+    """Whether the solution's torques exceed their limits; if so, prepares the larger program."""
+    if limits == NO_LIMITS or within_limits(solution.torque, motors.to_torque, motors.bounds):
+        return False
+    free_motions(reduction)
+    return True
+
+
+@kernel
+def write_forces(
+    code: int, active: Indices, count: int, unknowns: Array, solution: Solution
+) -> None:
+    """Write the forces of the points in stance, zeros for the others, and SOLVED; or a failure's code."""
     if code < 0:
         solution.code[0] = code
         return
-    for point in range(stance.shape[0]):
+    for point in range(solution.force.shape[0]):
         for axis in range(3):
             solution.force[point, axis] = 0.0
     for j in range(count):
         for axis in range(3):
-            solution.force[active[j], axis] = memory.unknowns[3 * j + axis]
+            solution.force[active[j], axis] = unknowns[3 * j + axis]
     solution.code[0] = SOLVED
 
 
@@ -186,15 +224,9 @@ def solve_forces(
     active, program, reduction = memory.active, memory.program, memory.reduction
     size, force_weight = 3 * count, float(weights.force[0])
     force_program(reduction, size, extra, force_weight, program.hessian, program.gradient)
-    rows = friction_rows(
-        count, extra, float(weights.friction[0]), float(weights.force_min[0]),
-        float(weights.force_max[0]), program.matrix, program.bound,
-    )  # fmt: skip
-    if extra > 0:
-        rows = torque_rows(
-            reduction, terms, active, count, motors.to_torque, motors.bounds, rows,
-            program.matrix, program.bound,
-        )  # fmt: skip
+    rows = limit_rows(
+        terms, weights, motors, count, extra, memory.reduction, active, memory.program
+    )
     code = solve_program(size + extra, rows, program, memory.memory, memory.unknowns)
     if code < 0:
         return code
@@ -207,6 +239,30 @@ def solve_forces(
     recover_acceleration(reduction, size, extra, memory.unknowns, solution.acceleration)
     recover_torque(terms, active, count, solution.acceleration, memory.unknowns, solution.torque)
     return code
+
+
+@kernel
+def limit_rows(
+    terms: RigidBodyTerms,
+    weights: Weights,
+    motors: Motors,
+    count: int,
+    extra: int,
+    reduction: Reduction,
+    active: Indices,
+    program: Program,
+) -> int:
+    """Write the rows of friction, and with ``extra`` unknowns those of torque; returns their number."""
+    matrix, bound = program.matrix, program.bound
+    rows = friction_rows(
+        count, extra, float(weights.friction[0]), float(weights.force_min[0]),
+        float(weights.force_max[0]), matrix, bound,
+    )  # fmt: skip
+    if extra > 0:
+        rows = torque_rows(
+            reduction, terms, active, count, motors.to_torque, motors.bounds, rows, matrix, bound
+        )
+    return rows
 
 
 @kernel
