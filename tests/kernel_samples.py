@@ -49,6 +49,7 @@ STEPPING = (
     capture_law.Settings._make(
         np.array(value) for value in (
             [2], [0.015], [0.006], [0.08], [1.0], [0.13], [0.015], [0.1], [0.2], [0.6, 1.8], [0.35],
+            [0.0005],
         )
     ),
     capture_law.Feet(
@@ -133,6 +134,10 @@ UNUSED = {
     "aloft.blocks.jumping.capture_law.aim_step": (*STEPPING, STEP_SCRATCH, 1, 5.7, 0.05),
     "aloft.blocks.jumping.capture_law.swing_foot": (
         STEP_PHASE, *STEPPING, STEP_PHASE, STEP_SCRATCH, 5.7,
+    ),
+    "aloft.blocks.jumping.capture_law.leave_hovering": (
+        SOLES + np.tile([[0.0], [0.002]], (2, 3)), np.array([0, 0, 1, 1]), 0.0005,
+        np.array([True, True, False, True]), np.zeros(4, bool),
     ),
     "aloft.mathematics.capture_step.nearest_in_foot": (
         SOLES, np.array([0, 0, 1, 1]), 1, np.array([0.1, 0.02]), np.zeros(2),
