@@ -66,7 +66,7 @@ def recorded_states(
         if block.phase.stance.any() and bound.clock.tick % every == 0:
             found.append(present_state(block))
 
-    block.step = watched  # type: ignore[method-assign]
+    block.step = watched  # type: ignore[method-assign]  # a recorder in its place
     ticks = None if duration is None else round(duration * graph.base_rate)
     Executor(bound, log=False, fuse=False).run(ticks).raise_if_failed()
     return block, found

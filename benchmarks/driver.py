@@ -164,7 +164,7 @@ def driver(rounds: int = 60, repetitions: int = 50) -> list[Row]:
         made.bus.reply_time = 5.0  # a busy machine is no fault of the drives
         devices = [motor.id for motor in made.hardware.motors.values()]
         alone = BulkExchange(made.bus, devices, READ, WRITE)
-        bare = _bare(bus.fileno(), board.fileno(), talk)  # type: ignore[attr-defined]
+        bare = _bare(bus.fileno(), board.fileno(), talk)  # type: ignore[attr-defined]  # both are serial ports
         spent = {"cycle": [0.0, 0.0], "bare": [0.0, 0.0]}
 
         def cycles(count: int) -> None:

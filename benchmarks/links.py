@@ -102,7 +102,7 @@ class _End:
         return MessageReader(link, self.memory.bus.layout, self.memory.bus.buffer.data)
 
     def inbox(self, link: Link) -> Inbox:
-        inbox = Inbox(link, self.reader(link), _Known(), PATIENCE)  # type: ignore[arg-type]
+        inbox = Inbox(link, self.reader(link), _Known(), PATIENCE)  # type: ignore[arg-type]  # stands in for the peers
         self.transport.subscribe(data_key(link.sender, link.receiver, link.source), inbox.hear)
         return inbox
 
@@ -286,7 +286,7 @@ def answer(ports: tuple[int, int]) -> None:
         end.transport.subscribe("bare/there", questions.put)
         for link in there:
             counter = LatestInbox(
-                link, end.reader(link), _Known(),  # type: ignore[arg-type]
+                link, end.reader(link), _Known(),  # type: ignore[arg-type]  # stands in for the peers
                 LinkPolicy(), LinkHealth.allocate(), lambda reason: None,
             )  # fmt: skip
             end.transport.subscribe(data_key("a", "b", link.source), counter.hear)

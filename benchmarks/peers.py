@@ -28,7 +28,7 @@ def drake_chain() -> Chain:
     from pydrake.systems.framework import DiagramBuilder, LeafSystem
     from pydrake.systems.primitives import ConstantVectorSource
 
-    class Filter(LeafSystem):  # type: ignore[misc, unused-ignore]
+    class Filter(LeafSystem):  # type: ignore[misc, unused-ignore]  # Drake may be missing
         def __init__(self) -> None:
             super().__init__()
             self.u = self.DeclareVectorInputPort("u", WIDTH)
@@ -76,7 +76,7 @@ def bdsim_chain() -> Chain:
     """A block diagram of 20 SampledBlocks; every call is a whole ``run``, the only way it has."""
     import bdsim
 
-    class Filter(bdsim.block.SampledBlock):  # type: ignore[misc, name-defined, unused-ignore]
+    class Filter(bdsim.block.SampledBlock):  # type: ignore[misc, name-defined, unused-ignore]  # bdsim may be missing
         nin = nout = 1
 
         def __init__(self, clock: Any, **options: Any) -> None:

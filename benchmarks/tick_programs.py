@@ -168,7 +168,7 @@ class OsqpController(WholeBodyController):
                 return usual.solve(active)
             return solve(active)
 
-        program.solve = solve_or_learn  # type: ignore[method-assign]
+        program.solve = solve_or_learn  # type: ignore[method-assign]  # a recorder in its place
         self._other = program
 
 

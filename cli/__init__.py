@@ -1,5 +1,33 @@
 """The command line, ``aloft VERB``. Every verb has a file; heavy imports are inside the verbs only."""
 
-from .app import main, make_app
+from __future__ import annotations
+
+import gc
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import typer
 
 __all__ = ["main", "make_app"]
+
+COLLECTED_AFTER = (100_000, 5, 5)
+"""How many objects are made before Python looks for garbage among them, and among older ones. By its
+own limits, which begin with 700, it would look a hundred times through classes and functions that a
+start makes and that all stay."""
+
+
+def main() -> None:
+    """Run the command line and leave with one of ``ExitCode``."""
+    gc.set_threshold(*COLLECTED_AFTER)
+    from .app import main as run_command_line
+
+    run_command_line()
+
+
+def make_app(verbs: Iterable[str] | None = None) -> typer.Typer:
+    """The command line with those verbs, or with all; the files of others are not imported."""
+    from .app import VERBS
+    from .app import make_app as put_together
+
+    return put_together(VERBS if verbs is None else verbs)

@@ -9,6 +9,7 @@ import typer
 
 from ..runtime.language.errors import AloftError, ExitCode
 from .completion import benchmark_names
+from .options import JsonBesideTables
 from .output import console, errors_reported, number, print_json, say, table
 
 if TYPE_CHECKING:
@@ -47,9 +48,7 @@ def bench(
     since: Annotated[
         str, typer.Option(help="A commit whose controller 'tick' measures as well: '65ca00c'.")
     ] = "",
-    as_json: Annotated[
-        bool, typer.Option("--json", help="Tables go to standard error, one JSON object to output.")
-    ] = False,
+    as_json: JsonBesideTables = False,
 ) -> None:
     """Measure the runtime beside hand-written loops and peers; exit with 1 if a goal is missed."""
     from ..benchmarks import BENCHMARKS, COUNTED, LINKED, PEERED, SEEDED, TIMED, run_benchmarks

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from .completion import block_names
+from .options import AsJson
 from .output import console, errors_reported, print_json, table
 
 if TYPE_CHECKING:
@@ -20,7 +21,7 @@ def blocks(
     name: Annotated[
         str, typer.Argument(help="One block, e.g. blocks.JointPD.", autocompletion=block_names)
     ] = "",
-    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
+    as_json: AsJson = False,
     markdown: Annotated[
         bool, typer.Option(help="Print the reference of ours as Markdown.")
     ] = False,

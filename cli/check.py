@@ -7,17 +7,14 @@ from typing import Annotated
 
 import typer
 
-from .completion import parameter_names
-from .output import SET_HELP, errors_reported, print_json
+from .options import AsJson, CompletedOverrides
+from .output import errors_reported, print_json
 
 
 def check(
     graph: Annotated[Path | None, typer.Argument(help="The graph file.")] = None,
-    overrides: Annotated[
-        list[str] | None,
-        typer.Option("--set", help=SET_HELP, autocompletion=parameter_names),
-    ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
+    overrides: CompletedOverrides = None,
+    as_json: AsJson = False,
     schema: Annotated[
         bool, typer.Option("--schema", help="Print the JSON Schema of graph files, for editors.")
     ] = False,

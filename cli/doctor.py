@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Annotated
-
-import typer
-
+from .options import AsJson
 from .output import console, print_json, say, table
 
 
 def doctor(
-    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
+    as_json: AsJson = False,
 ) -> None:
     """Say whether all libraries load, what this machine allows a control loop in real time, and what
     to change; nothing is changed."""

@@ -7,7 +7,8 @@ from typing import Annotated
 
 import typer
 
-from .output import SET_HELP, console, errors_reported, print_json, say, table
+from .options import AsJson, Overrides
+from .output import console, errors_reported, print_json, say, table
 
 export = typer.Typer(
     name="export",
@@ -27,8 +28,8 @@ def fmu(
         list[str] | None,
         typer.Option("--output", help="An output, as block.port, in place of all. Repeatable."),
     ] = None,
-    set_: Annotated[list[str] | None, typer.Option("--set", help=SET_HELP)] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
+    set_: Overrides = None,
+    as_json: AsJson = False,
 ) -> None:
     """A Functional Mock-up Unit (FMI 3.0, co-simulation) of a graph or of a sub-graph.
 

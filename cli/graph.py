@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from ..runtime.language.errors import AloftError
-from .completion import parameter_names
-from .output import SET_HELP, console, errors_reported, print_json, say, table
+from .options import CompletedOverrides
+from .output import console, errors_reported, print_json, say, table
 from .top import As, Keys, Local
 
 if TYPE_CHECKING:
@@ -25,10 +25,7 @@ def graph(
         Path | None,
         typer.Argument(help="The graph file, or a recording: its graph. With --live not needed."),
     ] = None,
-    overrides: Annotated[
-        list[str] | None,
-        typer.Option("--set", help=SET_HELP, autocompletion=parameter_names),
-    ] = None,
+    overrides: CompletedOverrides = None,
     as_table: Annotated[bool, typer.Option("--table", help="As a table (the default).")] = False,
     mermaid: Annotated[bool, typer.Option("--mermaid", help="As a Mermaid diagram.")] = False,
     flat: Annotated[

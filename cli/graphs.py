@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Annotated
-
-import typer
-
+from .options import AsJson
 from .output import console, print_json, say, table
 
 
 def graphs(
-    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
+    as_json: AsJson = False,
 ) -> None:
     """List the shipped graphs by the addresses that every verb takes: aloft run aloft:jump."""
     from ..runtime.loading.shipped import shipped_graphs, summary

@@ -9,7 +9,8 @@ import typer
 
 from ..runtime.language.errors import AloftError, ExitCode, UnitError
 from .jump_graphs import graph_of
-from .output import SET_HELP, console, errors_reported, print_json, say
+from .options import JsonBesideTables, NoRecord, Overrides, Quiet
+from .output import console, errors_reported, print_json, say
 from .rehearse import REHEARSE_HELP, rehearsal
 from .run import run_many, run_once
 
@@ -59,20 +60,18 @@ def jump(
     seeds: Annotated[
         str, typer.Option(help="Run once a seed instead: 0:20 or 1,5,7; nothing is recorded.")
     ] = "",
-    overrides: Annotated[list[str] | None, typer.Option("--set", help=SET_HELP)] = None,
+    overrides: Overrides = None,
     record: Annotated[
         Path | None, typer.Option(help="Where the recording goes; by default recordings/jump.rrd.")
     ] = None,
-    no_record: Annotated[bool, typer.Option("--no-record", help="Write no recording.")] = False,
+    no_record: NoRecord = False,
     nearest: Annotated[
         bool,
         typer.Option(help="Where there is no plan, search the nearest jump that has; about 6 s."),
     ] = True,
     rehearse: Annotated[bool, typer.Option("--rehearse", help=REHEARSE_HELP)] = False,
-    as_json: Annotated[
-        bool, typer.Option("--json", help="Tables go to standard error, one JSON object to output.")
-    ] = False,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print the verdict only.")] = False,
+    as_json: JsonBesideTables = False,
+    quiet: Quiet = False,
 ) -> None:
     """Plan a jump and run it: aloft jump --forward 20cm --up 5cm --turn 30deg."""
     from ..studies.batch.seeds import parse_seeds

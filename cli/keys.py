@@ -7,7 +7,8 @@ from typing import Annotated
 
 import typer
 
-from .output import SET_HELP, console, errors_reported, print_json, say, table
+from .options import AsJson, Overrides
+from .output import console, errors_reported, print_json, say, table
 
 
 def keys(
@@ -24,8 +25,8 @@ def keys(
         bool,
         typer.Option("--anew", help="Make another authority: earlier certificates are worthless."),
     ] = False,
-    overrides: Annotated[list[str] | None, typer.Option("--set", help=SET_HELP)] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
+    overrides: Overrides = None,
+    as_json: AsJson = False,
 ) -> None:
     """Make the certificates and sessions of all machines of a graph: mutual TLS, least access."""
     from ..runtime.links.access import keys_from

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from ..runtime.language.errors import AloftError, ExitCode
+from .options import AsJson
 from .output import console, errors_reported, number, print_json, print_warning, say, table
 
 if TYPE_CHECKING:
@@ -22,7 +23,6 @@ log = typer.Typer(
 )
 
 File = Annotated[Path, typer.Argument(help="The recording, a file .rrd.")]
-AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
 
 
 @log.command("info")

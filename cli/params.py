@@ -9,6 +9,7 @@ from typing import Annotated, Any
 import typer
 
 from ..runtime.language.errors import AloftError
+from .options import AsJson
 from .output import console, errors_reported, print_json, table
 
 params = typer.Typer(
@@ -21,7 +22,6 @@ params = typer.Typer(
 Run = Annotated[
     str, typer.Option("--run", help="The name of the run; needed only if there are several.")
 ]
-AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
 
 
 @params.command("list")

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..runtime.language.errors import ExitCode
+from .options import JsonBesideTables
 from .output import console, errors_reported, print_error, print_json, say
 from .plan_grid import plan_grid
 from .plan_output import (
@@ -67,9 +68,7 @@ def plan(
         ),
     ] = True,
     rehearse: Annotated[bool, typer.Option("--rehearse", help=REHEARSE_HELP)] = False,
-    as_json: Annotated[
-        bool, typer.Option("--json", help="Tables go to standard error, one JSON object to output.")
-    ] = False,
+    as_json: JsonBesideTables = False,
 ) -> None:
     """Plan jumps, check each with exact dynamics, and keep the valid ones in the plan library."""
     if bool(tasks) + (grid is not None) + listed != 1:
@@ -204,8 +203,9 @@ def search_nearest(
             status.update(f"searching the nearest task that can be planned: {text}")
 
         found = nearest_feasible(
-            task, library.robot, family=family, seconds=seconds_left(spent), progress=progress
-        )
+            task, library.robot, family=family, seconds=seconds_left(spent), progress=progress,
+            library=library,
+        )  # fmt: skip
     if found is None:
         say(screen, "a short search found no task near it that can be planned")
         return {"nearest": None}

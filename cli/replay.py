@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from ..runtime.language.errors import AloftError, ExitCode
+from .options import JsonBesideTables, Quiet
 from .output import (
     SET_HELP,
     console,
@@ -64,10 +65,8 @@ def replay(
         Path | None,
         typer.Option(help="Where the graph file's folder is now, if it is not where it was."),
     ] = None,
-    as_json: Annotated[
-        bool, typer.Option("--json", help="Tables go to standard error, one JSON object to output.")
-    ] = False,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print the verdict only.")] = False,
+    as_json: JsonBesideTables = False,
+    quiet: Quiet = False,
 ) -> None:
     """Execute a recorded run again and compare every byte of every tick with the recording."""
     from ..logs.replay.opened_run import OpenedRun

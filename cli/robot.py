@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..runtime.language.errors import AloftError, ExitCode
+from .options import AsJson
 from .output import console, errors_reported, print_error, print_json, say, table
 from .robot_bench import add_bench_verbs
 from .robot_identify import identify
@@ -31,7 +32,6 @@ robot.command("identify")(identify)
 
 Name = Annotated[str, typer.Argument(help="A robot of ours, or a YAML, URDF or MJCF file.")]
 ModelFile = Annotated[Path, typer.Argument(help="The URDF or MJCF file.")]
-AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
 
 
 @robot.command("show")

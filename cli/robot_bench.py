@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..runtime.language.errors import AloftError
+from .options import AsJson
 from .output import console, errors_reported, print_json, say, table
 
 if TYPE_CHECKING:
@@ -19,7 +20,6 @@ if TYPE_CHECKING:
     from ..robots.robot_description import RobotDescription
 
 HardwareFile = Annotated[Path, typer.Argument(help="The file of the hardware.")]
-AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
 
 _STATES = {0: "off", 1: "on", 2: "off after an error", 3: "damping"}
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..runtime.language.errors import AloftError
+from .options import AsJson
 from .output import console, errors_reported, print_json, say, table
 
 if TYPE_CHECKING:
@@ -33,7 +34,7 @@ def identify(
     out: Annotated[
         Path | None, typer.Option("--out", "-o", help="Write the values for a graph here.")
     ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
+    as_json: AsJson = False,
 ) -> None:
     """Fit mass, torso's CoM, joint friction and delay to a run, each with its standard deviation."""
     with errors_reported(as_json):

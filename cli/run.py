@@ -12,9 +12,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Protocol
 import typer
 
 from ..runtime.language.errors import AloftError, ExitCode
-from .completion import parameter_names
+from .options import CompletedOverrides, JsonBesideTables, NoRecord, Quiet
 from .output import (
-    SET_HELP,
     console,
     errors_reported,
     number,
@@ -51,10 +50,7 @@ class Live(StrEnum):
 
 def run(
     graph: Annotated[Path, typer.Argument(help="The graph file.")],
-    overrides: Annotated[
-        list[str] | None,
-        typer.Option("--set", help=SET_HELP, autocompletion=parameter_names),
-    ] = None,
+    overrides: CompletedOverrides = None,
     seeds: Annotated[
         str, typer.Option(help="Run once a seed: 0:20 or 1,5,7. Sets every parameter 'seed'.")
     ] = "",
@@ -75,7 +71,7 @@ def run(
         str,
         typer.Option(help="Go on in a new recording after this time of the graph, e.g. '10 min'."),
     ] = "",
-    no_record: Annotated[bool, typer.Option("--no-record", help="Write no recording.")] = False,
+    no_record: NoRecord = False,
     params: Annotated[
         str,
         typer.Option(
@@ -83,10 +79,8 @@ def run(
             "by its graph's name anyway. 'none': not at all."
         ),
     ] = "",
-    as_json: Annotated[
-        bool, typer.Option("--json", help="Tables go to standard error, one JSON object to output.")
-    ] = False,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print the verdict only.")] = False,
+    as_json: JsonBesideTables = False,
+    quiet: Quiet = False,
     traceback: Annotated[
         bool, typer.Option("--traceback", help="Print the whole traceback of a block that fails.")
     ] = False,

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..runtime.language.errors import AloftError, ExitCode
+from .options import Cluster, JsonBesideTables, Workers
 from .output import console, errors_reported, print_json, print_warning, say
 from .study_output import print_rows, print_tuned, study_json, tuned_json
 from .study_runs import check_cells, make_all, report_stop
@@ -41,8 +42,8 @@ def study(
     out: Annotated[
         Path | None, typer.Option(help="Folder for the results; by default results/NAME.")
     ] = None,
-    workers: Annotated[int, typer.Option(help="Processes; 0: one a core.", min=0)] = 0,
-    cluster: Annotated[str, typer.Option(help="Run on a Dask cluster: tcp://127.0.0.1:8786.")] = "",
+    workers: Workers = 0,
+    cluster: Cluster = "",
     number: Annotated[
         int,
         typer.Option("--open", help="Record run N of the worst runs (worst.md), and show it."),
@@ -50,9 +51,7 @@ def study(
     no_show: Annotated[
         bool, typer.Option("--no-show", help="With --open: only write the recording.")
     ] = False,
-    as_json: Annotated[
-        bool, typer.Option("--json", help="Tables go to standard error, one JSON object to output.")
-    ] = False,
+    as_json: JsonBesideTables = False,
 ) -> None:
     """Run a study: every graph, arm and grid point with every seed, on all cores.
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..runtime.language.errors import AloftError, ExitCode
+from .options import AsJson
 from .output import console, errors_reported, print_json, print_warning, say, table
 
 if TYPE_CHECKING:
@@ -48,7 +49,7 @@ def test(
         Path | None,
         typer.Option(help="With --from: where the graph file's folder is now, if it has moved."),
     ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
+    as_json: AsJson = False,
 ) -> None:
     """Test blocks: that they keep what every block promises, and your own tests with pytest.
 

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..runtime.language.errors import AloftError, ExitCode
-from .output import SET_HELP, console, errors_reported, print_json, table
+from .options import Overrides
+from .output import console, errors_reported, print_json, table
 
 if TYPE_CHECKING:
     from rich.console import Group
@@ -38,7 +39,7 @@ def top(
     keys: Keys = None,
     name: As = "viewer",
     local: Local = 0,
-    overrides: Annotated[list[str] | None, typer.Option("--set", help=SET_HELP)] = None,
+    overrides: Overrides = None,
     as_json: Annotated[
         bool, typer.Option("--json", help="With --once: print one JSON object.")
     ] = False,

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from ..runtime.language.errors import AloftError, ExitCode
+from .options import Cluster, JsonBesideTables, Workers
 from .output import console, errors_reported, print_json, say
 from .study_output import print_tuned, tuned_json
 from .study_runs import check_cells, make_all, report_stop
@@ -23,11 +24,9 @@ def tune(
     out: Annotated[
         Path | None, typer.Option(help="Folder for the runs; by default results/NAME.")
     ] = None,
-    workers: Annotated[int, typer.Option(help="Processes; 0: one a core.", min=0)] = 0,
-    cluster: Annotated[str, typer.Option(help="Run on a Dask cluster: tcp://127.0.0.1:8786.")] = "",
-    as_json: Annotated[
-        bool, typer.Option("--json", help="Tables go to standard error, one JSON object to output.")
-    ] = False,
+    workers: Workers = 0,
+    cluster: Cluster = "",
+    as_json: JsonBesideTables = False,
 ) -> None:
     """Search the best parameters of every arm of a study with Optuna (extra 'tune').
 

@@ -10,6 +10,7 @@ from typing import Annotated
 import typer
 
 from ..runtime.language.errors import AloftError
+from .options import AsJson
 from .output import console, errors_reported, print_json, say
 
 
@@ -33,7 +34,7 @@ def twin(
         typer.Option(help="What goes wrong: 'dead 0.5 left_knee_motor', 'lost 1 * share=0.1'."),
     ] = None,
     seconds: Annotated[float, typer.Option(help="End after so long; 0: with Ctrl-C.")] = 0.0,
-    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
+    as_json: AsJson = False,
 ) -> None:
     """Serve the drives and the sensor board of a robot on pseudo-terminals, with physics behind.
 

@@ -10,7 +10,8 @@ from typing import Annotated
 import typer
 
 from ..runtime.language.errors import AloftError
-from .output import SET_HELP, errors_reported
+from .options import Overrides
+from .output import errors_reported
 from .top import As, Keys, Local, observer_of
 
 
@@ -21,7 +22,7 @@ def watch(
     keys: Keys = None,
     name: As = "viewer",
     local: Local = 0,
-    overrides: Annotated[list[str] | None, typer.Option("--set", help=SET_HELP)] = None,
+    overrides: Overrides = None,
 ) -> None:
     """Show a machine's signals live, 50 times a second, until Ctrl-C. Nothing is sent to it."""
     from ..logs.recording.watched_part import WatchedPart

@@ -22,7 +22,7 @@ ROOT = Path(__file__).parent.parent
 def tasks_table(summary: dict[str, object]) -> str:
     """One row a task: how many of its runs succeeded, and between which rates that lies."""
     lines = ["| task | succeeded | 95 % interval | goal |", "|---|---|---|---|"]
-    for row in summary["rows"]:  # type: ignore[attr-defined]
+    for row in summary["rows"]:  # type: ignore[attr-defined]  # JSON
         low, high = (f"{100.0 * row[key]:.0f} %" for key in ("ci_low", "ci_high"))
         goal = f"{100.0 * row['goal']:.0f} %, {'met' if row['met'] else 'missed'}"
         lines.append(

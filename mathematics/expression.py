@@ -122,7 +122,7 @@ def _build(
     arguments: tuple[Array, ...]
     match node:
         case ast.Constant(value=value):
-            return np.full(size, float(value))  # type: ignore[arg-type]
+            return np.full(size, float(value))  # type: ignore[arg-type]  # a number here
         case ast.Name(id=name):
             return np.full(size, CONSTANTS[name]) if name not in variables else variables[name]
         case ast.IfExp(test=test, body=body, orelse=other):

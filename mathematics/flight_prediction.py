@@ -22,7 +22,7 @@ import numpy as np
 
 from .arrays import Array
 from .kernel import kernel
-from .least_squares import solve_positive
+from .least_squares import solve_positive, solve_rows
 from .linear import multiply_matrices
 
 _HELD = 1e6
@@ -233,33 +233,3 @@ def invert(matrix: Array, out: Array) -> None:
     for i in range(3):
         for j in range(3):
             out[i, j] *= scale
-
-
-@kernel
-def solve_rows(matrix: Array, rows: Array) -> None:
-    """Solve a symmetric positive definite system (n, n) for every one of the ``rows`` (m, n).
-
-    The method is an LDL' factorisation, which overwrites ``matrix``; each row becomes its solution.
-    """
-    n = matrix.shape[0]
-    for j in range(n):
-        pivot = float(matrix[j, j])
-        inverse_pivot = 1.0 / pivot if pivot > 1e-300 else 0.0
-        for i in range(j + 1, n):
-            factor = float(matrix[i, j]) * inverse_pivot
-            if factor == 0.0:
-                continue
-            for k in range(j + 1, i + 1):
-                matrix[i, k] -= factor * float(matrix[k, j])
-            for row in range(rows.shape[0]):
-                rows[row, i] -= factor * float(rows[row, j])
-        for row in range(rows.shape[0]):
-            rows[row, j] *= inverse_pivot
-        for i in range(j + 1, n):
-            matrix[j, i] = float(matrix[i, j]) * inverse_pivot
-    for j in range(n - 2, -1, -1):
-        for row in range(rows.shape[0]):
-            value = float(rows[row, j])
-            for i in range(j + 1, n):
-                value -= float(matrix[j, i]) * float(rows[row, i])
-            rows[row, j] = value

@@ -32,50 +32,49 @@ def solve_positive(matrix: Array, vector: Array) -> None:
     The method is an LDL' factorisation, which overwrites ``matrix``. A pivot that is not positive
     because of rounding is skipped.
     """
-    n = vector.shape[0]
-    for j in range(n):
-        pivot = float(matrix[j, j])
-        inverse_pivot = 1.0 / pivot if pivot > 1e-300 else 0.0
-        for i in range(j + 1, n):
-            factor = float(matrix[i, j]) * inverse_pivot
-            for k in range(j + 1, i + 1):
-                matrix[i, k] -= factor * float(matrix[k, j])
-            vector[i] -= factor * float(vector[j])
-        vector[j] *= inverse_pivot
-        for i in range(j + 1, n):
-            matrix[j, i] = float(matrix[i, j]) * inverse_pivot
-    for j in range(n - 2, -1, -1):
-        value = float(vector[j])
-        for i in range(j + 1, n):
-            value -= float(matrix[j, i]) * float(vector[i])
-        vector[j] = value
+    factorise_positive(matrix)
+    substitute(matrix, vector)
 
 
 @kernel
-def solve_positive_columns(matrix: Array, columns: Array) -> None:
-    """Solve a symmetric positive definite system for several right-hand sides, in place.
+def solve_rows(matrix: Array, rows: Array) -> None:
+    """As ``solve_positive`` for several right-hand sides: each of the ``rows`` (m, n) is one."""
+    factorise_positive(matrix)
+    for row in range(rows.shape[0]):
+        substitute(matrix, rows[row])
 
-    Args:
-        matrix: (n, n), of which the lower half is read; it is overwritten.
-        columns: the right-hand sides (n, m), which become the solutions. Where a pivot is not
-            positive because of rounding the solution is zero.
+
+@kernel
+def factorise_positive(matrix: Array) -> None:
+    """The factors of a symmetric matrix LDL' in place: D on the diagonal, L' above it.
+
+    Only the lower half is read; what is left there is of no use.
     """
-    n, m = columns.shape
+    n = matrix.shape[0]
     for j in range(n):
         pivot = float(matrix[j, j])
         inverse_pivot = 1.0 / pivot if pivot > 1e-300 else 0.0
         for i in range(j + 1, n):
             factor = float(matrix[i, j]) * inverse_pivot
-            for k in range(j + 1, i + 1):
-                matrix[i, k] -= factor * float(matrix[k, j])
-            for k in range(m):
-                columns[i, k] -= factor * float(columns[j, k])
-        for k in range(m):
-            columns[j, k] *= inverse_pivot
+            if factor != 0.0:
+                for k in range(j + 1, i + 1):
+                    matrix[i, k] -= factor * float(matrix[k, j])
         for i in range(j + 1, n):
             matrix[j, i] = float(matrix[i, j]) * inverse_pivot
-    for j in range(n - 2, -1, -1):
+
+
+@kernel
+def substitute(factors: Array, vector: Array) -> None:
+    """Solve LDL'x = b in place, with the factors of ``factorise_positive``."""
+    n = vector.shape[0]
+    for j in range(n):
+        value = float(vector[j])
         for i in range(j + 1, n):
-            factor = float(matrix[j, i])
-            for k in range(m):
-                columns[j, k] -= factor * float(columns[i, k])
+            vector[i] -= float(factors[j, i]) * value
+        pivot = float(factors[j, j])
+        vector[j] = value * (1.0 / pivot if pivot > 1e-300 else 0.0)
+    for j in range(n - 2, -1, -1):
+        value = float(vector[j])
+        for i in range(j + 1, n):
+            value -= float(factors[j, i]) * float(vector[i])
+        vector[j] = value

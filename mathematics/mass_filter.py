@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from .arrays import Array, Indices
 from .kernel import kernel
-from .least_squares import solve_positive_columns
+from .least_squares import solve_rows
 from .linear import multiply_vector
 
 DAMPING = 1e-8
@@ -30,7 +30,7 @@ DAMPING = 1e-8
 
 
 class LegScratch(NamedTuple):
-    """Scratch for ``base_force_map``: ``normal`` (n, n) and ``right`` (n, 6) for legs of up to n
+    """Scratch for ``base_force_map``: ``normal`` (n, n) and ``right`` (6, n) for legs of up to n
     joints."""
 
     normal: Array
@@ -74,17 +74,17 @@ def base_force_map(
                     for k in range(i + 1):
                         normal[i, k] += lever * float(row[6 + int(chains[foot, k])])
                     for k in range(6):
-                        right[i, k] += lever * float(row[k])
+                        right[k, i] += lever * float(row[k])
         if not loaded:
             continue
         for i in range(longest):
             normal[i, i] += DAMPING
-        solve_positive_columns(normal, right)
+        solve_rows(normal, right)
         for i in range(longest):
             joint = int(chains[foot, i])
             if joint >= 0:
                 for k in range(6):
-                    out[k, joint] = float(right[i, k])
+                    out[k, joint] = float(right[k, i])
 
 
 @kernel

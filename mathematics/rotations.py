@@ -81,28 +81,20 @@ def multiply(a: Array, b: Array, out: Array) -> None:
 @kernel
 def rotate(quaternion: Array, vector: Array, out: Array) -> None:
     """Rotate ``vector`` by a unit quaternion: from body to world."""
-    x, y, z, w = (
-        float(quaternion[0]),
-        float(quaternion[1]),
-        float(quaternion[2]),
-        float(quaternion[3]),
-    )
-    a, b, c = float(vector[0]), float(vector[1]), float(vector[2])
-    tx, ty, tz = 2.0 * (y * c - z * b), 2.0 * (z * a - x * c), 2.0 * (x * b - y * a)
-    out[0] = a + w * tx + y * tz - z * ty
-    out[1] = b + w * ty + z * tx - x * tz
-    out[2] = c + w * tz + x * ty - y * tx
+    x, y, z = float(quaternion[0]), float(quaternion[1]), float(quaternion[2])
+    turn(x, y, z, float(quaternion[3]), vector, out)
 
 
 @kernel
 def rotate_back(quaternion: Array, vector: Array, out: Array) -> None:
     """Rotate ``vector`` by the inverse of a unit quaternion: from world to body."""
-    x, y, z, w = (
-        -float(quaternion[0]),
-        -float(quaternion[1]),
-        -float(quaternion[2]),
-        float(quaternion[3]),
-    )
+    x, y, z = float(quaternion[0]), float(quaternion[1]), float(quaternion[2])
+    turn(-x, -y, -z, float(quaternion[3]), vector, out)
+
+
+@kernel
+def turn(x: float, y: float, z: float, w: float, vector: Array, out: Array) -> None:
+    """Rotate ``vector`` by the unit quaternion (x, y, z, w)."""
     a, b, c = float(vector[0]), float(vector[1]), float(vector[2])
     tx, ty, tz = 2.0 * (y * c - z * b), 2.0 * (z * a - x * c), 2.0 * (x * b - y * a)
     out[0] = a + w * tx + y * tz - z * ty

@@ -38,15 +38,14 @@ class PlacedYaml:
             fault = RobotFault((), f"the file cannot be read: {reason}")
             raise RobotError(str(path), [fault]) from error
         try:
-            root = yaml.compose(text, Loader=_Loader)
-            data = yaml.load(text, Loader=_Loader)
+            root, doubled, data = _read_once(text)
         except yaml.YAMLError as error:
             mark = getattr(error, "problem_mark", None)
             what = getattr(error, "problem", None) or " ".join(str(error).split())
             line, column = (mark.line + 1, mark.column + 1) if mark else (0, 0)
             fault = RobotFault((), f"this is no YAML: {what}", line=line, column=column)
             raise RobotError(str(path), [fault]) from error
-        return cls(data, root, tuple(_doubled_keys(root, ())))
+        return cls(data, root, doubled)
 
     def place(self, path: tuple[str | int, ...]) -> tuple[int, int]:
         """Line and column of the value at a path, or of the nearest thing that holds it; (0, 0)
@@ -83,6 +82,20 @@ class PlacedYaml:
         if not line and self.root is not None:
             line, column = self.root.start_mark.line + 1, self.root.start_mark.column + 1
         return replace(fault, line=line, column=column)
+
+
+def _read_once(text: str) -> tuple[yaml.Node | None, tuple[RobotFault, ...], Any]:
+    """The tree of a text, the keys that stand twice in it, and its data, which is made from that tree
+    rather than by reading the text again."""
+    loader = _Loader(text)
+    try:
+        root = loader.get_single_node()
+        doubled = tuple(
+            _doubled_keys(root, ())
+        )  # before merge keys are resolved in the tree itself
+        return root, doubled, None if root is None else loader.construct_document(root)
+    finally:
+        loader.dispose()
 
 
 def _doubled_keys(node: yaml.Node | None, path: tuple[str | int, ...]) -> list[RobotFault]:

@@ -173,7 +173,8 @@ class _Search:
     def failure(self, angles: Array) -> tuple[float, float, float]:
         """The largest residual of the conditions that must hold."""
         level, flatness, balance, _ = self.parts(angles[None])
-        return tuple(float(np.abs(part).max()) for part in (level, flatness, balance))  # type: ignore[return-value]
+        largest = [float(np.abs(part).max()) for part in (level, flatness, balance)]
+        return largest[0], largest[1], largest[2]
 
     def run(self) -> Array:
         """The pose near the start that minimises the sum of the squared residuals."""

@@ -57,7 +57,7 @@ if ! timeout "$limit" $pip -r "$folder/wanted.txt" || ! $pip --no-deps --no-buil
 fi
 echo "all tests run on Python $ours of .venv; these run on $("$folder/bin/python" --version), the $which packages:"
 OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 timeout "$limit" "$folder/bin/python" -m pytest \
-    --numprocesses auto -m "not long" -p no:cacheprovider \
+    --numprocesses auto --dist worksteal -m "not long" -p no:cacheprovider \
     tests/runtime/language tests/runtime/running tests/runtime/loading/test_examine.py \
     tests/blocks/general/test_pid.py tests/blocks/general/test_transfer_function.py \
     tests/studies/batch/test_jobs.py tests/planner/solving/test_bounded.py \

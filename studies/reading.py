@@ -78,8 +78,10 @@ def _read(tree: MapNode, path: Path, problems: Problems) -> Study:
 
     def section(key: str) -> MapNode:
         entry = keys.get(key)
-        if entry is None or isinstance(entry.value, MapNode):
-            return entry.value if entry else MapNode((), tree.where)  # type: ignore[return-value]
+        if entry is None:
+            return MapNode((), tree.where)
+        if isinstance(entry.value, MapNode):
+            return entry.value
         if not (isinstance(entry.value, ScalarNode) and entry.value.value is None):
             wrong_kind(entry.value, repr(key), "a mapping", problems)
         return MapNode((), entry.value.where)

@@ -1,5 +1,6 @@
 """Settings for all tests."""
 
+import gc
 import importlib.util
 import shutil
 import subprocess
@@ -11,12 +12,18 @@ from types import ModuleType
 import pytest
 from hypothesis import settings
 
+from aloft.cli import COLLECTED_AFTER
+
 ROOT = Path(__file__).parent.parent
 UNTRACKED = ("recordings", "build", "dist", "aloft.egg-info", "__pycache__", ".*")
 
 # The same examples every time: what passes here passes there. No deadline: machines are shared.
 settings.register_profile("repeatable", derandomize=True, deadline=None, database=None)
 settings.load_profile("repeatable")
+
+# As for the command line: with Python's own limits a fifth of the time goes into looking for garbage
+# among the modules and classes of everything that is tested.
+gc.set_threshold(*COLLECTED_AFTER)
 
 
 @pytest.fixture(scope="session")

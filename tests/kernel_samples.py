@@ -49,6 +49,7 @@ STEPPING = (
     capture_law.Settings._make(
         np.array(value) for value in (
             [2], [0.015], [0.006], [0.08], [1.0], [0.13], [0.015], [0.1], [0.2], [0.6, 1.8], [0.35],
+            [0.0005],
         )
     ),
     capture_law.Feet(
@@ -134,6 +135,10 @@ UNUSED = {
     "aloft.blocks.jumping.capture_law.swing_foot": (
         STEP_PHASE, *STEPPING, STEP_PHASE, STEP_SCRATCH, 5.7,
     ),
+    "aloft.blocks.jumping.capture_law.leave_hovering": (
+        SOLES + np.tile([[0.0], [0.002]], (2, 3)), np.array([0, 0, 1, 1]), 0.0005,
+        np.array([True, True, False, True]), np.zeros(4, bool),
+    ),
     "aloft.mathematics.capture_step.nearest_in_foot": (
         SOLES, np.array([0, 0, 1, 1]), 1, np.array([0.1, 0.02]), np.zeros(2),
     ),
@@ -195,7 +200,7 @@ UNUSED = {
         np.array([0.1, -0.05]), NORMAL((2, 4)), LANDING, np.zeros((4, 4)), np.zeros(4),
     ),
     "aloft.mathematics.flight_prediction.invert": (REGULAR, np.zeros((3, 3))),
-    "aloft.mathematics.flight_prediction.solve_rows": (
+    "aloft.mathematics.least_squares.solve_rows": (
         REGULAR + REGULAR.T, np.array([[0.3, -0.2, 0.5], [1.0, 0.4, -0.7]]),
     ),
     "aloft.blocks.control.balance_law.pattern_turn": (

@@ -7,6 +7,7 @@ runs.
 import ast
 import re
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -108,6 +109,8 @@ HEAVY = {
     "matplotlib",
 }
 LONGEST = 400
+NESTING = (ast.stmt, ast.excepthandler, ast.match_case)
+"""What a statement can stand in."""
 ROOMS_BY_NAME = tuple(name for name in PACKAGES if name != "planner")
 
 
@@ -127,24 +130,38 @@ def module_of(path: Path) -> tuple[str, ...]:
     return parts[:-1] if parts[-1] == "__init__" else parts
 
 
+@cache
+def import_statements(path: Path) -> tuple[tuple[ast.Import | ast.ImportFrom, bool], ...]:
+    """Every import statement of a file, and whether it is executed when the file is imported: those
+    in functions and under ``if TYPE_CHECKING`` are not."""
+    found: list[tuple[ast.Import | ast.ImportFrom, bool]] = []
+    pending: list[tuple[ast.AST, bool]] = [(ast.parse(path.read_text(encoding="utf-8")), True)]
+    while pending:
+        node, at_import = pending.pop()
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef) or (
+            isinstance(node, ast.If) and "TYPE_CHECKING" in ast.dump(node.test)
+        ):
+            at_import = False
+        pending += [
+            (each, at_import) for each in ast.iter_child_nodes(node) if isinstance(each, NESTING)
+        ]
+        if isinstance(node, ast.Import | ast.ImportFrom):
+            found.append((node, at_import))
+    return tuple(found)
+
+
 def imports(path: Path, *, only_at_import: bool = False) -> Iterator[tuple[str, ...]]:
     """The modules a file imports, relative ones resolved to the project's own names.
 
     With ``only_at_import`` those in functions and under ``if TYPE_CHECKING`` are left out.
     """
-    tree = ast.parse(path.read_text(encoding="utf-8"))
     package = path.relative_to(ROOT).parent.parts
-    pending: list[ast.AST] = [tree]
-    while pending:
-        node = pending.pop()
-        if only_at_import and isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+    for node, at_import in import_statements(path):
+        if only_at_import and not at_import:
             continue
-        if only_at_import and isinstance(node, ast.If) and "TYPE_CHECKING" in ast.dump(node.test):
-            continue
-        pending += ast.iter_child_nodes(node)
         if isinstance(node, ast.Import):
             yield from (tuple(alias.name.split(".")) for alias in node.names)
-        elif isinstance(node, ast.ImportFrom):
+        else:
             start = package[: len(package) - node.level + 1] if node.level else ()
             module = (*start, *(node.module.split(".") if node.module else ()))
             # `from . import x` names modules; `from .x import y` names what is in one
@@ -249,10 +266,10 @@ def test_inside_the_package_imports_are_relative() -> None:
 
 
 def absolute(path: Path) -> Iterator[tuple[str, ...]]:
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    for node, _ in import_statements(path):
         if isinstance(node, ast.Import):
             yield from (tuple(alias.name.split(".")) for alias in node.names)
-        elif isinstance(node, ast.ImportFrom) and node.level == 0 and node.module:
+        elif node.level == 0 and node.module:
             yield tuple(node.module.split("."))
 
 
@@ -345,7 +362,10 @@ def test_the_types_of_arrays_are_named_once() -> None:
 
 def environment_reads(path: Path) -> Iterator[str]:
     """The environment variables that a file reads, as far as they are written out."""
-    for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+    text = path.read_text("utf-8")
+    if "environ" not in text and "getenv" not in text:
+        return
+    for node in ast.walk(ast.parse(text)):
         match node:
             case ast.Call(func=called, args=[ast.Constant(value=str(name)), *_]):
                 if ast.unparse(called) in ("os.environ.get", "os.getenv"):

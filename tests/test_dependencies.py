@@ -6,7 +6,7 @@ import ast
 import re
 import sys
 import tomllib
-from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 ROOT = Path(__file__).parent.parent
@@ -38,18 +38,21 @@ PACKAGE = distributions(PROJECT["project"]["dependencies"], *EXTRAS)
 TESTS = PACKAGE | distributions(PROJECT["dependency-groups"]["dev"])
 
 
-def others_modules(path: Path) -> Iterator[str]:
+@cache
+def others_modules(path: Path) -> tuple[str, ...]:
     """The top-level modules that a file imports and that are neither Python's nor the project's."""
     near = {other.stem for other in path.parent.glob("*.py")}
+    known = {*sys.stdlib_module_names, "aloft", "tests", *near}
+    found: list[str] = []
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         names: list[str] = []
         if isinstance(node, ast.Import):
             names = [alias.name for alias in node.names]
         elif isinstance(node, ast.ImportFrom) and node.level == 0 and node.module:
             names = [node.module]
-        for name in {name.partition(".")[0] for name in names}:
-            if name not in sys.stdlib_module_names and name not in ("aloft", "tests", *near):
-                yield name
+        tops = dict.fromkeys(name.partition(".")[0] for name in names)
+        found += [name for name in tops if name not in known]
+    return tuple(found)
 
 
 def python_files(folder: Path) -> list[Path]:

@@ -69,7 +69,8 @@ class Settings(NamedTuple):
     """Numbers of the filter.
 
     ``every`` and ``settled`` are ticks, ``filter`` and ``follow`` shares in a tick, ``kept`` the share of
-    the unknown friction that stays between two measurements; ``noise`` (6,) [N, N m].
+    the unknown friction that stays between two measurements; ``noise`` (6,) [N, N m];
+    ``rotation_noise`` the standard deviation of the base's filtered angular acceleration [rad/s^2].
     """
 
     period: float
@@ -83,6 +84,7 @@ class Settings(NamedTuple):
     friction_left: float
     gate: float
     noise: Array
+    rotation_noise: float
 
 
 class Scratch(NamedTuple):
@@ -163,9 +165,14 @@ def correct_mass(
             if i < TILT:
                 value -= float(memory.published[i])
             expected += value * float(scratch.rows[k, i])
+        # The gyroscope's noise moves the residual by the inertia times the noise of the acceleration.
+        variance = float(settings.noise[k]) * float(settings.noise[k])
+        for j in range(3, 6):
+            moved = float(measured.mass_matrix[k, j]) * settings.rotation_noise
+            variance += moved * moved
         correct_row(
             memory.unknowns, memory.covariance, scratch.rows[k],
-            -float(scratch.residual[k]) - expected, float(settings.noise[k]), settings.gate,
+            -float(scratch.residual[k]) - expected, math.sqrt(variance), settings.gate,
             scratch.seen,
         )  # fmt: skip
 

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import Any
 
 import numpy as np
 
+from ...robots.description import RobotDescription
 from ...runtime.language.block import Misfit
 from .elements import PerElement, spread_bound
 
@@ -20,3 +22,12 @@ def crossed_bounds(lower: PerElement | None, upper: PerElement | None, n: int) -
             expected=f"at most {high[i]:g}",
             found=f"{low[i]:g}",
         )
+
+
+class Bounded:
+    """The base of blocks whose parameters ``lower`` and ``upper`` bound ``n`` elements."""
+
+    @classmethod
+    def requires(cls, params: Any, robot: RobotDescription | None) -> Iterable[Misfit]:
+        """The bounds must not cross."""
+        return crossed_bounds(params.lower, params.upper, params.n)

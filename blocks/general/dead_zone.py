@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-
 import numpy as np
 
-from ...robots.description import RobotDescription
-from ...runtime.language.block import Block, Input, Misfit, Output
-from ...runtime.language.parameters import Parameters, live_parameter
-from .bounds import crossed_bounds
+from ...runtime.language.block import Block, Input, Output
+from ...runtime.language.parameters import live_parameter
+from .bounds import Bounded
 from .elements import Elements, PerElement, spread
 from .quantity_parameters import Keeps
 from .vector import Vector
 
 
-class DeadZone(Keeps, Block):
+class DeadZone(Bounded, Keeps, Block):
     """Nothing within a zone, and what goes beyond it outside: y = u - min(max(u, lower), upper)."""
 
     class Params(Elements):
@@ -25,12 +22,6 @@ class DeadZone(Keeps, Block):
     params: Params
     u = Input(Vector, text="what is passed on outside the zone")
     y = Output(Vector, text="how far u is beyond the zone")
-
-    @classmethod
-    def requires(cls, params: Parameters, robot: RobotDescription | None) -> Iterable[Misfit]:
-        """The bounds must not cross."""
-        assert isinstance(params, cls.Params)
-        return crossed_bounds(params.lower, params.upper, params.n)
 
     def setup(self) -> None:
         """Keep the bounds at hand."""

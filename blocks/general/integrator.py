@@ -2,23 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-
 import numpy as np
 
-from ...robots.description import RobotDescription
-from ...runtime.language.block import Block, Input, Misfit, Output, State
+from ...runtime.language.block import Block, Input, Output, State
 from ...runtime.language.parameters import Parameters, parameter
 from ...runtime.language.quantities import Carried, Given
 from ...runtime.language.unit_algebra import SECOND
-from .bounds import crossed_bounds
+from .bounds import Bounded
 from .elements import PerElement, spread_bound
 from .flags import NEVER, Flag
 from .initial_value import InitialParameters
 from .vector import Vector
 
 
-class Integrator(Block):
+class Integrator(Bounded, Block):
     """The time integral by forward Euler: y[n] = x[n], x[n+1] = x[n] + T u[n], x[0] = initial.
 
     T is the block's period. With bounds x[n+1] is kept within them, so nothing winds up beyond.
@@ -35,12 +32,6 @@ class Integrator(Block):
     reset = Input(Flag, text="whether to start anew from the initial value", default=NEVER)
     y = Output(Vector, text="its integral")
     x = State(Vector, text="the integral")
-
-    @classmethod
-    def requires(cls, params: Parameters, robot: RobotDescription | None) -> Iterable[Misfit]:
-        """The bounds must not cross."""
-        assert isinstance(params, cls.Params)
-        return crossed_bounds(params.lower, params.upper, params.n)
 
     @classmethod
     def carried(cls, params: Parameters, given: Given) -> Carried:

@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import numpy as np
 
-from ...robots.description import RobotDescription
 from ...runtime.language.block import Block, Input, Output
 from ...runtime.language.parameters import Parameters
 from ...runtime.language.quantities import UNCHECKED, Carried, Given
-from .pairs import First, Joined, PairSizes, Second
+from .pairs import First, Joined, Pairs, PairSizes, Second
 
 
-class Mux(Block):
+class Mux(Pairs, Block):
     """Two vectors one behind the other: y = [a, b]. More are joined by several such blocks."""
 
     Params = PairSizes
@@ -21,14 +18,6 @@ class Mux(Block):
     a = Input(First, text="the first elements")
     b = Input(Second, text="the elements behind them")
     y = Output(Joined, text="all elements")
-
-    @classmethod
-    def local_dimensions(
-        cls, params: Parameters, robot: RobotDescription | None
-    ) -> Mapping[str, int]:
-        """``n`` is the sum of ``n_a`` and ``n_b``."""
-        assert isinstance(params, cls.Params)
-        return params.sizes()
 
     @classmethod
     def carried(cls, params: Parameters, given: Given) -> Carried:

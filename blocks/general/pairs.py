@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from ...robots.description import RobotDescription
 from ...runtime.language.parameters import Parameters, parameter
 from ...runtime.language.signals import Field, Signal
 
@@ -32,6 +33,14 @@ class PairSizes(Parameters):
     n_a: int = parameter(1, ge=1, text="elements of a")
     n_b: int = parameter(1, ge=1, text="elements of b")
 
-    def sizes(self) -> Mapping[str, int]:
-        """The dimensions ``n_a``, ``n_b`` and their sum ``n``."""
-        return {"n_a": self.n_a, "n_b": self.n_b, "n": self.n_a + self.n_b}
+
+class Pairs:
+    """The base of blocks with two vectors and the one that they make."""
+
+    @classmethod
+    def local_dimensions(
+        cls, params: Parameters, robot: RobotDescription | None
+    ) -> Mapping[str, int]:
+        """``n`` is the sum of ``n_a`` and ``n_b``."""
+        assert isinstance(params, PairSizes)
+        return {"n_a": params.n_a, "n_b": params.n_b, "n": params.n_a + params.n_b}

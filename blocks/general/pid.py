@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-
 import numpy as np
 
 from ...mathematics.pid import PidGains, PidMemory, start_pid, step_pid
-from ...robots.description import RobotDescription
-from ...runtime.language.block import Block, Input, Misfit, Output, State
+from ...runtime.language.block import Block, Input, Output, State
 from ...runtime.language.parameters import Parameters, live_parameter
 from ...runtime.language.quantities import Carried, Given
 from ...runtime.language.signals import Field, Signal
 from ...runtime.language.unit_algebra import read_unit
-from .bounds import crossed_bounds
+from .bounds import Bounded
 from .elements import Elements, PerElement, spread, spread_bound
 from .flags import NEVER, Flag
 from .quantity_parameters import InUnit
@@ -29,7 +26,7 @@ class Memory(Signal):
     started = Field((), dtype="bool", text="whether there was a run since the start or a reset")
 
 
-class PID(Block):
+class PID(Bounded, Block):
     """A PID controller for every element, with bounds, anti-windup and setpoint weights.
 
     With setpoint r, measurement y, feedforward f and the block's period T:
@@ -69,12 +66,6 @@ class PID(Block):
     reset = Input(Flag, text="whether to forget what was", default=NEVER)
     u = Output(Vector, text="the control, within the bounds")
     x = State(Memory, text="the integral and the derivative")
-
-    @classmethod
-    def requires(cls, params: Parameters, robot: RobotDescription | None) -> Iterable[Misfit]:
-        """The bounds must not cross."""
-        assert isinstance(params, cls.Params)
-        return crossed_bounds(params.lower, params.upper, params.n)
 
     @classmethod
     def carried(cls, params: Parameters, given: Given) -> Carried:

@@ -38,3 +38,14 @@ def random_unit(rng: np.random.Generator) -> Mapping[str, Any]:
     """A random unit quaternion, for the conformance suite."""
     value = rng.normal(size=4)
     return {"value": value / np.sqrt(np.sum(value * value))}
+
+
+class OfQuaternion:
+    """The base of blocks whose input ``u`` is a unit quaternion."""
+
+    @classmethod
+    def example_inputs(
+        cls, rng: np.random.Generator, dimensions: Mapping[str, int]
+    ) -> Mapping[str, Mapping[str, Any]]:
+        """A unit quaternion."""
+        return {"u": random_unit(rng)}

@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-
 import numpy as np
 
-from ...robots.description import RobotDescription
-from ...runtime.language.block import Block, Input, Misfit, Output
-from ...runtime.language.parameters import Parameters, live_parameter
-from .bounds import crossed_bounds
+from ...runtime.language.block import Block, Input, Output
+from ...runtime.language.parameters import live_parameter
+from .bounds import Bounded
 from .elements import Elements, PerElement, spread_bound
 from .quantity_parameters import Keeps
 from .vector import Vector
 
 
-class Saturation(Keeps, Block):
+class Saturation(Bounded, Keeps, Block):
     """Every element kept within its bounds: y = min(max(u, lower), upper).
 
     A bound that is left out does not bind.
@@ -28,12 +25,6 @@ class Saturation(Keeps, Block):
     params: Params
     u = Input(Vector, text="what is bounded")
     y = Output(Vector, text="u within the bounds")
-
-    @classmethod
-    def requires(cls, params: Parameters, robot: RobotDescription | None) -> Iterable[Misfit]:
-        """The bounds must not cross."""
-        assert isinstance(params, cls.Params)
-        return crossed_bounds(params.lower, params.upper, params.n)
 
     def setup(self) -> None:
         """Keep the bounds at hand."""

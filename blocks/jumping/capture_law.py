@@ -80,6 +80,7 @@ class Settings(NamedTuple):
     reach: Array
     apart: Array
     settle: Array
+    flat: Array
 
 
 class Feet(NamedTuple):
@@ -294,6 +295,27 @@ def swing_foot(
         float(settings.height[0]), terms.contact_position, terms.contact_velocity, out.stance,
         out.stepping, out.step_acceleration,
     )  # fmt: skip
+    leave_hovering(
+        terms.contact_position, feet.foot_of_point, float(settings.flat[0]), out.stance,
+        scratch.standing,
+    )  # fmt: skip
+
+
+@kernel
+def leave_hovering(
+    position: Array, foot_of_point: Indices, flat: float, stance: Flags, standing: Flags
+) -> None:
+    """Take points out of the ``stance`` that are higher than the lowest point of their foot in it by
+    more than ``flat`` [m]; ``standing`` is scratch, and all are (n_contacts,)."""
+    n = stance.shape[0]
+    for i in range(n):
+        standing[i] = stance[i]
+        for j in range(n):
+            if foot_of_point[j] == foot_of_point[i] and stance[j]:
+                low = float(position[j, 2])
+                standing[i] = standing[i] and float(position[i, 2]) <= low + flat
+    for i in range(n):
+        stance[i] = standing[i]
 
 
 @kernel

@@ -57,7 +57,9 @@ class CaptureStep(KernelBlock):
     motion of least mean square acceleration from where they are to their place, with a flat sole
     and the heading that the feet had before the first step. The whole-body controller follows it as
     a task and computes the torques of both legs (``ContactPoints``), so the leg's reaction on the
-    body is taken into account. The step ends with the first contact after 0.6 of ``duration``, or
+    body is taken into account. Of the feet that stand meanwhile, points more than ``flat`` above the
+    lowest of their foot are not in stance: the controller would rely on the friction of a heel that
+    hovers, and the foot would turn on its toe. The step ends with the first contact after 0.6 of ``duration``, or
     after 1.5 of it. The robot stays in LANDING, low, until ``settle`` after the last step, and then
     recovers.
 
@@ -96,6 +98,12 @@ class CaptureStep(KernelBlock):
         )
         settle: float = live_parameter(
             0.35, unit="s", ge=0.0, text="time from a step until the robot rises again"
+        )
+        flat: float = live_parameter(
+            0.0005,
+            unit="m",
+            ge=0.0,
+            text="height up to which the other points of a foot carry load while another foot steps",
         )
 
     needs = ("feet",)

@@ -83,8 +83,9 @@ class LandingHeuristic(KernelBlock):
     where tilt is the deviation from the planned orientation at touchdown, linear in s, of which up
     to ``free_tilt`` costs nothing. Drawn up legs touch down later, by s_z over the speed of the
     fall, and the base turns until then. s_z is within ``height_range`` h, but drawn up legs must
-    keep the stroke in which ``stop_acceleration`` g stops the fall. The goal g is the capture point of
-    the linear inverted pendulum of the standing height h, w^2 = g / h, times the gains::
+    keep the stroke in which ``stop_acceleration`` g stops the fall, and stretched legs touch down early
+    by at most the share ``early`` of the flight. The goal g is the capture point of the linear
+    inverted pendulum of the standing height h, w^2 = g / h, times the gains::
 
         g_x = capture l^x / (m w) + capture_turn k^y w / (m g),
         g_y = capture l^y / (m w) - capture_turn k^x w / (m g),    g_a = clearance |l^y| / (m w)

@@ -54,7 +54,12 @@ class PredictionGains(Parameters):
         0.25, gt=0.0, text="cost of landing with longer or shorter legs, per way off the place"
     )
     height_range: tuple[float, float] = live_parameter(
-        (-0.01, 0.2), text="shift of the feet down and up, in standing heights"
+        (-0.05, 0.2), text="shift of the feet down and up, in standing heights"
+    )
+    early: float = live_parameter(
+        0.03,
+        ge=0.0,
+        text="by how much of the flight, at most, stretched legs touch down early, as a share",
     )
     stop_acceleration: float = live_parameter(
         3.0, gt=0.0, text="stops the fall in the stroke that drawn up legs must keep, in g"
@@ -114,10 +119,11 @@ class Gains(NamedTuple):
     """``PredictionGains`` for a robot of some size: arrays of one element, or of more where said.
 
     Attributes:
-        cost: what the shift is judged by; its goal and its highest shift are computed in every tick.
+        cost: what the shift is judged by; its goal and its bounds are computed in every tick.
         per_linear, per_angular: way of the feet ahead and aside per momentum, (2,).
         clearance: way apart per lateral momentum [s/kg].
-        highest: largest shift upwards [m].
+        lowest, highest: shifts downwards and upwards that are never exceeded [m].
+        early: share of the flight by which stretched legs may touch down early.
         stroke: of the legs per square of the speed of the fall [s^2/m].
         damping: where a leg is nearly stretched [m].
         place_gain: share of a small miss of the planned place that is corrected.
@@ -128,7 +134,9 @@ class Gains(NamedTuple):
     per_linear: Array
     per_angular: Array
     clearance: Array
+    lowest: Array
     highest: Array
+    early: Array
     stroke: Array
     damping: Array
     place_gain: Array
@@ -175,7 +183,7 @@ def landing_prediction(robot: RobotDescription, sides: Sequence[float]) -> Predi
         np.array([sides[foot] for foot in foot_of_point]), np.array(offset),
     )  # fmt: skip
     cost = LandingCost(np.zeros(3), np.zeros(6), np.zeros((2, 2)), np.zeros(2))
-    gains = Gains(cost, np.zeros(2), np.zeros(2), *np.zeros((6, 1)))
+    gains = Gains(cost, np.zeros(2), np.zeros(2), *np.zeros((8, 1)))
     shapes = 3 * n, (3, 3), 3, 4, 4, 2, (2, 4), (4, 4)
     flight = flight_map(len(robot.joints), n)
     return Prediction(
@@ -193,11 +201,11 @@ def scale_gains(p: PredictionGains, mass: float, height: float, gains: Gains) ->
         (height * p.tilt_cost[0]) ** 2, (height * p.tilt_cost[1]) ** 2,
     )  # fmt: skip
     gains.cost.free[:] = (-aside, aside), (-back, ahead)
-    gains.cost.bounds[:] = height * p.height_range[0], 0.0
     gains.per_linear[:] = capture * p.capture[0], capture * p.capture[1]
     gains.per_angular[:] = capture_turn * p.capture_turn[0], capture_turn * p.capture_turn[1]
     gains.clearance[0] = capture * p.clearance
-    gains.highest[0] = height * p.height_range[1]
+    gains.lowest[0], gains.highest[0] = height * p.height_range[0], height * p.height_range[1]
+    gains.early[0] = p.early
     gains.stroke[0] = 0.5 / (GRAVITY * p.stop_acceleration)
     gains.damping[0] = height * p.stretch_damping
     gains.place_gain[0], gains.place_range[0] = p.place_gain, height * p.place_range
@@ -213,6 +221,7 @@ def choose_shift_of_feet(
     angular: Array,
     miss: Array,
     left: float,
+    duration: float,
     speed: float,
     prediction: Prediction,
     shift: Array,
@@ -244,6 +253,7 @@ def choose_shift_of_feet(
         scratch.flight, scratch.vector, angular, scratch.way, left, 1.0 / speed, soles.side,
         scratch.tilt, scratch.turn,
     )  # fmt: skip
+    cost.bounds[0] = max(float(gains.lowest[0]), -float(gains.early[0]) * duration * speed)
     cost.bounds[1] = max(float(gains.highest[0]) - speed * speed * float(gains.stroke[0]), 0.0)
     ahead = float(gains.per_linear[0]) * float(linear[0])
     cost.goal[0] = ahead + float(gains.per_angular[0]) * float(angular[1])

@@ -304,7 +304,8 @@ def predict(
     if left + later >= LAST:
         choose_shift_of_feet(
             terms, plan.foot_yaw, memory.planned, memory.orientation, scratch.linear,
-            scratch.angular, scratch.miss, left, speed, prediction, memory.shift,
+            scratch.angular, scratch.miss, left, float(memory.due[()]), speed, prediction,
+            memory.shift,
         )  # fmt: skip
         later = fall_time(speed, float(memory.shift[3]))
     return max(left + later, 0.0)

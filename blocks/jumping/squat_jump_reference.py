@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from functools import lru_cache
 
-from ...planner.library.jump_table import JumpTable, JumpTableReader
+from ...planner.library.jump_table import JumpTable
 from ...robots.description import RobotDescription
 from ...robots.pinocchio_model import build_pinocchio_model
-from ...runtime.language.block import Block, Misfit, Output
-from ...runtime.language.parameters import Parameters, parameter
-from ..signals import JumpReference
-from .guided_motion import too_few_joints
+from ...runtime.language.parameters import parameter
+from .guided_reference import GuidedParameters, GuidedReference
 from .squat_jump import SquatJumpTask, plan_squat_jump
 
 
-class SquatJumpReference(Block):
+class SquatJumpReference(GuidedReference):
     """A squat, thrust, flight and landing of the whole body, planned from a few numbers.
 
     It serves any robot whose feet stand level in its standing pose and that has joints enough to
@@ -43,7 +40,7 @@ class SquatJumpReference(Block):
     exceed its limit or a motor its speed.
     """
 
-    class Params(Parameters):
+    class Params(GuidedParameters):
         rise: float = parameter(
             0.09, unit="m", gt=0.0, le=1.0, text="apex of the centre of mass above standing"
         )
@@ -81,28 +78,15 @@ class SquatJumpReference(Block):
         pause_time: float = parameter(0.15, unit="s", gt=0.0, text="waiting at the bottom")
         landing_time: float = parameter(0.35, unit="s", gt=0.05, text="coming to rest")
         recover_time: float = parameter(0.6, unit="s", gt=0.05, text="rising to standing")
-        lead: float = parameter(
-            0.002,
-            unit="s",
-            ge=0.0,
-            le=0.02,
-            text="delay from sensing to torque that is compensated",
-        )
 
-    needs = ("floating base", "feet")
     params: Params
-    reference = Output(JumpReference, text="the plan at the present instant")
 
-    @classmethod
-    def requires(cls, params: Parameters, robot: RobotDescription | None) -> Iterable[Misfit]:
-        """Report too few joints to move the centre of mass and the base with all feet standing."""
-        return too_few_joints(robot)
-
-    def setup(self) -> None:
+    def make_table(self) -> JumpTable:
+        """The squat, the jump and the landing."""
         robot, p = self.robot, self.params
         names = set(SquatJumpTask.__dataclass_fields__)
         task = SquatJumpTask(**{k: v for k, v in p.model_dump().items() if k in names})
-        self._reader = JumpTableReader(_plan(robot.model_dump_json(), task), self.reference)
+        return _plan(robot.model_dump_json(), task)
 
     def step(self) -> None:
         self._reader.read(self.time, self.params.lead, self.period)

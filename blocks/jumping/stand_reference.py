@@ -2,26 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from functools import lru_cache
 
 import numpy as np
 
 from ...mathematics.arrays import Array
 from ...mathematics.polynomials import minimum_jerk
-from ...planner.library.jump_table import JumpTable, JumpTableReader
+from ...planner.library.jump_table import JumpTable
 from ...robots.description import RobotDescription
 from ...robots.pinocchio_model import build_pinocchio_model
-from ...runtime.language.block import Block, Misfit, Output
-from ...runtime.language.parameters import Parameters, parameter
-from ..signals import JumpReference
-from .guided_motion import GuidedBody, Motion, MotionRecorder, check_limits, too_few_joints
+from ...runtime.language.parameters import parameter
+from .guided_motion import GuidedBody, Motion, MotionRecorder, check_limits
+from .guided_reference import GuidedParameters, GuidedReference
 
 NEVER = 1e6
 """The time [s] of a lift-off that is not planned."""
 
 
-class StandReference(Block):
+class StandReference(GuidedReference):
     """The whole body stands as its description says, and with a ``squat_depth`` squats and rises.
 
     The feet stand still and the base stays level. For ``stand_time`` the robot stands in its
@@ -37,7 +35,7 @@ class StandReference(Block):
     or a motor past its speed raises ``BlockError`` at load.
     """
 
-    class Params(Parameters):
+    class Params(GuidedParameters):
         squat_depth: float = parameter(
             0.0, unit="m", ge=0.0, le=0.5, text="how far the centre of mass goes down; 0: no squat"
         )
@@ -47,29 +45,14 @@ class StandReference(Block):
         squat_time: float = parameter(0.5, unit="s", gt=0.1, text="going down")
         pause_time: float = parameter(0.3, unit="s", gt=0.0, text="waiting at the bottom")
         rise_time: float = parameter(0.6, unit="s", gt=0.1, text="rising to standing height")
-        lead: float = parameter(
-            0.002,
-            unit="s",
-            ge=0.0,
-            le=0.02,
-            text="delay from sensing to torque that is compensated",
-        )
 
-    needs = ("floating base", "feet")
     params: Params
-    reference = Output(JumpReference, text="the stance or squat at the present instant")
 
-    @classmethod
-    def requires(cls, params: Parameters, robot: RobotDescription | None) -> Iterable[Misfit]:
-        """Report too few joints to move the centre of mass and the base with all feet standing."""
-        return too_few_joints(robot)
-
-    def setup(self) -> None:
+    def make_table(self) -> JumpTable:
+        """The stance, and the squat if there is one."""
         p = self.params
         times = (p.stand_time, p.squat_time, p.pause_time, p.rise_time)
-        self._reader = JumpTableReader(
-            _plan(self.robot.model_dump_json(), float(p.squat_depth), times), self.reference
-        )
+        return _plan(self.robot.model_dump_json(), float(p.squat_depth), times)
 
     def step(self) -> None:
         self._reader.read(self.time, self.params.lead)

@@ -88,8 +88,8 @@ class Limits(NamedTuple):
 
 def fields_of(kind: type[Fields], signal: Signal) -> Fields:
     """The fields of a signal that a named tuple has, as kernels take them."""
-    names: tuple[str, ...] = kind._fields  # type: ignore[attr-defined]
-    return kind._make(getattr(signal, name) for name in names)  # type: ignore[attr-defined, no-any-return]
+    names: tuple[str, ...] = kind._fields  # type: ignore[attr-defined]  # a NamedTuple's
+    return kind._make(getattr(signal, name) for name in names)  # type: ignore[attr-defined, no-any-return]  # a NamedTuple's
 
 
 def following_limits(

@@ -74,12 +74,12 @@ class GraphSlave:
 
     def to_xml(self, model_options: Any = None) -> Element:
         """The model description, with the step and with what depends on what."""
-        root: Element = super().to_xml(model_options or {})  # type: ignore[misc]
+        root: Element = super().to_xml(model_options or {})  # type: ignore[misc]  # PythonFMU3 is not typed
         kind = root.find("CoSimulation")
         structure = root.find("ModelStructure")
         assert kind is not None and structure is not None
         kind.set("fixedInternalStepSize", f"{self.running.period:.17g}")
-        variables: Any = self.vars  # type: ignore[attr-defined]
+        variables: Any = self.vars  # type: ignore[attr-defined]  # PythonFMU3 is not typed
         references = {each.name: str(each.value_reference) for each in variables.values()}
         for each in self.running.interface["outputs"]:
             for unknown in structure:

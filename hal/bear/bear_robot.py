@@ -129,7 +129,7 @@ class BearRobot(DrivenRobot):
             wait_until_held(self._switch, _HOLDING_TIME)
             if params.time == "real":
                 devices = [motor.id for motor in hardware.motors.values()]
-                descriptor = bus_port.fileno()  # type: ignore[attr-defined]
+                descriptor = bus_port.fileno()  # type: ignore[attr-defined]  # a serial port
                 silence = self.context.clock.command_limit
                 self._watchdog = Watchdog(descriptor, devices, params.graph_timeout, silence)
             self._cycle = time.monotonic()

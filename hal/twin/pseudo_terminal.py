@@ -7,7 +7,6 @@ import select
 import threading
 import tty
 from collections.abc import Callable
-from types import TracebackType
 from typing import Self
 
 Device = Callable[[bytes], bytes]
@@ -52,10 +51,7 @@ class PseudoTerminal:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:  # fmt: skip
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def _serve(self) -> None:

@@ -23,6 +23,7 @@ from ...robots.ball_feet import ball_feet
 from ...robots.description import RobotDescription
 from ...robots.pinocchio_model import build_pinocchio_model
 from .coasting import coast, joint_side
+from .pushing import push, pushed_side
 
 Motion = tuple[Array, Array, Array]
 """Joint angles, velocities and accelerations."""
@@ -235,8 +236,8 @@ class ExactDynamics:
     def integrate(
         self, q: Array, v: Array, joints: JointMotion, force: Array, longest_step: float
     ) -> list[tuple[float, Array, Array]]:
-        """The motion over one interval from the state (q, v): the base's by Runge and Kutta's
-        method of order four under constant contact forces; without forces see ``coasting``.
+        """The motion over one interval from the state (q, v) under constant contact forces, see
+        ``pushing``, or without any, see ``coasting``.
 
         Returns time since the interval began [s], q and v after every step; ``q`` is followed as
         position and quaternion, and the joints' part of both is the planned one.
@@ -258,36 +259,28 @@ class ExactDynamics:
         self, base: Array, twist: Array, moved: Motion, force: Array, h: float
     ) -> tuple[Array, Array]:
         """The base's places and twists after every step under contact forces."""
-        count = len(moved[0]) // 2
-        bases, twists = np.empty((count, 7)), np.empty((count, 6))
-        at = list(zip(*moved, strict=True))
-        for i in range(count):
-            middle = at[2 * i + 1]
-            d1 = self._rates(base, twist, at[2 * i], force)
-            d2 = self._rates(base + 0.5 * h * d1[:7], twist + 0.5 * h * d1[7:], middle, force)
-            d3 = self._rates(base + 0.5 * h * d2[:7], twist + 0.5 * h * d2[7:], middle, force)
-            d4 = self._rates(base + h * d3[:7], twist + h * d3[7:], at[2 * i + 2], force)
-            change = h / 6.0 * (d1 + 2.0 * d2 + 2.0 * d3 + d4)
-            base, twist = base + change[:7], twist + change[7:]
-            base[3:7] /= np.linalg.norm(base[3:7])
-            bases[i], twists[i] = base, twist
-        return bases, twists
+        angles, speeds, bends = moved
+        side = pushed_side(self.pin, self.model, self.data, self._seen_from_base, angles, force)
+        q, v = np.empty(self.model.nq), np.empty(self.model.nv)
 
-    def _rates(
-        self, base: Array, twist: Array, joints: tuple[Array, Array, Array], force: Array
-    ) -> Array:
-        """The derivative of base position, quaternion and twist, (13,)."""
-        position, velocity, acceleration = joints
-        unit = base.copy()
-        unit[3:7] /= np.linalg.norm(unit[3:7])
-        q = np.concatenate([unit, position])
-        v = np.concatenate([twist, velocity])
-        x, y, z, w = unit[3:7]
-        spin = 0.5 * np.array([[w, -z, y], [z, w, -x], [-y, x, w], [-x, -y, -z]])
-        moved = self.pin.Quaternion(unit[3:7]).toRotationMatrix() @ twist[:3]
-        return np.concatenate(
-            [moved, spin @ twist[3:6], self.base_acceleration(q, v, acceleration, force)]
-        )
+        def bias(i: int, place: Array, speed: Array) -> Array:
+            q[:7], q[7:], v[:6], v[6:] = place, angles[i], speed, speeds[i]
+            self._known[6:] = bends[i]
+            return np.asarray(self.pin.rnea(self.model, self.data, q, v, self._known)[:6])
+
+        # From the centre of a ball its lowest point is one radius down in the world.
+        moment = np.zeros(3)
+        for ball in self.balls:
+            x, y, _ = force[ball.point]
+            moment += ball.radius * np.array([y, -x, 0.0])
+        return push(bias, base, twist, side, force.sum(axis=0), moment, h)
+
+    def _seen_from_base(self, q: Array) -> Array:
+        """The contact points, of balls the centres, for a base in the world's origin and axes."""
+        places = self.points(q)
+        for ball in self.balls:
+            places[ball.point, 2] += ball.radius
+        return places
 
 
 def rotation_between(first: Array, second: Array) -> float:

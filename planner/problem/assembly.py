@@ -149,10 +149,11 @@ class Assembly:
 
     # The functions of the whole problem
 
-    def functions(self) -> dict[str, Any]:
+    def functions(self, *, upper: bool = True) -> dict[str, Any]:
         """``f``, ``g`` (symbols and expressions in a dict for nlpsol) and the derivative functions
         ``nlp_f``, ``nlp_g``, ``nlp_grad_f``, ``nlp_jac_g``, ``nlp_hess_l`` with the signatures
-        nlpsol's own would have."""
+        nlpsol's own would have; with ``upper`` also ``hess_lag``, the upper triangle of the
+        Hessian alone."""
         import casadi as ca
 
         x, p = ca.MX.sym("x", self.variables), ca.MX.sym("p", self.parameters)
@@ -184,7 +185,7 @@ class Assembly:
         columns = np.concatenate(jacobian_cost_rows)
         grad = _scatter(ca.vertcat(*gradient), columns, self.variables)
         jac = self._jacobian(jacobian_values)
-        hess, upper = self._hessian(hessian_values)
+        whole, *triangle = self._hessian(hessian_values, upper)
         linear_rows, linear_columns, signs = self._linear
         pushed = _gather(lam_g, linear_rows, (-1, 1)) * ca.DM(signs)
         slope = _scatter(
@@ -192,7 +193,7 @@ class Assembly:
         )
         names = ["x", "p"]
         lagrangian = ["x", "p", "lam_f", "lam_g"]
-        return {
+        found = {
             "x": x, "p": p, "f": cost, "g": g,
             "nlp_f": ca.Function("nlp_f", [x, p], [cost], names, ["f"]),
             "nlp_g": ca.Function("nlp_g", [x, p], [g], names, ["g"]),
@@ -201,17 +202,19 @@ class Assembly:
             "nlp_jac_g": ca.Function(
                 "nlp_jac_g", [x, p], [g_again, jac], names, ["g", "jac_g_x"]),
             "nlp_hess_l": ca.Function(
-                "nlp_hess_l", [x, p, lam_f, lam_g], [slope, hess], lagrangian,
+                "nlp_hess_l", [x, p, lam_f, lam_g], [slope, whole], lagrangian,
                 ["grad_gamma_x", "hess_gamma_x_x"]),
             # nlpsol evaluates this once after fatrop ends; nobody reads its gradients.
             "nlp_grad": ca.Function(
                 "nlp_grad", [x, p, lam_f, lam_g],
                 [cost, g, ca.MX.zeros(self.variables), ca.MX.zeros(self.parameters)], lagrangian,
                 ["f", "g", "grad_gamma_x", "grad_gamma_p"]),
-            "hess_lag": ca.Function(
-                "nlp_hess_l", [x, p, lam_f, lam_g], [upper], lagrangian,
-                ["triu_hess_gamma_x_x"]),
         }  # fmt: skip
+        if triangle:
+            found["hess_lag"] = ca.Function(
+                "nlp_hess_l", [x, p, lam_f, lam_g], triangle, lagrangian, ["triu_hess_gamma_x_x"]
+            )
+        return found
 
     def _sum_rows(self, x: Any, rows: list[Any]) -> Any:
         import casadi as ca
@@ -247,8 +250,8 @@ class Assembly:
         everything = ca.vertcat(*values, ca.DM(signs))
         return ca.MX(pattern, _gather(everything, source, (-1, 1)))
 
-    def _hessian(self, values: list[Any]) -> tuple[Any, Any]:
-        """The whole symmetric matrix and its upper triangle."""
+    def _hessian(self, values: list[Any], upper: bool) -> list[Any]:
+        """The whole symmetric matrix, and its upper triangle if that is asked for."""
         import casadi as ca
 
         rows, columns = [], []
@@ -260,7 +263,7 @@ class Assembly:
         row, column = np.concatenate(rows), np.concatenate(columns)
         everything = ca.vertcat(*values, 0.0)
         found = []
-        for kept in (np.full(len(row), True), row <= column):
+        for kept in (np.full(len(row), True), row <= column)[: 1 + upper]:
             pattern = _sparse(row[kept], column[kept], (self.variables, self.variables))
             place = _positions(pattern, row[kept], column[kept])
             source = np.flatnonzero(kept)
@@ -271,7 +274,7 @@ class Assembly:
                     _gather(everything, index, (-1, 1)), entries, pattern.nnz()
                 )
             found.append(ca.MX(pattern, total))
-        return found[0], found[1]
+        return found
 
 
 def _layers(place: Indices, source: Indices, size: int, empty: int) -> list[Any]:
@@ -317,7 +320,9 @@ def _nonzeros(matrix: Any) -> Any:
 def _sparse(rows: Indices, columns: Indices, shape: tuple[int, int]) -> Any:
     import casadi as ca
 
-    order = np.unique(columns.astype(np.int64) * shape[0] + rows)
+    # Sorted here: NumPy's ``unique`` hashes whole numbers first, which takes six times as long.
+    order = np.sort(columns.astype(np.int64) * shape[0] + rows)
+    order = order[np.concatenate([[True], order[1:] != order[:-1]])] if len(order) else order
     starts = np.searchsorted(order // shape[0], np.arange(shape[1] + 1))
     return ca.Sparsity(shape[0], shape[1], starts.tolist(), (order % shape[0]).tolist())
 

@@ -112,119 +112,121 @@ def piece_expressions(
     import casadi as ca
 
     lift = Lifted() if lifted is None else lifted
-
-    n = coordinates.size
     sizes = parameter_sizes(coordinates)[name]
     w = {key: ca.SX.sym(key, size) for key, size in sizes.items()}
-    q, v = ca.SX.sym("q", n), ca.SX.sym("v", n)
+    q, v = ca.SX.sym("q", coordinates.size), ca.SX.sym("v", coordinates.size)
     cost: Any = ca.SX(0)
+    z: list[Any] = [q, v]
     rows: list[Any]
-    z: list[Any]
     if name in ("stance", "free_stance", "flight"):
-        a = ca.SX.sym("a", n)
-        state = ca.SX.sym("h")
-        h = w["step"] if name == "stance" else w["share"] * state
-        forces = 0 if name == "flight" else coordinates.forces
-        F = ca.SX.sym("F", forces)
-        z = [q, v, a, F] if name == "stance" else [q, v, state, a, F]
-        half_v = v + 0.5 * h * a
-        half_q = q + 0.5 * h * v + 0.125 * h * h * a
-        end_q, end_v = q + h * v + 0.5 * h * h * a, v + h * a
-        balance: list[Any] = []
-        if name == "flight":
-            z[-1] = ca.SX.sym("r", len(coordinates.turning))
-            end_q, end_v, balance, half_q, half_v = flight_interval(
-                model, coordinates, q, v, h, a, z[-1], lift
-            )
-        else:
-            half_q, half_v = lift(half_q), lift(half_v)
-        all_forces: Any = ca.mtimes(ca.DM(coordinates.force_matrix), F) if forces else None
-        named = {
-            model.robot.contacts[c].name: all_forces[3 * c : 3 * c + 3]
-            for c in coordinates.contacts
-            if forces
-        }
-        base, limbs, torque = model.inverse_dynamics(
-            coordinates.expand(half_q),
-            coordinates.expand(half_v),
-            coordinates.expand(a),
-            named,
-            coordinates.limbs,
-        )
-        held = model.held_torques(
-            coordinates.expand(half_q),
-            coordinates.expand(half_v),
-            coordinates.expand(a),
-            coordinates.limbs,
-        )
-        if name != "flight":
-            wrench = base + coordinates.share * sum(limbs.values())
-            balance = [wrench[list(coordinates.rows)]]
-        to_motor = model.robot.torque_to_motor[np.ix_(coordinates.joints, coordinates.joints)]
-        geared = _geared(model, coordinates)
-        motor = ca.mtimes(ca.DM(to_motor), torque[list(coordinates.joints)])
-        own = [6 + joint for joint in coordinates.joints]
-        speed = ca.mtimes(ca.DM(geared), coordinates.expand(v)[own])
-        end_speed = ca.mtimes(ca.DM(geared), coordinates.expand(v + h * a)[own])
-        gap = [-end_q, -end_v]
-        rows = [
-            *gap,
-            *([] if name == "stance" else [-state]),
-            *balance,
-            motor,
-            motor + w["slope"] * speed,
-            motor + w["slope"] * end_speed,
-            speed,
-            *held,
-        ]
-        off = q - w["nominal"]
-        cost = (
-            ca.dot(w["posture"], off * off)
-            + ca.dot(w["velocity"], v * v)
-            + ca.dot(w["acceleration"], a * a)
-        )
-        if forces:
-            cost = cost + w["force"] * ca.dot(F, F)
-            rows += _cones(coordinates, all_forces, w["friction"])
-            rows += _pressures(model, coordinates, all_forces, w["pressure"])
-        cost = h * cost
+        z, cost, rows = _interval(model, coordinates, name, q, v, w, lift)
     elif name == "impact":
-        change, F = ca.SX.sym("dv", n), ca.SX.sym("F", coordinates.forces)
-        z = [q, v, change, F]
-        pushes = ca.mtimes(ca.DM(coordinates.force_matrix), F)
-        rows = [
-            -q, -(v + change),
-            _impulse_balance(model, coordinates, q, change, pushes),
-            ca.mtimes(ca.DM(_geared(model, coordinates)),
-                      coordinates.expand(v)[[6 + joint for joint in coordinates.joints]]),
-            *_cones(coordinates, pushes, w["friction"]),
-        ]  # fmt: skip
-        cost = w["impulse"] * ca.dot(F, F)
+        z, cost, rows = _impact(model, coordinates, q, v, w)
     elif name == "contact":
-        z = [q, v]
         errors = _place_errors(model, coordinates, q, w["place"], w["heading"])
         rows = [ca.jtimes(errors, q, v) + DRIFT_RATE * errors, errors]
     elif name == "take_off":
-        z = [q, v]
         whole, speeds = coordinates.expand(q), coordinates.expand(v)
         linear, angular = model.momentum(whole, speeds)
         rise = linear[2] / model.robot.total_mass
         rows = [model.com(whole)[2] + rise * rise / (2.0 * GRAVITY), rise, angular]
     elif name == "air":
-        z = [q]
-        rows = _air_rows(model, coordinates, q)
+        z, rows = [q], _air_rows(model, coordinates, q)
     else:
-        z = [q]
-        rows = heights_above_step(model, coordinates, q, w)
+        z, rows = [q], heights_above_step(model, coordinates, q, w)
     rows_of_all = ca.vertcat(*rows)
     if lifted is None and lift.symbols:
         cost, rows_of_all = lift.put_back([cost, rows_of_all])
     return ca.vertcat(*z), ca.vertcat(*w.values()), cost, rows_of_all
 
 
-def _geared(model: SymbolicModel, coordinates: Coordinates) -> Any:
-    """Motor speeds from the speeds of the joints that are computed."""
-    return model.robot.joint_to_motor[np.ix_(coordinates.joints, coordinates.joints)]
+def _interval(
+    model: SymbolicModel, coordinates: Coordinates, name: str, q: Any, v: Any,
+    w: Mapping[str, Any], lift: Lifted,
+) -> tuple[list[Any], Any, list[Any]]:  # fmt: skip
+    """The symbols, the cost and the rows of an interval on the ground or in the air."""
+    import casadi as ca
+
+    a, state = ca.SX.sym("a", coordinates.size), ca.SX.sym("h")
+    h = w["step"] if name == "stance" else w["share"] * state
+    forces = 0 if name == "flight" else coordinates.forces
+    F = ca.SX.sym("F", forces)
+    z = [q, v, a, F] if name == "stance" else [q, v, state, a, F]
+    half_v = v + 0.5 * h * a
+    half_q = q + 0.5 * h * v + 0.125 * h * h * a
+    end_q, end_v = q + h * v + 0.5 * h * h * a, v + h * a
+    balance: list[Any] = []
+    if name == "flight":
+        z[-1] = ca.SX.sym("r", len(coordinates.turning))
+        end_q, end_v, balance, half_q, half_v = flight_interval(
+            model, coordinates, q, v, h, a, z[-1], lift
+        )
+    else:
+        half_q, half_v = lift(half_q), lift(half_v)
+    all_forces: Any = ca.mtimes(ca.DM(coordinates.force_matrix), F) if forces else None
+    named = {
+        model.robot.contacts[c].name: all_forces[3 * c : 3 * c + 3]
+        for c in coordinates.contacts
+        if forces
+    }
+    middle = [coordinates.expand(part) for part in (half_q, half_v, a)]
+    base, limbs, torque = model.inverse_dynamics(*middle, named, coordinates.limbs)
+    held = model.held_torques(*middle, coordinates.limbs)
+    if name != "flight":
+        wrench = base + coordinates.share * sum(limbs.values())
+        balance = [wrench[list(coordinates.rows)]]
+    start = [] if name == "stance" else [-state]
+    motors = _motor_rows(model, coordinates, torque, v, v + h * a, w["slope"])
+    rows = [-end_q, -end_v, *start, *balance, *motors, *held]
+    off = q - w["nominal"]
+    cost = (
+        ca.dot(w["posture"], off * off)
+        + ca.dot(w["velocity"], v * v)
+        + ca.dot(w["acceleration"], a * a)
+    )
+    if forces:
+        cost = cost + w["force"] * ca.dot(F, F)
+        rows += _cones(coordinates, all_forces, w["friction"])
+        rows += _pressures(model, coordinates, all_forces, w["pressure"])
+    return z, h * cost, rows
+
+
+def _motor_rows(
+    model: SymbolicModel, coordinates: Coordinates, torque: Any, begin: Any, end: Any, slope: Any
+) -> list[Any]:
+    """Motor torque, the torque-speed line at begin and end, and motor speed."""
+    import casadi as ca
+
+    to_motor = model.robot.torque_to_motor[np.ix_(coordinates.joints, coordinates.joints)]
+    motor = ca.mtimes(ca.DM(to_motor), torque[list(coordinates.joints)])
+    speed, end_speed = (_motor_speeds(model, coordinates, v) for v in (begin, end))
+    return [motor, motor + slope * speed, motor + slope * end_speed, speed]
+
+
+def _impact(
+    model: SymbolicModel, coordinates: Coordinates, q: Any, v: Any, w: Mapping[str, Any]
+) -> tuple[list[Any], Any, list[Any]]:
+    """The symbols, the cost and the rows of touchdown."""
+    import casadi as ca
+
+    change, F = ca.SX.sym("dv", coordinates.size), ca.SX.sym("F", coordinates.forces)
+    pushes = ca.mtimes(ca.DM(coordinates.force_matrix), F)
+    rows = [
+        -q, -(v + change),
+        _impulse_balance(model, coordinates, q, change, pushes),
+        _motor_speeds(model, coordinates, v),
+        *_cones(coordinates, pushes, w["friction"]),
+    ]  # fmt: skip
+    return [q, v, change, F], w["impulse"] * ca.dot(F, F), rows
+
+
+def _motor_speeds(model: SymbolicModel, coordinates: Coordinates, velocity: Any) -> Any:
+    """The speeds of the motors of those joints that are computed."""
+    import casadi as ca
+
+    geared = model.robot.joint_to_motor[np.ix_(coordinates.joints, coordinates.joints)]
+    own = [6 + joint for joint in coordinates.joints]
+    return ca.mtimes(ca.DM(geared), coordinates.expand(velocity)[own])
 
 
 def _cones(coordinates: Coordinates, forces: Any, friction: Any) -> list[Any]:

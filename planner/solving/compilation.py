@@ -128,7 +128,7 @@ def _load(
     functions: FunctionSet, key: str, names: tuple[str, ...], compiled: bool,
     progress: Progress | None,
 ) -> dict[str, Piece]:  # fmt: skip
-    compiler = _compiler() if compiled else None
+    compiler = find_compiler() if compiled else None
     pieces: dict[str, Piece] = {}
     waiting, elsewhere = deque(names), 0
     while waiting:
@@ -191,7 +191,8 @@ def _external(library: Path, prefix: str) -> Piece:
 
 
 @lru_cache(maxsize=1)
-def _compiler() -> str | None:
+def find_compiler() -> str | None:
+    """The C compiler; ``None`` where there is none."""
     return next((path for name in ("cc", "gcc", "clang") if (path := shutil.which(name))), None)
 
 

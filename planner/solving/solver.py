@@ -13,6 +13,7 @@ import numpy as np
 from ...mathematics.arrays import Array
 from ..problem.assembly import Assembly
 from .bounded import cpu_time
+from .panel_product import use_panel_product
 from .solver_process import call_bounded, call_solver, quiet
 
 VIOLATION = 1e-6
@@ -185,12 +186,13 @@ def _solver(assembly: Assembly, name: str, barrier: float, limit: int) -> tuple[
 def _make_solver(assembly: Assembly, name: str, barrier: float, limit: int) -> tuple[Any, Any, Any]:
     import casadi as ca
 
-    functions = assembly.functions()
+    functions = assembly.functions(upper=name != "fatrop")
     nlp = {key: functions[key] for key in ("x", "p", "f", "g")}
     own: dict[str, Any] = {"tol": DUAL_TOLERANCE, "constr_viol_tol": VIOLATION,
                               "max_iter": limit, "print_level": 0}  # fmt: skip
     options: dict[str, Any] = {"print_time": False, "calc_lam_p": False, "error_on_fail": False}
     if name == "fatrop":
+        use_panel_product()
         # Its own tolerance takes the short intervals' small coefficients for a lack of rank.
         own |= {"linsol_lu_fact_tol": 1e-7, "mu_init": barrier}
         if barrier < FAR:

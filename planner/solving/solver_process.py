@@ -27,6 +27,7 @@ import numpy as np
 
 from ...mathematics.arrays import Array
 from .bounded import bounded, count, cpu_time
+from .panel_product import use_panel_product
 
 Answer = tuple[Array, dict[str, Any]]
 
@@ -159,6 +160,7 @@ def serve() -> None:
     """What the process does: answers calls until its input ends."""
     import casadi as ca
 
+    use_panel_product()
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # meant for the one that asks
     requests: IO[bytes] = os.fdopen(os.dup(0), "rb")
     answers: IO[bytes] = os.fdopen(os.dup(1), "wb")

@@ -52,7 +52,7 @@ class KernelBlock(Block):
                 f"{cls.__name__}: a KernelBlock has no step of its own; setup() sets kernel_calls, "
                 "and attend() does what needs Python. Derive from Block to write a step"
             )
-        cls.step = _step_in_file_of(cls)  # type: ignore[assignment]
+        cls.step = _step_in_file_of(cls)  # type: ignore[assignment]  # one for each class
 
     def step(self) -> None:
         for call in self.kernel_calls:

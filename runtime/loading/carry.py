@@ -74,7 +74,7 @@ class _Carrier:
         found = False
         for name in list(self._missing(draft)):
             if answers.get(name) is not None:
-                draft.quantities[name] = answers[name]  # type: ignore[assignment]
+                draft.quantities[name] = answers[name]  # type: ignore[assignment]  # answers were checked above
                 found = True
         return found
 
@@ -175,7 +175,7 @@ def answers_of(draft: Draft, given: Given) -> dict[str, Quantity | None] | None:
     if block_type is None or draft.params is None:
         return {f"{name}.{field_name}": UNCHECKED for name, field_name in carried}
     said = {}
-    silent = block_type.carried.__func__ is Block.carried.__func__  # type: ignore[attr-defined]
+    silent = block_type.carried.__func__ is Block.carried.__func__  # type: ignore[attr-defined]  # a class method
     if not silent:
         try:
             said = dict(block_type.carried(draft.params, given))

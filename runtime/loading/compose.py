@@ -150,7 +150,7 @@ class _Composer:
             )
             return None
         entries = tuple(
-            Entry(name, part.where, part.items[0].literal)  # type: ignore[arg-type]
+            Entry(name, part.where, part.items[0].literal)  # type: ignore[arg-type]  # a constant
             for name, part in parts.items()
         )
         return FlatWire("", self.wire.where, constant=MapNode(entries, self.wire.where))
@@ -305,7 +305,7 @@ class _Composer:
         return draft
 
     def _report(self, message: str, where: object, **details: object) -> None:
-        self.problems.add(Code.SELECTION, message, where, **{"at": self.at, **details})  # type: ignore[arg-type]
+        self.problems.add(Code.SELECTION, message, where, **{"at": self.at, **details})  # type: ignore[arg-type]  # texts
 
 
 def said(plain: object) -> str:

@@ -25,7 +25,7 @@ _DEPTH = 100  # levels of nesting; PyYAML's own composer overflows the stack on 
 _BaseLoader: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 
 
-class _GraphLoader(_BaseLoader):  # type: ignore[misc]
+class _GraphLoader(_BaseLoader):  # type: ignore[misc]  # PyYAML is not typed
     """The safe loader, resolving plain scalars as in YAML 1.2."""
 
     yaml_implicit_resolvers: dict[Any, Any] = {}

@@ -146,7 +146,7 @@ class _Flattener:
 
     def _mapping(self, entry: Entry | None) -> MapNode | None:
         if entry is None or isinstance(entry.value, MapNode):
-            return entry.value if entry else None  # type: ignore[return-value]
+            return entry.value if entry else None  # type: ignore[return-value]  # a MapNode
         wrong_kind(entry.value, repr(entry.key), "a mapping", self.problems)
         return None
 

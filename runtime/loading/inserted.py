@@ -76,7 +76,7 @@ def insert_constant(reader: Draft, name: str, wire: FlatWire, values: Any) -> Bl
     signal: type[Any] = reader.inputs[name].signal
     return BlockSpec(
         path=f"{reader.flat.path}/{name}~constant",
-        block_type=constant_block_type(signal),  # type: ignore[arg-type]
+        block_type=constant_block_type(signal),  # type: ignore[arg-type]  # a class made here
         params=ConstantParameters(value=values),
         wires={},
         dimensions=reader.dimensions,

@@ -147,8 +147,10 @@ def wrong_kind(node: Node, what: str, expected: str, problems: Problems, **detai
 
 
 def _mapping(entry: Entry | None, problems: Problems) -> MapNode | None:
-    if entry is None or isinstance(entry.value, MapNode):
-        return entry.value if entry else None  # type: ignore[return-value]
+    if entry is None:
+        return None
+    if isinstance(entry.value, MapNode):
+        return entry.value
     if isinstance(entry.value, ScalarNode) and entry.value.value is None:
         return None  # an empty section; perhaps all its lines are commented out
     wrong_kind(entry.value, repr(entry.key), "a mapping", problems)

@@ -12,7 +12,6 @@ import threading
 from contextlib import suppress
 from mmap import mmap
 from pathlib import Path
-from types import TracebackType
 from typing import Self
 
 import numpy as np
@@ -60,12 +59,7 @@ class FreezeGuard:
         faulthandler.register(signal.SIGUSR1, self._pipe, all_threads=True)
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
         self._process.wait()
 

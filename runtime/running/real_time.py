@@ -16,6 +16,9 @@ from ..language.errors import AloftError
 
 _LOCK_ALL = 3
 """``MCL_CURRENT | MCL_FUTURE``: memory that is there, and memory that is still to come."""
+_ON_FAULT = 4
+"""``MCL_ONFAULT``: only what is in use. Else all that the process has reserved becomes memory in use,
+which libraries do by the gigabyte."""
 
 
 class RealTimeError(AloftError):
@@ -42,7 +45,7 @@ class RealTime:
         Raises:
             RealTimeError: something is refused; the text says what and what helps.
         """
-        with self.granted():
+        with self._granted(_LOCK_ALL | _ON_FAULT):
             pass
 
     @contextmanager
@@ -52,13 +55,18 @@ class RealTime:
         Raises:
             RealTimeError: as for ``check``.
         """
+        with self._granted(_LOCK_ALL):
+            yield
+
+    @contextmanager
+    def _granted(self, lock: int) -> Iterator[None]:
         with ExitStack() as after:
             if self.cpu is not None:
                 allowed = os.sched_getaffinity(0)
                 _pin(self.cpu)
                 after.callback(os.sched_setaffinity, 0, allowed)
             if self.lock_memory:
-                _lock_memory()
+                _lock_memory(lock)
                 after.callback(_libc().munlockall)
             if self.priority is not None:
                 before = os.sched_getscheduler(0), os.sched_getparam(0)
@@ -94,8 +102,8 @@ def _raise_priority(priority: int) -> None:
         ) from error
 
 
-def _lock_memory() -> None:
-    if _libc().mlockall(_LOCK_ALL) != 0:
+def _lock_memory(how: int) -> None:
+    if _libc().mlockall(how) != 0:
         reason = os.strerror(ctypes.get_errno())
         raise RealTimeError(
             f"--lock-memory: the system does not allow it ({reason}); `aloft doctor` says how to "

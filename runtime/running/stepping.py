@@ -12,7 +12,6 @@
 from __future__ import annotations
 
 from difflib import get_close_matches
-from types import TracebackType
 from typing import Any, Self
 
 import numpy as np
@@ -58,12 +57,7 @@ class SteppedRun:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def close(self) -> None:
@@ -165,7 +159,7 @@ class SteppedRun:
                 f"{name!r} is no block blocks.External, which alone can be set; "
                 f"there is {', '.join(external) or 'none'}"
             )
-        target: NDArray[np.float64] = block.x.value  # type: ignore[attr-defined]
+        target: NDArray[np.float64] = block.x.value  # type: ignore[attr-defined]  # of blocks.External
         array = np.asarray(value, np.float64)
         if array.shape not in ((), target.shape):
             raise ValueError(f"{path} has shape {target.shape}, not {array.shape}")

@@ -116,7 +116,7 @@ def _names(code: CodeType) -> Iterator[str]:
 def _ports_used(subject: Subject) -> None:
     """Every declared port is named somewhere in the code of the class."""
     kind = subject.block_type
-    if kind.fitted.__func__ is not Block.fitted.__func__:  # type: ignore[attr-defined]
+    if kind.fitted.__func__ is not Block.fitted.__func__:  # type: ignore[attr-defined]  # a class method
         return  # its ports follow from its parameters, so no code can name them
     used: dict[str, None] = {}
     for owner in kind.__mro__:

@@ -67,7 +67,7 @@ def process_results(
             if not busy:
                 return
             for pipe in wait(list(busy)):
-                worker = busy[pipe]  # type: ignore[index]
+                worker = busy[pipe]  # type: ignore[index]  # wait gives what it got
                 try:
                     message = worker.pipe.recv()
                 except (EOFError, OSError):

@@ -96,9 +96,16 @@ def hopping(tick: int) -> Inputs:
     return {"reference": {"phase": Phase.FLIGHT}, "phase": phase}
 
 
-def tottering(*velocity: float, turning: float = 0.0) -> Callable[[int], Inputs]:
-    """After a touchdown the robot moves so fast that its feet cannot hold it; it stays where it is."""
-    points = np.array([[x, y, 0.0] for y in (-0.076, 0.076) for x in (0.0425, -0.0425)])
+def tottering(
+    *velocity: float, turning: float = 0.0, heels: float = 0.0
+) -> Callable[[int], Inputs]:
+    """After a touchdown the robot moves so fast that its feet cannot hold it; it stays where it is.
+
+    Its heels are so high above the ground.
+    """
+    points = np.array(
+        [[x, y, z] for y in (-0.076, 0.076) for x, z in ((0.0425, 0.0), (-0.0425, heels))]
+    )
 
     def inputs(tick: int) -> Inputs:
         since = 0.002 * tick
@@ -152,6 +159,18 @@ def reacting(tick: int) -> Inputs:
     return {**inputs, "terms": {**inputs["terms"], **turned, **matrices}}
 
 
+def nearly_landed(tick: int) -> Inputs:
+    """A plan in flight, 50 ms before its touchdown."""
+    return {"reference": {"phase": int(Phase.FLIGHT), "time": 0.35, "touchdown_time": 0.4}}
+
+
+def leaning(tick: int) -> Inputs:
+    """The same with a torso that tilts the other way."""
+    inputs = reacting(tick)
+    turned = {"base_rotation": [[0.8, 0.0, -0.6], [0.0, 1.0, 0.0], [0.6, 0.0, 0.8]]}
+    return {**inputs, "terms": {**inputs["terms"], **turned}}
+
+
 SCENES: Mapping[str, list[Scene]] = {
     "blocks.Step": [Scene({"at": 0.1})],
     "blocks.Timer": [Scene({"duration": 0.1}, lambda tick: {"u": {"value": True}})],
@@ -177,6 +196,7 @@ SCENES: Mapping[str, list[Scene]] = {
         Scene({}, pushed),
         Scene({"law": "predicted"}, reacting),
         Scene({"law": "predicted", "height_range": (0.0, 0.0)}, reacting),
+        Scene({"law": "predicted", "height_range": (-0.5, 0.0)}, leaning),
     ],
     "blocks.CaptureStep": [
         Scene({"steps": 1, "after": 0.01, "duration": 0.05, "settle": 0.02}, tottering(-0.8, 0.1)),
@@ -189,8 +209,19 @@ SCENES: Mapping[str, list[Scene]] = {
             Scene({"steps": 1, "after": 0.01, "turn": 0.9}, tottering(-0.35, 0.0, turning=k))
             for k in np.linspace(-0.3, 0.3, 7)
         ),
+        *(
+            Scene({"steps": 1, "after": 0.01}, tottering(-0.8, 0.1, heels=heels))
+            for heels in (0.0003, 0.00045, 0.00055, 0.0008)
+        ),
     ],
-    "blocks.LegInverseKinematics": [Scene({"speed_limit": 0.5}), Scene({"level": 0.9})],
+    "blocks.LegInverseKinematics": [
+        Scene({"speed_limit": 0.5}),
+        Scene({"level": 0.9}),
+        *(
+            Scene({"follow": "plan", "level_time": 0.1, "turn_gain": gain}, nearly_landed)
+            for gain in (0.5, 0.002)
+        ),
+    ],
     "blocks.WholeBodyController": [
         Scene({"force_max": 20.0, "force_min": 1.0}),
         Scene({"tasks": ["ContactPoints", {"task": "Posture", "gains": {"joints": ["*"]}}]}),

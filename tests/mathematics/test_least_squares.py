@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from aloft.mathematics.least_squares import solve_damped, solve_positive
+from aloft.mathematics.least_squares import solve_damped, solve_positive, solve_rows
 
 square = arrays(np.float64, (5, 5), elements=st.floats(-1.0, 1.0))
 
@@ -20,6 +20,15 @@ def test_solve_positive(a):
     vector = matrix @ solution
     solve_positive(matrix.copy(), vector)
     assert np.abs(vector - solution).max() < 1e-9
+
+
+@given(square)
+def test_every_row_is_a_right_hand_side(a):
+    matrix = a @ a.T + 0.1 * np.eye(5)
+    solutions = np.arange(1.0, 11.0).reshape(2, 5)
+    rows = solutions @ matrix
+    solve_rows(matrix.copy(), rows)
+    assert np.abs(rows - solutions).max() < 1e-9
 
 
 @given(square, st.floats(0.01, 1.0))

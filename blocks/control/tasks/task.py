@@ -65,7 +65,7 @@ class Task(ABC, Generic[G]):
 
     def prepare(self, gains: Any) -> G:
         """Convert ``Gains`` to the argument of ``update``; called only when the gains are set."""
-        return gains  # type: ignore[no-any-return]
+        return gains  # type: ignore[no-any-return]  # one without types of its own
 
     @abstractmethod
     def update(self, gains: G) -> None:

@@ -103,6 +103,20 @@ def test_which_foot_steps_and_that_the_other_stands(velocity, foot):
     assert (np.sign(pushed[:, along]) == np.sign(velocity[along])).all()
 
 
+def test_a_heel_that_hovers_carries_nothing_while_the_other_foot_steps():
+    for heel, stands in ((0.0004, True), (0.003, False)):
+        bench = make(flat=0.0005)
+        points = POINTS.copy()
+        points[3, 2] = heel  # of the left foot
+        bench.set("terms", contact_position=points)
+        run(bench, 0.08, velocity=(-0.6, 0.15))
+        assert bench.get("phase").stance.all()  # no foot steps yet
+        run(bench, 0.12, velocity=(-0.6, 0.15))
+        out = bench.get("phase")
+        assert out.stepping.tolist() == [True, True, False, False]
+        assert out.stance.tolist() == [False, False, True, stands]
+
+
 def test_a_step_ends_at_contact_and_there_are_no_more_than_allowed():
     bench = make(steps=1, duration=0.13)
     run(bench, 0.12, velocity=(-0.6, 0.15))

@@ -108,6 +108,20 @@ def test_predicted_tucks_the_legs_where_the_torso_falls_back_and_stretches_them_
     assert moved[:, 2] == pytest.approx([0.2 * height - stroke] * 2, abs=1e-6)
 
 
+def test_predicted_stretches_the_legs_so_far_that_they_touch_down_early_by_a_share_of_the_flight():
+    params = {"tilt_cost": [0.0, 3.0], "free_tilt": [0.0, 0.0, 0.0], "height_range": [-0.5, 0.2]}
+    speed = GRAVITY * 0.2 + 0.5  # at touchdown, of a body that falls at 0.5 m/s 0.2 s before it
+    for early in (0.0, 0.02, 0.05):
+        bench, planned = predicting(**params, early=early)
+        bench.set("terms", com_velocity=[0.0, 0.0, -0.5])
+        moved = pushed(bench, [3.0, 0.0, 0.0], [0.0, 0.5, 0.0]) - planned
+        assert moved[:, 2] == pytest.approx([-early * 0.2 * speed] * 2, abs=1e-5)
+    bench, planned = predicting(**{**params, "height_range": [-0.01, 0.2]}, early=0.05)
+    moved = pushed(bench, [3.0, 0.0, 0.0], [0.0, 0.5, 0.0]) - planned
+    height = -float(standing_feet(ROBOT)[:, 2].mean())
+    assert moved[:, 2] == pytest.approx([-0.01 * height] * 2, abs=1e-5)
+
+
 def test_predicted_reaches_the_touchdown_of_tucked_legs_after_that_of_the_planned_ones():
     """The feet come upwards at the last, at ``retraction``, also where shorter legs land late."""
     params = {"tilt_cost": [0.0, 0.3], "free_tilt": [0.0, 0.0, 0.0], "stop_acceleration": 100.0}

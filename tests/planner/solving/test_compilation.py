@@ -16,7 +16,7 @@ from aloft.planner.solving.compilation import FunctionSet, load_functions
 from aloft.robots.description import find_robot
 
 PIECES = ("slow", "quick")
-needs_compiler = pytest.mark.skipif(compilation._compiler() is None, reason="no C compiler")
+needs_compiler = pytest.mark.skipif(compilation.find_compiler() is None, reason="no C compiler")
 
 
 def make(name: str) -> Piece:
@@ -62,7 +62,7 @@ def test_once_compiled_always_there(made: list[str], monkeypatch: pytest.MonkeyP
 
 
 def test_without_a_compiler(made: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(compilation, "_compiler", lambda: None)
+    monkeypatch.setattr(compilation, "find_compiler", lambda: None)
     assert values(load()) == [[4.5, 6.0]] * 2
     assert made == []
     assert not list(compilation.cache_folder().rglob("*"))

@@ -22,8 +22,8 @@ from aloft.runtime.links.zenoh_transport import ZenohTransport, session_config
 from aloft.runtime.placement.place import place
 from aloft.runtime.placement.placed import PlacedGraph
 
+from ...waiting import free_port, wait_for
 from .example_graphs import ring
-from .test_zenoh_transport import free_port, wait_for
 
 pytest.importorskip("cryptography")
 COMMANDS = "aloft/{}/data/far/onboard/last"

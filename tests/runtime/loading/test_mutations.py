@@ -103,9 +103,16 @@ def mutated(draw: st.DrawFn, text: str) -> str:
     return text
 
 
-@settings(max_examples=1000, deadline=None)
+@settings(max_examples=200, deadline=None)
 @given(mutated(GRAPH), mutated(without_spare(LEG)), mutated(MORE))
 def test_mutated_files(graph: str, leg: str, more: str) -> None:
+    survives(graph, leg, more, [])
+
+
+@pytest.mark.long
+@settings(max_examples=1000, deadline=None)
+@given(mutated(GRAPH), mutated(without_spare(LEG)), mutated(MORE))
+def test_many_mutated_files(graph: str, leg: str, more: str) -> None:
     survives(graph, leg, more, [])
 
 

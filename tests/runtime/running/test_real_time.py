@@ -114,3 +114,6 @@ def test_memory_is_locked_within_and_unlocked_after(monkeypatch: pytest.MonkeyPa
     with within():
         pass
     assert calls == ["lock 3", "run", "unlock"]
+    calls.clear()
+    RealTime(lock_memory=True).check()
+    assert calls == ["lock 7", "unlock"]  # 4: what is only reserved stays so
