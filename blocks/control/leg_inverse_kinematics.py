@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Iterable
 from typing import Literal
@@ -27,7 +28,11 @@ from ...runtime.language.kernel_block import KernelBlock
 from ...runtime.language.parameters import Parameters, live_parameter, parameter
 from ...runtime.language.signals import Field, Signal
 from ..signals import FootTarget, JointState, JointTarget, JumpReference
-from .leg_targets import PlannedJoints, begin_targets, end_targets
+from .followed_plan import Following, PlannedJoints, Soles
+from .leg_targets import begin_targets, end_targets
+
+LATERAL = 0.9
+"""Component along the base's y axis from which on a joint's axis is taken for lateral."""
 
 
 class LegMemory(Signal):
@@ -75,6 +80,19 @@ class LegInverseKinematics(KernelBlock):
     somersault depends on how far the legs are tucked, so its rotation is right only if all joints
     follow the plan.
 
+    A robot never turns exactly as planned, so the plan can be followed with regard to that, from the
+    targets of feet whose soles are level in the world (``landing.alpha`` 1). Let e be by how much the
+    base has turned further about its lateral axis than in the plan. The joints are those of the plan
+    later by::
+
+        plan_lead + turn_gain e,     the latter within turn_limit, and negative in a backward rotation
+
+    The lead grows until the middle of the flight and makes up for what drives lag behind. The term
+    with e counts from ``turn_time`` before the planned touchdown and ends with it: a robot that has
+    turned too far leaves its tuck earlier, and turns slower. From ``level_time`` before touchdown on the
+    last joint of each leg about the lateral axis turns the sole by -e, so that heel and toe touch
+    down together. It reaches that in half of the time. All three are off by default.
+
     Where a thigh is level, hip yaw and roll turn about one axis: a foot a few millimetres beside its
     planned place would ask for any yaw. The closed form keeps the yaw of the plan there, or straight
     ahead if there is no plan: below ``level``, the cosine of the hip's pitch, it goes over to it.
@@ -115,6 +133,27 @@ class LegInverseKinematics(KernelBlock):
             "feet", text="the feet's targets; those with the soles' planned pitch; or the plan's "
             "joints as long as the plan flies"
         )  # fmt: skip
+        plan_lead: float = live_parameter(
+            0.0, unit="s", ge=0.0, le=0.03,
+            text="by how much the joints are ahead of the plan's that they follow, from the middle of "
+            "the flight on",
+        )  # fmt: skip
+        level_time: float = live_parameter(
+            0.0, unit="s", ge=0.0, le=0.2,
+            text="how long before touchdown the soles of a plan that is followed begin to become "
+            "level; never with 0",
+        )  # fmt: skip
+        turn_gain: float = live_parameter(
+            0.0, unit="s/rad", ge=0.0, le=1.0,
+            text="by how much earlier the legs move for every rad that the base has turned further than in "
+            "the plan",
+        )  # fmt: skip
+        turn_time: float = live_parameter(
+            0.2, unit="s", gt=0.0, text="how long before touchdown they begin to do that"
+        )
+        turn_limit: float = live_parameter(
+            0.012, unit="s", ge=0.0, le=0.02, text="how much earlier or later they move at most"
+        )
         beyond: Literal["turn", "slide"] = live_parameter(
             "turn", text="where errors are allowed first for a target out of reach"
         )
@@ -148,6 +187,7 @@ class LegInverseKinematics(KernelBlock):
     def setup(self) -> None:
         robot, p, memory = self.robot, self.params, self.memory
         self._settings = leg_settings()
+        self._following = Following(*(np.zeros(1) for _ in Following._fields))
         self.on_parameters()
         self._target = LegTargets(*(getattr(self.target, name) for name in LegTargets._fields))
         held = {
@@ -165,8 +205,9 @@ class LegInverseKinematics(KernelBlock):
             legs += self._least_squares(foot) if leg is None else self._closed_form(foot, leg)
         plan = PlannedJoints(*(getattr(self.reference, name) for name in PlannedJoints._fields))
         end = KernelCall(
-            end_targets, p.follow == "plan", plan, self._target, memory.known, memory.position
-        )
+            end_targets, p.follow == "plan", self._following, self._soles(), plan, self._target,
+            memory.known, memory.position,
+        )  # fmt: skip
         self.kernel_calls = (begin, *legs, end)
 
     def on_parameters(self) -> None:
@@ -175,6 +216,27 @@ class LegInverseKinematics(KernelBlock):
         settings.damping[0], settings.speed_limit[0] = p.damping, p.speed_limit
         settings.level[0] = p.level
         settings.slides[0] = p.beyond == "slide"
+        for name in Following._fields:
+            getattr(self._following, name)[0] = getattr(p, name)
+
+    def _soles(self) -> Soles:
+        """The last joint of every leg that turns a sole with an extent about the lateral axis."""
+        robot, margin = self.robot, self.params.margin
+        joints, axes = [], []
+        for number, foot in enumerate(robot.feet):
+            chain = chain_to(robot, foot.link)
+            turning = [joint for joint in chain if abs(robot.joints[joint].axis[1]) > LATERAL]
+            if robot.foot_of_contact().count(number) < 2 or not turning:
+                turning, axis = [chain[-1]], 0.0
+            else:
+                axis = math.copysign(1.0, robot.joints[turning[-1]].axis[1])
+            joints.append(turning[-1])
+            axes.append(axis)
+        limits = robot.joint_limits[joints]
+        return Soles(
+            self.feet.rotation, np.array(joints, np.int64), np.array(axes), limits[:, 0] + margin,
+            limits[:, 1] - margin,
+        )  # fmt: skip
 
     def _closed_form(self, foot: int, leg: Leg) -> tuple[KernelCall, KernelCall]:
         """The calls for a five-joint leg."""

@@ -2,22 +2,13 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 from ...mathematics.arrays import Array, Flags, Indices
 from ...mathematics.kernel import kernel
 from ...robots.five_joint_track import LegTargets
 from ..signals import Phase
+from .followed_plan import Following, PlannedJoints, Soles, follow_plan
 
 _FLIGHT = int(Phase.FLIGHT)
-
-
-class PlannedJoints(NamedTuple):
-    """The fields of ``JumpReference`` that say what the joints should do."""
-
-    phase: Indices
-    joint_position: Array
-    joint_velocity: Array
 
 
 @kernel
@@ -32,15 +23,17 @@ def begin_targets(measured: Array, held: Indices, angles: Array, target: LegTarg
 
 @kernel
 def end_targets(
-    follows: bool, plan: PlannedJoints, target: LegTargets, known: Flags, found: Array
+    follows: bool,
+    following: Following,
+    soles: Soles,
+    plan: PlannedJoints,
+    target: LegTargets,
+    known: Flags,
+    found: Array,
 ) -> None:
     """Take the plan's joints instead where it flies and is followed; remember what was ``found``."""
     if follows and int(plan.phase[()]) == _FLIGHT:
-        for joint in range(found.shape[0]):
-            target.position[joint] = plan.joint_position[joint]
-            target.velocity[joint] = plan.joint_velocity[joint]
-        for foot in range(target.reachable.shape[0]):
-            target.reachable[foot] = True
+        follow_plan(following, soles, plan, target)
     for joint in range(found.shape[0]):
         found[joint] = target.position[joint]
     known[()] = True

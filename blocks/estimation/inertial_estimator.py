@@ -84,17 +84,7 @@ class InertialParameters(Parameters):
 class InertialEstimator(KernelBlock):
     """The base of estimators that integrate the IMU and are corrected by the legs (paper, II-B).
 
-    **Prediction.** The angular velocity w, which is the gyroscope minus its bias, is integrated to
-    the orientation R. The specific force f, which is the accelerometer minus its bias, is rotated
-    to the world and integrated to velocity and position::
-
-        R' = R [w]x,   v' = R f + g,   p' = v
-
-    **Correction by the legs.** Let r_i(q) be a contact point relative to the base. If the point is
-    at rest in the world at a_i, then v = -R (J_i q' + w x r_i) and p = a_i - R r_i. The estimate is
-    corrected towards both with the gains ``velocity_gain`` and ``position_gain`` per tick, so the
-    legs' noise is averaged over 1/gain ticks; there is no lag, because the IMU predicts the motion
-    meanwhile. a_i is set when the point touches down.
+    ``StateEstimator`` has the equations of prediction and of the correction by the legs.
 
     **Flight.** While no point is trusted there is only the prediction. ``flight: imu`` integrates
     the IMU. ``flight: ballistic`` averages the CoM's velocity by the IMU over the first 20 ms; from

@@ -159,6 +159,11 @@ def reacting(tick: int) -> Inputs:
     return {**inputs, "terms": {**inputs["terms"], **turned, **matrices}}
 
 
+def nearly_landed(tick: int) -> Inputs:
+    """A plan in flight, 50 ms before its touchdown."""
+    return {"reference": {"phase": int(Phase.FLIGHT), "time": 0.35, "touchdown_time": 0.4}}
+
+
 def leaning(tick: int) -> Inputs:
     """The same with a torso that tilts the other way."""
     inputs = reacting(tick)
@@ -209,7 +214,14 @@ SCENES: Mapping[str, list[Scene]] = {
             for heels in (0.0003, 0.00045, 0.00055, 0.0008)
         ),
     ],
-    "blocks.LegInverseKinematics": [Scene({"speed_limit": 0.5}), Scene({"level": 0.9})],
+    "blocks.LegInverseKinematics": [
+        Scene({"speed_limit": 0.5}),
+        Scene({"level": 0.9}),
+        *(
+            Scene({"follow": "plan", "level_time": 0.1, "turn_gain": gain}, nearly_landed)
+            for gain in (0.5, 0.002)
+        ),
+    ],
     "blocks.WholeBodyController": [
         Scene({"force_max": 20.0, "force_min": 1.0}),
         Scene({"tasks": ["ContactPoints", {"task": "Posture", "gains": {"joints": ["*"]}}]}),

@@ -3,7 +3,6 @@
 import io
 import json
 import os
-import shutil
 import subprocess
 import sys
 from collections.abc import Callable
@@ -15,14 +14,13 @@ import pytest
 
 from aloft.cli import main
 
-HERE = Path(__file__).parent
+from ..counting import copy_counting
 
 
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A folder with a graph and its block, which is where commands run."""
-    for name in ("counter.py", "count.yaml"):
-        shutil.copy(HERE / name, tmp_path)
+    copy_counting(tmp_path)
     monkeypatch.chdir(tmp_path)
     return tmp_path
 
@@ -31,16 +29,15 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def counted(tmp_path_factory: pytest.TempPathFactory) -> bytes:
     """The recording of ``count.yaml`` as it stands: made once, as that takes a second."""
     folder = tmp_path_factory.mktemp("counted")
-    for name in ("counter.py", "count.yaml"):
-        shutil.copy(HERE / name, folder)
+    copy_counting(folder)
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(folder)
         run_here("run", "count.yaml", "--record", "count.rrd", "--quiet")
     return (folder / "count.rrd").read_bytes()
 
 
-def run_here(*arguments: str, code: int = 0) -> subprocess.CompletedProcess[str]:
-    """Run the command line in this process and check how it would leave."""
+def outcome(*arguments: str, columns: int = 160) -> subprocess.CompletedProcess[str]:
+    """Run the command line in this process; how it would leave, and what it printed."""
     output, errors = io.StringIO(), io.StringIO()
     with (
         pytest.MonkeyPatch.context() as patch,
@@ -49,10 +46,19 @@ def run_here(*arguments: str, code: int = 0) -> subprocess.CompletedProcess[str]
         pytest.raises(SystemExit) as left,
     ):
         patch.setattr(sys, "argv", ["aloft", *arguments])
-        patch.setenv("COLUMNS", "160")
+        patch.setenv("COLUMNS", str(columns))
         main()
-    assert left.value.code == code, output.getvalue() + errors.getvalue()
-    return subprocess.CompletedProcess(arguments, code, output.getvalue(), errors.getvalue())
+    assert isinstance(left.value.code, int)
+    return subprocess.CompletedProcess(
+        arguments, left.value.code, output.getvalue(), errors.getvalue()
+    )
+
+
+def run_here(*arguments: str, code: int = 0) -> subprocess.CompletedProcess[str]:
+    """As ``outcome``, and check how it would leave."""
+    done = outcome(*arguments)
+    assert done.returncode == code, done.stdout + done.stderr
+    return done
 
 
 def run_for_json(*arguments: str, code: int = 0) -> dict[str, Any]:

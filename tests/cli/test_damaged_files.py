@@ -5,35 +5,23 @@ crash. The number of tries is small so that the test takes a bounded time; ``ALO
 it longer.
 """
 
-import io
 import os
 import random
-import sys
-from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
 
 import pytest
 
-from aloft.cli import main
 from aloft.planner.library.shipped import shipped_folder
+
+from .conftest import outcome
 
 TRIES = int(os.environ.get("ALOFT_FUZZ", "12"))
 
 
-def outcome(*arguments: str) -> tuple[int, str]:
+def left(*arguments: str) -> tuple[int, str]:
     """The exit code and all that was printed."""
-    printed = io.StringIO()
-    with (
-        pytest.MonkeyPatch.context() as patch,
-        redirect_stdout(printed),
-        redirect_stderr(printed),
-        pytest.raises(SystemExit) as left,
-    ):
-        patch.setattr(sys, "argv", ["aloft", *arguments])
-        patch.setenv("COLUMNS", "200")
-        main()
-    assert isinstance(left.value.code, int)
-    return left.value.code, printed.getvalue()
+    done = outcome(*arguments, columns=200)
+    return done.returncode, done.stdout + done.stderr
 
 
 def damaged(data: bytes, draw: random.Random) -> bytes:
@@ -71,14 +59,14 @@ def test_a_damaged_recording(
 ) -> None:
     data, draw = counted, random.Random(" ".join(command))
     (folder / "whole.rrd").write_bytes(data)
-    good, said = outcome(*(part.format("whole.rrd") for part in command))
+    good, said = left(*(part.format("whole.rrd") for part in command))
     assert good == 0, said
     refused = 0
     capfd.readouterr()
     for number in range(TRIES):
         file = folder / f"damaged{number}.rrd"
         file.write_bytes(damaged(data, draw))
-        code, printed = outcome(*(part.format(file.name) for part in command))
+        code, printed = left(*(part.format(file.name) for part in command))
         assert code in (0, 1, 2), printed
         assert "Traceback" not in printed
         assert capfd.readouterr() == ("", "")  # no library writes lines of its own
@@ -96,6 +84,6 @@ def test_a_damaged_plan(folder: Path) -> None:
     for number in range(TRIES):
         file = kept / f"damaged{number}.npz"
         file.write_bytes(damaged(data, draw))
-        code, printed = outcome("plan", "--list", "--keep", str(kept), "--json")
+        code, printed = left("plan", "--list", "--keep", str(kept), "--json")
         assert code in (0, 2), printed
         assert "Traceback" not in printed

@@ -17,7 +17,7 @@ from aloft.runtime.links.observer import Observer
 from aloft.runtime.loading import load
 from aloft.runtime.placement.place import place
 
-from ..runtime.links.test_zenoh_transport import wait_for
+from ..waiting import wait_for
 from .conftest import run_elsewhere, run_for_json, run_here
 from .test_run_local import BLOCKS, GRAPH, free_port
 

@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 
 import aloft
+from aloft.mathematics.compiling.compile_calls import compile_calls
 from aloft.runtime.language.stages import CheckedGraph
 from aloft.runtime.running.executor import Executor
 from aloft.runtime.running.memory import BoundGraph
@@ -15,8 +16,12 @@ BEFORE, AFTER = 600, 300
 """Ticks: thrust, flight and landing come after the snapshot."""
 
 
-def started(graph: CheckedGraph) -> Executor:
+def started(graph: CheckedGraph, *, plain: bool = False) -> Executor:
+    """A run before its first tick, as machine code unless it is to be ``plain`` Python."""
     executor = Executor(BoundGraph(graph))
+    if not plain:
+        assert compile_calls(executor.bound.kernel_calls) == ""
+        executor.ticker.fuse()
     executor.life.start()
     return executor
 
@@ -50,8 +55,12 @@ def test_restored_in_place_and_in_a_new_graph(graph: CheckedGraph) -> None:
 
 
 def test_no_tick_allocates_more_arrays_than_its_blocks_declare(graph: CheckedGraph) -> None:
-    executor = started(graph)
-    executor.ticker.advance(BEFORE)
+    compiled, executor = (
+        started(graph),
+        started(graph, plain=True),
+    )  # whose mathematics is seen, too
+    compiled.ticker.advance(BEFORE)
+    executor.bound.restore(compiled.bound.snapshot())
     declared = sum(spec.block_type.array_allocations for spec in graph.blocks)
     for tick in range(BEFORE, BEFORE + AFTER):
         with count_array_allocations() as counted:

@@ -12,23 +12,10 @@ from hypothesis import strategies as st
 from aloft.mathematics import inertial_filter as inertial
 from aloft.mathematics import rotations
 
+from ..turns import quaternion_of, turn_between
+
 small = st.floats(-0.1, 0.1)
 angles = st.floats(-1.0, 1.0)
-
-
-def quaternion(*vector):
-    out = np.empty(4)
-    rotations.exponential(np.array(vector, dtype=float), out)
-    return out
-
-
-def between(a, b):
-    """The rotation vector from b to a, in the world."""
-    inverse, product, out = np.empty(4), np.empty(4), np.empty(3)
-    rotations.conjugate(b, inverse)
-    rotations.multiply(a, inverse, product)
-    rotations.logarithm(product, out)
-    return out
 
 
 def turned_back(orientation, vector):
@@ -54,11 +41,11 @@ def test_propagate_follows_a_turning_and_accelerating_body():
     assert v[:2] == pytest.approx(
         np.array([-math.sin(angle), math.cos(angle)]) * radius * spin, abs=1e-5
     )
-    assert np.abs(between(q, quaternion(0, 0, angle))).max() < 1e-12
+    assert np.abs(turn_between(q, quaternion_of((0, 0, angle)))).max() < 1e-12
 
 
 def test_propagate_falls_freely():
-    q, p, v = quaternion(0.3, -0.2, 0.1), np.zeros(3), np.array([1.0, 0, 2.0])
+    q, p, v = quaternion_of((0.3, -0.2, 0.1)), np.zeros(3), np.array([1.0, 0, 2.0])
     for _ in range(100):
         inertial.propagate(
             q, p, v, np.zeros(3), np.zeros(3), np.zeros(3), 0.002, np.empty(4), np.empty(3)
@@ -69,19 +56,19 @@ def test_propagate_falls_freely():
 
 @given(small, small, small)
 def test_turn_is_the_exponential_from_the_left(x, y, z):
-    q = quaternion(0.4, 0.5, -0.6)
-    expected, turn = np.empty(4), quaternion(x, y, z)
+    q = quaternion_of((0.4, 0.5, -0.6))
+    expected, turn = np.empty(4), quaternion_of((x, y, z))
     rotations.multiply(turn, q, expected)
     inertial.turn(q, x, y, z)
-    assert np.abs(between(q, expected)).max() < 1e-3
+    assert np.abs(turn_between(q, expected)).max() < 1e-3
     assert np.linalg.norm(q) == pytest.approx(1.0)
 
 
 @given(angles, angles, st.floats(-3.0, 3.0))
 def test_upright_finds_the_tilt_from_gravity(roll, pitch, heading):
-    lean = quaternion(roll, pitch, 0.0)
+    lean = quaternion_of((roll, pitch, 0.0))
     q, found, up = np.empty(4), np.empty(4), np.empty(3)
-    rotations.multiply(quaternion(0, 0, heading), lean, q)
+    rotations.multiply(quaternion_of((0, 0, heading)), lean, q)
     force = turned_back(q, [0.0, 0.0, 9.7])
     inertial.upright(force, found)
     rotations.rotate(found, force, up)
@@ -98,9 +85,9 @@ def test_upright_without_a_force_and_upside_down():
 
 def test_right_up_converges_to_upright_and_keeps_the_heading():
     q = np.empty(4)
-    rotations.multiply(quaternion(0.1, -0.2, 0), quaternion(0, 0, 0.5), q)
+    rotations.multiply(quaternion_of((0.1, -0.2, 0)), quaternion_of((0, 0, 0.5)), q)
     before = rotations.yaw(q)
-    force = turned_back(quaternion(0, 0, 0.5), [0.0, 0.0, 9.81])
+    force = turned_back(quaternion_of((0, 0, 0.5)), [0.0, 0.0, 9.81])
     for _ in range(2000):
         inertial.right_up(q, force, 0.01, np.empty(3))
     assert rotations.tilt(q) < 1e-6
@@ -109,7 +96,7 @@ def test_right_up_converges_to_upright_and_keeps_the_heading():
 
 @given(small, small, small)
 def test_misalignment_levels_the_feet_and_faces_forward(x, y, z):
-    true = quaternion(0.5, 0.3, -0.2)
+    true = quaternion_of((0.5, 0.3, -0.2))
     place = np.array([[0.05, -0.08, 0], [-0.035, -0.08, 0], [0.05, 0.08, 0], [-0.035, 0.08, 0]])
     points = np.array([turned_back(true, row - [0.01, 0.02, 0.38]) for row in place])
     forward = turned_back(true, [2.0, 0.0, 0.0])
@@ -118,13 +105,13 @@ def test_misalignment_levels_the_feet_and_faces_forward(x, y, z):
     for _ in range(10):
         assert inertial.misalignment(q, points, forward, error, np.empty(3))
         inertial.turn(q, *error.tolist())
-    assert np.abs(between(q, true)).max() < 1e-9
+    assert np.abs(turn_between(q, true)).max() < 1e-9
 
 
 def test_misalignment_is_first_order_exact():
     """One step takes a small error away up to its square."""
     points = np.array([[0.05, -0.08, -0.4], [-0.03, -0.08, -0.4], [0.05, 0.08, -0.4]])
-    q, error = quaternion(1e-3, -2e-3, 3e-3), np.empty(3)
+    q, error = quaternion_of((1e-3, -2e-3, 3e-3)), np.empty(3)
     inertial.misalignment(q, points, np.array([1.0, 0, 0]), error, np.empty(3))
     assert error == pytest.approx([-1e-3, 2e-3, -3e-3], abs=1e-5)
 
@@ -133,7 +120,9 @@ def test_points_in_one_line_say_nothing():
     points = np.array([[0.05, 0.0, -0.4], [0.0, 0.0, -0.4], [-0.03, 0.0, -0.4]])
     error = np.ones(3)
     forward = np.array([1.0, 0, 0])
-    assert not inertial.misalignment(quaternion(0.1, 0, 0), points, forward, error, np.empty(3))
+    assert not inertial.misalignment(
+        quaternion_of((0.1, 0, 0)), points, forward, error, np.empty(3)
+    )
     assert not error.any()
 
 

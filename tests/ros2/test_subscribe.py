@@ -11,7 +11,7 @@ from aloft.ros2.names import attachment
 from aloft.ros2.subscribe import Subscribe
 from aloft.runtime.testing.bench import BlockBench
 
-from .conftest import wait_for
+from ..waiting import wait_for
 
 pytest.importorskip("rosbags")
 TWIST = MessageType("geometry_msgs/msg/Twist", "jazzy", {})

@@ -1,6 +1,5 @@
 """A folder with a graph whose runs are quick, and studies of it."""
 
-import shutil
 from collections.abc import Callable
 from pathlib import Path
 
@@ -9,14 +8,13 @@ import pytest
 from aloft.studies.reading import read_study
 from aloft.studies.study import Study
 
-CLI = Path(__file__).parent.parent / "cli"
+from ..counting import copy_counting
 
 
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """``counter.py`` and ``count.yaml``, which is where commands run."""
-    for name in ("counter.py", "count.yaml"):
-        shutil.copy(CLI / name, tmp_path)
+    copy_counting(tmp_path)
     monkeypatch.chdir(tmp_path)
     return tmp_path
 

@@ -24,6 +24,7 @@ def cluster(folder: Path) -> Iterator[str]:
         yield address
 
 
+@pytest.mark.long
 def test_the_table_is_the_same_on_a_cluster(folder: Path, cluster: str) -> None:
     (folder / "study.yaml").write_text(
         "graph: count.yaml\nseeds: 0:6\narms: {a: {counter.goal: 104}, b: {counter.fail_at: 9}}\n"

@@ -17,16 +17,12 @@ from aloft.robots.description import find_robot
 from aloft.runtime.language.errors import BlockError
 from aloft.runtime.testing import BlockBench
 
+from ...turns import quaternion_of
+
 ROBOT = find_robot("bruce")
 SEEN = ContactKinematics(ROBOT)
 PERIOD = 0.002
 NONE = np.zeros(10)
-
-
-def quaternion_of(vector):
-    out = np.empty(4)
-    rotations.exponential(np.asarray(vector, dtype=float), out)
-    return out
 
 
 def smooth(start, end, time):

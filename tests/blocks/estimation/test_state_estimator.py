@@ -14,25 +14,12 @@ from aloft.robots.description import find_robot
 from aloft.runtime.language.errors import BlockError
 from aloft.runtime.testing import BlockBench
 
+from ...turns import quaternion_of, turn_between
+
 ROBOT = find_robot("bruce")
 LEGS = [five_joint_leg.read_leg(ROBOT, foot) for foot in range(2)]
 PERIOD = 0.002
 STANDING_HEIGHT = 0.3796
-
-
-def quaternion_of(vector):
-    out = np.empty(4)
-    rotations.exponential(np.asarray(vector, dtype=float), out)
-    return out
-
-
-def turn_between(a, b):
-    """The size of the rotation from b to a [rad]."""
-    inverse, product, out = np.empty(4), np.empty(4), np.empty(3)
-    rotations.conjugate(b, inverse)
-    rotations.multiply(a, inverse, product)
-    rotations.logarithm(product, out)
-    return np.linalg.norm(out)
 
 
 class Motion:
@@ -111,7 +98,9 @@ class Run:
         return (
             np.linalg.norm(base.position - self.motion.position(time)),
             np.linalg.norm(base.linear_velocity - self.motion.velocity(time)),
-            turn_between(base.orientation, quaternion_of(self.motion.attitude(time))),
+            np.linalg.norm(
+                turn_between(base.orientation, quaternion_of(self.motion.attitude(time)))
+            ),
         )
 
 
@@ -363,7 +352,7 @@ def simulate(seed, kind=StateEstimator, **params):
             flying = not touched
             found["lift-off" if flying else "touchdown"] = (
                 np.linalg.norm(base.linear_velocity - truth.base_linear_velocity),
-                turn_between(base.orientation, truth.base_orientation),
+                np.linalg.norm(turn_between(base.orientation, truth.base_orientation)),
                 np.linalg.norm(base.position - truth.base_position),
             )
             if not flying and time > HOP_END + 0.1:

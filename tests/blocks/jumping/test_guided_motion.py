@@ -31,6 +31,21 @@ def motion(**changes):
     return Motion(**{**values, **changes})
 
 
+def moved(built, q, wanted, v, tolerance):
+    """Check centre of mass and rotation; gives the Jacobian of every sole."""
+    data = built.model.createData()
+    pin.computeCentroidalMomentum(built.model, data, q, v)
+    pin.centerOfMass(built.model, data, q, v)
+    assert data.vcom[0] == pytest.approx(wanted.com_velocity, abs=tolerance)
+    for axis in range(3):
+        found = data.hg.angular[axis] if wanted.by_momentum[axis] else v[3 + axis]
+        assert found == pytest.approx(wanted.rotation[axis], abs=tolerance)
+    world = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+    return [
+        pin.computeFrameJacobian(built.model, data, q, frame, world) for frame in built.sole_frames
+    ]
+
+
 @pytest.mark.parametrize(
     "by_momentum", [(False, False, False), (False, True, False), (True, True, True)]
 )
@@ -43,17 +58,7 @@ def test_the_velocity_is_the_one_asked_for(body, by_momentum):
         foot_velocity=np.array([[0.0, 0.0, 0.3], [0.1, 0.0, 0.0]]),
     )
     v = body.velocity(q, wanted)
-    data = BUILT.model.createData()
-    pin.computeCentroidalMomentum(BUILT.model, data, q, v)
-    pin.centerOfMass(BUILT.model, data, q, v)
-    assert data.vcom[0] == pytest.approx(wanted.com_velocity, abs=1e-10)
-    for axis in range(3):
-        found = data.hg.angular[axis] if by_momentum[axis] else v[3 + axis]
-        assert found == pytest.approx(wanted.rotation[axis], abs=1e-10)
-    for foot, frame in enumerate(BUILT.sole_frames):
-        turn = pin.computeFrameJacobian(
-            BUILT.model, data, q, frame, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
-        )
+    for foot, turn in enumerate(moved(BUILT, q, wanted, v, 1e-10)):
         assert turn[:3] @ v == pytest.approx(wanted.foot_velocity[foot], abs=1e-10)
         assert turn[4:] @ v == pytest.approx(np.zeros(2), abs=1e-10)
 
@@ -104,24 +109,14 @@ def test_any_body_moves_as_asked(robot, by_momentum, flying):
         flying=flying,
     )
     v = body.velocity(q, wanted)
-    data = built.model.createData()
-    pin.computeCentroidalMomentum(built.model, data, q, v)
-    pin.centerOfMass(built.model, data, q, v)
-    assert data.vcom[0] == pytest.approx(wanted.com_velocity, abs=1e-9)
-    for axis in range(3):
-        found = data.hg.angular[axis] if by_momentum[axis] else v[3 + axis]
-        assert found == pytest.approx(wanted.rotation[axis], abs=1e-9)
-    for foot, frame in enumerate(built.sole_frames):
-        turn = pin.computeFrameJacobian(
-            built.model, data, q, frame, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
-        )
-        moved = (body.feet(body.integrate(q, 1e-6 * v)) - body.feet(q))[foot] / 1e-6
+    for foot, turn in enumerate(moved(built, q, wanted, v, 1e-9)):
+        speed = (body.feet(body.integrate(q, 1e-6 * v)) - body.feet(q))[foot] / 1e-6
         rolled = np.zeros(3)
         if robot.name == "humanoid":
             assert turn[3:] @ v == pytest.approx(np.zeros(3), abs=1e-9)
         elif not flying:  # the contact moves along below the ball's centre
             rolled = 0.005 * np.cross(turn[3:] @ v, [0.0, 0.0, 1.0])
-        assert moved == pytest.approx(feet[foot] + rolled, abs=1e-5)
+        assert speed == pytest.approx(feet[foot] + rolled, abs=1e-5)
     names = [joint.name for joint in robot.joints]
     for name, angle in robot.held.items():
         assert v[6 + names.index(name)] == pytest.approx(0.0, abs=1e-12)

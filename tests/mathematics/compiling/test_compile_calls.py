@@ -22,11 +22,7 @@ sys.modules["kernels_for_tests"] = ours
 spec.loader.exec_module(ours)
 
 
-@pytest.fixture(autouse=True)
-def own_cache(tmp_path, monkeypatch):
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    monkeypatch.setattr(module, "_loaded", {})
-    monkeypatch.setattr(module, "_names", {})
+pytestmark = pytest.mark.usefixtures("own_cache")
 
 
 def arguments(order):

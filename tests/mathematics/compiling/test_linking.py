@@ -10,11 +10,7 @@ from aloft.mathematics.compiling import compile_calls as module
 from aloft.mathematics.compiling.kernel_call import KernelCall
 from aloft.mathematics.compiling.linking import linked_once
 
-
-@pytest.fixture(autouse=True)
-def own_cache(tmp_path, monkeypatch):
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    monkeypatch.setattr(module, "_loaded", {})
+pytestmark = pytest.mark.usefixtures("own_cache")
 
 
 def test_numba_is_as_before_outside():

@@ -18,10 +18,7 @@ FLOATS = type_of(np.zeros(3))
 MATRIX = type_of(np.zeros((3, 3)))
 
 
-@pytest.fixture(autouse=True)
-def own_cache(tmp_path, monkeypatch):
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    monkeypatch.setattr(module, "_loaded", {})
+pytestmark = pytest.mark.usefixtures("own_cache")
 
 
 def jobs():

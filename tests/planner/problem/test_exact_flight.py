@@ -49,21 +49,27 @@ def test_the_momentum_is_pinocchios() -> None:
         np.testing.assert_allclose(angular, exact[2], atol=1e-11)
 
 
-def step(place: np.ndarray, rate: np.ndarray, bend: np.ndarray, h: float) -> np.ndarray:
-    """The state at the interval's end where the rows are zero, found by Newton's method."""
+@lru_cache(maxsize=1)
+def interval() -> tuple[ca.Function, ca.Function]:
+    """What finds the accelerations and impulses of an interval, by Newton's method, and its end."""
     q, v, a, r = (ca.SX.sym(name, n) for name, n in (("q", 16), ("v", 16), ("a", 16), ("r", 3)))
-    lift = Lifted()
-    found = flight_interval(model(), make_coordinates(model(), "full"), q, v, ca.SX(h), a, r, lift)
+    h, lift = ca.SX.sym("h"), Lifted()
+    found = flight_interval(model(), make_coordinates(model(), "full"), q, v, h, a, r, lift)
     rows, end = lift.put_back([ca.vertcat(*found.rows), ca.vertcat(found.end, found.end_velocity)])
     unknown = ca.vertcat(a[:6], r)
     solve = ca.rootfinder(
-        "step", "newton", {"x": unknown, "p": ca.vertcat(q, v, a[6:]), "g": rows},
+        "step", "newton", {"x": unknown, "p": ca.vertcat(q, v, a[6:], h), "g": rows},
         {"abstol": 1e-9},
     )  # fmt: skip
+    return solve, ca.Function("end", [q, v, a, r, h], [end])
+
+
+def step(place: np.ndarray, rate: np.ndarray, bend: np.ndarray, h: float) -> np.ndarray:
+    """The state at the interval's end where the rows are zero."""
+    solve, ends = interval()
     start = np.concatenate([[0.0, 0.0, -9.81], np.zeros(3), rate[3:6]])
-    at = np.array(solve(start, np.concatenate([place, rate, bend]))).ravel()
-    ends = ca.Function("end", [q, v, a, r], [end])
-    return np.array(ends(place, rate, np.concatenate([at[:6], bend]), at[6:])).ravel()
+    at = np.array(solve(start, np.concatenate([place, rate, bend, [h]]))).ravel()
+    return np.array(ends(place, rate, np.concatenate([at[:6], bend]), at[6:], h)).ravel()
 
 
 def error(seed: int, intervals: int, duration: float = 0.1) -> tuple[float, float]:

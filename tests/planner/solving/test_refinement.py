@@ -66,7 +66,7 @@ def test_a_high_jump_is_valid_on_the_grid_it_needs() -> None:
     [
         {"rise": 0.1, "distance_x": 0.3},
         {"rise": 0.15, "distance_y": 0.2},
-        {"rise": 0.15, "twist": "60 deg"},
+        pytest.param({"rise": 0.15, "twist": "60 deg"}, marks=pytest.mark.long),
     ],
 )
 def test_the_reach_of_the_real_actuators(task: dict[str, Any]) -> None:

@@ -15,6 +15,8 @@ from aloft.planner.task.plan import ARRAYS
 from aloft.planner.task.task import make_task
 from aloft.robots.description import find_robot
 
+from ..independence import smallest_singular_value
+
 ROBOT = find_robot("bruce")
 FORWARD = make_task({"recipe": "paper", "name": "forward", "rise": 0.15, "distance_x": 0.1})
 
@@ -119,10 +121,13 @@ def test_derivatives_are_those_of_the_constraints() -> None:
 
 def test_equations_are_independent_at_the_guess() -> None:
     problem = make_problem(FORWARD, ROBOT)
-    functions = problem.assembly.functions()
-    jacobian = np.array(functions["nlp_jac_g"](ballistic_guess(problem), problem.parameters)[1])[
-        problem.row_lower == problem.row_upper
-    ]
-    sizes = np.linalg.norm(jacobian, axis=1, keepdims=True)
-    smallest = np.linalg.svd(jacobian / sizes, compute_uv=False)[-1]
-    assert smallest > 1e-7
+    assert smallest_singular_value(problem, ballistic_guess(problem)) > 1e-7
+
+
+def test_a_quick_solve_aside_starts_from_the_jump_ahead_not_from_a_plan_in_the_plane() -> None:
+    here = solve_jump(make_task({"recipe": "paper", "name": "here", "rise": 0.1}), ROBOT)
+    aside = make_task({"recipe": "paper", "name": "aside", "rise": 0.1, "distance_y": 0.05})
+    quick = solve_jump(aside, ROBOT, warm_start=here, quick=True)
+    assert not quick.statistics["warm"]
+    further = make_task({"recipe": "paper", "name": "further", "rise": 0.1, "distance_y": 0.06})
+    assert solve_jump(further, ROBOT, warm_start=quick, quick=True).statistics["warm"]

@@ -2,7 +2,7 @@
 
 import threading
 import time
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
 import pytest
@@ -17,6 +17,7 @@ from aloft.runtime.placement.place import place
 from aloft.runtime.running.run_result import RunResult
 from aloft.runtime.testing.spread import run_spread
 
+from ...waiting import wait_for
 from .example_graphs import Counter, ring
 
 HOLD = LinkPolicy(0.2, "hold")
@@ -117,13 +118,6 @@ def in_a_thread(part: BoundPart, results: dict[str, RunResult], name: str) -> th
     thread = threading.Thread(target=run, daemon=True)
     thread.start()
     return thread
-
-
-def wait_for(condition: Callable[[], bool], seconds: float = 60.0) -> bool:
-    end = time.monotonic() + seconds
-    while not condition() and time.monotonic() < end:
-        time.sleep(0.01)
-    return condition()
 
 
 def test_a_part_that_is_started_again_joins_without_the_others_starting_again() -> None:

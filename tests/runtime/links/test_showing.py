@@ -22,8 +22,8 @@ from aloft.runtime.placement.place import place
 from aloft.runtime.placement.placed import PlacedGraph
 from aloft.runtime.running.run_result import RunResult
 
+from ...waiting import free_port
 from .test_free_running import free, wait_for
-from .test_zenoh_transport import free_port
 
 
 class Running:

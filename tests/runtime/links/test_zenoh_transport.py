@@ -3,8 +3,7 @@
 import json
 import socket
 import threading
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from types import SimpleNamespace
 from typing import Any
 
@@ -15,18 +14,7 @@ from aloft.runtime.language.errors import AloftError
 from aloft.runtime.language.stages import MachineSpec
 from aloft.runtime.links.zenoh_transport import LEASE, ZenohTransport, as_chunk, session_config
 
-
-def free_port() -> int:
-    with socket.socket() as made:
-        made.bind(("127.0.0.1", 0))
-        return int(made.getsockname()[1])
-
-
-def wait_for(condition: Callable[[], bool], seconds: float = 60.0) -> bool:
-    end = time.monotonic() + seconds
-    while not condition() and time.monotonic() < end:
-        time.sleep(0.01)
-    return condition()
+from ...waiting import free_port, wait_for
 
 
 @pytest.fixture
@@ -56,7 +44,7 @@ def test_messages_arrive_in_order(pair: Pair) -> None:
     heard: list[bytes] = []
     second.subscribe("data/a/b/left/gain~delay", heard.append)
     send = first.publisher("data/a/b/left/gain~delay")
-    assert wait_for(lambda: send(b"probe") or bool(heard))  # type: ignore[func-returns-value]
+    assert wait_for(lambda: send(b"probe") or bool(heard))
     for k in range(500):
         send(k.to_bytes(4, "little") * 50)
 
@@ -73,7 +61,7 @@ def test_a_machine_that_closes_is_lost_at_once(pair: Pair) -> None:
     heard: list[bytes] = []
     first.subscribe("x", heard.append)
     send = second.publisher("x")
-    assert wait_for(lambda: send(b"there") or bool(heard))  # type: ignore[func-returns-value]
+    assert wait_for(lambda: send(b"there") or bool(heard))
     assert lost == []
     second.close()
     assert wait_for(lambda: lost == ["b"])

@@ -24,7 +24,7 @@ from aloft.runtime.placement.place import place
 from aloft.runtime.placement.placed import PlacedGraph
 
 from ...logs.viewing.browser import PROGRAM, Browser
-from ..links.test_zenoh_transport import free_port
+from ...waiting import free_port
 from .test_live_page import LINE, STATE, Page
 
 GRAPH = """\

@@ -3,7 +3,6 @@
 import math
 import os
 import signal
-import subprocess
 import sys
 from collections.abc import Iterator
 
@@ -13,34 +12,16 @@ from aloft.runtime.language.errors import AloftError
 from aloft.studies.batch.job import JobResult
 from aloft.studies.batch.jobs import run_jobs
 
-pytest.importorskip("distributed")
+from ...local_cluster import local_cluster
 
-CLUSTER = """
-import sys
-from distributed import LocalCluster
-if __name__ == "__main__":
-    with LocalCluster(
-        n_workers=int(sys.argv[1]), threads_per_worker=1, host="127.0.0.1", dashboard_address=None,
-        worker_dashboard_address=None, silence_logs=50,
-    ) as cluster:
-        print(cluster.scheduler_address, flush=True)
-        sys.stdin.read()
-"""
+pytest.importorskip("distributed")
 
 
 @pytest.fixture(scope="module")
 def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
     """The address of a cluster of two workers."""
-    folder = tmp_path_factory.mktemp("cluster")
-    script = folder / "cluster.py"
-    script.write_text(CLUSTER)
-    with subprocess.Popen(
-        [sys.executable, script, "2"], cwd=folder, text=True,
-        stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
-    ) as process:  # fmt: skip
-        assert process.stdout is not None
-        yield process.stdout.readline().strip()
-        process.terminate()
+    with local_cluster(tmp_path_factory.mktemp("cluster")) as address:
+        yield address
 
 
 def results(function: object, jobs: object, address: str) -> dict[int, JobResult]:

@@ -1,0 +1,130 @@
+"""How legs in flight follow a plan's joints, with regard to the base's attitude, as kernels."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from ...mathematics.arrays import Array, Indices
+from ...mathematics.kernel import kernel
+from ...mathematics.polynomials import minimum_jerk
+from ...robots.five_joint_track import LegTargets
+
+TAPER = 0.5
+"""Share of ``turn_time`` at the end of the flight, in which the legs return to the plan's time."""
+ONSET = 0.3
+"""Share of ``turn_time`` at its beginning, in which they leave it."""
+
+
+class PlannedJoints(NamedTuple):
+    """The fields of ``JumpReference`` that say what the joints should do."""
+
+    phase: Indices
+    time: Array
+    lift_off_time: Array
+    touchdown_time: Array
+    orientation: Array
+    angular_momentum: Array
+    joint_position: Array
+    joint_velocity: Array
+    joint_acceleration: Array
+
+
+class Following(NamedTuple):
+    """The parameters of ``LegInverseKinematics`` about a plan that is followed, (1,) each."""
+
+    plan_lead: Array
+    level_time: Array
+    turn_gain: Array
+    turn_time: Array
+    turn_limit: Array
+
+
+class Soles(NamedTuple):
+    """What levels the soles.
+
+    ``wanted`` (n_feet, 3, 3) are the axes of level soles in the base's. For every foot there is the
+    number of the ``joint`` that turns it about its lateral axis, that ``axis``' component along the
+    base's y axis, which is zero without such a joint, and the ``lowest`` and ``highest`` angle [rad].
+    """
+
+    wanted: Array
+    joint: Indices
+    axis: Array
+    lowest: Array
+    highest: Array
+
+
+@kernel
+def follow_plan(
+    following: Following, soles: Soles, plan: PlannedJoints, target: LegTargets
+) -> None:
+    """The plan's joints as the targets: of a later or earlier instant, and with level soles."""
+    ahead = float(following.plan_lead[0]) * share_of_lead(plan)
+    ahead += lead_of_turn(following, soles, plan)
+    for joint in range(plan.joint_position.shape[0]):
+        speed = float(plan.joint_velocity[joint])
+        change = float(plan.joint_acceleration[joint]) * ahead
+        way = ahead * (speed + 0.5 * change)
+        target.position[joint] = float(plan.joint_position[joint]) + way
+        target.velocity[joint] = speed + change
+    for foot in range(target.reachable.shape[0]):
+        target.reachable[foot] = True
+        level_sole(foot, float(following.level_time[0]), soles, plan, target)
+
+
+@kernel
+def share_of_lead(plan: PlannedJoints) -> float:
+    """How much of the lead counts: it grows from 0 at lift-off to 1 in the middle of the flight.
+
+    From its middle on the plan may name the times of the next flight already.
+    """
+    since = float(plan.time[()]) - float(plan.lift_off_time[()])
+    lasts = float(plan.touchdown_time[()]) - float(plan.lift_off_time[()])
+    if since < 0.0 or lasts <= 0.0:
+        return 1.0
+    return min(2.0 * since / lasts, 1.0)
+
+
+@kernel
+def lead_of_turn(following: Following, soles: Soles, plan: PlannedJoints) -> float:
+    """How much earlier [s] the legs move because the base has turned too far; negative: later."""
+    left = float(plan.touchdown_time[()]) - float(plan.time[()])
+    gain, lasts = float(following.turn_gain[0]), float(following.turn_time[0])
+    if gain == 0.0 or left > lasts or left <= 0.0:
+        return 0.0
+    onset, _, _ = minimum_jerk((lasts - left) / (ONSET * lasts))
+    taper, _, _ = minimum_jerk(left / (TAPER * lasts))
+    most = float(following.turn_limit[0])
+    ahead = gain * turned_too_far(0, soles, plan)
+    if plan.angular_momentum[1] < 0.0:
+        ahead = -ahead
+    return onset * taper * min(max(ahead, -most), most)
+
+
+@kernel
+def turned_too_far(foot: int, soles: Soles, plan: PlannedJoints) -> float:
+    """By how much [rad] the base has turned further about its y axis than in the plan.
+
+    It is the angle between a level sole in the base's axes as measured and as planned.
+    """
+    x, y = float(plan.orientation[0]), float(plan.orientation[1])
+    z, w = float(plan.orientation[2]), float(plan.orientation[3])
+    planned = math.atan2(2.0 * (w * y - x * z), 1.0 - 2.0 * (y * y + z * z))
+    measured = math.atan2(float(soles.wanted[foot, 2, 0]), float(soles.wanted[foot, 0, 0]))
+    error = measured - planned
+    return math.atan2(math.sin(error), math.cos(error))
+
+
+@kernel
+def level_sole(
+    foot: int, level_time: float, soles: Soles, plan: PlannedJoints, target: LegTargets
+) -> None:
+    """Turn a sole by its last joint against what the base has turned too far."""
+    if level_time <= 0.0 or soles.axis[foot] == 0.0:
+        return
+    since = float(plan.time[()]) - float(plan.touchdown_time[()]) + level_time
+    share, _, _ = minimum_jerk(2.0 * since / level_time)
+    joint, error = int(soles.joint[foot]), turned_too_far(foot, soles, plan)
+    angle = float(target.position[joint]) - share * float(soles.axis[foot]) * error
+    target.position[joint] = min(max(angle, float(soles.lowest[foot])), float(soles.highest[foot]))

@@ -1,0 +1,15 @@
+"""How independent the equations of a jump's problem are."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aloft.planner.problem.problem import Problem
+
+
+def smallest_singular_value(problem: Problem, at: NDArray[np.float64]) -> float:
+    """Of the Jacobian of all equations there, each divided by its length; zero: they depend."""
+    functions = problem.assembly.functions()
+    jacobian = np.array(functions["nlp_jac_g"](at, problem.parameters)[1])
+    equations = jacobian[problem.row_lower == problem.row_upper]
+    sizes = np.linalg.norm(equations, axis=1, keepdims=True)
+    return float(np.linalg.svd(equations / sizes, compute_uv=False)[-1])
