@@ -203,8 +203,9 @@ def search_nearest(
             status.update(f"searching the nearest task that can be planned: {text}")
 
         found = nearest_feasible(
-            task, library.robot, family=family, seconds=seconds_left(spent), progress=progress
-        )
+            task, library.robot, family=family, seconds=seconds_left(spent), progress=progress,
+            library=library,
+        )  # fmt: skip
     if found is None:
         say(screen, "a short search found no task near it that can be planned")
         return {"nearest": None}

@@ -31,6 +31,9 @@ SCALES = {
 }  # fmt: skip
 """How much of each parameter [its unit] is a distance of 1 between two tasks."""
 
+ALIKE = 2.0
+"""How far apart two tasks may be for the plan of one to say something about the other."""
+
 Solver = Callable[[JumpTask, RobotDescription, JumpPlan | None], JumpPlan]
 """Makes a plan of a task, starting from another plan where one is given."""
 
@@ -184,14 +187,44 @@ class PlanLibrary:
                 continue
             if distance is not None:
                 found.append((distance, str(path)))
-        for distance, name in sorted(found):
+        found.sort()
+        plan = self._first_valid(name for _, name in found)
+        if plan is None:
+            return None
+        return plan, next(d for d, name in found if plan.task.hash(self.robot) in name)
+
+    def _first_valid(self, names: Iterable[str]) -> JumpPlan | None:
+        """The first of these files that holds a valid plan of the task that it is named after."""
+        for name in names:
             try:
                 plan = read_plan(name)
             except PlanFileError:
                 continue
             if plan.valid and plan.task.hash(self.robot) in name:
-                return plan, distance
+                return plan
         return None
+
+    def farthest(self, task: JumpTask, parameter: str, modest: float) -> JumpPlan | None:
+        """Of the valid plans of tasks like this one but for ``parameter``, which lies between
+        ``modest`` and what the task says, the one that goes farthest; other parameters may be
+        ``ALIKE`` apart."""
+        asked = getattr(task, parameter)
+        found = []
+        for path, header in self.headers():
+            kept = header.get("task") if isinstance(header, dict) else None
+            if not isinstance(kept, dict):
+                continue
+            value = kept.get(parameter)
+            if not isinstance(value, float) or not 0.0 < (value - modest) / (asked - modest) < 1.0:
+                continue
+            there = task.model_copy(update={parameter: value}).resolved(self.robot)
+            wanted = there.model_dump(mode="json")
+            if _other_parameters(wanted) != _other_parameters(kept):
+                continue
+            distance = _scaled_distance(wanted, kept)
+            if distance is not None and distance <= ALIKE:
+                found.append((-abs(value - modest), distance, str(path)))
+        return self._first_valid(name for _, _, name in sorted(found))
 
     def tasks(self) -> Iterator[tuple[Path, JumpTask]]:
         """Every kept plan's file and task, in the order of their names; broken files are left out.

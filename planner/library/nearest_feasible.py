@@ -1,7 +1,7 @@
 """Searches for the nearest task that can be planned, where the given task cannot.
 
 The search changes one parameter at a time between the given value and a modest one, by bisection over round
-values. Where that finds nothing, because more than one is beyond the robot, all that say how far the jump goes
+values. It begins at the farthest value that a kept plan of a similar task has, else at the modest one. Where that finds nothing, because more than one is beyond the robot, all that say how far the jump goes
 change together, each by the same share of its way. It takes several solves, so only commands whose user waits
 for an answer call it; loading or running a graph never does.
 """
@@ -19,7 +19,7 @@ from ..solving.bounded import cpu_time
 from ..task.errors import PlanError, TaskError
 from ..task.plan import JumpPlan
 from ..task.task import JumpTask
-from .library import SCALES, Solver, solve_and_check
+from .library import SCALES, PlanLibrary, Solver, solve_and_check
 
 MOST_SOLVES = 10
 MOST_SECONDS, LEAST_SECONDS = 6.0, 3.0
@@ -129,14 +129,15 @@ def nearest_feasible(
     solve: Solver | None = None,
     seconds: float = MOST_SECONDS,
     progress: Callable[[str], None] = lambda _: None,
+    library: PlanLibrary | None = None,
 ) -> NearestFeasible | None:
     """Search for a task that differs in one parameter and has a valid plan; ``None`` if a short
     search finds none.
 
     ``family`` is the constraint family that could not be met; it decides what is tried first.
-    ``progress`` is told what is being tried.
+    ``progress`` is told what is being tried, and plans of ``library`` say where to begin.
     """
-    search = _Search(task, robot, solve, seconds, progress)
+    search = _Search(task, robot, solve, seconds, progress, library)
     tried = candidates(task, family)
     ways = ways_together(task)
     for parameter in tried[:SINGLE] if ways else tried:
@@ -231,8 +232,9 @@ class _Search:
         solve: Solver | None,
         seconds: float,
         progress: Callable[[str], None],
+        library: PlanLibrary | None,
     ) -> None:
-        self._task, self._robot, self._solve = task, robot, solve
+        self._task, self._robot, self._solve, self._library = task, robot, solve, library
         self._seconds, self._progress = seconds, progress
         self._started = cpu_time()
         self._solves = 0
@@ -250,13 +252,16 @@ class _Search:
     def along(self, way: list[dict[str, float]]) -> NearestFeasible | None:
         """The best point of a way from modest values to what is asked for; ``None`` where even the
         modest one has no plan, or no time is left to try it."""
-        plan = None if self._solves and self.spent else self._try(way[0], None)
+        begin, plan = self._kept(way)
+        if plan is None:
+            begin = 0
+            plan = None if self._solves and self.spent else self._try(way[0], None)
         if plan is None:
             return None
-        good, bad = 0, len(way) - 1
+        good, bad = begin, len(way) - 1
         while bad - good > 1 and not self.spent:
             # What fails costs several times what succeeds, so the first step is the smaller one.
-            middle = good + max(1, (bad - good) // (2 if good else 4))
+            middle = good + max(1, (bad - good) // (2 if good > begin else 4))
             better = self._try(way[middle], plan)
             if better is None:
                 bad = middle
@@ -268,6 +273,20 @@ class _Search:
             first, *ends[first], self._solves, self.cpu, plan, what_binds(plan, self._robot),
             {name: ends[name] for name in others},
         )  # fmt: skip
+
+    def _kept(self, way: list[dict[str, float]]) -> tuple[int, JumpPlan | None]:
+        """The point of a way that a kept plan of a similar task goes up to, and a plan there, which
+        starts from that one; without such a plan ``None``."""
+        parameter, *others = way[0]
+        if self._library is None or others or self.spent:
+            return 0, None
+        modest = way[0][parameter]
+        near = self._library.farthest(self._task, parameter, modest)
+        if near is None:
+            return 0, None
+        most = abs(getattr(near.task, parameter) - modest) + 1e-9
+        index = sum(abs(point[parameter] - modest) <= most for point in way) - 1
+        return index, self._try(way[index], near) if index else None
 
     def _try(self, values: Mapping[str, float], start: JumpPlan | None) -> JumpPlan | None:
         """A valid plan with those values, or ``None``."""

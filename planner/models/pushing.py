@@ -48,7 +48,8 @@ def pushed_side(
         # Of the base's own block Pinocchio writes both triangles.
         inertia[i] = pin.crba(model, data, q)[:6, :6]
         places[i] = points(q)
-    return PushedSide(np.linalg.inv(inertia), np.einsum("nci,cj->nij", places, force))
+    inverse = np.asarray(np.linalg.inv(inertia), dtype=np.float64)
+    return PushedSide(inverse, np.einsum("nci,cj->nij", places, force))
 
 
 def push(

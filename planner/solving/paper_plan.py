@@ -10,17 +10,16 @@ from ...blocks.signals import Phase
 from ...mathematics.arrays import Array
 from ...robots.description import RobotDescription
 from ...robots.kinematics import matrices_of_quaternions
-from ..models.exact_dynamics import ExactDynamics
 from ..models.robot_model import model_of
 from ..models.stance import stances_of
 from ..problem import centroidal_stages as stages
-from ..problem.one_flight import joint_torques
 from ..problem.paper_problem import PaperProblemBuilder
 from ..problem.program import Program
 from ..task.plan import JumpPlan
 from ..task.task import JumpTask
 from .bounded import cpu_time
 from .compilation import FunctionSet, Progress, load_functions
+from .motion_arrays import motion_arrays
 from .options import SolveOptions
 from .outcome import failure, statistics_of, versions
 from .solver import solve
@@ -93,20 +92,8 @@ def unpack(problem: Program, values: Array, robot: RobotDescription) -> dict[str
         if grounded[k]:
             force[k] = control[nv + 3 :]
     force[-1] = force[-2]
-    acceleration = np.diff(velocity, axis=0) / grid.steps[:, None]
-    contact = np.append(grounded, grounded[-1])
-    forces = force.reshape(count, -1, 3)
-    phases = [int(phase) for phase in grid.phases]
-    dynamics = ExactDynamics(problem.model.robot)
     return {
-        "time": grid.times,
-        "position": position,
-        "velocity": velocity,
-        "acceleration": np.vstack([acceleration, acceleration[-1:]]),
-        "contact_force": forces,
-        "contact": np.repeat(contact[:, None], forces.shape[1], axis=1),
-        "phase": np.array([*phases, phases[-1]], dtype=np.int64),
-        "joint_torque": joint_torques(dynamics, grid.times, position, velocity, forces),
+        **motion_arrays(problem, grid.steps, position, velocity, force),
         "com": states[:, n : n + 3].copy(),
         "com_velocity": states[:, n + 3 : n + 6].copy(),
         "angular_momentum": states[:, n + 6 :].copy(),

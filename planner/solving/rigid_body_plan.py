@@ -10,13 +10,11 @@ from ...blocks.signals import Phase
 from ...mathematics.arrays import Array
 from ...robots.description import RobotDescription
 from ...robots.kinematics import matrices_of_quaternions
-from ..models.exact_dynamics import ExactDynamics
 from ..models.quaternions import pose_of
 from ..models.rigid_body import RigidBody, lump
 from ..models.robot_model import model_of
 from ..models.stance import stances_of
 from ..problem import rigid_body_stages as stages
-from ..problem.one_flight import joint_torques
 from ..problem.program import Program
 from ..problem.rigid_body_problem import STATES, RigidBodyProblemBuilder
 from ..problem.unpacking import twist
@@ -24,6 +22,7 @@ from ..task.plan import JumpPlan
 from ..task.task import JumpTask
 from .bounded import cpu_time
 from .compilation import FunctionSet, Progress, load_functions
+from .motion_arrays import motion_arrays
 from .options import SolveOptions
 from .outcome import failure, statistics_of, versions
 from .rigid_body_motion import FeetPath, whole_body
@@ -100,24 +99,12 @@ def unpack(
     force[-1] = force[-2]
     position = np.array([pose_of(row) for row in q])
     velocity = np.array([twist(*row)[0] for row in zip(q, v, np.zeros_like(v), strict=True)])
-    acceleration = np.diff(velocity, axis=0) / steps[:, None]
     turn = matrices_of_quaternions(position[:, 3:7])
     momentum = np.array([
         r @ body.inertia @ w for r, w in zip(turn, velocity[:, 3:6], strict=True)
     ])  # fmt: skip
-    phases = [int(phase) for phase in grid.phases]
-    contact = np.array([phase != Phase.FLIGHT for phase in [*phases, phases[-1]]])
-    forces = force.reshape(count, -1, 3)
-    dynamics = ExactDynamics(problem.model.robot)
     return {
-        "time": times,
-        "position": position,
-        "velocity": velocity,
-        "acceleration": np.vstack([acceleration, acceleration[-1:]]),
-        "contact_force": forces,
-        "contact": np.repeat(contact[:, None], forces.shape[1], axis=1),
-        "phase": np.array([*phases, phases[-1]], dtype=np.int64),
-        "joint_torque": joint_torques(dynamics, times, position, velocity, forces),
+        **motion_arrays(problem, steps, position, velocity, force),
         "com": states[:, :3].copy(),
         "com_velocity": states[:, 6:9].copy(),
         "angular_momentum": momentum,

@@ -90,6 +90,8 @@ def solve_full(task: JumpTask, robot: RobotDescription, options: SolveOptions) -
     problem = make_problem(gridded, robot, compiled=options.compiled, progress=options.progress)
     guess = ballistic_guess(problem)
     solution, warm = None, False
+    if warm_start is not None and _leaves_plane(problem, warm_start) and options.quick:
+        warm_start = None  # the same jump straight ahead is a nearer start
     if warm_start is not None and can_start(problem, warm_start):
         warm = True
         near, most = pack(problem, warm_start, guess), QUICK if options.quick else LIMIT
@@ -247,6 +249,11 @@ def _barrier(problem: Problem) -> float:
     """The barrier's parameter for starts from another plan. With all coordinates such a plan is further
     from the solution, and a higher barrier takes a fifth fewer iterations."""
     return 1e-3 if problem.coordinates.name == "full" else NEAR
+
+
+def _leaves_plane(problem: Problem, plan: JumpPlan) -> bool:
+    """Whether a problem has all coordinates, and a plan of it would start from one that has not."""
+    return problem.coordinates.name == "full" and plan.statistics.get("coordinates") != "full"
 
 
 def _displaced(problem: Problem, robot: RobotDescription) -> Array | None:

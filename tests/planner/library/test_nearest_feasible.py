@@ -1,5 +1,6 @@
 """The search for the nearest task that can be planned: what it tries, finds, says and costs."""
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -159,3 +160,45 @@ def test_the_search_is_bounded() -> None:
     found = nearest_feasible(TASK, ROBOT, solve=solve, seconds=0.0)
     assert found is not None
     assert (found.solves, found.value) == (1, 0.08)
+
+
+def test_it_begins_where_a_kept_plan_of_a_similar_task_ends(tmp_path: Path) -> None:
+    """A turn of 120 degrees at 15 cm is among the shipped plans."""
+    task = make_task({"name": "round", "rise": 0.12, "twist": "360 deg"})
+    library = PlanLibrary(ROBOT, tmp_path, (SHIPPED,))
+    kept = library.farthest(task, "twist", 0.0)
+    assert kept is not None
+    assert (kept.task.rise, kept.task.twist) == pytest.approx((0.15, 2.0 * math.pi / 3.0))
+    solve = Planner(lambda asked: asked.twist < 2.2)
+    found = nearest_feasible(task, ROBOT, solve=solve, library=library)
+    assert found is not None
+    degrees = [round(math.degrees(asked.twist)) for asked in solve.asked]
+    assert degrees[:2] == [120, 180]
+    assert solve.warm[0]
+    assert math.degrees(found.value) == pytest.approx(126.0)
+
+
+@pytest.mark.parametrize(
+    "values",
+    [{"twist": "-360 deg"}, {"twist": "100 deg"}, {"rise": 0.4, "twist": "360 deg"},
+     {"friction": 1.4, "twist": "360 deg", "weights": {"force": 0.5}}],
+    ids=["the other way", "further than asked", "another height", "other weights"],
+)  # fmt: skip
+def test_a_kept_plan_of_another_task_says_nothing(values: dict[str, Any], tmp_path: Path) -> None:
+    task = make_task({"name": "round", "rise": 0.15, **values})
+    kept = PlanLibrary(ROBOT, tmp_path, (SHIPPED,)).farthest(task, "twist", 0.0)
+    assert kept is None or 0.0 < kept.task.twist < math.radians(100.0) == task.twist
+
+
+def test_from_what_a_kept_plan_cannot_help_with_it_begins_at_the_modest_value(
+    tmp_path: Path,
+) -> None:
+    task = make_task({"name": "round", "rise": 0.12, "twist": "360 deg"})
+    solve = Planner(lambda asked: asked.twist < 0.5)
+    found = nearest_feasible(
+        task, ROBOT, solve=solve, library=PlanLibrary(ROBOT, tmp_path, (SHIPPED,))
+    )
+    assert found is not None
+    degrees = [round(math.degrees(asked.twist)) for asked in solve.asked]
+    assert degrees[:2] == [120, 0]
+    assert found.value < 0.5

@@ -122,3 +122,12 @@ def test_derivatives_are_those_of_the_constraints() -> None:
 def test_equations_are_independent_at_the_guess() -> None:
     problem = make_problem(FORWARD, ROBOT)
     assert smallest_singular_value(problem, ballistic_guess(problem)) > 1e-7
+
+
+def test_a_quick_solve_aside_starts_from_the_jump_ahead_not_from_a_plan_in_the_plane() -> None:
+    here = solve_jump(make_task({"recipe": "paper", "name": "here", "rise": 0.1}), ROBOT)
+    aside = make_task({"recipe": "paper", "name": "aside", "rise": 0.1, "distance_y": 0.05})
+    quick = solve_jump(aside, ROBOT, warm_start=here, quick=True)
+    assert not quick.statistics["warm"]
+    further = make_task({"recipe": "paper", "name": "further", "rise": 0.1, "distance_y": 0.06})
+    assert solve_jump(further, ROBOT, warm_start=quick, quick=True).statistics["warm"]
