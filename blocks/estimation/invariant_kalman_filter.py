@@ -7,9 +7,11 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from ...mathematics.arrays import Array
 from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.constants import GRAVITY
 from ...mathematics.invariant_propagation import error_transition
+from ...robots.ball_feet import ball_feet
 from ...robots.contact_kinematics import (
     ContactKinematics,
     Measured,
@@ -24,6 +26,23 @@ from ..signals import BaseState, ContactState, EstimatorHealth, ImuReading, Join
 from .invariant_estimate import InvariantEstimate, InvariantFilterParameters
 from .invariant_records import Base, Estimate, Health, Points, Samples, Tuning, Work
 from .invariant_steps import take_samples, use_contacts
+
+
+def tracked_points(robot: RobotDescription) -> tuple[Array, Array]:
+    """The points of the feet that stand still on the ground, and their heights above it.
+
+    A foot that rolls over its toe by the angle a moves the centre of the toe's rubber, of radius r, by
+    r a. The point of the foot that was lowest moves by r (a - sin a) only, a hundredth of that. So the
+    filter tracks this point. A foot that is a ball has no such point: there it is the centre.
+
+    Returns:
+        (n_contacts, 3) [m, link frame] and (n_contacts,) [m].
+    """
+    points = np.array([contact.position for contact in robot.contacts], np.float64).reshape(-1, 3)
+    heights = np.zeros(len(robot.contacts))
+    for ball in ball_feet(robot):
+        points[ball.point], heights[ball.point] = ball.centre, ball.radius
+    return points, heights
 
 
 class InvariantKalmanFilter(KernelBlock):
@@ -41,7 +60,8 @@ class InvariantKalmanFilter(KernelBlock):
     there is only the prediction.
 
     **Contacts.** A point that is reported active, while the IMU measures support, is added to the
-    state at the position that leg kinematics measure. From then on it stands still except for the
+    state at the position that leg kinematics measure: the point of the foot that is lowest while the
+    foot is flat, or the centre of a foot that is a ball. From then on it stands still except for the
     process noise ``contact_noise`` of the point and that of its foot,
     sqrt(slide_noise^2 + (impact_slide (|f| - g))^2), because feet slide a little at impacts and
     hard pushes. The measurement update is R h(q) + p - d = 0. If a residual is too unlikely
@@ -95,7 +115,8 @@ class InvariantKalmanFilter(KernelBlock):
         foot = np.array(robot.foot_of_contact(), np.int64)
         samples = Samples(*(np.zeros(n) for n in (3, 3, 6, joints, joints)))
         health = Health(*(getattr(self.health, name) for name in Health._fields))
-        radius = np.array([contact.radius for contact in robot.contacts], np.float64)
+        tracked, radius = tracked_points(robot)
+        rolling = seen.contacts._replace(centre=tracked)
         self.kernel_calls = (
             KernelCall(
                 take_samples, self.imu.angular_velocity, self.imu.specific_force,
@@ -110,7 +131,7 @@ class InvariantKalmanFilter(KernelBlock):
                 seen.seen,
             ),
             KernelCall(
-                differentiate_contacts, seen.rigid, seen.contacts, seen.centres, seen.jacobians
+                differentiate_contacts, seen.rigid, rolling, seen.centres, seen.jacobians
             ),
             KernelCall(
                 use_contacts, self.contacts.active, estimate, tuning, samples,

@@ -169,7 +169,7 @@ def _interval(
         for c in coordinates.contacts
         if forces
     }
-    middle = [coordinates.expand(part) for part in (half_q, half_v, a)]
+    middle = coordinates.expand(half_q), coordinates.expand(half_v), coordinates.expand(a)
     base, limbs, torque = model.inverse_dynamics(*middle, named, coordinates.limbs)
     held = model.held_torques(*middle, coordinates.limbs)
     if name != "flight":

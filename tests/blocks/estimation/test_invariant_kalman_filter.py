@@ -9,9 +9,11 @@ from functools import cache
 import numpy as np
 import pytest
 from scipy.stats import chi2
+from tests.robots.limbed_robots import quadruped
 
-from aloft.blocks.estimation.invariant_kalman_filter import InvariantKalmanFilter
+from aloft.blocks.estimation.invariant_kalman_filter import InvariantKalmanFilter, tracked_points
 from aloft.mathematics import extended_pose, rotations
+from aloft.robots.ball_feet import ball_feet
 from aloft.robots.contact_kinematics import ContactKinematics
 from aloft.robots.description import find_robot
 from aloft.runtime.language.errors import BlockError
@@ -355,3 +357,18 @@ def test_point_feet_stand(count):
     assert bench.get("health").trusted.all()
     assert np.abs(base.linear_velocity).max() < 1e-3
     assert np.linalg.norm(base.orientation[:3]) < 5e-3
+
+
+def test_it_tracks_the_point_of_a_foot_that_stands_while_the_foot_rolls():
+    points, heights = tracked_points(ROBOT)
+    assert points.tolist() == [list(contact.position) for contact in ROBOT.contacts]
+    assert heights.tolist() == [0.0] * len(ROBOT.contacts)
+
+
+def test_of_a_foot_that_is_a_ball_it_tracks_the_centre():
+    robot = quadruped()
+    points, heights = tracked_points(robot)
+    assert len(ball_feet(robot)) == 4
+    for ball in ball_feet(robot):
+        assert points[ball.point].tolist() == ball.centre.tolist()
+        assert heights[ball.point] == ball.radius > 0.0

@@ -108,7 +108,7 @@ def test_a_machine_commands_and_hears_by_its_own_links(
     assert wait_for(lambda: far.put(COMMANDS.format(name), b"go") or bool(onboard.heard))
     near = opened(placed, folder, "near")
     state = hears(near, f"aloft/{name}/data/onboard/near/robot")
-    assert wait_for(lambda: onboard.tell(b"state") or bool(state))  # type: ignore[func-returns-value]
+    assert wait_for(lambda: onboard.tell(b"state") or bool(state))
 
 
 def silent(onboard: Onboard, put: Callable[[], object]) -> bool:
@@ -127,12 +127,12 @@ def test_an_observer_watches_and_never_commands(
     name = placed.graph.name
     viewer = opened(placed, folder, "viewer")
     seen = hears(viewer, f"aloft/{name}/watch/**")
-    assert wait_for(lambda: onboard.show(b"status") or bool(seen))  # type: ignore[func-returns-value]
+    assert wait_for(lambda: onboard.show(b"status") or bool(seen))
     assert silent(onboard, lambda: viewer.put(COMMANDS.format(name), b"go"))
     # nor when it does not keep to its own session's rules
     rude = opened(placed, folder, "viewer", {"access_control": {"enabled": False}})
     rude_seen = hears(rude, f"aloft/{name}/watch/**")
-    assert wait_for(lambda: onboard.show(b"status") or bool(rude_seen))  # type: ignore[func-returns-value]
+    assert wait_for(lambda: onboard.show(b"status") or bool(rude_seen))
     assert silent(onboard, lambda: rude.put(COMMANDS.format(name), b"go"))
     # and what is on links it does not even hear: a slow one would hinder them
     data = hears(rude, f"aloft/{name}/data/**")
@@ -146,7 +146,7 @@ def test_a_machine_cannot_send_what_another_sends(
     near = opened(placed, folder, "near", {"access_control": {"enabled": False}})
     name = placed.graph.name
     state = hears(near, f"aloft/{name}/data/onboard/near/robot")
-    assert wait_for(lambda: onboard.tell(b"state") or bool(state))  # type: ignore[func-returns-value]
+    assert wait_for(lambda: onboard.tell(b"state") or bool(state))
     assert silent(onboard, lambda: near.put(COMMANDS.format(name), b"go"))
     assert silent(onboard, lambda: near.put("aloft/**", b"go"))
     assert silent(onboard, lambda: near.delete(COMMANDS.format(name)))
