@@ -65,7 +65,7 @@ def test_a_high_jump_is_valid_on_the_grid_it_needs() -> None:
     "task",
     [
         {"rise": 0.1, "distance_x": 0.3},
-        {"rise": 0.15, "distance_y": 0.2},
+        pytest.param({"rise": 0.15, "distance_y": 0.2}, marks=pytest.mark.long),
         pytest.param({"rise": 0.15, "twist": "60 deg"}, marks=pytest.mark.long),
     ],
 )
