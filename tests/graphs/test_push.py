@@ -20,8 +20,13 @@ def test_the_graph_has_no_problems():
 
 @pytest.mark.parametrize("angle", [0.0, np.pi, np.pi / 2.0])
 def test_a_push_in_the_air_is_landed(angle):
-    result = aloft.load(PUSH, {"robot.seed": 70, "push.angle": angle}).run(log=False)
-    assert result.success, result.reason
+    """Straight back nine of ten land (studies/tasks.yaml), so one of three may fail."""
+    failures = []
+    for seed in (70, 71, 72):
+        result = aloft.load(PUSH, {"robot.seed": seed, "push.angle": angle}).run(log=False)
+        if not result.success:
+            failures.append(result.reason)
+    assert len(failures) <= (angle == np.pi), failures
 
 
 STRONG = {"robot.seed": 70, "push.force": 100.0}
