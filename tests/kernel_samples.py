@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from aloft.blocks.control import balance_law
+from aloft.blocks.control import balance_law, followed_plan
 from aloft.blocks.jumping import capture_law
 from aloft.blocks.scoring import footing, jump_following, jump_series, stand_following, stand_score
 from aloft.hal.simulated import base, external_force
@@ -128,7 +128,34 @@ SERIES = jump_series.Series(
 )  # fmt: skip
 BASE = base.BaseTruth(np.ones(3), np.ones(4), np.ones(3), np.ones(3))
 TIMES = jump_following.Times(0.02, 0.5, 0.1, 0.15, 3, True)
+FOLLOWED = (
+    followed_plan.Following(*np.array([[0.009], [0.08], [0.15], [0.3], [0.05]])),
+    followed_plan.Soles(
+        np.tile(np.eye(3), (2, 1, 1)),
+        np.array([4, 9]),
+        np.array([1.0, -1.0]),
+        -2.0 * np.ones(2),
+        2.0 * np.ones(2),
+    ),
+    followed_plan.PlannedJoints(
+        np.array(3),
+        np.array(1.0),
+        np.array(0.7),
+        np.array(1.05),
+        np.array([0.02, 0.2, -0.03, 0.98]),
+        np.array([0.1, 0.8, -0.05]),
+        DRAW(10),
+        DRAW(10),
+        DRAW(10),
+    ),
+)
+FOLLOWING = LegTargets(np.zeros(10), np.zeros(10), np.zeros(2, np.bool_))
 UNUSED = {
+    "aloft.blocks.control.followed_plan.follow_plan": (*FOLLOWED, FOLLOWING),
+    "aloft.blocks.control.followed_plan.share_of_lead": FOLLOWED[2:],
+    "aloft.blocks.control.followed_plan.lead_of_turn": FOLLOWED,
+    "aloft.blocks.control.followed_plan.turned_too_far": (1, *FOLLOWED[1:]),
+    "aloft.blocks.control.followed_plan.level_sole": (1, 0.08, *FOLLOWED[1:], FOLLOWING),
     "aloft.blocks.control.balance_law.correct_place": PLACE,
     "aloft.blocks.jumping.capture_law.best_foot": (*STEPPING, STEP_SCRATCH, 5.7),
     "aloft.blocks.jumping.capture_law.aim_step": (*STEPPING, STEP_SCRATCH, 1, 5.7, 0.05),
