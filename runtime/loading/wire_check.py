@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 from ..language.block import Block, Input, Output
@@ -166,6 +167,13 @@ class WireCheck:
         self.graph = graph
         self.drafts = drafts
         self.problems = problems
+        self._similar: dict[str, tuple[str, ...]] = {}
+
+    @cached_property
+    def _known(self) -> list[str]:
+        """All blocks and sub-graphs that a wire may name."""
+        known = [path for path, draft in self.drafts.items() if not draft.stands_for]
+        return [*known, *self.graph.subgraphs]
 
     def check(self, draft: Draft) -> None:
         """Report every problem of the wires into one block."""
@@ -333,10 +341,9 @@ class WireCheck:
         prefixes = [f"{path}/" for path in self.graph.broken]
         if self.graph.incomplete or any(f"{block}/".startswith(prefix) for prefix in prefixes):
             return  # it may be in a file that could not be read, which is reported
-        known = [path for path, draft in self.drafts.items() if not draft.stands_for]
-        known += self.graph.subgraphs
-        similar = nearest(block, known)
-        names = [f"{match}.{wire.source_port}" for match in similar]
+        if block not in self._similar:  # many wires may read one block that is missing
+            self._similar[block] = nearest(block, self._known)
+        names = [f"{match}.{wire.source_port}" for match in self._similar[block]]
         candidates = self._local(names or candidates, at, wire)
         candidates = tuple(f"{each}{wire.selected}" for each in candidates)
         self.problems.add(
@@ -344,7 +351,7 @@ class WireCheck:
             f"{at} reads {wire.source}, but there is no block {block!r}",
             wire.where,
             at=at,
-            expected=listing(known),
+            expected=listing(self._known),
             found=wire.source,
             nearest=candidates,
             fix=f"{at.rpartition('.')[2]}: {candidates[0]}" if candidates else "",
@@ -359,19 +366,24 @@ class WireCheck:
         """
         taken = {wire.source: None for wire in target.flat.wires.values()}
         taken.update(dict.fromkeys(proposed))
+        count = 3
         exact: list[str] = []
         other: list[str] = []
         for source in self.drafts.values():
+            if len(exact) == count:
+                break  # in a large graph nearly every block may fit
             if source is target or source.stands_for:
                 continue
             for name, output in source.outputs.items():
                 path = f"{source.flat.path}.{name}"
                 if path in taken or name in source.absent:
                     continue
+                same = output.signal is port.signal
+                if not same and len(other) == count:
+                    continue
                 if fits(output, port, source, target):
-                    same = output.signal is port.signal
                     (exact if same else other).append(path)
-        return tuple([*exact, *other][:3])
+        return tuple([*exact, *other][:count])
 
 
 def _signal_text(signal: type[Signal]) -> str:
