@@ -266,7 +266,8 @@ class WireCheck:
             return
         missing = [n for n in port.signal.fields if n not in output.signal.fields]
         if missing:
-            candidates = self._local(self._candidates(target, port), at, wire)
+            selected = [f"{wire.source}.{n}" for n in _fitting(source, output, port)]
+            candidates = self._local(selected[:3] or self._candidates(target, port), at, wire)
             self.problems.add(
                 Code.FIELD_MISSING,
                 f"{wire.source} does not carry {listing(missing)}",
@@ -366,11 +367,10 @@ class WireCheck:
         """
         taken = {wire.source: None for wire in target.flat.wires.values()}
         taken.update(dict.fromkeys(proposed))
-        count = 3
         exact: list[str] = []
         other: list[str] = []
         for source in self.drafts.values():
-            if len(exact) == count:
+            if len(exact) == 3:
                 break  # in a large graph nearly every block may fit
             if source is target or source.stands_for:
                 continue
@@ -379,11 +379,21 @@ class WireCheck:
                 if path in taken or name in source.absent:
                     continue
                 same = output.signal is port.signal
-                if not same and len(other) == count:
+                if not same and len(other) == 3:
                     continue
                 if fits(output, port, source, target):
                     (exact if same else other).append(path)
-        return tuple([*exact, *other][:count])
+        return tuple([*exact, *other][:3])
+
+
+def _fitting(source: Draft, output: Output[Any], port: Input[Any]) -> Iterator[str]:
+    """The fields of an output of which an input with one field may select one."""
+    wanted, *more = port.signal.fields.values()
+    asked = quantity_of(wanted) or UNCHECKED
+    for name, given in output.signal.fields.items():
+        same = given.dtype_name == wanted.dtype_name and not more
+        if same and source.quantity(output.name, name).agrees(asked):
+            yield name
 
 
 def _signal_text(signal: type[Signal]) -> str:
