@@ -155,7 +155,10 @@ def _import_own(path: Path) -> ModuleType:
 def _class_of(module: ModuleType, class_name: str, name: str) -> type[Block]:
     found = getattr(module, class_name, None)
     if found is None:
-        raise UnknownBlockError(f"module {module.__name__!r} has no class {class_name!r}")
+        written = module.__name__.partition("@")[
+            0
+        ]  # of two modules of one name, one has its folder
+        raise UnknownBlockError(f"module {written!r} has no class {class_name!r}")
     if not (isinstance(found, type) and issubclass(found, Block)):
         raise BlockImportError(f"{name} is not a block: it does not derive from aloft's Block")
     if inspect.isabstract(found):

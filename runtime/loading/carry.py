@@ -41,16 +41,20 @@ class _Carrier:
                     if declared is not None:
                         draft.quantities[f"{name}.{field_name}"] = declared
         self.waiting = {path: None for path, draft in drafts.items() if self._missing(draft)}
+        self.vain: dict[str, None] = {}
+        """Blocks that had no answer to what has arrived so far."""
 
     def run(self) -> None:
         """Ask all blocks until every output is known."""
         self._settle(self.waiting)
         while self.waiting:
-            changed = next((path for path in self.waiting if self._ask(path)), None)
+            asked = (path for path in self.waiting if path not in self.vain)
+            changed = next((path for path in asked if self._ask(path)), None)
             if changed is None:
                 changed = next(iter(self.waiting))
                 draft = self.drafts[changed]
                 draft.quantities[next(self._missing(draft))] = Quantity()
+                self._tell_readers(changed)
             self._settle([changed, *self.readers.get(changed, ())])
 
     def _settle(self, paths: Mapping[str, None] | list[str]) -> None:
@@ -76,7 +80,16 @@ class _Carrier:
             if answers.get(name) is not None:
                 draft.quantities[name] = answers[name]  # type: ignore[assignment]  # answers were checked above
                 found = True
+        if found:
+            self._tell_readers(path)
+        else:
+            self.vain[path] = None
         return found
+
+    def _tell_readers(self, path: str) -> None:
+        """Something new arrives at the blocks that read this one: they may be asked again."""
+        for reader in self.readers.get(path, ()):
+            self.vain.pop(reader, None)
 
     def _missing(self, draft: Draft) -> Iterator[str]:
         """The output fields that are not known yet."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 from ..language.block import Block, Input, Output
@@ -166,6 +167,13 @@ class WireCheck:
         self.graph = graph
         self.drafts = drafts
         self.problems = problems
+        self._similar: dict[str, tuple[str, ...]] = {}
+
+    @cached_property
+    def _known(self) -> list[str]:
+        """All blocks and sub-graphs that a wire may name."""
+        known = [path for path, draft in self.drafts.items() if not draft.stands_for]
+        return [*known, *self.graph.subgraphs]
 
     def check(self, draft: Draft) -> None:
         """Report every problem of the wires into one block."""
@@ -258,7 +266,8 @@ class WireCheck:
             return
         missing = [n for n in port.signal.fields if n not in output.signal.fields]
         if missing:
-            candidates = self._local(self._candidates(target, port), at, wire)
+            selected = [f"{wire.source}.{n}" for n in _fitting(source, output, port)]
+            candidates = self._local(selected[:3] or self._candidates(target, port), at, wire)
             self.problems.add(
                 Code.FIELD_MISSING,
                 f"{wire.source} does not carry {listing(missing)}",
@@ -333,10 +342,9 @@ class WireCheck:
         prefixes = [f"{path}/" for path in self.graph.broken]
         if self.graph.incomplete or any(f"{block}/".startswith(prefix) for prefix in prefixes):
             return  # it may be in a file that could not be read, which is reported
-        known = [path for path, draft in self.drafts.items() if not draft.stands_for]
-        known += self.graph.subgraphs
-        similar = nearest(block, known)
-        names = [f"{match}.{wire.source_port}" for match in similar]
+        if block not in self._similar:  # many wires may read one block that is missing
+            self._similar[block] = nearest(block, self._known)
+        names = [f"{match}.{wire.source_port}" for match in self._similar[block]]
         candidates = self._local(names or candidates, at, wire)
         candidates = tuple(f"{each}{wire.selected}" for each in candidates)
         self.problems.add(
@@ -344,7 +352,7 @@ class WireCheck:
             f"{at} reads {wire.source}, but there is no block {block!r}",
             wire.where,
             at=at,
-            expected=listing(known),
+            expected=listing(self._known),
             found=wire.source,
             nearest=candidates,
             fix=f"{at.rpartition('.')[2]}: {candidates[0]}" if candidates else "",
@@ -362,16 +370,30 @@ class WireCheck:
         exact: list[str] = []
         other: list[str] = []
         for source in self.drafts.values():
+            if len(exact) == 3:
+                break  # in a large graph nearly every block may fit
             if source is target or source.stands_for:
                 continue
             for name, output in source.outputs.items():
                 path = f"{source.flat.path}.{name}"
                 if path in taken or name in source.absent:
                     continue
+                same = output.signal is port.signal
+                if not same and len(other) == 3:
+                    continue
                 if fits(output, port, source, target):
-                    same = output.signal is port.signal
                     (exact if same else other).append(path)
         return tuple([*exact, *other][:3])
+
+
+def _fitting(source: Draft, output: Output[Any], port: Input[Any]) -> Iterator[str]:
+    """The fields of an output of which an input with one field may select one."""
+    wanted, *more = port.signal.fields.values()
+    asked = quantity_of(wanted) or UNCHECKED
+    for name, given in output.signal.fields.items():
+        same = given.dtype_name == wanted.dtype_name and not more
+        if same and source.quantity(output.name, name).agrees(asked):
+            yield name
 
 
 def _signal_text(signal: type[Signal]) -> str:

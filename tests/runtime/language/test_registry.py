@@ -101,6 +101,9 @@ def test_two_graphs_with_modules_of_the_same_name(tmp_path: Path) -> None:
         (tmp_path / name / "my_twin_part.py").write_text(BLOCK.format(mark=name))
         marks.append(find_block("my_twin_part:Mine", tmp_path / name).mark)  # type: ignore[attr-defined]
     assert marks == ["here", "there"]
+    for name in ("here", "there"):  # errors name the module as the graph does
+        with pytest.raises(UnknownBlockError, match=r"^module 'my_twin_part' has no class 'Mime'"):
+            find_block("my_twin_part:Mime", tmp_path / name)
 
 
 def test_a_module_of_another_graph_is_not_run_for_one_of_the_same_name(tmp_path: Path) -> None:

@@ -1,8 +1,11 @@
 """Very many mistakes of one kind are printed shortly and counted in full."""
 
 from pathlib import Path
+from typing import Any
 
-from aloft.runtime.loading import check
+import pytest
+
+from aloft.runtime.loading import carry, check, wire_check
 
 
 def test_one_missing_block_read_by_many(tmp_path: Path) -> None:
@@ -30,3 +33,25 @@ def test_a_ring_of_very_many_blocks(tmp_path: Path) -> None:
     assert "-> b399.u -> b399.y -> b0.u" in problem.found
     assert problem.fix == "u: {from: b399.y, delay: 1}"
     assert len(report.text()) < 1000
+
+
+def test_the_work_for_one_missing_block_grows_with_its_readers(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    calls = dict.fromkeys(("answers_of", "fits", "nearest"), 0)
+    for module, name in ((carry, "answers_of"), (wire_check, "fits"), (wire_check, "nearest")):
+        original = getattr(module, name)
+
+        def counted(*given: Any, name: str = name, original: Any = original) -> Any:
+            calls[name] += 1
+            return original(*given)
+
+        monkeypatch.setattr(module, name, counted)
+    count = 100
+    lines = [f"  b{k}: {{use: blocks.Gain, in: {{u: nowhere.y}}}}" for k in range(count)]
+    path = tmp_path / "graph.yaml"
+    path.write_text("\n".join(["rate: 100 Hz", "blocks:", *lines]))
+    assert len(check(path).problems) == count
+    assert 0 < calls["answers_of"] <= 6 * count  # not count ** 2
+    assert 0 < calls["fits"] <= 6 * count
+    assert calls["nearest"] == 1

@@ -19,6 +19,11 @@ PART = "inputs: {u: a signal}\noutputs: {y: gain.y}\nblocks:\n  gain: {use: bloc
         ("graphs/tasks/go2_in_situ_10cm.yaml", "a task of the jump planner", "aloft plan {}"),
         ("robots/bruce/bruce.yaml", "a robot's description", "in a graph: robot: {}"),
         ("robots/go2/go2.yaml", "a robot's description", "in a graph: robot: {}"),
+        (
+            "graphs/hardware/bruce.yaml",
+            "a robot's hardware",
+            "in a graph: robot: {{use: hal.BearRobot, with: {{hardware: {}}}}}",
+        ),
     ],
 )
 def test_shipped_files_that_are_no_graphs(file: str, kind: str, fix: str) -> None:
@@ -34,6 +39,40 @@ def test_a_sub_graph(tmp_path: Path) -> None:
     (problem,) = check(path).problems
     assert "is a sub-graph, a part of a graph" in problem.message
     assert problem.fix == f"in a graph: blocks: {{part: {{use: {path}}}}}"
+
+
+@pytest.mark.parametrize(
+    ("file", "missing"),
+    [
+        ("graphs/controllers/bruce_gains.yaml", "joint_pd, weight, safety, switches, landing"),
+        ("graphs/controllers/whole_body.yaml", "robot, plan"),
+        ("graphs/trials/standard.yaml", "robot"),
+    ],
+)
+def test_shipped_parts_that_graphs_include(file: str, missing: str) -> None:
+    path = ROOT / file
+    (problem,) = check(path).problems
+    assert problem.message == (f"{path} is a part that graphs include, not a graph that can be run")
+    assert f"blocks that are not here: {missing}" in problem.found
+    assert problem.fix == f"in a graph with such blocks: include: {path}"
+
+
+def test_a_graph_without_its_rate_and_with_one_wrong_name_is_a_graph(tmp_path: Path) -> None:
+    path = tmp_path / "graph.yaml"
+    path.write_text(
+        "blocks:\n  wave: {use: blocks.SineWave}\n  twice: {use: blocks.Gain, in: {u: wav.y}}\n"
+    )
+    messages = [problem.message for problem in check(path).problems]
+    assert "the graph does not say its rate" in messages
+    assert any("there is no block 'wav'" in message for message in messages)
+
+
+def test_a_file_that_changes_a_graph_it_includes_is_a_graph(tmp_path: Path) -> None:
+    (tmp_path / "base.yaml").write_text("rate: 10 Hz\nblocks: {wave: {use: blocks.SineWave}}\n")
+    path = tmp_path / "changed.yaml"
+    path.write_text("include: base.yaml\nset: {wave.amplitude: 2, wove.amplitude: 3}\n")
+    (problem,) = check(path).problems
+    assert problem.message == "'wove.amplitude': there is no block 'wove'"
 
 
 def test_a_graph_with_a_key_too_many_is_a_graph(tmp_path: Path) -> None:
