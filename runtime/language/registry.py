@@ -155,9 +155,8 @@ def _import_own(path: Path) -> ModuleType:
 def _class_of(module: ModuleType, class_name: str, name: str) -> type[Block]:
     found = getattr(module, class_name, None)
     if found is None:
-        written = module.__name__.partition("@")[
-            0
-        ]  # of two modules of one name, one has its folder
+        # Of two modules of one name, the name of one goes on with its folder.
+        written = module.__name__.partition("@")[0]
         raise UnknownBlockError(f"module {written!r} has no class {class_name!r}")
     if not (isinstance(found, type) and issubclass(found, Block)):
         raise BlockImportError(f"{name} is not a block: it does not derive from aloft's Block")
