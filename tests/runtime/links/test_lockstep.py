@@ -19,6 +19,7 @@ from aloft.runtime.placement.place import place, spread
 from aloft.runtime.running.executor import run
 from aloft.runtime.testing.spread import run_spread
 
+from ...waiting import wait_for
 from .example_graphs import Counter, endpoints, random_graph, ring
 
 GRAPHS = Path(__file__).parents[3] / "graphs"
@@ -132,6 +133,7 @@ def test_a_parameter_changes_everywhere_in_one_tick(machine: str) -> None:
     spread_out = run_spread(
         ring(), prepare=lambda parts, hub: answers.append(change(parts, 9, machine, 2.0))
     )
+    wait_for(lambda: answers[0])  # the thread that asked may run later than the run ends
     assert answers == [[""]]
     for part in spread_out.parts.values():
         assert [(c.tick, c.path, c.new) for c in part.parameters.changes] == [
@@ -162,6 +164,7 @@ def test_a_change_that_a_block_refuses_changes_nothing_anywhere(machine: str) ->
     spread_out = run_spread(
         ring(), prepare=lambda parts, hub: answers.append(change(parts, 9, machine, 7.0))
     )
+    wait_for(lambda: answers[0])
     assert answers == [["block 'first' refuses the change: seven is refused"]]
     assert spread_out.run_hash == run(ring()).run_hash
     for part in spread_out.parts.values():
