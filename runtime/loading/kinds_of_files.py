@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 
 from ..language.stages import Position
 from .document import read_file
-from .nodes import ListNode, MapNode, Node, ScalarNode
+from .nodes import MapNode, Node, texts_of
 from .problems import Code, Problems, listing
 from .written import COMMON_KEYS, GRAPH_KEYS
 
@@ -71,7 +71,8 @@ def _is_to_be_included(tree: MapNode, keys: list[str], shown: str, problems: Pro
     for each in trees:
         inputs = [_mapping(e.value, "in") for e in _mapping(each, "blocks")]
         targets = [e.key for key in ("set", "wires") for e in _mapping(each, key)]
-        for text in [*targets, *_texts([*inputs, _mapping(each, "wires")])]:
+        sources = [text for node in (*inputs, _mapping(each, "wires")) for text in texts_of(node)]
+        for text in [*targets, *sources]:
             if found := _BLOCK.match(text):
                 named[found[1]] = None
     missing = [name for name in named if name not in own]
@@ -95,7 +96,7 @@ def _with_included(tree: MapNode, path: Path, seen: dict[Path, None]) -> list[Ma
     """A file and all that it includes, each once; ``None`` if one of them cannot be read."""
     trees = [tree]
     entry = tree.get("include")
-    for text in _texts([entry.value] if entry else []):
+    for text in texts_of(entry.value) if entry else ():
         file = (path.parent / text).resolve()
         if file in seen:
             continue
@@ -113,14 +114,3 @@ def _mapping(node: Node, key: str) -> MapNode:
     entry = node.get(key) if isinstance(node, MapNode) else None
     value = entry.value if entry else None
     return value if isinstance(value, MapNode) else MapNode((), node.where)
-
-
-def _texts(nodes: list[MapNode] | list[Node]) -> Iterator[str]:
-    """Every text inside of these values."""
-    for node in nodes:
-        if isinstance(node, ScalarNode):
-            if isinstance(node.value, str):
-                yield node.value
-        else:
-            items = node.items if isinstance(node, ListNode) else [e.value for e in node]
-            yield from _texts(list(items))

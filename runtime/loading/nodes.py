@@ -99,6 +99,16 @@ def plain(node: Node) -> Any:
     return {entry.key: plain(entry.value) for entry in node.entries}
 
 
+def texts_of(node: Node) -> Iterator[str]:
+    """Every text inside of a value, in the order of the file; keys are none of them."""
+    if isinstance(node, ScalarNode):
+        if isinstance(node.value, str):
+            yield node.value
+        return
+    for inner in node.items if isinstance(node, ListNode) else (e.value for e in node):
+        yield from texts_of(inner)
+
+
 def from_plain(value: Any, where: Position) -> Node:
     """A tree of plain Python data (also NumPy arrays and scalars), all of it at one place."""
     if hasattr(value, "tolist"):

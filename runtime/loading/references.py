@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 
-from .nodes import ListNode, MapNode, Node, ScalarNode
+from .nodes import ListNode, Node, ScalarNode, texts_of
 from .problems import Code, Problems, listing, nearest
 from .written import WrittenGraph
 
@@ -67,7 +67,7 @@ def report_unused(
     for file in files:
         for entry in file.tree:
             if entry.key not in ("parameters", "inputs"):
-                _collect(entry.value, texts)
+                texts.update(dict.fromkeys(texts_of(entry.value)))
     referred = {match[1] for match in map(_INPUT.match, texts) if match}
     for entry in subgraph.parameters:
         if f"${entry.key}" not in texts:
@@ -87,15 +87,3 @@ def report_unused(
                 at=entry.key,
                 fix=f"use it as inputs.{entry.key}, or remove it",
             )
-
-
-def _collect(node: Node, texts: dict[str, None]) -> None:
-    if isinstance(node, ScalarNode):
-        if isinstance(node.value, str):
-            texts[node.value] = None
-    elif isinstance(node, ListNode):
-        for item in node.items:
-            _collect(item, texts)
-    elif isinstance(node, MapNode):
-        for entry in node:
-            _collect(entry.value, texts)
