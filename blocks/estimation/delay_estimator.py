@@ -71,6 +71,9 @@ class DelayEstimator(Block):
         usual: float = parameter(
             0.00075, unit="s", ge=0.0, text="jitter and sampling, which nobody tells"
         )
+        tolerated: float = parameter(
+            0.002, unit="s", ge=0.0, le=0.02, text="delay for which the controller's gains are made"
+        )
         tolerance: float = parameter(
             0.001, unit="s", gt=0.0, text="difference of both without a caution"
         )
@@ -86,8 +89,8 @@ class DelayEstimator(Block):
         p, estimate = self.params, self.estimate
         memory = Memory(*(getattr(self.memory, name) for name in Memory._fields))
         self._give = KernelCall(
-            give_delay, p.told, p.usual, p.follow == "measured", memory, estimate.measured,
-            estimate.known, estimate.delay,
+            give_delay, p.told, p.usual, p.follow == "measured", memory, p.tolerated,
+            estimate.measured, estimate.known, estimate.delay, estimate.ahead,
         )  # fmt: skip
         self._follow = KernelCall(
             follow_delay, self.command.torque, self.joints.torque,

@@ -258,8 +258,8 @@ class JumpPlan(KernelBlock):
         lead = self.delay.delay if p.lead is None else np.array(p.lead, np.float64)
         calls = [
             KernelCall(
-                plan_instant, clock.present, clock.base_period, progress.late, lead, period,
-                reader.instant,
+                plan_instant, clock.present, clock.base_period, progress.late, lead,
+                self.delay.ahead, period, reader.instant,
             ),
             reader.call,
         ]  # fmt: skip
