@@ -14,7 +14,7 @@ from ...mathematics.constants import GRAVITY
 from ...mathematics.kernel import kernel
 from ...runtime.language.block import Input, Output, State
 from ...runtime.language.kernel_block import KernelBlock
-from ...runtime.language.parameters import Parameters, live_parameter
+from ...runtime.language.parameters import Parameters, live_parameter, parameter
 from ...runtime.language.signals import Field, Signal
 from ..signals import ContactState, DelayEstimate, DynamicsTerms, JumpReference, Phase, PhaseState
 from .capture_law import PhaseFields
@@ -113,7 +113,7 @@ class JumpPhase(KernelBlock):
         flat_height: float = live_parameter(
             0.006, unit="m", ge=0.0, text="height up to which a foot's other points are in stance"
         )
-        early_landing: float = live_parameter(
+        early_landing: float = parameter(
             1.0,
             ge=0.0,
             le=2.0,
@@ -243,6 +243,8 @@ def follow_phases(
         )  # fmt: skip
     times[NOW], times[IN_PHASE] = now, now - float(memory.began[()])
     times[LIFT_OFF], times[TOUCHDOWN] = lift_off, touchdown
+    if before == Phase.LANDING:  # it may have begun without a contact, after a long flight
+        shortest = min(shortest, float(times[IN_PHASE]))
     times[REMAINING], times[UNLOADED], times[AHEAD] = remaining, shortest, float(ahead[()])
     find_conditions(times, table.limits, int(planned.phase[()]), another, table.holds)
     phase = next_phase(table.transitions, before, table.holds)

@@ -110,7 +110,7 @@ def find_conditions(
     holds[Condition.OVERDUE] = in_phase > flight + float(limits[LOST_CONTACT])
     holds[Condition.RESTED] = not another and in_phase >= limits[LANDING_TIME]
     holds[Condition.THRUSTS_AGAIN] = another and planned == Phase.THRUST
-    holds[Condition.LOST_CONTACT] = min(unloaded, in_phase) > float(limits[LOST_CONTACT])
+    holds[Condition.LOST_CONTACT] = unloaded > limits[LOST_CONTACT]
 
 
 @kernel

@@ -88,7 +88,13 @@ class Progress(NamedTuple):
 
 @kernel
 def plan_instant(
-    present: Indices, base_period: float, late: Array, lead: Array, ahead: Array, hold: float, instant: Array
+    present: Indices,
+    base_period: float,
+    late: Array,
+    lead: Array,
+    ahead: Array,
+    hold: float,
+    instant: Array,
 ) -> None:
     """The instant at which the plan is read.
 
