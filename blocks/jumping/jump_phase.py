@@ -114,10 +114,10 @@ class JumpPhase(KernelBlock):
             0.006, unit="m", ge=0.0, text="height up to which a foot's other points are in stance"
         )
         early_landing: float = parameter(
-            1.0,
+            1.5,
             ge=0.0,
-            le=2.0,
-            text="share of `delay.ahead` by which a landing begins before the predicted touchdown",
+            le=3.0,
+            text="by this times `delay.ahead` a landing begins before the predicted touchdown",
         )
         lost_contact: float = live_parameter(
             0.2, unit="s", gt=0.0, text="time without contact after which it is a fault"
