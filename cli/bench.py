@@ -51,7 +51,15 @@ def bench(
     as_json: JsonBesideTables = False,
 ) -> None:
     """Measure the runtime beside hand-written loops and peers; exit with 1 if a goal is missed."""
-    from ..benchmarks import BENCHMARKS, COUNTED, LINKED, PEERED, SEEDED, TIMED, run_benchmarks
+    from ..benchmarks.catalogue import (
+        BENCHMARKS,
+        COUNTED,
+        LINKED,
+        PEERED,
+        SEEDED,
+        TIMED,
+        run_benchmarks,
+    )
     from ..studies.batch.seeds import parse_seeds
 
     out = console(to_stderr=as_json)

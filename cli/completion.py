@@ -33,6 +33,6 @@ def parameter_names(context: typer.Context, incomplete: str) -> list[str]:
 
 def benchmark_names(incomplete: str) -> list[str]:
     """The names of benchmarks that begin with a text."""
-    from ..benchmarks import BENCHMARKS
+    from ..benchmarks.catalogue import BENCHMARKS
 
     return [name for name in BENCHMARKS if name.startswith(incomplete)]

@@ -16,7 +16,7 @@ from typing import Any
 
 from marks import refresh
 
-from aloft.benchmarks.tick_chart import BARS, tick_chart
+from aloft.benchmarks.tick.chart import BARS, tick_chart
 
 PAGE = Path(__file__).parent / "compiled.md"
 README = PAGE.parent.parent / "README.md"

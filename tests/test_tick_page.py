@@ -6,7 +6,7 @@ from types import ModuleType
 import pytest
 
 from aloft.benchmarks.rows import Row
-from aloft.benchmarks.tick_chart import tick_chart
+from aloft.benchmarks.tick.chart import tick_chart
 
 ROWS = [
     Row("block wbc", 20.0, "us/tick"),
