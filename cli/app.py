@@ -14,7 +14,7 @@ import typer
 
 from .. import __version__
 from ..runtime.language.errors import ExitCode
-from .output import print_json
+from .shared.output import print_json
 
 EXIT_CODES = """\b
 Exit codes:

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..runtime.language.errors import AloftError, ExitCode
-from .completion import benchmark_names
-from .options import JsonBesideTables
-from .output import console, errors_reported, number, print_json, say, table
+from .shared.completion import benchmark_names
+from .shared.options import JsonBesideTables
+from .shared.output import console, errors_reported, number, print_json, say, table
 
 if TYPE_CHECKING:
     from rich.console import Console

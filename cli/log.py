@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from ..runtime.language.errors import AloftError, ExitCode
-from .options import AsJson
-from .output import console, errors_reported, number, print_json, print_warning, say, table
+from .shared.options import AsJson
+from .shared.output import console, errors_reported, number, print_json, print_warning, say, table
 
 if TYPE_CHECKING:
     from ..logs.file.reader import RecordedRun

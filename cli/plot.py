@@ -10,7 +10,7 @@ import numpy as np
 import typer
 
 from ..runtime.language.errors import AloftError
-from .output import errors_reported
+from .shared.output import errors_reported
 
 if TYPE_CHECKING:
     from ..logs.file.reader import RecordedRun

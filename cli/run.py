@@ -12,8 +12,9 @@ from typing import TYPE_CHECKING, Annotated, Any, Protocol
 import typer
 
 from ..runtime.language.errors import AloftError, ExitCode
-from .options import CompletedOverrides, JsonBesideTables, NoRecord, Quiet
-from .output import (
+from .running.run_output import print_result, print_verdict
+from .shared.options import CompletedOverrides, JsonBesideTables, NoRecord, Quiet
+from .shared.output import (
     console,
     errors_reported,
     number,
@@ -23,8 +24,7 @@ from .output import (
     say,
     table,
 )
-from .run_output import print_result, print_verdict
-from .stopping import stopped_by_signals
+from .shared.stopping import stopped_by_signals
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -132,7 +132,7 @@ def run(
         if wishes_of_thread != NO_WISHES and (seeds or local):
             raise AloftError("--cpu, --priority and --lock-memory are for one run, in one process")
         if local:
-            from .run_local import Wishes, run_local
+            from .running.run_local import Wishes, run_local
 
             place = None if no_record else record
             wishes = Wishes(
@@ -147,7 +147,7 @@ def run(
             loaded: Runs = load(graph, settings)
             name = loaded.checked.name
             if machine:
-                from .run_part import Part
+                from .running.run_part import Part
 
                 loaded, name = Part(loaded.checked, machine, keys), f"{name}-{machine}"
             default = Path("recordings") / f"{name}.rrd"
@@ -216,7 +216,7 @@ def leave_viewer(viewer: Viewer, *, wait: bool) -> None:
 
 def open_endpoint(graph: Runs, name: str, default: str) -> ParameterEndpoint | None:
     """Open the endpoint at which ``aloft params`` reaches the run. Unless it was asked for, it may fail."""
-    from . import endpoints
+    from .shared import endpoints
 
     if name == "none" or not (name or graph.checked.clock.kind != "free"):
         return None
@@ -269,8 +269,8 @@ def run_once(
     from ..logs.recording.recorder import Recorder
     from ..runtime.running.freeze_guard import FreezeGuard
     from ..runtime.running.real_time import NO_WISHES
-    from .last_words import LastWords
-    from .progress import TickCounter, compiling_shown, progress_bar
+    from .running.last_words import LastWords
+    from .shared.progress import TickCounter, compiling_shown, progress_bar
     from .view import how_to_view
 
     name = graph.checked.name
@@ -330,7 +330,7 @@ def run_many(
 ) -> ExitCode:
     """Run the graph once with each seed; print a row for each, and how many succeeded."""
     from ..studies.batch.seeds import run_seeds
-    from .progress import progress_bar
+    from .shared.progress import progress_bar
 
     rows: list[SeedRow] = []
     with (

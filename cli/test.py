@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..runtime.language.errors import AloftError, ExitCode
-from .options import AsJson
-from .output import console, errors_reported, print_json, print_warning, say, table
+from .shared.options import AsJson
+from .shared.output import console, errors_reported, print_json, print_warning, say, table
 
 if TYPE_CHECKING:
     from rich.console import Console

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from ..runtime.language.errors import AloftError, ExitCode
-from .output import errors_reported
+from .shared.output import errors_reported
 
 if TYPE_CHECKING:
     from ..logs.file.reader import RecordedRun
@@ -132,7 +132,7 @@ def show(file: Path, *, web: bool) -> None:
 
 def keep_open(viewer: Viewer) -> None:
     """Wait until the window is closed, or for Ctrl-C; then end the viewer."""
-    from .stopping import stopped_by_signals
+    from .shared.stopping import stopped_by_signals
 
     try:
         if viewer.kind == "web":

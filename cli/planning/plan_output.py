@@ -9,19 +9,19 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .output import number, table
+from ..shared.output import number, table
 
 if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
 
-    from ..logs.recording.motion_recording import RecordedMotion
-    from ..planner.library.nearest_feasible import NearestFeasible
-    from ..planner.task.errors import PlanError
-    from ..planner.task.plan import JumpPlan
-    from ..planner.task.task import JumpTask
-    from ..robots.description import RobotDescription
-    from ..studies.batch.plan_grid import GridRow
+    from ...logs.recording.motion_recording import RecordedMotion
+    from ...planner.library.nearest_feasible import NearestFeasible
+    from ...planner.task.errors import PlanError
+    from ...planner.task.plan import JumpPlan
+    from ...planner.task.task import JumpTask
+    from ...robots.description import RobotDescription
+    from ...studies.batch.plan_grid import GridRow
 
 SHOWN_STATISTICS = ("solver", "iterations", "cpu_s", "violation", "cost", "warm")
 
@@ -180,11 +180,11 @@ def failure_rows(rows: Sequence[GridRow]) -> list[tuple[str, str]]:
 
 def recorded_motion(plan: JumpPlan, robot: RobotDescription) -> RecordedMotion:
     """The plan as a motion with time series, with an instant about every 10 ms."""
-    from ..logs.recording.motion_recording import RecordedMotion
-    from ..planner.checking.evidence import Evidence
-    from ..planner.checking.plan_tests import allowed_motor_torque
-    from ..planner.checking.replay import replay
-    from ..planner.library.reference_table import reference_table
+    from ...logs.recording.motion_recording import RecordedMotion
+    from ...planner.checking.evidence import Evidence
+    from ...planner.checking.plan_tests import allowed_motor_torque
+    from ...planner.checking.replay import replay
+    from ...planner.library.reference_table import reference_table
 
     evidence = Evidence(plan, robot, replay(plan, robot))
     samples = evidence.replay.samples

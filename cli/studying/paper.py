@@ -8,20 +8,20 @@ from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..runtime.language.errors import AloftError, ExitCode
-from .output import plain, print_json, print_warning, say
+from ...runtime.language.errors import AloftError, ExitCode
+from ..shared.output import plain, print_json, print_warning, say
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from rich.console import Console
 
-    from ..studies.execution import Run
-    from ..studies.figures.trace import Trace
-    from ..studies.journal import Journal
+    from ...studies.execution import Run
+    from ...studies.figures.trace import Trace
+    from ...studies.journal import Journal
 
 NAME = "paper"
-STUDY = Path(__file__).parents[1] / "graphs" / "studies" / "paper.yaml"
+STUDY = Path(__file__).parents[2] / "graphs" / "studies" / "paper.yaml"
 
 
 def draw_paper(
@@ -38,15 +38,15 @@ def draw_paper(
     show the runs of the first seed, which are made every time. All other runs are kept in
     ``results/paper`` or, with ``out``, in its folder ``runs``.
     """
-    from ..studies.batch.seeds import parse_seeds
-    from ..studies.execution import Run
-    from ..studies.expansion import cells as expand
-    from ..studies.figures.page import page
-    from ..studies.figures.paper import draw
-    from ..studies.journal import Journal
-    from ..studies.reading import read_study
-    from ..studies.summary import summarise
-    from ..studies.table import make_table, write_table
+    from ...studies.batch.seeds import parse_seeds
+    from ...studies.execution import Run
+    from ...studies.expansion import cells as expand
+    from ...studies.figures.page import page
+    from ...studies.figures.paper import draw
+    from ...studies.journal import Journal
+    from ...studies.reading import read_study
+    from ...studies.summary import summarise
+    from ...studies.table import make_table, write_table
     from .study_runs import check_cells, make_all, report_stop
 
     found = read_study(study)
@@ -86,10 +86,10 @@ def traced(
     Raises:
         AloftError: one of them broke.
     """
-    from ..studies.batch.jobs import job_results, processors
-    from ..studies.expansion import job
-    from ..studies.figures.trace import make_trace
-    from .progress import progress_bar
+    from ...studies.batch.jobs import job_results, processors
+    from ...studies.expansion import job
+    from ...studies.figures.trace import make_trace
+    from ..shared.progress import progress_bar
 
     shown = [run for run in runs if run.seed == seed]
     jobs = [(run.cell.task, job(run.cell, seed)) for run in shown]

@@ -6,17 +6,17 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
-from ..runtime.language.errors import AloftError, ExitCode
-from .output import print_json, print_warning, say
+from ...runtime.language.errors import AloftError, ExitCode
+from ..shared.output import print_json, print_warning, say
+from ..view import draw, how_to_view, show
 from .study_runs import check_cells
-from .view import draw, how_to_view, show
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from rich.console import Console
 
-    from ..studies.study import Filter, Study
+    from ...studies.study import Filter, Study
 
 
 def open_run(
@@ -35,12 +35,12 @@ def open_run(
     Raises:
         AloftError: the study has no finished runs, or none with that number.
     """
-    from ..logs.recording.recorder import Recorder
-    from ..studies.execution import Run
-    from ..studies.expansion import cells as expand
-    from ..studies.journal import Journal
-    from ..studies.tuning import read_tuned
-    from ..studies.worst import chosen_run, file_name, labels_of, run_again, with_outcomes
+    from ...logs.recording.recorder import Recorder
+    from ...studies.execution import Run
+    from ...studies.expansion import cells as expand
+    from ...studies.journal import Journal
+    from ...studies.tuning import read_tuned
+    from ...studies.worst import chosen_run, file_name, labels_of, run_again, with_outcomes
 
     chosen = [cell for cell in expand(found, read_tuned(found)) if part.takes(cell.labels)]
     cells = check_cells(found, chosen, screen)

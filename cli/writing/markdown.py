@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ..runtime.language.reference import BlockReference, PortReference
+from ...runtime.language.reference import BlockReference, PortReference
 
 HEAD = """# Blocks
 

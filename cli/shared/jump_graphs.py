@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from ..runtime.language.errors import AloftError
+from ...runtime.language.errors import AloftError
 
 
 def graph_of(robot: str) -> Path:
@@ -24,7 +24,7 @@ def graph_of(robot: str) -> Path:
 
 def jump_graphs() -> dict[str, Path]:
     """The shipped graph in which each robot jumps, by the robot's name."""
-    from ..runtime.loading.shipped import PREFIX, shipped_graphs
+    from ...runtime.loading.shipped import PREFIX, shipped_graphs
 
     return {
         name.removeprefix(f"{PREFIX}robots/").removesuffix("_jump"): path

@@ -5,26 +5,26 @@ from __future__ import annotations
 import signal
 from typing import TYPE_CHECKING
 
-from ..runtime.language.errors import ExitCode
-from .output import print_json, print_warning, say
-from .stopping import stopped_by_signals
+from ...runtime.language.errors import ExitCode
+from ..shared.output import print_json, print_warning, say
+from ..shared.stopping import stopped_by_signals
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from rich.console import Console
 
-    from ..studies.execution import Run
-    from ..studies.expansion import Cell
-    from ..studies.journal import Journal, Outcome
-    from ..studies.study import Study
+    from ...studies.execution import Run
+    from ...studies.expansion import Cell
+    from ...studies.journal import Journal, Outcome
+    from ...studies.study import Study
 
 
 def check_cells(found: Study, expanded: Sequence[Cell], screen: Console) -> list[Cell]:
     """The cells, after each was checked as ``aloft check`` checks a graph."""
-    from ..studies.expansion import checked_cells
-    from ..studies.fingerprint import code_fingerprint
-    from .progress import progress_bar
+    from ...studies.expansion import checked_cells
+    from ...studies.fingerprint import code_fingerprint
+    from ..shared.progress import progress_bar
 
     with progress_bar(screen, f"checking {len(expanded)} cells", len(expanded)) as (bar, task):
         return checked_cells(expanded, found, code_fingerprint(), lambda: bar.advance(task))
@@ -43,8 +43,8 @@ def make_all(
     Returns:
         All runs with their outcomes, or the signal that stopped the work.
     """
-    from ..studies.execution import make_runs
-    from .progress import progress_bar
+    from ...studies.execution import make_runs
+    from ..shared.progress import progress_bar
 
     successes = 0
     keys = {run.key for run in runs}

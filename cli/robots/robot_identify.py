@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from ..runtime.language.errors import AloftError
-from .options import AsJson
-from .output import console, errors_reported, print_json, say, table
+from ...runtime.language.errors import AloftError
+from ..shared.options import AsJson
+from ..shared.output import console, errors_reported, print_json, say, table
 
 if TYPE_CHECKING:
-    from ..logs.file.reader import RecordedRun
-    from ..robots.identification.delay import Delay
-    from ..robots.identification.rigid_body import RigidBody
-    from ..robots.robot_description import RobotDescription
+    from ...logs.file.reader import RecordedRun
+    from ...robots.identification.delay import Delay
+    from ...robots.identification.rigid_body import RigidBody
+    from ...robots.robot_description import RobotDescription
 
 Recording = Annotated[Path, typer.Argument(help="The recording of a run, a file .rrd.")]
 
@@ -66,7 +66,7 @@ def identify(
 
 
 def _recorded(file: Path) -> tuple[RecordedRun, RobotDescription]:
-    from .log import read
+    from ..log import read
 
     run = read(file)
     if run.header.robot is None:
@@ -80,10 +80,10 @@ def _identified(
 ) -> tuple[RigidBody, Delay]:  # fmt: skip
     import numpy as np
 
-    from ..mathematics.rotations import to_matrix
-    from ..robots.identification.delay import identify_delay
-    from ..robots.identification.motion import Motion
-    from ..robots.identification.rigid_body import IdentificationError, identify_rigid_body
+    from ...mathematics.rotations import to_matrix
+    from ...robots.identification.delay import identify_delay
+    from ...robots.identification.motion import Motion
+    from ...robots.identification.rigid_body import IdentificationError, identify_rigid_body
 
     names = {
         "position": f"{robot}.joints.position", "velocity": f"{robot}.joints.velocity",

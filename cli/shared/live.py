@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from ..runtime.language.errors import AloftError
+from ...runtime.language.errors import AloftError
 
 if TYPE_CHECKING:
-    from ..runtime.live.live_page import Opened
-    from ..runtime.live.live_run import LiveRun
-    from ..runtime.live.live_server import Watched
-    from ..runtime.live.spread_run import SpreadRun
-    from ..runtime.placement.placed import PlacedGraph
+    from ...runtime.live.live_page import Opened
+    from ...runtime.live.live_run import LiveRun
+    from ...runtime.live.live_server import Watched
+    from ...runtime.live.spread_run import SpreadRun
+    from ...runtime.placement.placed import PlacedGraph
 
 PATIENCE = 10.0
 """Seconds to wait for parts that run elsewhere."""
@@ -46,7 +46,7 @@ def open_live_run(name: str, elsewhere: Elsewhere | None = None) -> Watched:
     Raises:
         AloftError: no such graph runs.
     """
-    from ..runtime.live.live_run import LiveRun
+    from ...runtime.live.live_run import LiveRun
     from .endpoints import find
 
     try:
@@ -62,9 +62,9 @@ def open_live_run(name: str, elsewhere: Elsewhere | None = None) -> Watched:
 
 def _whole(run: LiveRun, path: Path, elsewhere: Elsewhere | None) -> Watched:
     """The whole of the graph of which ``run`` is the part that answers at ``path``."""
-    from ..runtime.links.key_folder import secured
-    from ..runtime.live.spread_run import SpreadRun
-    from ..runtime.placement.place import place
+    from ...runtime.links.key_folder import secured
+    from ...runtime.live.spread_run import SpreadRun
+    from ...runtime.placement.place import place
 
     placed = place(run.graph)
     keys = elsewhere.keys if elsewhere is not None else None
@@ -93,10 +93,10 @@ def _spread_elsewhere(elsewhere: Elsewhere) -> SpreadRun | None:
     Raises:
         AloftError: the graph is wrong, or none of its parts was heard.
     """
-    from ..runtime.links.key_folder import secured
-    from ..runtime.live.spread_run import SpreadRun
-    from ..runtime.loading import load
-    from ..runtime.placement.place import place
+    from ...runtime.links.key_folder import secured
+    from ...runtime.live.spread_run import SpreadRun
+    from ...runtime.loading import load
+    from ...runtime.placement.place import place
     from .local_runs import settings_of
 
     def settings() -> tuple[str, ...]:
@@ -134,7 +134,7 @@ def _spread_elsewhere(elsewhere: Elsewhere) -> SpreadRun | None:
 
 def _control(placed: PlacedGraph) -> Path | None:
     """The socket of a part on this machine that takes changes of parameters by its usual name."""
-    from ..runtime.live.parameter_endpoint import answers
+    from ...runtime.live.parameter_endpoint import answers
     from .endpoints import path_of
 
     for spec in placed.machines:
@@ -147,9 +147,9 @@ def _control(placed: PlacedGraph) -> Path | None:
 
 def serve_live(run: Watched, save: Path | None = None, opened: Opened = "diagram") -> None:
     """Serve the page until Ctrl-C is pressed."""
-    from ..runtime.live.live_server import LiveServer
+    from ...runtime.live.live_server import LiveServer
+    from ..view import open_page
     from .stopping import stopped_by_signals
-    from .view import open_page
 
     server = LiveServer(run, save or Path(f"{run.graph.name}-tuned.yaml"), opened)
     with server, stopped_by_signals():

@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from .output import number, say, table
+from ..shared.output import number, say, table
 
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from ..runtime.running.run_result import RunResult
+    from ...runtime.running.run_result import RunResult
 
 
 def print_result(out: Console, name: str, result: RunResult, *, times: bool = True) -> None:

@@ -6,17 +6,17 @@ from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..runtime.language.errors import ExitCode
-from .output import print_json, say, table
+from ...runtime.language.errors import ExitCode
+from ..shared.output import print_json, say, table
+from ..shared.stopping import stopped_by_signals
 from .plan_output import failure_rows
-from .stopping import stopped_by_signals
 
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from ..planner.library.library import PlanLibrary
-    from ..planner.task.task import JumpTask
-    from ..studies.batch.plan_grid import GridRow
+    from ...planner.library.library import PlanLibrary
+    from ...planner.task.task import JumpTask
+    from ...studies.batch.plan_grid import GridRow
 
 
 def plan_grid(
@@ -29,9 +29,9 @@ def plan_grid(
     as_json: bool,
 ) -> ExitCode:
     """Fill the library with a grid of tasks. If a signal stops it, print how much is done."""
-    from ..planner.library.library import PlanLibrary
-    from ..studies.batch.plan_grid import fill, read_grid, robot_of
-    from .progress import progress_bar
+    from ...planner.library.library import PlanLibrary
+    from ...studies.batch.plan_grid import fill, read_grid, robot_of
+    from ..shared.progress import progress_bar
 
     tasks = read_grid(grid)
     library = PlanLibrary(robot_of(tasks), keep)
@@ -82,9 +82,9 @@ def plan_grid(
 
 def compile_once(library: PlanLibrary, tasks: list[JumpTask], screen: Console) -> None:
     """Compile before the workers start; otherwise each of them would compile the same functions."""
-    from ..planner.solving.solve import make_problem
-    from ..planner.task.errors import PlanError
-    from ..planner.task.task import TaskError
+    from ...planner.solving.solve import make_problem
+    from ...planner.task.errors import PlanError
+    from ...planner.task.task import TaskError
 
     # In the plane and out of it there are other functions, and for every formulation.
     kinds = {(t.formulation, bool(t.distance_y or t.twist), t.impact): t for t in tasks}

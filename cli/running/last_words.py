@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from ..runtime.running.memory import BoundGraph
-from ..runtime.running.run_result import RunResult
-from .output import print_json
+from ...runtime.running.memory import BoundGraph
+from ...runtime.running.run_result import RunResult
+from ..shared.output import print_json
 
 
 class LastWords:

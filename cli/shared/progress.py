@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.progress import Progress, TaskID
 
-    from ..runtime.running.memory import BoundGraph
+    from ...runtime.running.memory import BoundGraph
 
 TICKS_A_STEP = 100
 """Ticks between two updates of the bar: the control thread pays microseconds for each."""
@@ -55,7 +55,7 @@ def progress_bar(out: Console, text: str, total: int | None) -> Iterator[tuple[P
 @contextmanager
 def compiling_shown(progress: Progress) -> Iterator[None]:
     """Show a second bar while kernels are compiled, which only the first run on a machine does."""
-    from ..mathematics.compiling.compile_calls import watchers
+    from ...mathematics.compiling.compile_calls import watchers
 
     bars: list[TaskID] = []
 

@@ -7,14 +7,14 @@ import typer
 
 def block_names(incomplete: str) -> list[str]:
     """The names of blocks that begin with a text."""
-    from ..runtime.language.registry import known_names
+    from ...runtime.language.registry import known_names
 
     return [name for name in known_names() if name.startswith(incomplete)]
 
 
 def parameter_names(context: typer.Context, incomplete: str) -> list[str]:
     """The parameters, as ``block.parameter=``, of the graph on the command line that begin with a text."""
-    from ..runtime.loading import LoadError, load
+    from ...runtime.loading import LoadError, load
 
     # Arguments in front of an option that still waits for its value are not parsed yet.
     given = context.params.get("graph") or next(iter(context.args), "")
@@ -33,6 +33,6 @@ def parameter_names(context: typer.Context, incomplete: str) -> list[str]:
 
 def benchmark_names(incomplete: str) -> list[str]:
     """The names of benchmarks that begin with a text."""
-    from ..benchmarks.catalogue import BENCHMARKS
+    from ...benchmarks.catalogue import BENCHMARKS
 
     return [name for name in BENCHMARKS if name.startswith(incomplete)]

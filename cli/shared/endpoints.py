@@ -8,10 +8,10 @@ import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..runtime.language.errors import AloftError
+from ...runtime.language.errors import AloftError
 
 if TYPE_CHECKING:
-    from ..runtime.live.parameter_endpoint import ParameterEndpoint
+    from ...runtime.live.parameter_endpoint import ParameterEndpoint
 
 SUFFIX = ".sock"
 
@@ -44,7 +44,7 @@ def path_of(name: str) -> Path:
 
 def open_endpoint(name: str) -> ParameterEndpoint:
     """An endpoint for a run of that name. Raises ``AloftError``."""
-    from ..runtime.live.parameter_endpoint import ParameterEndpoint
+    from ...runtime.live.parameter_endpoint import ParameterEndpoint
 
     return ParameterEndpoint(path_of(name))
 
@@ -55,7 +55,7 @@ def find(name: str) -> Path:
     Raises:
         AloftError: there is none, or several and no name.
     """
-    from ..runtime.live.parameter_endpoint import answers
+    from ...runtime.live.parameter_endpoint import answers
 
     running = [path.name.removesuffix(SUFFIX) for path in sorted(folder().glob(f"*{SUFFIX}"))
                if answers(path)]  # fmt: skip

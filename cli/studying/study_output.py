@@ -6,14 +6,14 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .output import number, print_warning, table
+from ..shared.output import number, print_warning, table
 
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from ..studies.study import Study
-    from ..studies.summary import Row
-    from ..studies.tuning import Draw
+    from ...studies.study import Study
+    from ...studies.summary import Row
+    from ...studies.tuning import Draw
 
 MOST_ROWS = 60
 
@@ -22,8 +22,8 @@ def study_json(
     study: Study, rows: Sequence[Row], seeds: Sequence[int], folder: Path
 ) -> dict[str, Any]:
     """The results as one JSON object."""
-    from ..studies.fingerprint import code_fingerprint
-    from ..studies.study import FIRST_REPORT_SEED
+    from ...studies.fingerprint import code_fingerprint
+    from ...studies.study import FIRST_REPORT_SEED
 
     n, successes = sum(row.n for row in rows), sum(row.successes for row in rows)
     errors = sum(row.errors for row in rows)
@@ -50,7 +50,7 @@ def study_json(
 
 def print_rows(screen: Console, study: Study, rows: Sequence[Row], seeds: Sequence[int]) -> None:
     """Print one line for each cell. Axes with a single value are left out."""
-    from ..studies.study import FIRST_REPORT_SEED
+    from ...studies.study import FIRST_REPORT_SEED
 
     tuning = sum(seed < FIRST_REPORT_SEED for seed in seeds)
     if tuning:
@@ -105,7 +105,7 @@ def tuned_json(study: Study, best: Mapping[str, Draw], path: Path, broken: int) 
 
 def print_tuned(screen: Console, study: Study, best: Mapping[str, Draw]) -> None:
     """Print the best draw of every arm."""
-    from ..runtime.loading.nodes import text_of
+    from ...runtime.loading.nodes import text_of
 
     assert study.tuning is not None
     cells = [

@@ -19,17 +19,17 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..runtime.language.errors import AloftError, ExitCode, RunError
-from ..runtime.language.stages import CheckedGraph
-from ..runtime.links.path_ages import NAME
-from ..runtime.loading import load
-from ..runtime.placement.place import place
-from ..runtime.placement.placed import PlacedGraph
-from ..runtime.running.memory import BoundGraph
-from ..runtime.running.run_result import RunResult, merge_metrics
-from ..runtime.running.timing import BlockTimes
-from .local_runs import registered
-from .output import number, print_json, print_place, print_warning, say, table
+from ...runtime.language.errors import AloftError, ExitCode, RunError
+from ...runtime.language.stages import CheckedGraph
+from ...runtime.links.path_ages import NAME
+from ...runtime.loading import load
+from ...runtime.placement.place import place
+from ...runtime.placement.placed import PlacedGraph
+from ...runtime.running.memory import BoundGraph
+from ...runtime.running.run_result import RunResult, merge_metrics
+from ...runtime.running.timing import BlockTimes
+from ..shared.local_runs import registered
+from ..shared.output import number, print_json, print_place, print_warning, say, table
 from .run_output import print_result, print_verdict
 
 if TYPE_CHECKING:
@@ -65,8 +65,8 @@ def run_local(path: Path, wishes: Wishes, out: Console) -> ExitCode:
         PlacementError: it names no machines.
         AloftError: a part said nothing when it ended.
     """
-    from ..logs.recording.merged_run import merge_recordings, path_metrics, read_parts, run_hash_of
-    from .view import how_to_view
+    from ...logs.recording.merged_run import merge_recordings, path_metrics, read_parts, run_hash_of
+    from ..view import how_to_view
 
     placed = place(load(path, wishes.settings))
     graph = placed.graph

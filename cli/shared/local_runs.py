@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ..runtime.language.errors import AloftError
+from ...runtime.language.errors import AloftError
 from .endpoints import folder
 
 SUFFIX = ".local"

@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from ..runtime.language.errors import AloftError
-from .options import AsJson
-from .output import console, errors_reported, print_json, say, table
+from ...runtime.language.errors import AloftError
+from ..shared.options import AsJson
+from ..shared.output import console, errors_reported, print_json, say, table
 
 if TYPE_CHECKING:
-    from ..hal.bear.bus import BearBus
-    from ..hal.bear.configuration import Hardware
-    from ..robots.robot_description import RobotDescription
+    from ...hal.bear.bus import BearBus
+    from ...hal.bear.configuration import Hardware
+    from ...robots.robot_description import RobotDescription
 
 HardwareFile = Annotated[Path, typer.Argument(help="The file of the hardware.")]
 
@@ -37,7 +37,7 @@ def scan(
     as_json: AsJson = False,
 ) -> None:
     """List the drives that answer a ping. Nothing else is sent."""
-    from ..hal.bear import bench
+    from ...hal.bear import bench
 
     with errors_reported(as_json), _bus(file) as (bus, hardware, _):
         found = bench.scan(bus, hardware, range(last + 1))
@@ -53,7 +53,7 @@ def scan(
 
 def status(file: HardwareFile, as_json: AsJson = False) -> None:
     """Read every drive's state, voltage, temperature and errors. Nothing is written."""
-    from ..hal.bear import bench
+    from ...hal.bear import bench
 
     with errors_reported(as_json), _bus(file) as (bus, hardware, _):
         rows = bench.status(bus, hardware)
@@ -83,8 +83,8 @@ def watch(
     """Print the joints' angles while you move them by hand. Nothing is written to the drives."""
     import numpy as np
 
-    from ..hal.bear.bulk import BulkExchange
-    from ..hal.bear.measurement import READ, Measurement
+    from ...hal.bear.bulk import BulkExchange
+    from ...hal.bear.measurement import READ, Measurement
 
     with errors_reported(as_json), _bus(file) as (bus, hardware, robot):
         names = robot.transmission.motors
@@ -120,7 +120,7 @@ def calibrate(
     """Print the offsets that make the present pose the zero pose. Nothing is written."""
     import numpy as np
 
-    from ..hal.bear import bench
+    from ...hal.bear import bench
 
     with errors_reported(as_json), _bus(file) as (bus, hardware, robot):
         pose = robot.standing_position if standing else np.zeros(len(robot.joints))
@@ -143,8 +143,8 @@ def jog(
     as_json: AsJson = False,
 ) -> None:
     """Move one motor there and back with little current. Without --arm nothing moves."""
-    from ..hal.bear import bench
-    from ..hal.bear.dead_man import open_switch, wait_until_held
+    from ...hal.bear import bench
+    from ...hal.bear.dead_man import open_switch, wait_until_held
 
     with errors_reported(as_json):
         if not arm:
@@ -177,7 +177,7 @@ def jog(
 
 def estop(file: HardwareFile, as_json: AsJson = False) -> None:
     """Put all drives into damping, and read back whether they are."""
-    from ..hal.bear import bench
+    from ...hal.bear import bench
 
     with errors_reported(as_json):
         with _bus(file) as (bus, hardware, _):
@@ -192,7 +192,7 @@ def estop(file: HardwareFile, as_json: AsJson = False) -> None:
 
 def schema() -> None:
     """Print the JSON Schema of the hardware's file, with which editors complete its keys."""
-    from ..hal.bear.configuration import Hardware
+    from ...hal.bear.configuration import Hardware
 
     print_json(Hardware.model_json_schema())
 
@@ -200,9 +200,9 @@ def schema() -> None:
 @contextmanager
 def _bus(file: Path) -> Iterator[tuple[BearBus, Hardware, RobotDescription]]:
     """The open bus of a file of the hardware, with the robot that it names."""
-    from ..hal.bear.bus import BearBus, open_port
-    from ..hal.bear.configuration import Hardware
-    from ..robots.description import find_robot
+    from ...hal.bear.bus import BearBus, open_port
+    from ...hal.bear.configuration import Hardware
+    from ...robots.description import find_robot
 
     try:
         description: Any = find_robot(Hardware.read(file).robot)

@@ -7,16 +7,16 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..runtime.language.errors import AloftError
-from .jump_graphs import graph_of, jump_graphs
-from .output import say, table
+from ...runtime.language.errors import AloftError
+from ..shared.jump_graphs import graph_of, jump_graphs
+from ..shared.output import say, table
 
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from ..planner.library.library import PlanLibrary
-    from ..planner.library.rehearsed import Rehearsed
-    from ..planner.task.task import JumpTask
+    from ...planner.library.library import PlanLibrary
+    from ...planner.library.rehearsed import Rehearsed
+    from ...planner.task.task import JumpTask
 
 REHEARSE_HELP = (
     "Run the plan in simulation and learn what the controller misses at lift-off: 3 to 9 runs."
@@ -28,7 +28,7 @@ def rehearsal_of_file(
     screen: Console,
 ) -> dict[str, Any]:  # fmt: skip
     """As ``rehearsal``, of a task's file in the shipped graph of its robot."""
-    from ..runtime.loading.nodes import text_of
+    from ...runtime.loading.nodes import text_of
 
     if task.robot not in jump_graphs() and not wanted:
         return {}
@@ -51,15 +51,15 @@ def rehearsal(
         AloftError: the graph does not take what is learnt, a run could not be made, or what was
             learnt before is damaged.
     """
-    from ..planner.library.rehearsed import (
+    from ...planner.library.rehearsed import (
         controller_hash,
         find_rehearsed,
         keep_rehearsed,
         was_rehearsed,
     )
-    from ..runtime.graph import load
-    from ..runtime.loading import flatten
-    from ..studies.rehearsal import LEVER, corrected_parameters, rehearse
+    from ...runtime.graph import load
+    from ...runtime.loading import flatten
+    from ...studies.rehearsal import LEVER, corrected_parameters, rehearse
 
     if not wanted and not was_rehearsed(library, task):
         return {}
