@@ -153,9 +153,10 @@ LEG_TARGETS = LegTargets(np.zeros(10), np.zeros(10), np.zeros(2, np.bool_))
 UNUSED = {
     "aloft.blocks.control.followed_plan.follow_plan": (*FOLLOWED, LEG_TARGETS),
     "aloft.blocks.control.followed_plan.share_of_lead": FOLLOWED[2:],
-    "aloft.blocks.control.followed_plan.lead_of_turn": FOLLOWED,
-    "aloft.blocks.control.followed_plan.turned_too_far": (1, *FOLLOWED[1:]),
-    "aloft.blocks.control.followed_plan.level_sole": (1, 0.08, *FOLLOWED[1:], LEG_TARGETS),
+    "aloft.blocks.control.followed_plan.lead_of_turn": (*FOLLOWED, 0.1),
+    "aloft.blocks.control.followed_plan.planned_pitch": FOLLOWED[2:],
+    "aloft.blocks.control.followed_plan.turned_too_far": (1, FOLLOWED[1], 0.1),
+    "aloft.blocks.control.followed_plan.level_sole": (1, 0.08, *FOLLOWED[1:], 0.1, LEG_TARGETS),
     "aloft.blocks.control.balance_law.correct_place": PLACE,
     "aloft.blocks.jumping.capture_law.best_foot": (*STEPPING, STEP_SCRATCH, 5.7),
     "aloft.blocks.jumping.capture_law.aim_step": (*STEPPING, STEP_SCRATCH, 1, 5.7, 0.05),

@@ -7,10 +7,10 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from ..language.stages import Position
-from .document import read_file
-from .nodes import MapNode, Node, texts_of
+from .files import FileTree
+from .nodes import MapNode, texts_of
 from .problems import Code, Problems, listing
-from .written import COMMON_KEYS, GRAPH_KEYS
+from .written import COMMON_KEYS, GRAPH_KEYS, read_graph
 
 _STUDY = ("arms", "grid", "goals", "plots", "graphs", "graph", "tune", "draws_per_arm")
 _ROBOT = ("links", "joints", "feet", "profiles", "standing", "transmission")
@@ -63,16 +63,19 @@ def _is_to_be_included(tree: MapNode, keys: list[str], shown: str, problems: Pro
     """
     if not keys or any(key not in COMMON_KEYS for key in keys):
         return False
-    trees = _with_included(tree, Path(shown), {})
-    if trees is None or any(each.get(key) is not None for each in trees for key in GRAPH_KEYS):
+    files = FileTree(Problems())  # what is wrong in them is said when they are read as a graph
+    root = read_graph(tree, shown, Path(shown).parent, files.problems, subgraph=False)
+    *included, _ = files.gather(root, ((Path(shown).resolve(), shown),))
+    if files.incomplete or any(file.graph for file in (root, *included)):
         return False
-    own = [entry.key for each in trees for entry in _mapping(each, "blocks")]
+    own: list[str] = []
     named: dict[str, None] = {}
-    for each in trees:
-        inputs = [_mapping(e.value, "in") for e in _mapping(each, "blocks")]
-        targets = [e.key for key in ("set", "wires") for e in _mapping(each, key)]
-        sources = [text for node in (*inputs, _mapping(each, "wires")) for text in texts_of(node)]
-        for text in [*targets, *sources]:
+    for file in (root, *included):
+        own += [block.name for block in file.blocks]
+        inputs = [block.inputs for block in file.blocks if block.inputs]
+        targets = [entry.key for entry in (*file.sets, *file.wires)]
+        sources = [*inputs, *(entry.value for entry in file.wires)]
+        for text in [*targets, *(text for node in sources for text in texts_of(node))]:
             if found := _BLOCK.match(text):
                 named[found[1]] = None
     missing = [name for name in named if name not in own]
@@ -90,27 +93,3 @@ def _is_to_be_included(tree: MapNode, keys: list[str], shown: str, problems: Pro
 
 
 _BLOCK = re.compile(r"([A-Za-z]\w*)[./]")
-
-
-def _with_included(tree: MapNode, path: Path, seen: dict[Path, None]) -> list[MapNode] | None:
-    """A file and all that it includes, each once; ``None`` if one of them cannot be read."""
-    trees = [tree]
-    entry = tree.get("include")
-    for text in texts_of(entry.value) if entry else ():
-        file = (path.parent / text).resolve()
-        if file in seen:
-            continue
-        seen[file] = None
-        included = read_file(file, str(file), Problems())
-        below = _with_included(included, file, seen) if included is not None else None
-        if below is None:
-            return None
-        trees += below
-    return trees
-
-
-def _mapping(node: Node, key: str) -> MapNode:
-    """The mapping below a key; empty where there is none."""
-    entry = node.get(key) if isinstance(node, MapNode) else None
-    value = entry.value if entry else None
-    return value if isinstance(value, MapNode) else MapNode((), node.where)
