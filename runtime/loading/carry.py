@@ -8,9 +8,9 @@ from collections.abc import Iterator, Mapping
 from ..language.block import Block
 from ..language.quantities import UNCHECKED, Given, Quantity, quantity_of
 from ..language.unit_algebra import over
+from .draft import Draft
 from .inserted import own_unit
 from .problems import Code, Problems
-from .wire_check import Draft
 
 
 def carry(drafts: Mapping[str, Draft], problems: Problems) -> None:

@@ -17,13 +17,14 @@ from ...robots.description import RobotDescription
 from ..language.parameters import Parameters
 from ..language.quantities import quantity_of
 from ..language.signals import Field, Signal
+from .draft import Draft
 from .flat import FlatBlock, FlatGraph, FlatWire, Item, Part
 from .gathering import Piece, gather_block_type, part_signal
 from .inserted import read_values
 from .nodes import Entry, MapNode, text_of
 from .problems import Code, Problems, listing, nearest
 from .selection import Selection, runs, select
-from .wire_check import Draft, WireCheck
+from .wire_check import WireCheck
 
 JOINTS = "n_joints"
 """The dimension whose elements have the names of the robot's joints."""

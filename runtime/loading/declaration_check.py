@@ -6,8 +6,8 @@ import numpy as np
 
 from ..language.feedthrough import inputs_read_by_emit
 from ..language.stages import Position
+from .draft import Draft
 from .problems import Code, Problems, listing, nearest
-from .wire_check import Draft
 
 
 def check_emit(draft: Draft, problems: Problems) -> None:

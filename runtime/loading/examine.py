@@ -20,6 +20,7 @@ from ..language.stages import BlockSpec, CheckedGraph, Position, Wire
 from .carry import carried_fields, carry, unchecked_wires
 from .compose import put_together
 from .declaration_check import check_defaults, check_emit
+from .draft import Draft
 from .fit import check_fit, lacks_robot
 from .flat import FlatBlock, FlatGraph
 from .inserted import insert_constant, insert_delay, read_values
@@ -31,7 +32,7 @@ from .rates import check_hyperperiod, read_offset, read_period
 from .settings import Settings, read_settings
 from .sizes import check_sizes
 from .told import resolve_told
-from .wire_check import Draft, WireCheck
+from .wire_check import WireCheck
 
 LONGEST_RING = 8
 """Names at each end of a ring that are printed; what is between is counted."""

@@ -6,10 +6,10 @@ from collections.abc import Mapping
 
 from ..language.block import Clock, Context, Misfit
 from ..language.fit import find_misfits, unmet_needs
+from .draft import Draft
 from .nodes import ListNode, MapNode, Node
 from .problems import Code, Problems
 from .settings import Settings
-from .wire_check import Draft
 
 
 def lacks_robot(draft: Draft, settings: Settings) -> bool:

@@ -15,12 +15,13 @@ from .graph_keys import as_entry, is_graph_key, merge
 from .kinds_of_files import is_another_kind
 from .links import Link, read_link
 from .machines import placed
-from .nodes import Entry, MapNode, Node, ScalarNode, plain, text_of
+from .nodes import Entry, MapNode, Node, ScalarNode, plain
 from .overrides import Override, Overrides, read_overrides, read_sets
-from .problems import Code, Problems, instead, listing, nearest
+from .problems import Code, Problems, listing, nearest
 from .rates import wrap_offset
 from .references import Bindings, report_unused
 from .shipped import addresses_like
+from .subgraph_parameters import parameter_values
 from .subgraphs import Instance, Resolver
 from .written import WrittenBlock, WrittenGraph, read_graph, wrong_kind
 
@@ -325,7 +326,7 @@ class _Flattener:
         incomplete, self.files.incomplete = self.files.incomplete, False
         files = self.files.gather(subgraph, stack, subgraph=True)
         missing, self.files.incomplete = self.files.incomplete, incomplete
-        values = self._parameters(draft.block, subgraph)
+        values = parameter_values(draft.block, subgraph, problems)
         if values is None or missing:
             return
         instance.broken = False
@@ -335,50 +336,6 @@ class _Flattener:
         for entry in subgraph.outputs:
             instance.outputs[entry.key] = self._link(entry, inner, f"{path}.{entry.key}")
         self._expand(files, inner)
-
-    def _parameters(self, block: FlatBlock, subgraph: WrittenGraph) -> dict[str, Node] | None:
-        """The values of a sub-graph's parameters for one use; ``None`` if one is missing."""
-        declared = {entry.key: entry for entry in subgraph.parameters}
-        misspelt: dict[str, None] = {}
-        for entry in block.parameters:
-            if entry.key not in declared:
-                similar = nearest(entry.key, declared)
-                misspelt.update(dict.fromkeys(similar[:1]))
-                self.problems.add(
-                    Code.UNKNOWN_PARAMETER,
-                    f"{subgraph.file} has no parameter {entry.key!r}",
-                    entry.key_where,
-                    at=f"{block.path}.{entry.key}",
-                    expected=listing(declared),
-                    found=entry.key,
-                    nearest=similar,
-                    fix=instead(entry.key, text_of(plain(entry.value)), entry.key_where, similar[0])
-                    if similar
-                    else f"remove {entry.key!r}",
-                )
-        values: dict[str, Node] = {}
-        complete = True
-        for name, entry in declared.items():
-            given = block.parameters.get(name)
-            default = entry.value
-            if given is not None:
-                values[name] = given.value
-            elif isinstance(default, ScalarNode) and default.value is None:
-                complete = False
-                if name in misspelt:
-                    continue  # one mistake, one problem
-                self.problems.add(
-                    Code.MISSING_PARAMETER,
-                    f"{block.path} does not give the parameter {name!r}",
-                    block.parameters.where,
-                    at=f"{block.path}.{name}",
-                    other=name,
-                    other_where=entry.key_where,
-                    fix=f"with: {{{name}: ...}}",
-                )
-            else:
-                values[name] = default
-        return values if complete else None
 
 
 def _finish(draft: _Draft, resolver: Resolver) -> FlatBlock:

@@ -16,10 +16,10 @@ from ..language.signals import Field, Signal
 from ..language.stages import BlockSpec, Wire
 from ..language.unit_algebra import ONE
 from ..language.units import QUANTITY, Unit, parse_quantity, parse_unit
+from .draft import Draft
 from .flat import FlatWire
 from .nodes import ListNode, MapNode, Node, ScalarNode, plain, text_of
 from .problems import Code, Problems, listing, nearest
-from .wire_check import Draft
 
 
 class ConstantParameters(Parameters):

@@ -8,11 +8,11 @@ from dataclasses import replace
 from ..language.errors import AloftError
 from ..language.schedule import hyperperiod
 from ..language.stages import Position
+from .draft import Draft
 from .flat import FlatBlock
 from .nodes import Node, ScalarNode, kind
 from .problems import Code, Problems
 from .settings import read_quantity
-from .wire_check import Draft
 
 
 def read_period(flat: FlatBlock, base_rate: float, problems: Problems) -> int:

@@ -10,9 +10,9 @@ from ..language.block import Port
 from ..language.layout import LARGEST
 from ..language.signals import DTYPES, Field, Signal
 from ..language.stages import Position
+from .draft import Draft
 from .flat import FlatGraph
 from .problems import Code, Problems
-from .wire_check import Draft
 
 
 @dataclass(frozen=True)

@@ -3,161 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
-from ..language.block import Block, Input, Output
-from ..language.parameters import Parameters
-from ..language.quantities import UNCHECKED, Quantity, quantity_of
-from ..language.signals import Field, Signal
-from ..language.unit_algebra import over
-from ..language.units import Unit
-from .flat import FlatBlock, FlatGraph, FlatWire
+from ..language.block import Input, Output
+from ..language.quantities import UNCHECKED, quantity_of
+from ..language.signals import Signal
+from .draft import Draft
+from .flat import FlatGraph, FlatWire
 from .nodes import text_of
 from .problems import Code, Problems, listing, nearest
-
-
-@dataclass
-class Draft:
-    """A block while it is checked.
-
-    ``complete`` is true if all its dimensions are known. ``absent`` holds the outputs that it
-    cannot have with the graph's robot, each with the reason.
-    """
-
-    flat: FlatBlock
-    block_type: type[Block] | None = None
-    params: Parameters | None = None
-    dimensions: Mapping[str, int] = field(default_factory=dict)
-    complete: bool = False
-    absent: Mapping[str, str] = field(default_factory=dict)
-    quantities: dict[str, Quantity] = field(default_factory=dict)
-    """Unit and frame of every output, by ``port.field``; those of blocks that take any are there
-    once ``carry`` has been called."""
-    period_ticks: int = 1
-    offset_ticks: int = 0
-    stands_for: str = ""
-    """For a block that loading has inserted: the input whose wire it puts together."""
-
-    @property
-    def inputs(self) -> Mapping[str, Input[Any]]:
-        """The declared inputs."""
-        return self.block_type.inputs if self.block_type else {}
-
-    @property
-    def outputs(self) -> Mapping[str, Output[Any]]:
-        """The declared outputs."""
-        return self.block_type.outputs if self.block_type else {}
-
-    def shape(self, item: Field) -> tuple[int, ...] | None:
-        """A field's shape in numbers, where it is known."""
-        try:
-            return item.resolve(self.dimensions)
-        except KeyError:
-            return None
-
-    def quantity(self, port: str, field_name: str) -> Quantity:
-        """Unit and frame of an output's field; not checked where they are not known."""
-        known = self.quantities.get(f"{port}.{field_name}")
-        if known is None:
-            known = quantity_of(self.outputs[port].signal.fields[field_name])
-        return known or UNCHECKED
-
-
-@dataclass(frozen=True)
-class Mismatch:
-    """One way in which a reader's field differs from the writer's."""
-
-    code: Code
-    message: str
-    expected: str
-    found: str
-    fix: str = ""
-
-
-def compare(
-    output: Output[Any], reader: type[Signal], source: Draft, target: Draft
-) -> Iterator[Mismatch]:
-    """All mismatches of the fields that the signals of an output and of its reader have."""
-    for name, wanted in reader.fields.items():
-        given = output.signal.fields.get(name)
-        if given is None:
-            continue
-        if given.dtype_name != wanted.dtype_name:
-            yield Mismatch(
-                Code.DTYPE,
-                f"field {name!r} has another element type",
-                wanted.dtype_name,
-                given.dtype_name,
-            )
-        expected, found = target.shape(wanted), source.shape(given)
-        if expected is not None and found is not None and expected != found:
-            yield Mismatch(
-                Code.SHAPE,
-                f"field {name!r} has another shape",
-                _shape_text(wanted, expected),
-                _shape_text(given, found),
-            )
-        quantity = source.quantity(output.name, name)
-        yield from _compare_units(name, quantity.unit, wanted, _says_unit(source))
-        if quantity.frame and wanted.frame and quantity.frame != wanted.frame:
-            yield Mismatch(
-                Code.FRAME,
-                f"field {name!r} is expressed in another frame",
-                wanted.frame,
-                quantity.frame,
-                f"rotate it from {quantity.frame} to {wanted.frame} in a block between",
-            )
-
-
-def _says_unit(source: Draft) -> bool:
-    """Whether the source is a block whose parameter ``unit`` may still be set."""
-    fields = type(source.params).model_fields if source.params is not None else {}
-    return "unit" in fields and source.flat.parameters.get("unit") is None
-
-
-def _compare_units(
-    name: str, given: Unit | None, wanted: Field, may_say: bool
-) -> Iterator[Mismatch]:
-    if given is None or wanted.unit is None or given.matches(wanted.unit):
-        return
-    if given.same_dimension(wanted.unit):
-        factor = given.factor_to(wanted.unit)
-        yield Mismatch(
-            Code.UNIT,
-            f"field {name!r} has another scale",
-            str(wanted.unit),
-            str(given),
-            f"multiply by {factor:.9g} in a block between: 1 {given} is {factor:.9g} {wanted.unit}; "
-            f"blocks.Gain with {{gain: {factor:.9g}, unit: {over(wanted.unit, given)}}}",
-        )
-    else:
-        fix = ""
-        if may_say:
-            fix = f"say what its numbers are: with: {{unit: {over(wanted.unit, given)}}}"
-        yield Mismatch(
-            Code.UNIT, f"field {name!r} is another quantity", str(wanted.unit), str(given), fix
-        )
-
-
-def _shape_text(item: Field, shape: tuple[int, ...]) -> str:
-    """``[10]``, or ``[n_joints] = [10]`` where names are involved."""
-    if not shape:
-        return "one number"
-    numbers = f"[{', '.join(map(str, shape))}]"
-    if all(isinstance(size, int) for size in item.shape):
-        return numbers
-    return f"[{', '.join(map(str, item.shape))}] = {numbers}"
-
-
-def fits(output: Output[Any], port: Input[Any], source: Draft, target: Draft) -> bool:
-    """Whether a wire from ``output`` to ``port`` would have no problem."""
-    if output.truth and not port.reads_truth:
-        return False
-    if any(name not in output.signal.fields for name in port.signal.fields):
-        return False
-    return next(compare(output, port.signal, source, target), None) is None
+from .signal_match import compare, fits
 
 
 class WireCheck:
