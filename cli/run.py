@@ -12,12 +12,13 @@ from typing import TYPE_CHECKING, Annotated, Any, Protocol
 import typer
 
 from ..runtime.language.errors import AloftError, ExitCode
-from .running.run_output import print_result, print_verdict
+from .running.run_output import code_with_recording, print_result, print_verdict
 from .shared.options import CompletedOverrides, JsonBesideTables, NoRecord, Quiet
 from .shared.output import (
     console,
     errors_reported,
     number,
+    print_error,
     print_json,
     print_place,
     print_warning,
@@ -291,6 +292,8 @@ def run_once(
                 fuse=fuse, real_time=real_time or NO_WISHES,
             )  # fmt: skip
     recording = recorder.recording if recorder is not None else None
+    problem = recorder.problem if recorder is not None and record is not None else ""
+    code = code_with_recording(result.exit_code, problem)
     print_result(out, name, result, times=times)
     if recorder is not None and recording is not None:
         missing = f" ({recorder.missing} ticks are not in it)" if recorder.missing else ""
@@ -308,6 +311,7 @@ def run_once(
         warnings = [*said, *result.warnings]
         files = [str(file) for file in recorder.files] if recorder is not None else []
         about = {**result.to_json(), "warnings": warnings, "recording": shown, "files": files}
+        about |= {"exit_code": int(code), "recording_problem": problem or None}
         print_json(
             {"graph": name, "overrides": overrides, **(also or {}), **about, **graph.about()}
         )
@@ -315,7 +319,9 @@ def run_once(
         print_verdict(result)
         if result.error is not None:
             print_place(result.error, traceback=traceback)
-    return result.exit_code
+    if problem:
+        print_error(problem)
+    return code
 
 
 def run_many(
