@@ -75,7 +75,7 @@ def run_local(path: Path, wishes: Wishes, out: Console) -> ExitCode:
     """
     from ...logs.recording.merged_run import merge_recordings, path_metrics, read_parts, run_hash_of
     from ...logs.recording.remedy import cause_of, remedy
-    from ..view import how_to_view
+    from ..shared.viewing import how_to_view
 
     placed = place(load(path, wishes.settings))
     graph = placed.graph

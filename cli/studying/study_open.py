@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from ...runtime.language.errors import AloftError, ExitCode
 from ..running.run_output import code_with_recording
 from ..shared.output import print_error, print_json, print_warning, say
-from ..view import draw, how_to_view, show
+from ..shared.viewing import draw, how_to_view, show
 from .study_runs import check_cells
 
 if TYPE_CHECKING:
