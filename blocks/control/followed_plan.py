@@ -79,8 +79,7 @@ def follow_plan(
     ahead = float(following.plan_lead[0]) * share_of_lead(plan)
     pitch = planned_pitch(plan)
     ahead += lead_of_turn(following, soles, plan, pitch)
-    before = float(plan.touchdown_time[()]) - float(plan.time[()]) > BEFORE
-    if before or following.late_time[0] == 0.0 or not flown.known[()]:
+    if not keeps_acceleration(following, plan, flown):
         for joint in range(flown.acceleration.shape[0]):
             flown.acceleration[joint] = plan.joint_acceleration[joint]
     for joint in range(plan.joint_position.shape[0]):
@@ -97,6 +96,17 @@ def follow_plan(
     for joint in range(plan.joint_position.shape[0]):
         flown.position[joint] = target.position[joint]
         flown.velocity[joint] = target.velocity[joint]
+
+
+@kernel
+def keeps_acceleration(following: Following, plan: PlannedJoints, flown: Flown) -> bool:
+    """Whether the accelerations of before count, because those of the plan may be of its landing.
+
+    A ``touchdown_time`` that has long passed is that of the flight before.
+    """
+    if following.late_time[0] == 0.0 or not flown.known[()]:
+        return False
+    return abs(float(plan.touchdown_time[()]) - float(plan.time[()])) <= BEFORE
 
 
 @kernel

@@ -98,6 +98,11 @@ class LegInverseKinematics(KernelBlock):
     last joint of each leg about the lateral axis turns the sole by -e, so that heel and toe touch
     down together. It reaches that in half of the time. All three are off by default.
 
+    A robot may land later than planned. For ``late_time`` after the planned touchdown the joints of a leg
+    that is still in the air keep their last acceleration of the flight, so that its feet slow down further.
+    Then the accelerations of the last 6 ms before touchdown are not the plan's either: they are read ahead
+    of time, so they would be those of the landing. With 0, the default, the plan's flight ends on time.
+
     Where a thigh is level, hip yaw and roll turn about one axis: a foot a few millimetres beside its
     planned place would ask for any yaw. The closed form keeps the yaw of the plan there, or straight
     ahead if there is no plan: below ``level``, the cosine of the hip's pitch, it goes over to it.
