@@ -140,7 +140,7 @@ def serve(graph: CheckedGraph, values: Values | None = None) -> None:
     """Show the diagram in a browser until Ctrl-C is pressed."""
     from ..runtime.drawing.loopback import ADDRESS
     from ..runtime.drawing.page_server import page_server
-    from .view import open_page
+    from .shared.viewing import open_page
 
     server = page_server(graph, values=values)
     page = f"http://{ADDRESS}:{server.server_address[1]}/"

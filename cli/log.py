@@ -11,6 +11,7 @@ import typer
 from ..runtime.language.errors import AloftError, ExitCode
 from .shared.options import AsJson
 from .shared.output import console, errors_reported, number, print_json, print_warning, say, table
+from .shared.recordings import read
 
 if TYPE_CHECKING:
     from ..logs.file.reader import RecordedRun
@@ -214,21 +215,6 @@ def merge(
         return
     count = f"{ticks} ticks of {len(parts)} parts"
     typer.echo(f"{written}: {count}, run hash {run_hash}; `aloft replay --check {written}` runs it")
-
-
-def read(file: Path, *, damaged: bool = False) -> RecordedRun:
-    """The recording. Raises ``AloftError`` if it cannot be read."""
-    from ..logs.file import reader
-    from ..logs.recording.place import part_of
-
-    try:
-        return reader.read(file, damaged=damaged)
-    except FileNotFoundError:
-        part = part_of(file)
-        also = f"; {part} is there: it is being written, or was cut off" if part.exists() else ""
-        raise AloftError(f"{file} cannot be read: there is no such file{also}") from None
-    except OSError as error:
-        raise AloftError(f"{file} cannot be read: {error.strerror or error}") from None
 
 
 def summary(run: RecordedRun) -> dict[str, Any]:

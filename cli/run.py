@@ -186,7 +186,7 @@ def open_viewer(live: Live, said: list[str]) -> Viewer | None:
     """Open the viewer that shows the run. Without a viewer the run is not shown, and ``said`` gets
     the reason."""
     from ..logs.viewing.viewer import ViewerError, start_viewer
-    from .view import open_page
+    from .shared.viewing import open_page
 
     if live is Live.NONE:
         return None
@@ -204,7 +204,7 @@ def open_viewer(live: Live, said: list[str]) -> Viewer | None:
 
 def leave_viewer(viewer: Viewer, *, wait: bool) -> None:
     """Leave the viewer open after the run: a window until it is closed, a page until Ctrl-C."""
-    from .view import keep_open
+    from .shared.viewing import keep_open
 
     if viewer.kind != "web":
         return
@@ -271,7 +271,7 @@ def run_once(
     from ..runtime.running.real_time import NO_WISHES
     from .running.last_words import LastWords
     from .shared.progress import TickCounter, compiling_shown, progress_bar
-    from .view import how_to_view
+    from .shared.viewing import how_to_view
 
     name = graph.checked.name
     recorder = None

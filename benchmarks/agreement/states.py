@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,10 +11,11 @@ from ...blocks.control.whole_body_controller import WholeBodyController
 from ...mathematics.arrays import Array, Flags
 from ...mathematics.whole_body_qp import RigidBodyTerms, TaskRows
 from ...runtime.graph import load
+from ...runtime.loading.shipped import FOLDER
 from ...runtime.running.executor import Executor
 from ...runtime.running.memory import BoundGraph
 
-GRAPH = Path(__file__).parents[2] / "graphs" / "jump.yaml"
+GRAPH = FOLDER / "jump.yaml"
 SEED = 7001
 """The seed of the recorded jumps; the next ones follow it."""
 JUMPS: dict[str, dict[str, Any]] = {

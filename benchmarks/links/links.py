@@ -10,9 +10,7 @@ drives' watchdog damps after commands have ended.
 from __future__ import annotations
 
 import json
-import signal
 import socket
-import subprocess
 import sys
 import threading
 import time
@@ -35,6 +33,7 @@ from ...runtime.loading import load_text
 from ...runtime.placement.place import place
 from ...runtime.placement.placed import Link, PlacedGraph
 from ...runtime.running.memory import Memory
+from ..other_process import other_process
 from ..rows import Row, compare, take_turns
 from .damping import damping
 
@@ -120,30 +119,18 @@ def links(rounds: int = 40, repetitions: int = 25, ticks: int = 3000) -> list[Ro
         one.bind(("127.0.0.1", 0))
         two.bind(("127.0.0.1", 0))
         ports = one.getsockname()[1], two.getsockname()[1]
+    told: dict[str, int] = {}
     code = f"from aloft.benchmarks.links.links import answer; answer({ports})"
-    command = [sys.executable, "-c", code]
-    with subprocess.Popen(
-        command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
-    ) as other:
-        assert other.stdin is not None and other.stdout is not None
-        try:
-            rows = _round_trips(graph(ports), rounds, repetitions)
-            other.stdin.write("ten links\n")
-            other.stdin.flush()
-            other.stdout.readline()
-            told: dict[str, int] = {}
+    with other_process(code) as other:
 
-            def freeze() -> None:
-                """Have the other process count what has come, and stop it."""
-                assert other.stdin is not None and other.stdout is not None
-                other.stdin.write("count\n")
-                other.stdin.flush()
-                told.update(json.loads(other.stdout.readline()))
-                other.send_signal(signal.SIGSTOP)
+        def freeze() -> None:
+            """Have the other process count what has come, and stop it."""
+            told.update(other.ask("count"))
+            other.freeze()
 
-            rows += _ten_links(graph(ports), ticks, freeze)
-        finally:
-            other.kill()
+        rows = _round_trips(graph(ports), rounds, repetitions)
+        other.ask("ten links")
+        rows += _ten_links(graph(ports), ticks, freeze)
     sent = COUNT * ticks
     note = f"{told['received']} of {sent} messages of {NUMBERS * 8} B came, {told['lost']} gaps"
     rows.append(Row("lost by ten links at 1 kHz", float(sent - told["received"]), "messages",
@@ -291,6 +278,6 @@ def answer(ports: tuple[int, int]) -> None:
             )  # fmt: skip
             end.transport.subscribe(data_key("a", "b", link.source), counter.hear)
             counters.append(counter)
-        print("ready", flush=True)
+        print(json.dumps("ready"), flush=True)
         threading.Thread(target=answer_bare, daemon=True).start()
     end.transport.close()

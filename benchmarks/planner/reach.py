@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 from typing import Any
 
 from ...planner.checking.validity import InvalidPlanError, check_plan
@@ -13,6 +12,7 @@ from ...planner.task.errors import PlanError
 from ...planner.task.read_task import read_task
 from ...planner.task.task import make_task
 from ...robots.description import find_robot
+from ...runtime.loading.shipped import FOLDER
 from ..rows import Row
 
 REACH: dict[str, dict[str, Any]] = {
@@ -43,9 +43,8 @@ def reach_rows() -> list[Row]:
             continue
         note = f"valid, {len(plan.time)} knots"
         rows.append(Row(f"reach {name}", cpu_time() - start, "s", note=note))
-    folder = Path(__file__).parents[2] / "graphs" / "tasks"
     for name in SOMERSAULTS:
-        task = read_task(folder / f"{name}.yaml")
+        task = read_task(FOLDER / "tasks" / f"{name}.yaml")
         kept = PlanLibrary(robot).find(task)
         report = None if kept is None else check_plan(kept, robot)
         error_mm = report.figures["flight_error_mm"] if report and report.valid else None

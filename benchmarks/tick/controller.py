@@ -5,7 +5,6 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,13 +14,14 @@ from ...mathematics.compiling.compile_calls import compile_calls
 from ...runtime.graph import load
 from ...runtime.language.block import Block
 from ...runtime.language.stages import CheckedGraph, ClockSpec
+from ...runtime.loading.shipped import FOLDER
 from ...runtime.running.executor import Executor
 from ...runtime.running.memory import BoundGraph
 from ...runtime.running.pacing import WallTime
 from ...runtime.running.sinks import MemoryLog
 from ...runtime.running.ticker import Ticker
 
-GRAPH = Path(__file__).parents[2] / "graphs" / "jump.yaml"
+GRAPH = FOLDER / "jump.yaml"
 OUTSIDE = ("robot", "push", "score")
 """What is no part of the controller: the simulated robot, and who pushes and judges it."""
 

@@ -28,7 +28,7 @@ def rehearsal_of_file(
     screen: Console,
 ) -> dict[str, Any]:  # fmt: skip
     """As ``rehearsal``, of a task's file in the shipped graph of its robot."""
-    from ...runtime.loading.nodes import text_of
+    from ...runtime.loading.reading.nodes import text_of
 
     if task.robot not in jump_graphs() and not wanted:
         return {}

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from ...runtime.language.errors import AloftError, ExitCode
 from ..shared.output import print_json, print_warning, say
-from ..view import draw, how_to_view, show
+from ..shared.viewing import draw, how_to_view, show
 from .study_runs import check_cells
 
 if TYPE_CHECKING:

@@ -31,6 +31,7 @@ FLAGS = ("-O1", "-fPIC", "-shared", "-ffp-contract=off")
 are the same everywhere. Higher optimisation takes twice as long to compile and gains nothing."""
 
 SOURCES = (
+    "models/symbolic_frames.py",
     "models/symbolic_model.py",
     "models/symbolic_momentum.py",
     "models/symmetry.py",
