@@ -12,19 +12,20 @@ from typing import TYPE_CHECKING, Annotated, Any, Protocol
 import typer
 
 from ..runtime.language.errors import AloftError, ExitCode
-from .options import CompletedOverrides, JsonBesideTables, NoRecord, Quiet
-from .output import (
+from .running.run_output import code_with_recording, print_result, print_verdict
+from .shared.options import CompletedOverrides, JsonBesideTables, NoRecord, Quiet
+from .shared.output import (
     console,
     errors_reported,
     number,
+    print_error,
     print_json,
     print_place,
     print_warning,
     say,
     table,
 )
-from .run_output import print_result, print_verdict
-from .stopping import stopped_by_signals
+from .shared.stopping import stopped_by_signals
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -132,7 +133,7 @@ def run(
         if wishes_of_thread != NO_WISHES and (seeds or local):
             raise AloftError("--cpu, --priority and --lock-memory are for one run, in one process")
         if local:
-            from .run_local import Wishes, run_local
+            from .running.run_local import Wishes, run_local
 
             place = None if no_record else record
             wishes = Wishes(
@@ -147,7 +148,7 @@ def run(
             loaded: Runs = load(graph, settings)
             name = loaded.checked.name
             if machine:
-                from .run_part import Part
+                from .running.run_part import Part
 
                 loaded, name = Part(loaded.checked, machine, keys), f"{name}-{machine}"
             default = Path("recordings") / f"{name}.rrd"
@@ -186,7 +187,7 @@ def open_viewer(live: Live, said: list[str]) -> Viewer | None:
     """Open the viewer that shows the run. Without a viewer the run is not shown, and ``said`` gets
     the reason."""
     from ..logs.viewing.viewer import ViewerError, start_viewer
-    from .view import open_page
+    from .shared.viewing import open_page
 
     if live is Live.NONE:
         return None
@@ -204,7 +205,7 @@ def open_viewer(live: Live, said: list[str]) -> Viewer | None:
 
 def leave_viewer(viewer: Viewer, *, wait: bool) -> None:
     """Leave the viewer open after the run: a window until it is closed, a page until Ctrl-C."""
-    from .view import keep_open
+    from .shared.viewing import keep_open
 
     if viewer.kind != "web":
         return
@@ -216,7 +217,7 @@ def leave_viewer(viewer: Viewer, *, wait: bool) -> None:
 
 def open_endpoint(graph: Runs, name: str, default: str) -> ParameterEndpoint | None:
     """Open the endpoint at which ``aloft params`` reaches the run. Unless it was asked for, it may fail."""
-    from . import endpoints
+    from .shared import endpoints
 
     if name == "none" or not (name or graph.checked.clock.kind != "free"):
         return None
@@ -269,9 +270,9 @@ def run_once(
     from ..logs.recording.recorder import Recorder
     from ..runtime.running.freeze_guard import FreezeGuard
     from ..runtime.running.real_time import NO_WISHES
-    from .last_words import LastWords
-    from .progress import TickCounter, compiling_shown, progress_bar
-    from .view import how_to_view
+    from .running.last_words import LastWords
+    from .shared.progress import TickCounter, compiling_shown, progress_bar
+    from .shared.viewing import how_to_view
 
     name = graph.checked.name
     recorder = None
@@ -291,6 +292,8 @@ def run_once(
                 fuse=fuse, real_time=real_time or NO_WISHES,
             )  # fmt: skip
     recording = recorder.recording if recorder is not None else None
+    problem = recorder.problem if recorder is not None and record is not None else ""
+    code = code_with_recording(result.exit_code, problem)
     print_result(out, name, result, times=times)
     if recorder is not None and recording is not None:
         missing = f" ({recorder.missing} ticks are not in it)" if recorder.missing else ""
@@ -308,6 +311,7 @@ def run_once(
         warnings = [*said, *result.warnings]
         files = [str(file) for file in recorder.files] if recorder is not None else []
         about = {**result.to_json(), "warnings": warnings, "recording": shown, "files": files}
+        about |= {"exit_code": int(code), "recording_problem": problem or None}
         print_json(
             {"graph": name, "overrides": overrides, **(also or {}), **about, **graph.about()}
         )
@@ -315,7 +319,9 @@ def run_once(
         print_verdict(result)
         if result.error is not None:
             print_place(result.error, traceback=traceback)
-    return result.exit_code
+    if problem:
+        print_error(problem)
+    return code
 
 
 def run_many(
@@ -330,7 +336,7 @@ def run_many(
 ) -> ExitCode:
     """Run the graph once with each seed; print a row for each, and how many succeeded."""
     from ..studies.batch.seeds import run_seeds
-    from .progress import progress_bar
+    from .shared.progress import progress_bar
 
     rows: list[SeedRow] = []
     with (

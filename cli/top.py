@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..runtime.language.errors import AloftError, ExitCode
-from .options import Overrides
-from .output import console, errors_reported, print_json, table
+from .shared.options import Overrides
+from .shared.output import console, errors_reported, print_json, table
 
 if TYPE_CHECKING:
     from rich.console import Group
@@ -82,7 +82,7 @@ def observer_of(
     from ..runtime.links.observer import Observer
     from ..runtime.loading import load
     from ..runtime.placement.place import place
-    from .local_runs import settings_of
+    from .shared.local_runs import settings_of
 
     placed = place(load(graph, [*settings_of(graph, process), *overrides]))
     return Observer(placed, None if keys is None else secured(placed, keys, name))

@@ -10,8 +10,8 @@ from typing import Annotated
 import typer
 
 from ..runtime.language.errors import AloftError
-from .options import Overrides
-from .output import errors_reported
+from .shared.options import Overrides
+from .shared.output import errors_reported
 from .top import As, Keys, Local, observer_of
 
 
