@@ -77,7 +77,8 @@ def export(
     as_json: AsJson = False,
 ) -> None:
     """Write the signals of a recording, every number exact, into a file of another format."""
-    from ..logs.exporting.export import EXPORTS
+    from ..logs.exporting.export import export as write_export
+    from ..logs.recording.remedy import remedy
 
     with errors_reported(as_json):
         kinds = [k for k, on in (("csv", csv), ("parquet", parquet), ("mcap", mcap)) if on]
@@ -86,11 +87,15 @@ def export(
         target = output or file.with_suffix(f".{kinds[0]}")
         run = read(file)
         try:
-            EXPORTS[kinds[0]](run, target, signal or ())
+            write_export(kinds[0], run, target, signal or ())
         except KeyError as error:
             raise AloftError(str(error.args[0])) from None
         except OSError as error:
-            raise AloftError(f"{target} cannot be written: {error.strerror or error}") from None
+            why, fix = (
+                error.strerror or error,
+                remedy(error.errno or 0, target, "-o FILE writes elsewhere"),
+            )
+            raise AloftError(f"{target} cannot be written: {why}; {fix}") from None
     if as_json:
         print_json({"success": True, "file": str(target), "ticks": len(run.ticks)})
     else:

@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
 from ...runtime.language.errors import ExitCode
-from ..shared.output import print_json, print_place, print_warning, say
-from .run_output import print_result, print_verdict
+from ..shared.output import print_error, print_json, print_place, print_warning, say
+from .run_output import code_with_recording, print_result, print_verdict
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -82,6 +82,8 @@ def run_once(
                 fuse=fuse, real_time=real_time or NO_WISHES,
             )  # fmt: skip
     recording = recorder.recording if recorder is not None else None
+    problem = recorder.problem if recorder is not None and record is not None else ""
+    code = code_with_recording(result.exit_code, problem)
     print_result(out, name, result, times=times)
     if recorder is not None and recording is not None:
         missing = f" ({recorder.missing} ticks are not in it)" if recorder.missing else ""
@@ -91,14 +93,15 @@ def run_once(
                 f"{', '.join(file.name for file in recorder.files)}")  # fmt: skip
         if recorder.before:
             say(out, recorder.before)
-    for problem in (*result.cautions, *result.stop_problems):
-        print_warning(problem)
+    for warning in (*result.cautions, *result.stop_problems):
+        print_warning(warning)
     if as_json:
         shown = str(recording) if recording else None
         overrides = dict(graph.checked.overrides)
         warnings = [*said, *result.warnings]
         files = [str(file) for file in recorder.files] if recorder is not None else []
         about = {**result.to_json(), "warnings": warnings, "recording": shown, "files": files}
+        about |= {"exit_code": int(code), "recording_problem": problem or None}
         print_json(
             {"graph": name, "overrides": overrides, **(also or {}), **about, **graph.about()}
         )
@@ -106,4 +109,6 @@ def run_once(
         print_verdict(result)
         if result.error is not None:
             print_place(result.error, traceback=traceback)
-    return result.exit_code
+    if problem:
+        print_error(problem)
+    return code
