@@ -13,7 +13,6 @@ from __future__ import annotations
 import json
 import os
 import select
-import subprocess
 import sys
 import time
 import tty
@@ -37,6 +36,7 @@ from ..hal.twin.virtual_port import VirtualBoardPort, VirtualBusPort
 from ..mathematics.compiling.compile_calls import compile_calls
 from ..mathematics.compiling.kernel_call import collect_calls
 from ..robots.description import find_robot
+from .other_process import other_process
 from .rows import Row, compare, take_turns
 
 GOAL = 300.0
@@ -113,21 +113,11 @@ def recorded() -> tuple[Driver, Talk]:
 @contextmanager
 def far_end(talk: Talk) -> Iterator[tuple[str, str]]:
     """Another process answers as recorded; gives the paths of the bus's and the board's ports."""
-    code = "from aloft.benchmarks.driver import answer; answer()"
-    command = [sys.executable, "-c", code]
-    with subprocess.Popen(
-        command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
-    ) as other:
-        assert other.stdin is not None and other.stdout is not None
-        try:
-            said = {"size": len(talk.request), "answers": [each.hex() for each in talk.answers],
-                    "packets": [each.hex() for each in talk.packets]}  # fmt: skip
-            other.stdin.write(json.dumps(said) + "\n")
-            other.stdin.flush()
-            bus, board = json.loads(other.stdout.readline())
-            yield bus, board
-        finally:
-            other.kill()
+    with other_process("from aloft.benchmarks.driver import answer; answer()") as other:
+        said = {"size": len(talk.request), "answers": [each.hex() for each in talk.answers],
+                "packets": [each.hex() for each in talk.packets]}  # fmt: skip
+        bus, board = other.ask(json.dumps(said))
+        yield bus, board
 
 
 def answer() -> None:

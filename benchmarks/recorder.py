@@ -20,6 +20,7 @@ from ..logs.recording.recorder import Recorder
 from ..runtime.graph import load
 from ..runtime.language.errors import ExitCode
 from ..runtime.language.stages import CheckedGraph, ClockSpec
+from ..runtime.loading.shipped import FOLDER
 from ..runtime.running.executor import Executor
 from ..runtime.running.memory import BoundGraph
 from ..runtime.running.run_result import RunResult
@@ -30,7 +31,7 @@ COST_GOAL = 2.0
 """Microseconds of the control thread a tick [us]."""
 BURST = 200
 """Ticks recorded at once, less than the ring holds."""
-GRAPH = Path(__file__).parent.parent / "graphs" / "jump.yaml"
+GRAPH = FOLDER / "jump.yaml"
 GROWTH_GOAL = 16.0
 """Mebibytes that memory may grow from the second to the last quarter of a run of any length."""
 MEMORY_PERIOD = 1.0

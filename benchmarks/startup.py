@@ -7,7 +7,7 @@ from pathlib import Path
 
 from .aloft_process import time_process
 from .rows import Row
-from .tick_controller import GRAPH
+from .tick.controller import GRAPH
 
 FEW_TICKS = ("--duration", "0.01 s", "--no-record")
 """A run that ends before it has begun to jump: what is left is its start and its end."""

@@ -1,4 +1,5 @@
-"""The command line, ``aloft VERB``. Every verb has a file; heavy imports are inside the verbs only."""
+"""The command line, ``aloft VERB``. Every verb has a file here, and ``app`` puts them together; what they
+need lies in folders. Heavy imports are inside functions only."""
 
 from __future__ import annotations
 

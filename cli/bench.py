@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..runtime.language.errors import AloftError, ExitCode
-from .completion import benchmark_names
-from .options import JsonBesideTables
-from .output import console, errors_reported, number, print_json, say, table
+from .shared.completion import benchmark_names
+from .shared.options import JsonBesideTables
+from .shared.output import console, errors_reported, number, print_json, say, table
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -51,7 +51,15 @@ def bench(
     as_json: JsonBesideTables = False,
 ) -> None:
     """Measure the runtime beside hand-written loops and peers; exit with 1 if a goal is missed."""
-    from ..benchmarks import BENCHMARKS, COUNTED, LINKED, PEERED, SEEDED, TIMED, run_benchmarks
+    from ..benchmarks.catalogue import (
+        BENCHMARKS,
+        COUNTED,
+        LINKED,
+        PEERED,
+        SEEDED,
+        TIMED,
+        run_benchmarks,
+    )
     from ..studies.batch.seeds import parse_seeds
 
     out = console(to_stderr=as_json)

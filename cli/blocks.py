@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .completion import block_names
-from .options import AsJson
-from .output import console, errors_reported, print_json, table
+from .shared.completion import block_names
+from .shared.options import AsJson
+from .shared.output import console, errors_reported, print_json, table
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -30,7 +30,7 @@ def blocks(
     with errors_reported(as_json):
         found = [reference(name)] if name else all_references(ours=markdown)
     if markdown:
-        from .markdown import reference_page
+        from .writing.markdown import reference_page
 
         typer.echo(reference_page(found), nl=False)
     elif as_json:

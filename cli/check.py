@@ -7,8 +7,8 @@ from typing import Annotated
 
 import typer
 
-from .options import AsJson, CompletedOverrides
-from .output import errors_reported, print_json
+from .shared.options import AsJson, CompletedOverrides
+from .shared.output import errors_reported, print_json
 
 
 def check(

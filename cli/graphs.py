@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from .options import AsJson
-from .output import console, print_json, say, table
+from .shared.options import AsJson
+from .shared.output import console, print_json, say, table
 
 
 def graphs(

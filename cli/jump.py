@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..runtime.language.errors import AloftError, ExitCode, UnitError
-from .jump_graphs import graph_of
-from .options import JsonBesideTables, NoRecord, Overrides, Quiet
-from .output import console, errors_reported, print_json, say
-from .rehearse import REHEARSE_HELP, rehearsal
-from .run import run_many, run_once
+from .planning.rehearse import REHEARSE_HELP, rehearsal
+from .running.run_many import run_many
+from .running.run_once import run_once
+from .shared.jump_graphs import graph_of
+from .shared.options import JsonBesideTables, NoRecord, Overrides, Quiet
+from .shared.output import console, errors_reported, print_json, say
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -165,7 +166,7 @@ def usual_rise(path: Path) -> float | None:
 
 def settings_for(asked: dict[str, float], trial: str) -> list[str]:
     """The overrides of a graph for what was asked."""
-    from ..runtime.loading.nodes import text_of
+    from ..runtime.loading.reading.nodes import text_of
     from ..studies.trials import trial_settings
 
     return [

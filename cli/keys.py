@@ -7,8 +7,8 @@ from typing import Annotated
 
 import typer
 
-from .options import AsJson, Overrides
-from .output import console, errors_reported, print_json, say, table
+from .shared.options import AsJson, Overrides
+from .shared.output import console, errors_reported, print_json, say, table
 
 
 def keys(

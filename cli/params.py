@@ -9,8 +9,8 @@ from typing import Annotated, Any
 import typer
 
 from ..runtime.language.errors import AloftError
-from .options import AsJson
-from .output import console, errors_reported, print_json, table
+from .shared.options import AsJson
+from .shared.output import console, errors_reported, print_json, table
 
 params = typer.Typer(
     name="params",
@@ -73,7 +73,7 @@ def set_(
 ) -> None:
     """Change parameters, all in the same tick. If one of them is wrong, none is changed."""
     from ..runtime.live.parameter_endpoint import set_parameters
-    from .endpoints import find
+    from .shared.endpoints import find
 
     with errors_reported(as_json):
         changes = set_parameters(find(run), settings)
@@ -94,7 +94,7 @@ def web(
     ] = None,
 ) -> None:
     """Change them in the browser, with sliders, beside the running graph's diagram."""
-    from .live import open_live_run, serve_live
+    from .shared.live import open_live_run, serve_live
 
     with errors_reported(False):
         serve_live(open_live_run(run), save, "parameters")
@@ -103,7 +103,7 @@ def web(
 def ask_list(run: str) -> tuple[str, list[dict[str, Any]]]:
     """The graph's name and all its parameters. Raises ``AloftError``."""
     from ..runtime.live.parameter_endpoint import ask
-    from .endpoints import find
+    from .shared.endpoints import find
 
     answer = ask(find(run), {"verb": "list"})
     return answer["graph"], answer["parameters"]
@@ -126,6 +126,6 @@ def value_of(name: str, found: list[dict[str, Any]]) -> Any:
 
 def text_of(value: Any) -> str:
     """A value as it is written in a graph file."""
-    from ..runtime.loading.nodes import text_of
+    from ..runtime.loading.reading.nodes import text_of
 
     return text_of(value)

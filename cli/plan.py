@@ -8,10 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..runtime.language.errors import ExitCode
-from .options import JsonBesideTables
-from .output import console, errors_reported, print_error, print_json, say
-from .plan_grid import plan_grid
-from .plan_output import (
+from .planning.plan_grid import plan_grid
+from .planning.plan_output import (
     failure,
     listed_row,
     listing,
@@ -21,8 +19,10 @@ from .plan_output import (
     recorded_motion,
     summary,
 )
-from .rehearse import REHEARSE_HELP, rehearsal_of_file
-from .view import how_to_view
+from .planning.rehearse import REHEARSE_HELP, rehearsal_of_file
+from .shared.options import JsonBesideTables
+from .shared.output import console, errors_reported, print_error, print_json, say
+from .shared.viewing import how_to_view
 
 if TYPE_CHECKING:
     from rich.console import Console

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from ..runtime.language.errors import AloftError, ExitCode
-from .options import JsonBesideTables, Quiet
-from .output import (
+from .shared.options import JsonBesideTables, Quiet
+from .shared.output import (
     SET_HELP,
     console,
     errors_reported,
@@ -140,7 +140,7 @@ def execute(
 ) -> Replayed:
     """Replay, with a progress bar. Raises ``AloftError``."""
     from ..logs.replay.replay import replay as replay_run
-    from .progress import TickCounter, progress_bar
+    from .shared.progress import TickCounter, progress_bar
 
     if first is not None and until is not None and until <= first:
         raise AloftError(

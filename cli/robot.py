@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..runtime.language.errors import AloftError, ExitCode
-from .options import AsJson
-from .output import console, errors_reported, print_error, print_json, say, table
-from .robot_bench import add_bench_verbs
-from .robot_identify import identify
+from .robots.robot_bench import add_bench_verbs
+from .robots.robot_identify import identify
+from .shared.options import AsJson
+from .shared.output import console, errors_reported, print_error, print_json, say, table
 
 if TYPE_CHECKING:
     from rich.console import Console

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..runtime.language.errors import AloftError, ExitCode
-from .options import Cluster, JsonBesideTables, Workers
-from .output import console, errors_reported, print_json, print_warning, say
-from .study_output import print_rows, print_tuned, study_json, tuned_json
-from .study_runs import check_cells, make_all, report_stop
+from .shared.options import Cluster, JsonBesideTables, Workers
+from .shared.output import console, errors_reported, print_json, print_warning, say
+from .studying.study_output import print_rows, print_tuned, study_json, tuned_json
+from .studying.study_runs import check_cells, make_all, report_stop
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -63,7 +63,7 @@ def study(
     """
     from ..studies.batch.seeds import parse_seeds
     from ..studies.reading import part_of, read_study
-    from .paper import NAME, draw_paper
+    from .studying.paper import NAME, draw_paper
 
     screen = console(to_stderr=as_json)
     with errors_reported(as_json):
@@ -87,7 +87,7 @@ def study(
         else:
             part = part_of(found, where or [])
             if number:
-                from .study_open import open_run
+                from .studying.study_open import open_run
 
                 raise typer.Exit(
                     open_run(found, part, chosen, folder, number, screen, as_json, show=not no_show)
@@ -200,6 +200,6 @@ def json_text(value: dict[str, Any]) -> str:
     """The text of a JSON file; numbers that are not finite become null."""
     import json
 
-    from .output import plain
+    from .shared.output import plain
 
     return json.dumps(plain(value), allow_nan=False, indent=1) + "\n"

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..runtime.language.errors import AloftError, ExitCode
-from .options import AsJson
-from .output import console, errors_reported, print_json, print_warning, say, table
+from .shared.options import AsJson
+from .shared.output import console, errors_reported, print_json, print_warning, say, table
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -87,7 +87,7 @@ def sort_targets(
     """
     from ..runtime.language.registry import find_block
     from ..runtime.loading import load
-    from ..runtime.loading.adjust import plain_parameters
+    from ..runtime.loading.checking.adjust import plain_parameters
 
     blocks: list[tuple[str, type[Block], dict[str, Any] | None]] = []
     paths = []

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from ..runtime.language.errors import AloftError, ExitCode
-from .options import Cluster, JsonBesideTables, Workers
-from .output import console, errors_reported, print_json, say
-from .study_output import print_tuned, tuned_json
-from .study_runs import check_cells, make_all, report_stop
+from .shared.options import Cluster, JsonBesideTables, Workers
+from .shared.output import console, errors_reported, print_json, say
+from .studying.study_output import print_tuned, tuned_json
+from .studying.study_runs import check_cells, make_all, report_stop
 
 if TYPE_CHECKING:
     from ..studies.execution import Run

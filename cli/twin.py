@@ -10,8 +10,8 @@ from typing import Annotated
 import typer
 
 from ..runtime.language.errors import AloftError
-from .options import AsJson
-from .output import console, errors_reported, print_json, say
+from .shared.options import AsJson
+from .shared.output import console, errors_reported, print_json, say
 
 
 def twin(

@@ -1,4 +1,4 @@
-"""Runs the standard trial's reported seeds and writes the README's table of results."""
+"""Runs the standard trial's reported seeds, and writes the table of results and the README's sentence."""
 
 from __future__ import annotations
 
@@ -28,9 +28,8 @@ FIGURES = (
 
 def results_table(rows: list[SeedRow]) -> str:
     """The table of least, median and greatest over the seeds."""
-    successes = sum(row.success for row in rows)
     lines = [
-        f"Jump on the spot, seeds {SEEDS[0]} to {SEEDS[-1]}: **{successes} of {len(rows)} succeed**.",
+        f"{_count(rows)}.",
         "",
         "| | least | median | greatest | unit | goal |",
         "|---|---|---|---|---|---|",
@@ -45,6 +44,20 @@ def results_table(rows: list[SeedRow]) -> str:
     return "\n".join(lines) + "\n"
 
 
+def headline(rows: list[SeedRow]) -> str:
+    """How many seeds succeeded, and the median of the first figure."""
+    name, text, scale, unit, goal = FIGURES[0]
+    middle = median(row.metrics[name] * scale for row in rows if name in row.metrics)
+    return f"{_count(rows)}, with an {text} of {middle:.3g} {unit} in the median (goal {goal}).\n"
+
+
+def _count(rows: list[SeedRow]) -> str:
+    successes = sum(row.success for row in rows)
+    seeds = f"seeds {SEEDS[0]} to {SEEDS[-1]}"
+    return f"Jump on the spot, {seeds}: **{successes} of {len(rows)} succeed**"
+
+
 if __name__ == "__main__":
     found = list(run_seeds(ROOT / "graphs" / "jump.yaml", [], SEEDS))
-    refresh(ROOT / "README.md", "results", results_table(found))
+    refresh(ROOT / "docs" / "results.md", "results", results_table(found))
+    refresh(ROOT / "README.md", "results", headline(found))

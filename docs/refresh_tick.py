@@ -16,11 +16,20 @@ from typing import Any
 
 from marks import refresh
 
-from aloft.benchmarks.tick_chart import BARS, tick_chart
+from aloft.benchmarks.tick.chart import BARS, tick_chart
 
 PAGE = Path(__file__).parent / "compiled.md"
 README = PAGE.parent.parent / "README.md"
 PICTURE = "tick.svg"
+HEADLINE = (
+    "controller, fused, beside OSQP",
+    "whole-body program, beside DAQP",
+    "state to torque, beside TSID",
+    "busy-wait loop, period",
+)
+"""The rows that the README shows in any case."""
+HEAD = ("| | median | as many times as fast as | times | floor | goal | |", "|---|" + "---|" * 6)
+REACHED, FLOOR, MISSED = "goal reached", "floor reached", "missed"
 
 
 def tick_tables(found: Mapping[str, Any]) -> str:
@@ -46,11 +55,7 @@ def tick_tables(found: Mapping[str, Any]) -> str:
             f"{blocks[prefix][block]:.1f}" if block in blocks[prefix] else "" for prefix, _ in shown
         )
         lines.append(f"| `{block}` | {' | '.join(cells)} |")
-    lines += [
-        "",
-        "| | median | as many times as fast as | times | floor | goal | |",
-        "|---|" + "---|" * 6,
-    ]
+    lines += ["", *HEAD]
     lines += [_line(row) for row in rows if not row["name"].startswith(tuple(blocks))]
     return "\n".join(lines) + "\n"
 
@@ -70,23 +75,32 @@ def _line(row: Mapping[str, Any]) -> str:
             cells.append("")
         else:
             cells.append(f"{1.0 / number:.3g}" if row["peer"] else f"{number:g} {row['unit']}")
+    return f"| {' | '.join([*cells, '; '.join(filter(None, (_outcome(row), row['note'])))])} |"
+
+
+def _outcome(row: Mapping[str, Any]) -> str:
     measured = row["ratio"] if row["peer"] else row["value"]
-    met = {True: "goal reached", False: "missed", None: ""}[row["met"]]
     if row["met"] is False and row["floor"] is not None and measured <= row["floor"]:
-        met = "floor reached"
-    return f"| {' | '.join([*cells, '; '.join(filter(None, (met, row['note'])))])} |"
+        return FLOOR
+    return {True: REACHED, False: MISSED, None: ""}[row["met"]]
 
 
 def short_table(found: Mapping[str, Any]) -> str:
-    """Only the ratios that have a goal, with the picture."""
-    lines = [
-        f"![The blocks of one tick beside its peers](docs/{PICTURE})",
-        "",
-        "| | median | as many times as fast as | times | floor | goal | |",
-        "|---|" + "---|" * 6,
-        *(_line(row) for row in found["rows"] if row["goal"] is not None),
+    """The picture, how many goals are reached, the rows of ``HEADLINE``, and all missed ones."""
+    rows = [row for row in found["rows"] if row["goal"] is not None]
+    outcomes = [_outcome(row) for row in rows]
+    shown = [
+        row
+        for row, outcome in zip(rows, outcomes, strict=True)
+        if row["name"] in HEADLINE or outcome == MISSED
     ]
-    return "\n".join(lines) + "\n"
+    reached, floor, missed = (outcomes.count(each) for each in (REACHED, FLOOR, MISSED))
+    count = (
+        f"Of {len(rows)} rows with a goal {reached} reach it, {floor} reach only their floor, and {missed} "
+        "miss both. Some of these, and all that miss both:"
+    )
+    lines = [f"![The blocks of one tick beside its peers](docs/{PICTURE})", "", count, "", *HEAD]
+    return "\n".join([*lines, *map(_line, shown)]) + "\n"
 
 
 if __name__ == "__main__":

@@ -22,8 +22,8 @@ from .graph import Graph, load
 from .language.block import Block
 from .language.errors import AloftError
 from .language.registry import block_name
-from .loading.nodes import text_of
 from .loading.problems import nearest
+from .loading.reading.nodes import text_of
 
 
 class Source:

@@ -20,7 +20,7 @@ from .language.stages import CheckedGraph, ClockSpec
 from .links.path_ages import path_sinks
 from .loading import load as load_checked
 from .loading import load_text
-from .loading.nodes import text_of
+from .loading.reading.nodes import text_of
 from .running.executor import Executor
 from .running.real_time import NO_WISHES, RealTime
 from .running.run_result import RunResult

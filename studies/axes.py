@@ -14,9 +14,18 @@ from __future__ import annotations
 import math
 import re
 
-from ..runtime.loading.nodes import Entry, ListNode, MapNode, Node, ScalarNode, kind, plain, text_of
 from ..runtime.loading.problems import Code, Problems, listing
-from ..runtime.loading.written import unknown_key, wrong_kind
+from ..runtime.loading.reading.nodes import (
+    Entry,
+    ListNode,
+    MapNode,
+    Node,
+    ScalarNode,
+    kind,
+    plain,
+    text_of,
+)
+from ..runtime.loading.reading.written import unknown_key, wrong_kind
 from .quantities import column_name, in_unit, quantity, written
 from .study import Axis, Case, Coordinate
 

@@ -18,8 +18,8 @@ from typing import Any
 from ..runtime.graph import Graph
 from ..runtime.language.stages import CheckedGraph, Position
 from ..runtime.loading import load, load_text
-from ..runtime.loading.nodes import Entry, from_plain, plain, text_of
 from ..runtime.loading.problems import Code, LoadError, Problem, Problems, Report
+from ..runtime.loading.reading.nodes import Entry, from_plain, plain, text_of
 from .study import Arm, Axis, Coordinate, Study, Task
 
 Tuned = Mapping[str, Mapping[str, Any]]

@@ -16,9 +16,17 @@ from typing import Any
 
 import numpy as np
 
-from ..runtime.loading.nodes import Entry, ListNode, MapNode, Node, ScalarNode, plain, text_of
 from ..runtime.loading.problems import Code, Problems
-from ..runtime.loading.written import unknown_key
+from ..runtime.loading.reading.nodes import (
+    Entry,
+    ListNode,
+    MapNode,
+    Node,
+    ScalarNode,
+    plain,
+    text_of,
+)
+from ..runtime.loading.reading.written import unknown_key
 from .quantities import in_unit, quantity, written
 from .study import Range
 

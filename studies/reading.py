@@ -11,10 +11,10 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from ..runtime.language.stages import Position
-from ..runtime.loading.document import read_file
-from ..runtime.loading.nodes import Entry, ListNode, MapNode, Node, ScalarNode, plain
 from ..runtime.loading.problems import Code, LoadError, Problems, nearest
-from ..runtime.loading.written import unknown_key, wrong_kind
+from ..runtime.loading.reading.document import read_file
+from ..runtime.loading.reading.nodes import Entry, ListNode, MapNode, Node, ScalarNode, plain
+from ..runtime.loading.reading.written import unknown_key, wrong_kind
 from .axes import read_axes, read_sets
 from .ranges import read_range
 from .sections import Labels, read_goals, read_plots, read_seeds, read_tuning

@@ -21,8 +21,8 @@ from ..mathematics.constants import GRAVITY
 from ..planner.library.rehearsed import ZERO, Deviation, Rehearsed, Vector
 from ..runtime.graph import load
 from ..runtime.language.errors import AloftError
-from ..runtime.loading.flat import FlatGraph
-from ..runtime.loading.nodes import text_of
+from ..runtime.loading.flattening.flat import FlatGraph
+from ..runtime.loading.reading.nodes import text_of
 from ..runtime.running.run_result import RunResult
 from .batch.jobs import job_results
 from .batch.seeds import overrides_for

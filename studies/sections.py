@@ -8,9 +8,18 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from ..runtime.language.errors import AloftError
-from ..runtime.loading.nodes import Entry, ListNode, MapNode, Node, ScalarNode, kind, plain, text_of
 from ..runtime.loading.problems import Code, Problems, listing, nearest
-from ..runtime.loading.written import unknown_key, wrong_kind
+from ..runtime.loading.reading.nodes import (
+    Entry,
+    ListNode,
+    MapNode,
+    Node,
+    ScalarNode,
+    kind,
+    plain,
+    text_of,
+)
+from ..runtime.loading.reading.written import unknown_key, wrong_kind
 from .axes import read_sets
 from .batch.seeds import parse_seeds
 from .quantities import in_unit

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from ..runtime.language.stages import Position
-from ..runtime.loading.nodes import Entry
+from ..runtime.loading.reading.nodes import Entry
 
 FIRST_REPORT_SEED = 1000
 """Gains are tuned on the seeds below, and reported on those from here on."""

@@ -24,9 +24,9 @@ import numpy as np
 
 from ..runtime.language.errors import AloftError
 from ..runtime.language.stages import Position
-from ..runtime.loading.document import read_file
-from ..runtime.loading.nodes import plain, text_of
 from ..runtime.loading.problems import LoadError, Problems
+from ..runtime.loading.reading.document import read_file
+from ..runtime.loading.reading.nodes import plain, text_of
 from .execution import Run
 from .expansion import Cell, Tuned, cells
 from .ranges import corners, draw

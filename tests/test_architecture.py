@@ -24,7 +24,7 @@ ALLOWED: dict[str, tuple[str, ...]] = {
     "robots": ("mathematics",),
     "runtime/language": ("robots", "mathematics/compiling"),
     "runtime/running": (
-        "runtime/language", "runtime/loading/selection", "robots", "mathematics/compiling",
+        "runtime/language", "runtime/loading/reading/selection", "robots", "mathematics/compiling",
     ),
     "runtime/loading": ("runtime/language", "runtime/placement", "robots"),
     "runtime/placement": ("runtime/language", "robots"),

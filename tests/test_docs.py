@@ -10,7 +10,7 @@ import pytest
 
 import aloft
 from aloft.cli.blocks import all_references
-from aloft.cli.markdown import reference_page
+from aloft.cli.writing.markdown import reference_page
 from aloft.robots.description import find_robot
 from aloft.runtime.loading import LoadError
 

@@ -10,7 +10,7 @@ import pytest
 
 ROOT = Path(__file__).parent.parent
 PLACES = {
-    "README.md": ("results", "tasks"),
+    "README.md": ("results", "tasks", "tick"),
     "docs/bring_up.md": ("twin",),
     "docs/compiled.md": ("tick",),
     "docs/frontier.md": ("frontier",),
@@ -20,6 +20,7 @@ PLACES = {
         for rise in ("", " 12 cm")
     ),
     "docs/planning.md": ("task parameters",),
+    "docs/results.md": ("results", "tasks"),
     "docs/robots_results.md": ("tasks",),
 }
 

@@ -6,7 +6,7 @@ from types import ModuleType
 import pytest
 
 from aloft.benchmarks.rows import Row
-from aloft.benchmarks.tick_chart import tick_chart
+from aloft.benchmarks.tick.chart import tick_chart
 
 ROWS = [
     Row("block wbc", 20.0, "us/tick"),
@@ -41,14 +41,28 @@ def test_the_tables(script: ModuleType) -> None:
     assert "| period | 100 us |  |  | 250 us | 50 us | floor reached |" in page
 
 
-def test_readme_has_only_what_has_a_goal(script: ModuleType) -> None:
-    table = script.short_table(FOUND)
+def test_readme_has_its_rows_and_all_that_miss_their_goal(script: ModuleType) -> None:
+    one, *_ = script.HEADLINE
+    rows = [
+        *ROWS,
+        Row(one, 30.0, "us/tick", "OSQP", 0.01, 1 / 30, floor=1 / 20),
+        Row("process", 2.0, "s", "real time", 0.9, 1 / 5, floor=1 / 2),
+    ]
+    table = script.short_table({**FOUND, "rows": [row.to_json() for row in rows]})
     assert "![The blocks of one tick beside its peers](docs/tick.svg)" in table
-    assert "| controller, fused | 30 us | OSQP | 25 | 20 | 30 | floor reached |" in table
-    assert "| period | 100 us |" in table
-    assert "TSID" not in table and "`wbc`" not in table
+    assert "Of 4 rows with a goal 1 reach it, 2 reach only their floor, and 1 miss both." in table
+    assert f"| {one} | 30 us | OSQP | 100 | 20 | 30 | goal reached |" in table
+    assert "| process | 2 s | real time | 1.11 | 2 | 5 | missed |" in table
+    assert all(row.name not in table for row in ROWS if row.name != "controller, fused")
+    assert "| controller, fused |" not in table
     page = script.README.read_text()
     assert page.count("<!-- tick -->") == page.count("<!-- end of tick -->") == 1
+
+
+def test_the_rows_of_readme_were_measured(script: ModuleType) -> None:
+    for name in script.HEADLINE:
+        assert f"| {name} |" in script.PAGE.read_text()
+        assert f"| {name} |" in script.README.read_text()
 
 
 def test_an_earlier_commit_has_other_blocks(script: ModuleType) -> None:

@@ -17,7 +17,7 @@ from ...runtime.language.signals import Field
 from ...runtime.language.stages import BlockSpec, CheckedGraph
 from ...runtime.language.units import parse_unit
 from ...runtime.loading import flatten
-from ...runtime.loading.flat import FlatBlock, FlatGraph, FlatWire
+from ...runtime.loading.flattening.flat import FlatBlock, FlatGraph, FlatWire
 from ...runtime.loading.load import load
 
 _USUAL = ("1", "m", "m/s", "m/s^2", "rad", "rad/s", "N", "N m", "kg", "s", "N/m", "W", "V", "A")

@@ -19,7 +19,7 @@ import yaml
 from ... import __version__
 from ...logs.file.surroundings import named_file
 from ...runtime.language.errors import AloftError
-from ...runtime.loading.flat import ROBOT_FILES
+from ...runtime.loading.flattening.flat import ROBOT_FILES
 from .cut import Cut, Terminal, cut, start_of
 from .running_graph import GRAPH, INTERFACE
 

@@ -22,7 +22,7 @@ from ...runtime.language.layout import Layout
 from ...runtime.language.parameter_change import ParameterChange
 from ...runtime.language.stages import CheckedGraph
 from ...runtime.loading import load_text
-from ...runtime.loading.earlier_versions import in_present_form
+from ...runtime.loading.reading.earlier_versions import in_present_form
 from ...runtime.running.memory import BoundGraph, Snapshot
 from ..file.header import machine, versions
 from ..file.reader import RecordedRun, read

@@ -9,15 +9,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
-from .symbolic_model import (
+from .symbolic_frames import (
     Expression,
-    SymbolicModel,
     base_angular_velocity,
     base_rotation,
     inertia_tensor,
     joint_origin,
     joint_rotation,
 )
+from .symbolic_model import SymbolicModel
 
 
 class Centroidal(NamedTuple):

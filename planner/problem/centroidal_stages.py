@@ -28,6 +28,7 @@ PIECES = ("stance", "flight", "posture", "attitude")
 TIP = 1e-2
 """N, how far the friction cone's tip is rounded, inwards, to be smooth where there is no force."""
 SOURCES = (
+    "models/symbolic_frames.py",
     "models/symbolic_model.py",
     "problem/stage_functions.py",
     "models/centroidal_model.py",

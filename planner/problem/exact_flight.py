@@ -20,7 +20,8 @@ from typing import Any, NamedTuple
 
 from ...mathematics.constants import GRAVITY
 from ..models.coordinates import Coordinates
-from ..models.symbolic_model import Expression, SymbolicModel
+from ..models.symbolic_frames import Expression
+from ..models.symbolic_model import SymbolicModel
 from ..models.symbolic_momentum import centroidal_momentum
 from .lifted import Lifted
 

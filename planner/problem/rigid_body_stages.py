@@ -18,17 +18,14 @@ from __future__ import annotations
 from typing import Any
 
 from ...mathematics.constants import GRAVITY
-from ..models.symbolic_model import (
-    SymbolicModel,
-    base_angular_acceleration,
-    base_angular_velocity,
-    base_rotation,
-)
+from ..models.symbolic_frames import base_angular_acceleration, base_angular_velocity, base_rotation
+from ..models.symbolic_model import SymbolicModel
 from .stage_functions import Piece, derived
 
 NAME = "srbm"
 PIECES = ("stance", "flight", "legs", "take_off")
 SOURCES = (
+    "models/symbolic_frames.py",
     "models/symbolic_model.py",
     "problem/stage_functions.py",
     "problem/rigid_body_stages.py",

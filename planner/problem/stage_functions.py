@@ -43,7 +43,8 @@ from ..models.coordinates import (
     mirrored_coordinates,
     sagittal_coordinates,
 )
-from ..models.symbolic_model import SymbolicModel, base_rotation
+from ..models.symbolic_frames import base_rotation
+from ..models.symbolic_model import SymbolicModel
 from .exact_flight import flight_interval
 from .lifted import Lifted
 from .obstacles import heights_above_step, touching_sphere

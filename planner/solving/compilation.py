@@ -31,6 +31,7 @@ FLAGS = ("-O1", "-fPIC", "-shared", "-ffp-contract=off")
 are the same everywhere. Higher optimisation takes twice as long to compile and gains nothing."""
 
 SOURCES = (
+    "models/symbolic_frames.py",
     "models/symbolic_model.py",
     "models/symbolic_momentum.py",
     "models/symmetry.py",
@@ -197,21 +198,41 @@ def find_compiler() -> str | None:
 
 
 def _compile(compiler: str, piece: Piece, library: Path) -> bool:
-    """Compile a piece; whether that worked. Other processes see the whole library or none."""
+    """Compile a piece; whether that worked."""
     import casadi as ca
 
     try:
-        library.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryDirectory(dir=library.parent) as folder:
+        with made_aside(library) as made:
             generator = ca.CodeGenerator(f"{library.stem}.c")
             for kind in KINDS:
                 generator.add(getattr(piece, kind))
-            generator.generate(f"{folder}/")
-            made = Path(folder) / library.name
-            source = Path(folder) / f"{library.stem}.c"
-            command = [compiler, *FLAGS, str(source), "-o", str(made), "-lm"]
-            subprocess.run(command, check=True, capture_output=True)
-            made.replace(library)
+            generator.generate(f"{made.parent}/")
+            run_compiler(compiler, made.with_suffix(".c"), made)
     except (OSError, subprocess.CalledProcessError):
         return False
     return True
+
+
+@contextmanager
+def made_aside(library: Path) -> Iterator[Path]:
+    """Where to make a library that takes its place at the end: other processes see the whole one or none.
+
+    Raises:
+        OSError: the folder cannot be written.
+    """
+    library.parent.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(dir=library.parent) as folder:
+        made = Path(folder) / library.name
+        yield made
+        made.replace(library)
+
+
+def run_compiler(compiler: str, source: Path, library: Path, *flags: str) -> None:
+    """Compile a file of C to a library, with ``FLAGS`` and more.
+
+    Raises:
+        OSError: the compiler cannot be run.
+        subprocess.CalledProcessError: it refuses the file.
+    """
+    command = [compiler, *FLAGS, *flags, str(source), "-o", str(library), "-lm"]
+    subprocess.run(command, check=True, capture_output=True)

@@ -18,14 +18,13 @@ import json
 import os
 import subprocess
 import sys
-import tempfile
 from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
 
 from ...mathematics.arrays import Array
-from .compilation import FLAGS, cache_folder, find_compiler
+from .compilation import FLAGS, cache_folder, find_compiler, made_aside, run_compiler
 
 SOURCE = Path(__file__).with_suffix(".c")
 FUNCTION = "kernel_dgemm_nt_4x4_lib4"
@@ -90,15 +89,13 @@ def _compiled(blasfeo: Path) -> Path | None:
         compiler = find_compiler()
         if compiler is None:
             return None
-        folder.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryDirectory(dir=folder) as aside:
-            made = Path(aside) / library.name
-            command = [compiler, *FLAGS, OPTIMISED, str(SOURCE), "-o", str(made)]
-            if subprocess.run(command, capture_output=True, check=False).returncode:
-                return None
-            if not _agrees(blasfeo, made):
-                made.write_bytes(b"")
-            made.replace(library)
+        try:
+            with made_aside(library) as made:
+                run_compiler(compiler, SOURCE, made, OPTIMISED)
+                if not _agrees(blasfeo, made):
+                    made.write_bytes(b"")
+        except subprocess.CalledProcessError:
+            return None
     return library if library.stat().st_size else None
 
 

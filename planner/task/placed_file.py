@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import Any
 
 from ...runtime.language.stages import Position
-from ...runtime.loading.document import read_value
-from ...runtime.loading.nodes import ListNode, MapNode, Node, plain
 from ...runtime.loading.problems import Problems
+from ...runtime.loading.reading.document import read_value
+from ...runtime.loading.reading.nodes import ListNode, MapNode, Node, plain
 from .errors import TaskError
 
 Key = str | int

@@ -6,8 +6,8 @@ from typing import Any
 
 from ..language.reference import PortReference, block_reference
 from ..language.stages import BlockSpec, CheckedGraph
-from ..loading.nodes import text_of
 from ..loading.picture import BlockRow, table
+from ..loading.reading.nodes import text_of
 
 
 def details(graph: CheckedGraph) -> dict[str, dict[str, Any]]:

@@ -10,7 +10,7 @@ from typing import Any
 from ..language.errors import AloftError
 from ..language.stages import CheckedGraph
 from ..loading import LoadError, load_text
-from ..loading.nodes import text_of
+from ..loading.reading.nodes import text_of
 
 FIRST_LINE = "# Values that were tuned while the graph ran; `aloft run` takes this file."
 

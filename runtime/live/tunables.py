@@ -12,7 +12,7 @@ from pydantic.fields import FieldInfo
 from ..language.parameters import unit_of
 from ..language.stages import CheckedGraph
 from ..loading import LoadError, flatten
-from ..loading.nodes import MapNode
+from ..loading.reading.nodes import MapNode
 
 LONGEST_LIST = 12
 """Numbers of a list that have a slider each; a longer one is changed as a text."""

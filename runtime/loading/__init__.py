@@ -1,7 +1,8 @@
 """From a YAML file to a checked graph, with every mistake in one report.
 
-written (one file, with the place of every key) -> flat (includes and sub-graphs expanded,
-overrides applied) -> checked (``stages.CheckedGraph``).
+Its stages have a folder each: ``reading`` (one file as it is written, with the place of every key) ->
+``flattening`` (includes and sub-graphs expanded, overrides applied) -> ``checking``
+(``stages.CheckedGraph``). Here is what all of them share, and what users call.
 """
 
 from .load import check, flatten, load, load_text

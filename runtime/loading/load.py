@@ -5,11 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 
 from ..language.stages import CheckedGraph
-from .examine import examine
-from .flat import FlatGraph
-from .flatten import flatten_file, flatten_text
-from .overrides import Overrides
+from .checking.examine import examine
+from .flattening.flat import FlatGraph
+from .flattening.flatten import flatten_file, flatten_text
 from .problems import LoadError, Problems, Report
+from .reading.overrides import Overrides
 from .shipped import graph_path
 
 

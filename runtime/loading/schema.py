@@ -12,7 +12,7 @@ from typing import Any
 
 from ..language.block import Block
 from ..language.registry import all_blocks
-from .written import CLOCK_KEYS
+from .reading.written import CLOCK_KEYS
 
 Schema = dict[str, Any]
 

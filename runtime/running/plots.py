@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ...plotting import Line, Panel, panels_svg, save_panels
 from ..language.signals import Field
 from ..language.stages import BlockSpec, CheckedGraph
-from ..loading.selection import Selection, read_selection, select
+from ..loading.reading.selection import Selection, read_selection, select
 
 
 class Logged(Protocol):

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from aloft.cli import paper
+from aloft.cli.studying import paper
 from aloft.studies.figures import offscreen
 from aloft.studies.figures.page import page
 from aloft.studies.reading import read_study
@@ -36,7 +36,7 @@ def has_content(path: Path, size: list[int]) -> None:
 @pytest.fixture(scope="module")
 def drawn(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, Any]]:
     """The command on runs that end soon: long enough for the pushes' flight to begin."""
-    from aloft.cli.output import console
+    from aloft.cli.shared.output import console
 
     folder = tmp_path_factory.mktemp("paper")
     study = folder / "short.yaml"

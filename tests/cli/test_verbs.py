@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 import aloft
-import aloft.benchmarks
+import aloft.benchmarks.catalogue
 import aloft.runtime.loading
 
 Call = Callable[..., subprocess.CompletedProcess[str]]
@@ -156,7 +156,7 @@ def test_bench_prints_rows_and_exits_by_the_goals(
     for met, code in ((True, 0), (None, 0), (False, 1)):
         rows = [{**row, "goal": 1.1, "met": met, "note": ""}]
         monkeypatch.setattr(
-            aloft.benchmarks, "run_benchmarks", lambda *_, r=rows: {**results, "rows": r}
+            aloft.benchmarks.catalogue, "run_benchmarks", lambda *_, r=rows: {**results, "rows": r}
         )
         assert call_json("bench", "scheduler", code=code)["rows"] == rows
         text = call("bench", code=code).stdout
@@ -212,7 +212,8 @@ atexit.register(lambda: print(len(searched), gc.get_freeze_count(), *sys.modules
     ours = [name for name in modules if name.startswith("aloft.")]
     assert len(ours) < 300
     assert {name for name in ours if name.startswith("aloft.cli.")} == {
-        "aloft.cli.app", "aloft.cli.output", "aloft.cli.check", "aloft.cli.completion", "aloft.cli.options",
+        "aloft.cli.app", "aloft.cli.check", "aloft.cli.shared", "aloft.cli.shared.completion",
+        "aloft.cli.shared.options", "aloft.cli.shared.output",
     }  # fmt: skip
 
 

@@ -19,7 +19,7 @@ from aloft.robots.description import find_robot
 from aloft.runtime.language.errors import BlockError
 from aloft.runtime.testing import BlockBench
 
-from ...turns import quaternion_of
+from ...turns import quaternion_of, turn_in_body
 
 ROBOT = find_robot("bruce")
 SEEN = ContactKinematics(ROBOT)
@@ -82,19 +82,11 @@ def velocity(motion, time, step=1e-5):
     return (motion.pose(time + step)[1] - motion.pose(time - step)[1]) / (2 * step)
 
 
-def turn_between(after, before):
-    inverse, product, out = np.empty(4), np.empty(4), np.empty(3)
-    rotations.conjugate(before, inverse)
-    rotations.multiply(inverse, after, product)
-    rotations.logarithm(product, out)
-    return out
-
-
 @cache
 def imu(motion, time):
     """Angular velocity at that time and mean specific force over the tick before."""
     step = 1e-5
-    rate = turn_between(motion.pose(time + step)[0], motion.pose(time - step)[0]) / (2 * step)
+    rate = turn_in_body(motion.pose(time + step)[0], motion.pose(time - step)[0]) / (2 * step)
     change = (velocity(motion, time) - velocity(motion, time - PERIOD)) / PERIOD
     force = np.empty(3)
     rotations.rotate_back(

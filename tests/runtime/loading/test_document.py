@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 
 from aloft.runtime.language.stages import Position
 from aloft.runtime.loading import check
-from aloft.runtime.loading.document import read_file, read_mapping, read_value
-from aloft.runtime.loading.nodes import MapNode, ScalarNode, plain, text_of
 from aloft.runtime.loading.problems import Problems
+from aloft.runtime.loading.reading.document import read_file, read_mapping, read_value
+from aloft.runtime.loading.reading.nodes import MapNode, ScalarNode, plain, text_of
 
 
 def read(text: str) -> Any:

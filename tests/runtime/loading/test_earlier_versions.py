@@ -8,7 +8,7 @@ import yaml
 from aloft.robots.description import find_robot
 from aloft.runtime.language.registry import block_name
 from aloft.runtime.loading import LoadError, load_text
-from aloft.runtime.loading.earlier_versions import in_present_form
+from aloft.runtime.loading.reading.earlier_versions import in_present_form
 
 BRUCE = find_robot("bruce")
 OLD = """\

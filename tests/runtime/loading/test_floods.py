@@ -5,7 +5,8 @@ from typing import Any
 
 import pytest
 
-from aloft.runtime.loading import carry, check, wire_check
+from aloft.runtime.loading import check
+from aloft.runtime.loading.checking import carry, wire_check
 
 
 def test_one_missing_block_read_by_many(tmp_path: Path) -> None:

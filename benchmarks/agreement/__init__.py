@@ -1,0 +1,1 @@
+"""Whether all methods for the whole-body program find the same minimum."""

@@ -1,0 +1,1 @@
+"""How far jumps reach in every direction, landed and planned."""

@@ -1,0 +1,145 @@
+"""Jumps that nobody chose, in closed loop: random tasks are planned and run in the robust trial.
+
+Each task of ``random_tasks`` is planned from nothing, with one recipe for all, and its plan is run in
+``graphs/jump.yaml`` with the robust trial once a seed; ground and expectation follow from the task.
+A run lands if ``blocks.JumpScore`` says so. What has been run is kept in ``results/jumps`` and not
+run again unless the code changes.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from contextlib import closing
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ...planner.checking.validity import InvalidPlanError
+from ...planner.library.library import PlanLibrary, solve_and_check
+from ...planner.library.shipped import shipped_folder
+from ...planner.solving.bounded import cpu_time
+from ...planner.task.errors import PlanError, TaskError
+from ...planner.task.task import JumpTask
+from ...robots.description import find_robot
+from ...studies.batch.jobs import job_results
+from ...studies.confidence import wilson_interval
+from ...studies.expansion import load_cell
+from ...studies.fingerprint import code_fingerprint
+from ...studies.journal import Journal, Outcome
+from ..rows import Row
+from .random_tasks import SEED, random_tasks, why_not
+
+COUNT = 200
+RUNS = range(9000, 9004)
+"""The seeds of the trial that each jump is run with; nothing is tuned on them."""
+FOLDER = Path("results") / "jumps"
+LANDED_GOAL = 0.05
+"""The largest good share of planned jumps that do not land."""
+MEDIAN_GOAL, MOST_GOAL, WORST_GOAL = 0.3, 1.5, 5.0
+"""s; CPU time of planning: the median's, that of 95 % of the tasks, and the worst."""
+
+
+@dataclass(frozen=True)
+class JumpJob:
+    """A task, the seeds to run it with, where its plan goes, and what is there already."""
+
+    task: JumpTask
+    seeds: tuple[int, ...]
+    folder: Path
+    planned: bool
+
+
+def jumps(
+    count: int = COUNT, seed: int = SEED, runs: Sequence[int] = RUNS, folder: Path = FOLDER
+) -> list[Row]:
+    """Rows: the share of tasks without a plan, and what binds; of runs that do not land, with its
+    95 % interval; and the CPU time of planning, from nothing to checked."""
+    tasks = random_tasks(count, seed)
+    code = code_fingerprint()
+    robot = find_robot("bruce")
+    names = [f"{code}:{task.hash(robot)}" for task in tasks]
+    with Journal(folder / "runs.jsonl") as journal:
+        jobs, owners = [], []
+        for task, name in zip(tasks, names, strict=True):
+            planned = journal.outcomes.get(name)
+            missing = tuple(s for s in runs if f"{name}:{s}" not in journal.outcomes)
+            if planned is None or (planned.success and missing):
+                jobs.append(JumpJob(task, missing, folder / "plans", planned is not None))
+                owners.append(name)
+        with closing(job_results(plan_and_run, jobs)) as results:
+            for result in results:
+                for part, outcome in result.value or [("", Outcome(False, result.error))]:
+                    journal.add(f"{owners[result.index]}{part}", outcome)
+        plans = [journal.outcomes[name] for name in names]
+        found = [
+            (task.name, s, journal.outcomes[f"{name}:{s}"])
+            for task, name, plan in zip(tasks, names, plans, strict=True)
+            if plan.success
+            for s in runs
+        ]
+    return [*_plan_rows(tasks, plans, seed), _landing_row(found)]
+
+
+def plan_and_run(job: JumpJob) -> list[tuple[str, Outcome]]:
+    """The outcomes of one task: of its plan with an empty key, then of each run by its seed."""
+    robot = find_robot("bruce")
+    library = PlanLibrary(robot, job.folder, ())
+    found = []
+    if not job.planned or library.path_of(job.task) is None:
+        started = cpu_time()
+        reason = ""
+        try:
+            library.add(solve_and_check(job.task, robot))
+        except (InvalidPlanError, PlanError, TaskError) as error:
+            reason = why_not(error)
+        found.append(("", Outcome(not reason, reason, metrics={"cpu_s": cpu_time() - started})))
+        if reason:
+            return found
+    return found + [(f":{seed}", run_once(job, seed)) for seed in job.seeds]
+
+
+def run_once(job: JumpJob, seed: int) -> Outcome:
+    """One run of a planned task in the robust trial."""
+    graphs = shipped_folder()
+    given = job.task.model_dump(mode="json", exclude_unset=True)
+    sets: dict[str, Any] = {
+        "plan.task": given, "plan.library": str(job.folder.absolute()), "robot.seed": seed,
+    }  # fmt: skip
+    trial = graphs / "trials" / "robust.yaml"
+    graph = load_cell(graphs / "jump.yaml", [trial], sets, graphs / "bench.yaml")
+    result = graph.run(log=False)
+    return Outcome(result.success, result.reason, result.run_hash, result.to_json()["metrics"])
+
+
+def _plan_rows(tasks: Sequence[JumpTask], plans: Sequence[Outcome], seed: int) -> list[Row]:
+    refused = [(task.name, plan.reason) for task, plan in zip(tasks, plans, strict=True)
+               if not plan.success]  # fmt: skip
+    seconds = [plan.metrics["cpu_s"] for plan in plans if "cpu_s" in plan.metrics]
+    told = "; ".join(f"{name} ({reason})" for name, reason in refused)
+    what = f"{len(tasks)} tasks of seed {seed}" + (f"; refused: {told}" if told else "")
+    median, most, worst = (float(np.quantile(seconds, q)) for q in (0.5, 0.95, 1.0))
+    return [
+        Row("random jumps that are refused, with what binds", len(refused) / len(tasks), "", note=what),
+        Row("random jumps, planning, median CPU", median, "s", goal=MEDIAN_GOAL),
+        Row("random jumps, planning, 95 % of them within", most, "s", goal=MOST_GOAL),
+        Row("random jumps, planning, worst", worst, "s", goal=WORST_GOAL),
+    ]  # fmt: skip
+
+
+def _landing_row(found: Sequence[tuple[str, int, Outcome]]) -> Row:
+    failed = [(name, seed, outcome.reason) for name, seed, outcome in found if not outcome.success]
+    n = len(found)
+    low, high = wilson_interval(n - len(failed), n)
+    by_task = Counter(name for name, _, _ in failed)
+    told = "; ".join(f"{name}: {times}" for name, times in by_task.items())
+    return Row(
+        "planned random jumps that do not land",
+        len(failed) / n if n else None,
+        "",
+        goal=LANDED_GOAL,
+        note=f"{n - len(failed)} of {n} runs land, 95 % interval {low:.3f} to {high:.3f}, robust trial"
+        + (f"; failures by task: {told}" if told else ""),
+    )

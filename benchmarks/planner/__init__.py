@@ -1,0 +1,1 @@
+"""What a plan costs, beside other solvers on the same problem."""

@@ -1,0 +1,1 @@
+"""The cost of the runtime beside a hand-written loop and other frameworks."""

@@ -1,0 +1,256 @@
+"""One tick of the controller of a jump: block by block, whole, and beside other solvers.
+
+All cases run the same recorded jump of ``graphs/jump.yaml`` in turns of ``CHUNK`` ticks, so whatever
+else the machine does hits them alike. A ratio is the median over the ratios of single ticks.
+"""
+
+from __future__ import annotations
+
+import gc
+import time
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...blocks.control.dynamics import Dynamics
+from ...blocks.control.whole_body_controller import WholeBodyController
+from ...blocks.control.whole_body_program import WholeBodyProgram
+from ...mathematics.whole_body_qp import joint_torque
+from ..rows import Row
+from .comparisons import (
+    BARE,
+    COMPILED,
+    FUSED,
+    HAND,
+    OSQP,
+    PLAIN,
+    QP,
+    QP_DAQP,
+    QP_OSQP,
+    TSID,
+    Times,
+    block_rows,
+    controller_rows,
+    earlier_rows,
+    program_rows,
+    state_to_torque_rows,
+    tsid_rows,
+)  # fmt: skip
+from .controller import HandWrittenLoop, RecordedController, RecordedJump, record_jump
+from .process import busy_wait_row, process_row
+from .programs import DaqpProgram, OsqpController, OsqpProgram, PeerProgram
+from .since import EarlierController
+from .tsid import TsidController, TsidProgram, import_tsid
+from .tsid_check import TsidCheck
+
+CHUNK = 50
+PLAIN_TICKS = 200
+"""How many ticks plain Python takes part in: it needs tens of milliseconds for each."""
+EVERY = 10
+"""One in so many ticks in stance is a state for the solvers by themselves."""
+ROUNDS = 5
+"""Turns of the solvers in each of these states, of which the median counts."""
+TORQUE_ERROR = 1e-6
+"""How much the torques of two exact methods may differ [N m]."""
+
+
+def tick(
+    rounds: int = 3,
+    ticks: int | None = None,
+    process: bool = True,
+    tsid: str = "",
+    since: str = "",
+) -> list[Row]:
+    """The rows.
+
+    Args:
+        rounds: how often the jump is run again; plain Python takes part in the first ticks of the first round only.
+        ticks: how much of the jump is used; by default all.
+        process: whether the whole process and the loop in real time are measured as well.
+        tsid: a folder with the wheels of TSID, which is a peer then (``tick_tsid``).
+        since: a commit whose controller is a peer as well (``tick_since``).
+
+    Raises:
+        AloftError: TSID or the commit is not there.
+        AssertionError: the controller computes something else than in the recorded jump, or the
+            methods that are exact do not agree.
+    """
+    module = import_tsid(Path(tsid)) if tsid else None  # before anything imports Pinocchio
+    earlier = EarlierController(since) if since else None
+    jump = record_jump(ticks)
+    own, plain = RecordedController(jump, fuse=False), RecordedController(jump, plain=True)
+    fused = RecordedController(jump)
+    bare = RecordedController(jump, fuse=False, timing=False, checks=False, record=False)
+    cases = {COMPILED: own, FUSED: fused, BARE: bare, HAND: HandWrittenLoop(jump)}
+    missing = _missing("osqp")
+    programs = _programs(own, with_osqp=not missing)
+    if not missing:
+        cases[OSQP] = _osqp_controller(jump)
+    check = None
+    if module is not None:
+        cases[TSID], check = _tsid_controller(jump, module), TsidCheck(module, fused)
+    for case in cases.values():  # warm, and what OSQP must know beforehand
+        shown = check.compare if check is not None and case is fused else None
+        case.run(jump.ticks, programs.learn if case is own else shown)
+    before: list[dict[str, float]] = []
+    with _quiet():
+        for number in range(rounds):
+            running = {PLAIN: plain, **cases} if number == 0 else cases
+            _one_round(jump, running, programs if number == 0 else None)
+            if earlier is not None:
+                before.append(earlier.run())
+    if earlier is not None:
+        earlier.close()
+    times = {name: np.array(case.times[-rounds * jump.ticks :]) for name, case in cases.items()}
+    of_first = {PLAIN: np.array(plain.times), COMPILED: times[COMPILED][: len(plain.times)]}
+    rows = [
+        *block_rows(own, "block "),
+        *block_rows(fused, "fused block "),
+        *(block_rows(cases[OSQP], "OSQP block ") if OSQP in cases else []),
+        *(block_rows(cases[TSID], "TSID block ") if TSID in cases else []),
+        *controller_rows(times, of_first, missing),
+    ]
+    rows += program_rows(programs.times, missing)
+    rows += state_to_torque_rows(fused, cases.get(OSQP), missing)
+    rows += tsid_rows(times, fused, cases.get(TSID), check)
+    rows += earlier_rows(times, before, since)
+    if process:
+        rows += [process_row(jump), busy_wait_row(jump)]
+    return rows
+
+
+def _one_round(
+    jump: RecordedJump, cases: Mapping[str, RecordedController], programs: _Programs | None
+) -> None:
+    """Run the jump once, all cases in turns; the order shifts from turn to turn."""
+    for case in cases.values():
+        case.again()
+    names = list(cases)
+    for turn in range(-(-jump.ticks // CHUNK)):
+        shift = turn % len(names)
+        for name in (*names[shift:], *names[:shift]):
+            if name != PLAIN or cases[name].tick < PLAIN_TICKS:
+                cases[name].run(CHUNK)
+    for name in (PLAIN, COMPILED, FUSED, BARE, HAND):
+        if name in cases:
+            cases[name].check()
+    if programs is not None:
+        cases[COMPILED].again()
+        cases[COMPILED].run(jump.ticks, programs.measure)
+
+
+class _Programs:
+    """The whole-body program of one controller's present state, solved in several ways."""
+
+    def __init__(self, block: WholeBodyController, *, with_osqp: bool) -> None:
+        self._block = block
+        self._acceleration = np.zeros_like(block.command.acceleration)
+        self._force = np.zeros_like(block.command.force)
+        self._torque, self._product = np.zeros((2, block.command.torque.shape[0]))
+        self._daqp = DaqpProgram(block)
+        self._osqp = OsqpProgram(block) if with_osqp else None
+        self.times: Times = {}
+        self._found: list[dict[str, float]] = []
+
+    def learn(self, tick: int) -> None:
+        """Show a state to OSQP."""
+        active = np.flatnonzero(self._block.phase.stance)
+        if self._osqp is not None and active.size:
+            self._osqp.learn(active)
+
+    def measure(self, tick: int) -> None:
+        """Solve the program of the present state in all ways, in turns."""
+        active = np.flatnonzero(self._block.phase.stance)
+        if tick % EVERY or not active.size:
+            return
+        prepared = self._daqp.assemble(active)
+        cases: dict[str, Callable[[], object]] = {
+            QP: self._block._solve.run,
+            QP_DAQP: lambda: self._solve(self._daqp, active, prepared),
+        }
+        if self._osqp is not None:
+            osqp = self._osqp
+            ready = osqp.assemble(active)
+            cases[QP_OSQP] = lambda: self._solve(osqp, active, ready)
+        taken: dict[str, list[float]] = {name: [] for name in cases}
+        for _ in range(ROUNDS):
+            for name, body in cases.items():
+                taken[name].append(_hot(body))
+        self._found.append({name: float(np.median(found)) for name, found in taken.items()})
+        self.times = {name: np.array([each[name] for each in self._found]) for name in cases}
+        self._solve(self._daqp, active, prepared)
+        apart = float(np.abs(self._torque - self._block.command.torque).max())
+        if self._block.command.solved and apart > TORQUE_ERROR:
+            raise AssertionError(f"tick {tick}: DAQP's torque is {apart:.2g} N m from the own one")
+
+    def _solve(
+        self, peer: PeerProgram, active: NDArray[np.int64], program: WholeBodyProgram
+    ) -> None:
+        """From the program's matrices, which are ready, to accelerations, forces and torques."""
+        answer, n = peer.solve_assembled(program, len(active)), self._acceleration.shape[0]
+        if answer is not None:
+            self._acceleration[...] = answer[:n]
+            self._force.fill(0.0)
+            self._force[active] = answer[n:].reshape(-1, 3)
+            joint_torque(
+                self._block._model, self._acceleration, self._force, self._product, self._torque
+            )
+
+
+def _programs(own: RecordedController, *, with_osqp: bool) -> _Programs:
+    block = own.bound.blocks["wbc"]
+    assert isinstance(block, WholeBodyController)
+    return _Programs(block, with_osqp=with_osqp)
+
+
+def _osqp_controller(jump: RecordedJump) -> RecordedController:
+    """The controller with OSQP, which has seen every state of the jump once."""
+    controller = RecordedController(jump, fuse=False, instead={"wbc": OsqpController})
+    controller.run(jump.ticks)
+    block = controller.bound.blocks["wbc"]
+    assert isinstance(block, OsqpController)
+    block.learning = False
+    controller.again()
+    return controller
+
+
+def _tsid_controller(jump: RecordedJump, tsid: ModuleType) -> RecordedController:
+    """The controller with TSID, whose model has the described mass."""
+    controller = RecordedController(jump, fuse=False, instead={"wbc": TsidController})
+    block, dynamics = controller.bound.blocks["wbc"], controller.bound.blocks["dynamics"]
+    assert isinstance(block, TsidController) and isinstance(dynamics, Dynamics)
+    block.use(TsidProgram(tsid, block, dynamics.base.orientation))
+    return controller
+
+
+def _hot(body: Callable[[], object]) -> float:
+    """Microseconds of a call that follows two others, as in a loop that does nothing else."""
+    body()
+    body()
+    start = time.perf_counter_ns()
+    body()
+    return (time.perf_counter_ns() - start) * 1e-3
+
+
+def _missing(package: str) -> str:
+    """Why a peer cannot be measured; empty where it is installed."""
+    from importlib.util import find_spec
+
+    return "" if find_spec(package) else f"not installed: pip install aloft[peers] has {package}"
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """No garbage is collected within."""
+    gc.collect()
+    gc.freeze()
+    gc.disable()
+    try:
+        yield
+    finally:
+        gc.enable()
+        gc.unfreeze()

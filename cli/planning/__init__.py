@@ -1,0 +1,1 @@
+"""What ``aloft plan`` shows, the grids that it plans, and rehearsals of plans."""

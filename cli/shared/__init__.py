@@ -1,0 +1,1 @@
+"""What several verbs need: printing, options, completion, progress, and where graphs run."""

@@ -1,0 +1,161 @@
+"""Serves the page of a graph that is running, for ``aloft graph --live`` and ``aloft params web``."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import typer
+
+from ...runtime.language.errors import AloftError
+
+if TYPE_CHECKING:
+    from ...runtime.live.live_page import Opened
+    from ...runtime.live.live_run import LiveRun
+    from ...runtime.live.live_server import Watched
+    from ...runtime.live.spread_run import SpreadRun
+    from ...runtime.placement.placed import PlacedGraph
+
+PATIENCE = 10.0
+"""Seconds to wait for parts that run elsewhere."""
+
+
+@dataclass(frozen=True)
+class Elsewhere:
+    """Where the parts of a graph are looked for: its file, overrides, the folder of keys and the
+    observer's name for TLS, and the process of ``aloft run --local``, zero for the only one."""
+
+    graph: Path
+    overrides: Sequence[str] = ()
+    keys: Path | None = None
+    observer: str = "viewer"
+    process: int = 0
+
+
+def open_live_run(name: str, elsewhere: Elsewhere | None = None) -> Watched:
+    """The running graph of that name, or the only one there is; all parts of a graph on several
+    machines.
+
+    Args:
+        name: of the run; empty for the only one.
+        elsewhere: how to reach a graph that no process of this machine answers for.
+
+    Raises:
+        AloftError: no such graph runs.
+    """
+    from ...runtime.live.live_run import LiveRun
+    from .endpoints import find
+
+    try:
+        path = find(name or (elsewhere.graph.stem if elsewhere is not None else ""))
+    except AloftError:
+        found = None if elsewhere is None or name else _spread_elsewhere(elsewhere)
+        if found is None:
+            raise
+        return found
+    run = LiveRun(path)
+    return _whole(run, path, elsewhere) if run.machine else run
+
+
+def _whole(run: LiveRun, path: Path, elsewhere: Elsewhere | None) -> Watched:
+    """The whole of the graph of which ``run`` is the part that answers at ``path``."""
+    from ...runtime.links.key_folder import secured
+    from ...runtime.live.spread_run import SpreadRun
+    from ...runtime.placement.place import place
+
+    placed = place(run.graph)
+    keys = elsewhere.keys if elsewhere is not None else None
+    if keys is None and any(spec.endpoint.startswith("tls/") for spec in placed.machines):
+        typer.echo(
+            f"only the part on {run.machine} is shown: the links use TLS, and the other parts need "
+            "--keys FOLDER",
+            err=True,
+        )
+        return run
+
+    def again() -> PlacedGraph | None:
+        try:
+            run.refresh()
+        except AloftError:
+            return None
+        return place(run.graph)
+
+    observer = elsewhere.observer if elsewhere is not None else "viewer"
+    return SpreadRun(placed, None if keys is None else secured(placed, keys, observer), again, path)
+
+
+def _spread_elsewhere(elsewhere: Elsewhere) -> SpreadRun | None:
+    """A graph whose parts answer over the network; ``None`` where it is for one process.
+
+    Raises:
+        AloftError: the graph is wrong, or none of its parts was heard.
+    """
+    from ...runtime.links.key_folder import secured
+    from ...runtime.live.spread_run import SpreadRun
+    from ...runtime.loading import load
+    from ...runtime.placement.place import place
+    from .local_runs import settings_of
+
+    def settings() -> tuple[str, ...]:
+        return settings_of(elsewhere.graph, elsewhere.process)
+
+    known = settings()
+    graph = load(elsewhere.graph, [*known, *elsewhere.overrides])
+    if not graph.machines:
+        return None
+    placed, keys = place(graph), elsewhere.keys
+
+    def again() -> PlacedGraph | None:
+        nonlocal known
+        try:
+            if settings() == known:
+                return None
+            known = settings()
+            return place(load(elsewhere.graph, [*known, *elsewhere.overrides]))
+        except AloftError:
+            return None
+
+    run = SpreadRun(
+        placed,
+        None if keys is None else secured(placed, keys, elsewhere.observer),
+        again,
+        _control(placed),
+    )
+    # the parts of a run that is registered here are there, or come as soon as they have started
+    if not known and not run.is_heard(PATIENCE):
+        run.close()
+        names = ", ".join(spec.name for spec in placed.machines)
+        raise AloftError(f"nothing was heard of {names} for {PATIENCE:g} s: do they run?")
+    return run
+
+
+def _control(placed: PlacedGraph) -> Path | None:
+    """The socket of a part on this machine that takes changes of parameters by its usual name."""
+    from ...runtime.live.parameter_endpoint import answers
+    from .endpoints import path_of
+
+    for spec in placed.machines:
+        with suppress(AloftError):  # not every name can be that of a socket
+            path = path_of(f"{placed.graph.name}-{spec.name}")
+            if answers(path):
+                return path
+    return None
+
+
+def serve_live(run: Watched, save: Path | None = None, opened: Opened = "diagram") -> None:
+    """Serve the page until Ctrl-C is pressed."""
+    from ...runtime.live.live_server import LiveServer
+    from .stopping import stopped_by_signals
+    from .viewing import open_page
+
+    server = LiveServer(run, save or Path(f"{run.graph.name}-tuned.yaml"), opened)
+    with server, stopped_by_signals():
+        try:
+            typer.echo(f"{server.page}\nthe page is there until you press Ctrl-C")
+            open_page(server.page)
+            server.serve_forever()
+        finally:
+            run.close()

@@ -1,0 +1,128 @@
+"""Prints what the verbs have to say: tables for people, one JSON object for programs, and errors."""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+import typer
+
+from ...runtime.language.errors import AloftError, ExitCode, RunError
+from ...runtime.loading.problems import LoadError
+
+if TYPE_CHECKING:
+    from rich.console import Console
+    from rich.table import Table
+
+
+SET_HELP = "Set a parameter: block.parameter=value. Repeatable."
+WIDE = 200
+
+
+def console(*, to_stderr: bool = False, quiet: bool = False) -> Console:
+    """Rich's console on standard output, or on standard error where JSON goes to the former."""
+    from rich.console import Console
+
+    made = Console(stderr=to_stderr, quiet=quiet, highlight=False)
+    if not made.is_terminal:
+        made.width = WIDE  # a file or a pipe has no edge to wrap at
+    return made
+
+
+def table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> Table:
+    """A table without boxes. Columns whose name starts with ``>`` are aligned to the right."""
+    from rich import box
+    from rich.markup import escape
+    from rich.table import Table
+
+    made = Table(title=title or None, box=box.SIMPLE_HEAD, title_justify="left", pad_edge=False)
+    for column in columns:
+        right = column.startswith(">")
+        made.add_column(
+            escape(column.removeprefix(">")), justify="right" if right else "left", overflow="fold"
+        )
+    for row in rows:
+        made.add_row(*(escape(cell) for cell in row))
+    return made
+
+
+def say(out: Console, text: str) -> None:
+    """Print a line as it is, without markup and without wrapping."""
+    out.print(text, markup=False, soft_wrap=True)
+
+
+def number(value: Any) -> str:
+    """A metric for a table: floats with four significant digits."""
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, float):
+        return f"{value:.4g}"
+    return str(value)
+
+
+def plain(value: Any) -> Any:
+    """``value`` as JSON can hold it: numbers that are not finite become null."""
+    if isinstance(value, Mapping):
+        return {str(key): plain(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [plain(item) for item in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    if hasattr(value, "tolist"):
+        return plain(value.tolist())  # NumPy's scalars and arrays
+    return value if value is None or isinstance(value, (bool, int, float, str)) else str(value)
+
+
+def print_json(value: Mapping[str, Any]) -> None:
+    """Print one JSON object on one line of its own: the last thing on standard output."""
+    sys.stdout.write(json.dumps(plain(value), allow_nan=False) + "\n")
+    sys.stdout.flush()
+
+
+def print_error(message: str) -> None:
+    """Print an error for a person, on standard error."""
+    typer.secho("error: ", fg=typer.colors.RED, bold=True, nl=False, err=True)
+    typer.echo(message, err=True)
+
+
+def print_warning(message: str) -> None:
+    """Print a warning on standard error."""
+    typer.secho("warning: ", fg=typer.colors.YELLOW, bold=True, nl=False, err=True)
+    typer.echo(message, err=True)
+
+
+def print_place(error: RunError, *, traceback: bool) -> None:
+    """Print, on standard error, where a block failed: the line, or the whole traceback."""
+    if traceback and error.traceback:
+        typer.echo(error.traceback, err=True)
+    elif error.where:
+        typer.echo(f"  raised at {error.where}; --traceback shows how it came there", err=True)
+
+
+@contextmanager
+def errors_reported(as_json: bool, *, traceback: bool = False) -> Iterator[None]:
+    """Turn what aloft raises on purpose into a message and the exit code that belongs to it."""
+    try:
+        yield
+    except LoadError as error:
+        if as_json:
+            print_json(
+                {"success": False, "reason": error.report.headline(), **error.report.as_json()}
+            )
+        else:
+            console(to_stderr=True).print(error.report.rich(), soft_wrap=True)
+        raise typer.Exit(ExitCode.BAD_INPUT) from error
+    except AloftError as error:
+        code = ExitCode.RUN_FAILED if isinstance(error, RunError) else ExitCode.BAD_INPUT
+        if as_json:
+            details = error.to_json() if isinstance(error, RunError) else {}
+            print_json({"success": False, "reason": str(error), **details})
+        else:
+            print_error(str(error))
+            if traceback and isinstance(error, RunError):
+                print_place(error, traceback=True)
+        raise typer.Exit(code) from error

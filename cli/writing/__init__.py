@@ -1,0 +1,1 @@
+"""What ``aloft new`` and ``aloft blocks`` write: files of a project, and the reference as a page."""

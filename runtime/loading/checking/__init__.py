@@ -1,0 +1,1 @@
+"""The third stage: all that can be wrong with a flat graph, and the checked graph."""

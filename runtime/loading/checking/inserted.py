@@ -1,0 +1,194 @@
+"""The blocks that loading inserts: a delay for each delayed wire, a constant for each value."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from ...language.block import Block, Output
+from ...language.delay import DelayParameters, delay_block_type
+from ...language.errors import UnitError
+from ...language.parameters import Parameters, parameter
+from ...language.signals import Field, Signal
+from ...language.stages import BlockSpec, Wire
+from ...language.unit_algebra import ONE
+from ...language.units import QUANTITY, Unit, parse_quantity, parse_unit
+from ..flattening.flat import FlatWire
+from ..problems import Code, Problems, listing, nearest
+from ..reading.nodes import ListNode, MapNode, Node, ScalarNode, plain, text_of
+from .draft import Draft
+
+
+class ConstantParameters(Parameters):
+    """The parameters of every constant."""
+
+    value: Mapping[str, Any] = parameter({}, text="values by field; fields not named are zero")
+
+
+class ConstantSignal(Block):
+    """Holds constant values: y[n] = value, and zero in the fields that are not named.
+
+    A graph makes it by ``{value: {field: number}}`` in place of a source. Subclasses made by
+    ``constant_block_type`` fix the signal. It raises no errors: the values are checked at load.
+    """
+
+    Params = ConstantParameters
+    params: ConstantParameters
+
+    def setup(self) -> None:
+        """Write the values once; no other code writes to the output."""
+        signal: Signal = self.__dict__["y"]
+        for name, value in self.params.value.items():
+            signal.views()[name][...] = value
+
+    def step(self) -> None:
+        """Do nothing: the output is constant."""
+
+
+@lru_cache(maxsize=256)
+def constant_block_type(signal: type[Signal]) -> type[ConstantSignal]:
+    """The block type that holds a constant ``signal`` in its output ``y``."""
+    text = "the values"
+    body = {"__doc__": ConstantSignal.__doc__, "y": Output(signal, text=text)}
+    return type(f"Constant{signal.__name__}", (ConstantSignal,), body)
+
+
+def insert_delay(reader: Draft, name: str, wire: FlatWire, source: Draft, values: Any) -> BlockSpec:
+    """The block that delays a wire; it runs in the same ticks as the wire's source."""
+    signal = source.outputs[wire.source_port].signal
+    return BlockSpec(
+        path=f"{reader.flat.path}/{name}~delay",
+        block_type=delay_block_type(signal, wire.delay),
+        params=DelayParameters(initial=values),
+        wires={"u": Wire(wire.source, f"{reader.flat.path}/{name}~delay.u", where=wire.where)},
+        dimensions=source.dimensions,
+        period_ticks=source.period_ticks,
+        offset_ticks=source.offset_ticks,
+        where=wire.where,
+    )
+
+
+def insert_constant(reader: Draft, name: str, wire: FlatWire, values: Any) -> BlockSpec:
+    """The block that writes a constant which stands in place of a source."""
+    signal: type[Any] = reader.inputs[name].signal
+    return BlockSpec(
+        path=f"{reader.flat.path}/{name}~constant",
+        block_type=constant_block_type(signal),  # type: ignore[arg-type]  # a class made here
+        params=ConstantParameters(value=values),
+        wires={},
+        dimensions=reader.dimensions,
+        period_ticks=reader.period_ticks,
+        offset_ticks=reader.offset_ticks,
+        where=wire.where,
+    )
+
+
+def read_values(
+    values: MapNode, signal: type[Signal], owner: Draft, at: str, problems: Problems
+) -> dict[str, Any]:
+    """Values by field of ``signal``: numbers, nested lists, or texts with a unit, all checked."""
+    found: dict[str, Any] = {}
+    for entry in values:
+        field = signal.fields.get(entry.key)
+        if field is None:
+            similar = nearest(entry.key, signal.fields)
+            problems.add(
+                Code.INITIAL,
+                f"{signal.__name__} has no field {entry.key!r}",
+                entry.key_where,
+                at=at,
+                expected=listing(signal.fields),
+                found=entry.key,
+                nearest=similar,
+                fix=similar[0] if similar else f"remove {entry.key!r}",
+            )
+            continue
+        value, expected = _array(entry.value, field, owner)
+        if expected:
+            problems.add(
+                Code.INITIAL,
+                f"{at}: {entry.key} cannot be {_short(entry.value)}",
+                entry.value.where,
+                at=at,
+                expected=expected,
+                found=_short(entry.value),
+            )
+        else:
+            found[entry.key] = value
+    return found
+
+
+def own_unit(node: Node) -> Unit | None:
+    """The unit of a constant for an input that takes any: that of its first number with a unit.
+
+    Numbers without a unit are plain; zeros alone have a unit that is not checked, because zero
+    means the same in all of them.
+    """
+    if isinstance(node, ScalarNode):
+        if isinstance(node.value, str):
+            match = QUANTITY.match(node.value)
+            if match is not None:
+                try:
+                    return parse_unit(match["unit"])
+                except UnitError:
+                    return ONE  # reported with the value
+        return None if node.value in (0, False) else ONE
+    found = [own_unit(item) for item in (node.items if isinstance(node, ListNode) else ())]
+    units = [unit for unit in found if unit is not None]
+    return next((unit for unit in units if unit is not ONE), units[0] if units else None)
+
+
+def _array(node: Node, field: Field, owner: Draft) -> tuple[Any, str]:
+    """The value and an empty text, or ``None`` and a text that says what was expected."""
+    shape = owner.shape(field)
+    unit = f" in {field.unit}" if field.unit is not None and str(field.unit) != "1" else ""
+    types: tuple[type, ...]
+    if field.dtype_name == "bool":
+        types = (bool,)
+        expected = "true or false"
+    elif field.dtype_name == "int64":
+        types = (int,)
+        expected = "a whole number"
+    else:
+        types = (int, float)
+        expected = f"a finite number{unit}"
+    if shape:
+        expected = f"{expected}, or a list of shape [{', '.join(map(str, shape))}]"
+    own = field.unit
+    if field.carried:
+        own = own_unit(node) or ONE
+    try:
+        value = _numbers(node, own, types)
+        array = np.asarray(value, np.float64)
+    except (TypeError, ValueError, OverflowError):
+        return None, expected
+    if not np.isfinite(array).all() or (shape is not None and array.shape not in ((), shape)):
+        return None, expected
+    if field.dtype_name == "int64" and np.abs(array).max(initial=0.0) >= 2.0**63:
+        return None, expected
+    return value, ""
+
+
+def _numbers(node: Node, unit: Unit | None, types: tuple[type, ...]) -> Any:
+    """Plain numbers. Raises ``ValueError`` for anything else."""
+    if isinstance(node, ScalarNode):
+        value = node.value
+        if isinstance(value, str) and unit is not None:
+            try:
+                return parse_quantity(value, unit.text)
+            except UnitError as error:
+                raise ValueError(str(error)) from error
+        if not isinstance(value, types) or (isinstance(value, bool) and bool not in types):
+            raise ValueError(f"{value!r} is not a number")
+        return value
+    if isinstance(node, MapNode):
+        raise TypeError("a mapping is not a number")
+    return [_numbers(item, unit, types) for item in node.items]
+
+
+def _short(node: Node) -> str:
+    text = text_of(plain(node))
+    return text if len(text) <= 60 else f"{text[:57]}..."

@@ -1,0 +1,137 @@
+"""Checks the settings of the graph as a whole: rate, duration, robot, dimensions and clock."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from ....robots.description import RobotDescription
+from ...language.stages import ClockSpec, Position
+from ..flattening.flat import FlatGraph
+from ..problems import Code, Problems, listing, nearest
+from ..reading.nodes import Entry, kind, plain
+from ..reading.quantity import read_quantity
+from ..reading.written import CLOCK_KEYS, unknown_key
+from .graph_robot import read_robot
+
+_CLOCK_WORDS: Mapping[str, tuple[str, ...]] = {
+    "kind": ("free", "paced", "robot"),
+    "overrun": ("skip", "stop"),
+}
+
+
+@dataclass(frozen=True)
+class Settings:
+    """The settings of the graph; one is ``None`` if it is not given or has a problem."""
+
+    base_rate: float | None = None
+    ticks: int | None = None
+    robot: RobotDescription | None = None
+    robot_known: bool = True
+    """False if the graph names a robot that could not be read."""
+    dimensions: Mapping[str, int] = field(default_factory=dict)
+    clock: ClockSpec = field(default_factory=ClockSpec)
+    folder: Path = Path()
+    """Where the graph's file lies."""
+
+
+def read_settings(graph: FlatGraph, problems: Problems) -> Settings:
+    """All settings of a graph; what is wrong is reported to ``problems``."""
+    rate = None
+    if graph.rate is not None:
+        rate = read_quantity(graph.rate.value, "rate", "Hz", problems)
+    elif not graph.incomplete:
+        problems.add(
+            Code.MISSING_KEY,
+            "the graph does not say its rate",
+            Position(graph.file, 1, 1),
+            expected="the base rate, which all blocks' rates divide",
+            fix="rate: 500 Hz",
+        )
+    ticks = None
+    if graph.duration is not None:
+        duration = read_quantity(graph.duration.value, "duration", "s", problems)
+        if duration is not None and rate is not None:
+            ticks = max(1, round(duration * rate))
+    robot = read_robot(graph, problems)
+    return Settings(
+        rate,
+        ticks,
+        robot,
+        robot is not None or graph.robot is None,
+        _read_dimensions(graph, robot, problems),
+        _read_clock(graph, problems),
+        graph.folder,
+    )
+
+
+def _read_dimensions(
+    graph: FlatGraph, robot: RobotDescription | None, problems: Problems
+) -> dict[str, int]:
+    found = dict(robot.dimensions) if robot else {}
+    for entry in graph.dimensions or ():
+        value = plain(entry.value)
+        if not isinstance(value, int) or isinstance(value, bool) or value < 1:
+            problems.add(
+                Code.DIMENSION,
+                f"dimension {entry.key!r} cannot be {kind(entry.value)}",
+                entry.value.where,
+                at=f"dimensions.{entry.key}",
+                expected="a whole number from 1",
+                found=kind(entry.value),
+            )
+        elif found.get(entry.key, value) != value:
+            assert robot is not None
+            problems.add(
+                Code.DIMENSION,
+                f"dimension {entry.key!r} is {value}, but robot {robot.name} has "
+                f"{found[entry.key]}",
+                entry.value.where,
+                at=f"dimensions.{entry.key}",
+                other="robot",
+                other_where=graph.robot.key_where if graph.robot else None,
+                expected=str(found[entry.key]),
+                found=str(value),
+                fix=f"remove {entry.key!r}",
+            )
+        else:
+            found[entry.key] = value
+    return found
+
+
+def _read_clock(graph: FlatGraph, problems: Problems) -> ClockSpec:
+    values: dict[str, Any] = {}
+    for entry in graph.clock or ():
+        if entry.key not in CLOCK_KEYS:
+            unknown_key(entry, CLOCK_KEYS, "of 'clock'", problems)
+            continue
+        if entry.key == "hangs_after":
+            limit = read_quantity(entry.value, "clock.hangs_after", "s", problems)
+            values |= {} if limit is None else {entry.key: limit}
+            continue
+        value = plain(entry.value)
+        words = _CLOCK_WORDS.get(entry.key)
+        if words is not None and value not in words:
+            _bad_clock(entry, listing(words), words, problems)
+        elif words is None and (not isinstance(value, int) or isinstance(value, bool) or value < 1):
+            _bad_clock(entry, "overruns in a row, a whole number from 1", (), problems)
+        else:
+            values[entry.key] = value
+    return ClockSpec(**values)
+
+
+def _bad_clock(entry: Entry, expected: str, words: tuple[str, ...], problems: Problems) -> None:
+    value = plain(entry.value)
+    similar = nearest(value, words) if isinstance(value, str) else ()
+    problems.add(
+        Code.BAD_VALUE,
+        f"clock.{entry.key} cannot be {kind(entry.value)}",
+        entry.value.where,
+        at=f"clock.{entry.key}",
+        expected=expected,
+        found=kind(entry.value),
+        nearest=similar,
+        fix=f"{entry.key}: {similar[0]}" if similar else "",
+    )

@@ -1,0 +1,220 @@
+"""The second stage: one graph with its includes and sub-graphs expanded and overrides applied."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from ...language.stages import HasSource, Position
+from ..reading.nodes import Entry, MapNode, Node, plain, text_of
+from ..reading.selection import WHOLE, Selection
+
+_WIDTH = 100
+ROBOT_FILES = (".yaml", ".yml", ".urdf", ".xml", ".mjcf")
+"""The endings by which the name of a robot is taken for a file, relative to the graph."""
+
+
+@dataclass(frozen=True)
+class Item:
+    """One piece of a wire that is put together: what is selected of a source, or a ``literal``."""
+
+    where: Position
+    wire: FlatWire | None = None
+    selection: Selection = WHOLE
+    literal: Node | None = None
+
+    def plain(self) -> Any:
+        """The piece as a graph file says it."""
+        if self.literal is not None:
+            return plain(self.literal)
+        assert self.wire is not None
+        return f"{self.wire.source}{self.selection}"
+
+
+@dataclass(frozen=True)
+class Part:
+    """What one field of an input is made of; ``field`` is empty for its only one."""
+
+    field: str
+    where: Position
+    items: tuple[Item, ...]
+    is_list: bool = False
+
+    def plain(self) -> Any:
+        """The part as a graph file says it."""
+        items = [item.plain() for item in self.items]
+        return items if self.is_list else items[0]
+
+
+@dataclass(frozen=True)
+class FlatWire(HasSource):
+    """What one input reads: the output ``source`` (``block.port``), a ``constant``, or ``parts``
+    that are put together."""
+
+    source: str
+    where: Position
+    delay: int = 0
+    initial: MapNode | None = None
+    truth: bool = False
+    constant: MapNode | None = None
+    parts: tuple[Part, ...] = ()
+    shown: str = ""
+    """What stands in the graph in place of ``source``, where loading has put a block between."""
+
+    @property
+    def selected(self) -> str:
+        """What is written behind the source: ``.position[2]``."""
+        return self.shown.removeprefix(self.source) if self.shown else ""
+
+    def inner(self) -> tuple[FlatWire, ...]:
+        """The wires that this one is made of: itself, or those of its parts; none of a constant."""
+        if self.constant is not None:
+            return ()
+        items = [item for part in self.parts for item in part.items]
+        return tuple(i.wire for i in items if i.wire is not None) if self.parts else (self,)
+
+    def plain(self) -> Any:
+        """The wire as a graph file says it."""
+        if self.constant is not None:
+            return {"value": plain(self.constant)}
+        source: Any = self.source
+        if self.parts:
+            one = len(self.parts) == 1 and not self.parts[0].field
+            source = {part.field: part.plain() for part in self.parts}
+            source = self.parts[0].plain() if one else source
+        if not self.delay and not self.truth:
+            return source
+        data: dict[str, Any] = {"from": source}
+        if self.delay:
+            data["delay"] = self.delay
+        if self.initial is not None:
+            data["initial"] = plain(self.initial)
+        if self.truth:
+            data["allow"] = "truth"
+        return data
+
+
+@dataclass(frozen=True)
+class FlatBlock:
+    """One block. ``excused`` inputs are unwired because of a problem that is already reported."""
+
+    path: str
+    where: Position
+    use: str
+    use_where: Position
+    folder: Path
+    parameters: MapNode
+    wires: Mapping[str, FlatWire] = field(default_factory=dict)
+    rate: Node | None = None
+    offset: Node | None = None
+    excused: tuple[str, ...] = ()
+    input_places: Mapping[str, Position] = field(default_factory=dict)
+    """Where each wired input's name is written."""
+    machine: Node | None = None
+    """The name of the machine that the block is placed on."""
+
+    def plain(self) -> dict[str, Any]:
+        """The block as an entry of ``blocks``, as plain data."""
+        given = (("rate", self.rate), ("offset", self.offset), ("on", self.machine))
+        return {
+            "use": self.use,
+            "with": plain(self.parameters),
+            "in": {name: wire.plain() for name, wire in self.wires.items()},
+            **{key: plain(node) for key, node in given if node is not None},
+        }
+
+    def text(self) -> str:
+        """The block as an entry of ``blocks``."""
+        lines = [f"  {self.path}:", f"    use: {text_of(self.use)}"]
+        lines += _section("with", _escape(plain(self.parameters)))
+        lines += _section("in", {name: wire.plain() for name, wire in self.wires.items()})
+        for key, node in (("rate", self.rate), ("offset", self.offset), ("on", self.machine)):
+            if node is not None:
+                lines.append(f"    {key}: {text_of(plain(node))}")
+        return "\n".join(lines)
+
+
+@dataclass(frozen=True)
+class FlatGraph:
+    """The whole graph.
+
+    ``incomplete`` is true if some file could not be read, so that names may be missing. ``broken``
+    holds the paths of the sub-graph blocks that could not be expanded.
+    """
+
+    name: str
+    file: str
+    folder: Path
+    blocks: tuple[FlatBlock, ...]
+    rate: Entry | None = None
+    duration: Entry | None = None
+    robot: Entry | None = None
+    robot_folder: Path = Path()
+    actuators: Entry | None = None
+    dimensions: MapNode | None = None
+    clock: MapNode | None = None
+    machines: MapNode | None = None
+    links: MapNode | None = None
+    overrides: Mapping[str, Any] = field(default_factory=dict)
+    empty: bool = False
+    """No file has any blocks."""
+    incomplete: bool = False
+    broken: tuple[str, ...] = ()
+    subgraphs: Mapping[str, Mapping[str, FlatWire]] = field(default_factory=dict)
+    """The sub-graph blocks that were expanded, and where their outputs come from."""
+    subgraph_inputs: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
+    """The same for their inputs, ``block.port``, as far as each is one whole output."""
+
+    def plain(self) -> dict[str, dict[str, Any]]:
+        """The entries of all blocks as plain data, by their paths."""
+        return {block.path: block.plain() for block in self.blocks}
+
+    @property
+    def text(self) -> str:
+        """The graph as the text of a file that, lying in ``folder``, loads to the same graph."""
+        lines = []
+        for entry in (self.rate, self.duration):
+            if entry is not None:
+                lines.append(f"{entry.key}: {text_of(plain(entry.value))}")
+        if self.robot is not None:
+            robot = plain(self.robot.value)
+            if isinstance(robot, str) and robot.endswith(ROBOT_FILES):
+                robot = Path(os.path.relpath(self.robot_folder / robot, self.folder)).as_posix()
+            lines.append(f"robot: {text_of(robot)}")
+        if self.actuators is not None:
+            lines.append(f"actuators: {text_of(plain(self.actuators.value))}")
+        for key, node in (
+            ("dimensions", self.dimensions),
+            ("clock", self.clock),
+            ("machines", self.machines),
+            ("links", self.links),
+        ):
+            if node is not None and node.entries:
+                lines.append(f"{key}: {text_of(plain(node))}")
+        lines.append("blocks:" if self.blocks else "blocks: {}")
+        lines.extend(block.text() for block in self.blocks)
+        return "\n".join(lines) + "\n"
+
+
+def _section(key: str, data: Mapping[str, Any]) -> list[str]:
+    """The lines of a mapping inside a block: one line where it fits."""
+    if not data:
+        return []
+    line = f"    {key}: {text_of(data)}"
+    if len(line) <= _WIDTH:
+        return [line]
+    return [f"    {key}:", *(f"      {text_of(k)}: {text_of(v)}" for k, v in data.items())]
+
+
+def _escape(value: Any) -> Any:
+    """The value with the leading ``$`` of every text doubled, which a file reads as one ``$``."""
+    if isinstance(value, str):
+        return f"${value}" if value.startswith("$") else value
+    if isinstance(value, list):
+        return [_escape(item) for item in value]
+    if isinstance(value, dict):
+        return {key: _escape(item) for key, item in value.items()}
+    return value

@@ -1,0 +1,357 @@
+"""Makes one flat graph from the written files: expands includes, sub-graphs and their parameters,
+and applies overrides."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from ...language.stages import Position
+from ..problems import Code, Problems, listing, nearest
+from ..reading.document import read_file, read_mapping
+from ..reading.files import FileTree, Stack
+from ..reading.graph_keys import as_entry, is_graph_key, merge
+from ..reading.kinds_of_files import is_another_kind
+from ..reading.nodes import Entry, MapNode, Node, ScalarNode, plain
+from ..reading.overrides import Override, Overrides, read_overrides, read_sets
+from ..reading.references import Bindings, report_unused
+from ..reading.written import WrittenBlock, WrittenGraph, read_graph, wrong_kind
+from ..shipped import addresses_like
+from .flat import FlatBlock, FlatGraph, FlatWire
+from .links import Link, read_link
+from .machines import placed
+from .rates import wrap_offset
+from .subgraph_parameters import parameter_values
+from .subgraphs import Instance, Resolver
+
+_MAXIMAL_BLOCKS = 5000
+_SUFFIXES = (".yaml", ".yml")
+
+
+@dataclass(frozen=True)
+class _Scope:
+    """Where blocks are expanded: the root, or one use of a sub-graph."""
+
+    bindings: Bindings
+    instance: str | None = None
+    stack: Stack = ()
+    rate: Node | None = None
+    offset: Node | None = None
+    machine: Node | None = None
+    shifted: bool = False
+    """Whether the offset is said further out than the rate, so that it may exceed a period."""
+    sets: tuple[Override, ...] = ()
+    wires: Mapping[str, tuple[Link | None, Position, str]] = field(default_factory=dict)
+    """Wires that other files give, by ``block.input``: the link, its place and its file."""
+
+    @property
+    def prefix(self) -> str:
+        """What stands in front of the paths of this scope's blocks."""
+        return f"{self.instance}/" if self.instance else ""
+
+
+@dataclass
+class _Draft:
+    """A block whose wires are not resolved yet."""
+
+    block: FlatBlock
+    links: dict[str, Link | None]
+    shifted: bool = False
+    """Whether the offset is inherited from further out than the rate."""
+
+
+def flatten_file(path: Path, overrides: Overrides, problems: Problems) -> FlatGraph:
+    """The flat graph of a file; what is wrong is reported to ``problems`` and left out."""
+    similar = () if path.exists() else addresses_like(path)
+    if similar:
+        problems.add(
+            Code.FILE,
+            f"cannot read {path}: no such file",
+            Position(str(path), 0, 0),
+            nearest=similar,
+            fix=f"{similar[0]}, which is shipped; 'aloft graphs' lists all",
+        )
+        return _Flattener(problems).run(path, None, overrides)
+    return _Flattener(problems).run(path, read_file(path, str(path), problems), overrides)
+
+
+def flatten_text(text: str, path: Path, overrides: Overrides, problems: Problems) -> FlatGraph:
+    """The flat graph of a text that stands for the file ``path``."""
+    return _Flattener(problems).run(path, read_mapping(text, str(path), problems), overrides)
+
+
+class _Flattener:
+    def __init__(self, problems: Problems) -> None:
+        self.problems = problems
+        self.files = FileTree(problems)
+        self.drafts: dict[str, _Draft] = {}
+        self.instances: dict[str, Instance] = {}
+
+    def run(self, path: Path, tree: MapNode | None, overrides: Overrides) -> FlatGraph:
+        shown = str(path)
+        commands = read_overrides(overrides, self.problems)
+        graph: dict[str, tuple[Entry, Path]] = {}
+        empty = False
+        if tree is not None and is_another_kind(tree, shown, self.problems):
+            tree = None
+        self.files.incomplete = tree is None
+        if tree is not None:
+            root = read_graph(tree, shown, path.parent, self.problems, subgraph=False)
+            scope = _Scope(Bindings(None, self.problems), stack=((path.resolve(), shown),))
+            files = self.files.gather(root, scope.stack)
+            empty = not any(_has_blocks(file) for file in files)
+            names = [block.name for file in files for block in file.blocks]
+            own = tuple(o for o in commands if not is_graph_key(o, names))
+            for file in files:
+                for entry in file.graph:
+                    merge(graph, entry, file.folder)
+            for command in commands:
+                if is_graph_key(command, names):
+                    merge(graph, as_entry(command), path.parent)
+            self._expand(files, replace(scope, sets=own))
+        resolver = Resolver(self.instances, self.problems)
+        base_rate = graph["rate"][0].value if "rate" in graph else None
+        blocks = tuple(
+            wrap_offset(_finish(draft, resolver), base_rate)
+            if draft.shifted
+            else _finish(draft, resolver)
+            for draft in self.drafts.values()
+        )
+
+        def written(key: str) -> Entry | None:
+            return graph[key][0] if key in graph else None
+
+        blocks = placed(blocks, self._mapping(written("place")), self.instances, self.problems)
+        return FlatGraph(
+            name=path.stem,
+            file=shown,
+            folder=path.parent,
+            blocks=blocks,
+            rate=written("rate"),
+            duration=written("duration"),
+            robot=written("robot"),
+            actuators=written("actuators"),
+            robot_folder=graph["robot"][1] if "robot" in graph else path.parent,
+            dimensions=self._mapping(written("dimensions")),
+            clock=self._mapping(written("clock")),
+            machines=self._mapping(written("machines")),
+            links=self._mapping(written("links")),
+            overrides={command.key: plain(command.value) for command in commands},
+            empty=empty and not self.files.incomplete,
+            incomplete=self.files.incomplete,
+            broken=tuple(p for p, instance in self.instances.items() if instance.broken),
+            subgraphs=resolver.outputs(),
+            subgraph_inputs=Resolver(self.instances, Problems()).inputs(),
+        )
+
+    def _mapping(self, entry: Entry | None) -> MapNode | None:
+        if entry is None or isinstance(entry.value, MapNode):
+            return entry.value if entry else None  # type: ignore[return-value]  # a MapNode
+        wrong_kind(entry.value, repr(entry.key), "a mapping", self.problems)
+        return None
+
+    def _expand(self, files: list[WrittenGraph], scope: _Scope) -> None:
+        prefix = scope.prefix
+        sets: list[Override] = []
+        wires: dict[str, tuple[Link | None, Position, str]] = {}
+        first: dict[str, WrittenBlock] = {}
+        mine: list[tuple[WrittenBlock, WrittenGraph]] = []
+        for file in files:
+            for found in read_sets(file.sets, prefix, self.problems):
+                sets.append(replace(found, value=scope.bindings.substitute(found.value)))
+            for entry in file.wires:
+                target = f"{prefix}{entry.key}"
+                link = self._link(entry, scope, target)
+                wires[target] = (link, entry.key_where, file.file)
+            for block in file.blocks:
+                if block.name in first:
+                    self._duplicate(prefix + block.name, block.where, first[block.name].where)
+                    continue
+                first[block.name] = block
+                mine.append((block, file))
+        inner = replace(scope, sets=(*sets, *scope.sets), wires={**wires, **scope.wires})
+        for block, file in mine:
+            self._block(block, file, inner)
+        self._report_lost(sets, wires, scope)
+
+    def _report_lost(
+        self,
+        sets: Iterable[Override],
+        wires: Mapping[str, tuple[Link | None, Position, str]],
+        scope: _Scope,
+    ) -> None:
+        """Report overrides and wires of blocks that do not exist."""
+        lost = [(o.block, o.key, o.where, Code.OVERRIDE) for o in sets]
+        if scope.instance is None:
+            lost += [(o.block, o.key, o.where, Code.OVERRIDE) for o in scope.sets]
+        for target, (_, where, _) in wires.items():
+            block, dot, _ = target.rpartition(".")
+            if not dot:
+                self.problems.add(
+                    Code.WRONG_KIND,
+                    f"{target!r} does not name an input",
+                    where,
+                    expected="block.input: source",
+                    found=target,
+                )
+                continue
+            lost.append((block, target, where, Code.UNKNOWN_INPUT))
+        paths = [*self.drafts, *self.instances]
+        if self.files.incomplete:
+            return
+        for block, key, where, code in lost:
+            if block in self.drafts or block in self.instances:
+                continue
+            if any(block.startswith(f"{p}/") and i.broken for p, i in self.instances.items()):
+                continue
+            similar = nearest(block, paths)
+            self.problems.add(
+                code,
+                f"{key!r}: there is no block {block!r}",
+                where,
+                at=key,
+                expected=listing(paths),
+                found=block,
+                nearest=similar,
+                fix=(key if where.line else where.file).replace(block, similar[0], 1)
+                if similar
+                else "",
+            )
+
+    def _duplicate(self, path: str, where: Position, other: Position) -> None:
+        self.problems.add(
+            Code.DUPLICATE_BLOCK,
+            f"there are two blocks {path!r}",
+            where,
+            at=path,
+            other=path,
+            other_where=other,
+            fix="rename one; to change a block of an included file use 'set' and 'wires'",
+        )
+
+    def _link(self, entry: Entry, scope: _Scope, at: str) -> Link | None:
+        node = scope.bindings.substitute(entry.value)
+        return read_link(node, scope.prefix, scope.instance, at, self.problems)
+
+    def _block(self, block: WrittenBlock, file: WrittenGraph, scope: _Scope) -> None:
+        path = scope.prefix + block.name
+        if len(self.drafts) >= _MAXIMAL_BLOCKS:
+            self.problems.add(Code.TOO_LARGE, f"more than {_MAXIMAL_BLOCKS} blocks", block.where)
+            return
+        if path in self.drafts or path in self.instances:
+            present = self.drafts[path].block if path in self.drafts else self.instances[path]
+            self._duplicate(path, block.where, present.where)
+            return
+        substitute = scope.bindings.substitute
+        parameters = substitute(block.parameters) if block.parameters else None
+        if not isinstance(parameters, MapNode):
+            parameters = MapNode((), block.where)
+        use = substitute(block.use) if block.use else None
+        for override in scope.sets:
+            if override.block == path and override.path == ("use",):
+                use = override.value
+            elif override.block == path:
+                parameters = parameters.assign(override.path, override.value, override.where)
+        links, places = self._links(block, file, scope, path)
+        rate = substitute(block.rate) if block.rate else scope.rate
+        offset = substitute(block.offset) if block.offset else scope.offset
+        machine = substitute(block.machine) if block.machine else scope.machine
+        shifted = block.offset is None and (block.rate is not None or scope.shifted)
+        draft = _Draft(
+            FlatBlock(
+                path,
+                block.where,
+                "",
+                block.where,
+                file.folder,
+                parameters,
+                rate=rate,
+                offset=offset,
+                input_places=places,
+                machine=machine,
+            ),
+            links,
+            shifted,
+        )
+        if use is None or not (isinstance(use, ScalarNode) and isinstance(use.value, str)):
+            if use is not None:
+                expected = "a block such as blocks.JointPD, module:Class, or a file.yaml"
+                wrong_kind(use, "'use'", expected, self.problems, at=path)
+        elif use.value.endswith(_SUFFIXES):
+            inner = replace(scope, rate=rate, offset=offset, machine=machine, shifted=shifted)
+            self._instance(draft, use, file, inner)
+            return
+        else:
+            draft.block = replace(draft.block, use=use.value, use_where=use.where)
+        self.drafts[path] = draft
+
+    def _links(
+        self, block: WrittenBlock, file: WrittenGraph, scope: _Scope, path: str
+    ) -> tuple[dict[str, Link | None], dict[str, Position]]:
+        links: dict[str, Link | None] = {}
+        places: dict[str, Position] = {}
+        for entry in block.inputs or ():
+            links[entry.key] = self._link(entry, scope, f"{path}.{entry.key}")
+            places[entry.key] = entry.key_where
+        for target, (link, where, wire_file) in scope.wires.items():
+            owner, _, name = target.rpartition(".")
+            if owner != path:
+                continue
+            if name in places and wire_file == file.file:
+                self.problems.add(
+                    Code.WIRED_TWICE,
+                    f"{target} is wired here and at its block",
+                    where,
+                    at=target,
+                    other=target,
+                    other_where=places[name],
+                    fix="remove one of the two",
+                )
+                continue
+            links[name] = link
+            places[name] = where
+        return links, places
+
+    def _instance(self, draft: _Draft, use: ScalarNode, file: WrittenGraph, scope: _Scope) -> None:
+        """Expand one use of a sub-graph."""
+        path, problems = draft.block.path, self.problems
+        instance = Instance(path, draft.block.where, str(use.value), draft.links)
+        self.instances[path] = instance
+        located = self.files.locate(use, file, scope.stack)
+        subgraph = self.files.read(*located, subgraph=True) if located else None
+        if located is None or subgraph is None:
+            return
+        stack = (*scope.stack, located)
+        incomplete, self.files.incomplete = self.files.incomplete, False
+        files = self.files.gather(subgraph, stack, subgraph=True)
+        missing, self.files.incomplete = self.files.incomplete, incomplete
+        values = parameter_values(draft.block, subgraph, problems)
+        if values is None or missing:
+            return
+        instance.broken = False
+        instance.declare_inputs(subgraph, draft.block.input_places, problems)
+        report_unused(subgraph, files, problems)
+        inner = replace(scope, bindings=Bindings(values, problems), instance=path, stack=stack)
+        for entry in subgraph.outputs:
+            instance.outputs[entry.key] = self._link(entry, inner, f"{path}.{entry.key}")
+        self._expand(files, inner)
+
+
+def _finish(draft: _Draft, resolver: Resolver) -> FlatBlock:
+    """The block, every wire of which comes from an output of a block that is no sub-graph."""
+    wires: dict[str, FlatWire] = {}
+    excused = []
+    for name, link in draft.links.items():
+        resolved = resolver.resolve(link, f"{draft.block.path}.{name}")
+        if isinstance(resolved, FlatWire):
+            wires[name] = resolved
+        elif resolved is None:
+            excused.append(name)
+    return replace(draft.block, wires=wires, excused=tuple(excused))
+
+
+def _has_blocks(file: WrittenGraph) -> bool:
+    """Whether anything is written under ``blocks``, even if it is wrong."""
+    entry = file.tree.get("blocks")
+    return entry is not None and bool(plain(entry.value))

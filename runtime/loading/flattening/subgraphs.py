@@ -1,0 +1,311 @@
+"""Uses of sub-graphs, and the resolution of wires through them to the outputs of blocks."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+from ...language.stages import Position
+from ..problems import Code, Problems, listing, nearest
+from ..reading.nodes import MapNode, ScalarNode, kind
+from ..reading.selection import WHOLE, Selection
+from ..reading.written import WrittenGraph
+from .flat import FlatWire, Item, Part
+from .links import Link
+
+UNWIRED = "unwired"
+"""The result for a wire that comes from an optional, unwired input of a sub-graph."""
+
+
+@dataclass
+class Instance:
+    """One use of a sub-graph. ``broken`` is true if it could not be expanded, which is reported."""
+
+    path: str
+    where: Position
+    file: str
+    links: dict[str, Link | None]
+    inputs: dict[str, MapNode | str | None] = field(default_factory=dict)
+    """The declared inputs: ``None`` required, ``"unwired"`` optional, or constant values."""
+    outputs: dict[str, Link | None] = field(default_factory=dict)
+    broken: bool = True
+
+    def declare_inputs(
+        self, subgraph: WrittenGraph, places: Mapping[str, Position], problems: Problems
+    ) -> None:
+        """Take the inputs that the sub-graph's file declares, and check the wires against them."""
+        for entry in subgraph.inputs:
+            value = entry.value
+            text = value.value if isinstance(value, ScalarNode) else ""
+            if isinstance(value, MapNode):
+                self.inputs[entry.key] = value
+            elif text is None or text == "required":
+                self.inputs[entry.key] = None
+            elif text == "optional":
+                self.inputs[entry.key] = UNWIRED
+            else:
+                self.inputs[entry.key] = UNWIRED
+                problems.add(
+                    Code.WRONG_KIND,
+                    f"the default of input {entry.key!r} cannot be {kind(value)}",
+                    value.where,
+                    at=entry.key,
+                    expected="nothing (required), optional, or constant fields {field: 0.0}",
+                    found=kind(value),
+                )
+        misspelt: dict[str, None] = {}
+        for name in self.links:
+            if name not in self.inputs:
+                similar = nearest(name, self.inputs)
+                misspelt.update(dict.fromkeys(similar[:1]))
+                problems.add(
+                    Code.UNKNOWN_INPUT,
+                    f"{self.path} has no input {name!r}",
+                    places.get(name, self.where),
+                    at=f"{self.path}.{name}",
+                    expected=listing(self.inputs),
+                    found=name,
+                    nearest=similar,
+                    fix=similar[0] if similar else f"remove {name!r}",
+                )
+        for entry in subgraph.inputs:
+            wired = entry.key in self.links or entry.key in misspelt
+            if self.inputs[entry.key] is None and not wired:
+                problems.add(
+                    Code.UNWIRED_INPUT,
+                    f"input {entry.key!r} of {self.path} is not wired",
+                    self.where,
+                    at=f"{self.path}.{entry.key}",
+                    other=entry.key,
+                    other_where=entry.key_where,
+                    fix=f"in: {{{entry.key}: block.port}}",
+                )
+
+
+class Resolver:
+    """Follows links through the inputs and outputs of sub-graphs."""
+
+    def __init__(self, instances: Mapping[str, Instance], problems: Problems) -> None:
+        self.instances = instances
+        self.problems = problems
+
+    def resolve(self, link: Link | None, at: str) -> FlatWire | str | None:
+        """The wire that a link stands for, ``UNWIRED``, or ``None`` after a problem."""
+        if link is None:
+            return None
+        start, seen = link, {}  # type: Link, dict[str, None]
+        total = FlatWire("", start.where)
+        selection = WHOLE
+        while True:
+            if link.constant is not None:
+                if total.delay:
+                    self._delayed_constant(start, at)
+                if selection:
+                    return self._of_constant(link.constant, selection, start, at)
+                return FlatWire("", start.where, constant=link.constant)
+            if link.delay and total.delay:
+                self._delayed_twice(link, start, at)
+                return None
+            if link.delay:
+                total = replace(total, delay=link.delay, initial=link.initial)
+            total = replace(total, truth=total.truth or link.truth)
+            if link.parts:
+                return self._put_together(link, replace(total, where=start.where), selection, at)
+            if link.selection:
+                try:
+                    selection = selection.of(link.selection)
+                except ValueError as error:
+                    self._selection(str(error), start, at)
+                    return None
+            block, _, port = link.source.rpartition(".")
+            key = f"{link.instance}<{link.source}" if link.instance else link.source
+            if key in seen:
+                self._ring(seen, key, start, at)
+                return None
+            seen[key] = None
+            following: Link | str | None
+            if link.instance is not None:
+                following = self._input(link, at)
+            elif block in self.instances:
+                following = self._output(self.instances[block], port, link, at)
+            elif selection:
+                inner = FlatWire(link.source, start.where, truth=total.truth)
+                item = Item(start.where, inner, selection)
+                return replace(total, parts=(Part("", start.where, (item,)),))
+            else:
+                return replace(total, source=link.source)
+            if following is None or isinstance(following, str):
+                return following
+            link = following
+
+    def _put_together(
+        self, link: Link, total: FlatWire, selection: Selection, at: str
+    ) -> FlatWire | None:
+        """The wire of a link with parts, of which ``selection`` takes something."""
+        parts = link.parts
+        if selection.field:
+            parts = tuple(part for part in parts if part.field == selection.field)
+            if not parts:
+                names = listing(part.field for part in link.parts if part.field)
+                self._selection(
+                    f"there is no field {selection.field!r}; there is {names}", link, at
+                )
+                return None
+        if selection.indices and (len(parts) > 1 or parts[0].is_list):
+            self._selection("elements cannot be selected of several sources", link, at)
+            return None
+        resolved = []
+        for part in parts:
+            items = []
+            for each in part.items:
+                if each.literal is not None:
+                    items.append(Item(each.where, literal=each.literal))
+                    continue
+                wire = self.resolve(each, at)
+                if wire is None:
+                    return None
+                if isinstance(wire, str):
+                    self._selection("a part comes from an input that is not wired", each, at)
+                    return None
+                items += self._pieces(wire, selection, total)
+            resolved.append(Part(part.field, part.where, tuple(items), part.is_list))
+        if selection.field:
+            resolved = [replace(resolved[0], field="")]
+        return replace(total, parts=tuple(resolved))
+
+    def _pieces(self, wire: FlatWire, selection: Selection, total: FlatWire) -> list[Item]:
+        """The pieces that a resolved wire adds to a part."""
+        rest = Selection("", selection.indices)
+        if not wire.parts:
+            inner = replace(wire, truth=wire.truth or total.truth)
+            return [Item(wire.where, inner, rest)]
+        return [
+            replace(
+                item,
+                selection=rest.of(item.selection),
+                wire=replace(
+                    item.wire,
+                    truth=item.wire.truth or wire.truth or total.truth,
+                    delay=wire.delay or item.wire.delay,
+                    initial=wire.initial or item.wire.initial,
+                )
+                if item.wire is not None
+                else None,
+            )
+            for part in wire.parts
+            for item in part.items
+        ]
+
+    def _of_constant(
+        self, constant: MapNode, selection: Selection, start: Link, at: str
+    ) -> FlatWire | None:
+        """A part of constant values, which is a number again."""
+        entry = constant.get(selection.field) if selection.field else None
+        if selection.indices or (entry is None and len(constant.entries) != 1):
+            self._selection(f"{str(selection)!r} cannot be selected of a constant", start, at)
+            return None
+        node = (entry or constant.entries[0]).value
+        item = Item(start.where, literal=node)
+        return FlatWire("", start.where, parts=(Part("", start.where, (item,)),))
+
+    def _selection(self, message: str, link: Link, at: str) -> None:
+        self.problems.add(
+            Code.SELECTION, f"the wire to {at} cannot be made: {message}", link.where, at=at
+        )
+
+    def outputs(self) -> dict[str, dict[str, FlatWire]]:
+        """For every sub-graph block that was expanded, where its outputs come from."""
+        found: dict[str, dict[str, FlatWire]] = {}
+        for path, instance in self.instances.items():
+            if instance.broken:
+                continue
+            wires = {n: self.resolve(link, f"{path}.{n}") for n, link in instance.outputs.items()}
+            found[path] = {n: wire for n, wire in wires.items() if isinstance(wire, FlatWire)}
+        return found
+
+    def inputs(self) -> dict[str, dict[str, str]]:
+        """For every sub-graph block, the output ``block.port`` that each of its inputs is wired to;
+        those that are put together, selected or constant are left out."""
+        found: dict[str, dict[str, str]] = {}
+        for path, instance in self.instances.items():
+            wires = {n: self.resolve(link, f"{path}.{n}") for n, link in instance.links.items()}
+            found[path] = {
+                name: wire.source
+                for name, wire in wires.items()
+                if isinstance(wire, FlatWire) and wire.source
+            }
+        return found
+
+    def _input(self, link: Link, at: str) -> Link | str | None:
+        assert link.instance is not None
+        instance = self.instances[link.instance]
+        if link.source not in instance.inputs:
+            similar = nearest(link.source, instance.inputs)
+            self.problems.add(
+                Code.UNKNOWN_SOURCE,
+                f"this sub-graph has no input {link.source!r}",
+                link.where,
+                at=at,
+                expected=listing(f"inputs.{name}" for name in instance.inputs),
+                found=f"inputs.{link.source}",
+                nearest=tuple(f"inputs.{name}" for name in similar),
+                fix=f"inputs.{similar[0]}" if similar else f"inputs: {{{link.source}: }}",
+            )
+            return None
+        if link.source in instance.links:
+            return instance.links[link.source]
+        default = instance.inputs[link.source]
+        if isinstance(default, MapNode):
+            return Link(default.where, constant=default)
+        return default
+
+    def _output(self, instance: Instance, port: str, link: Link, at: str) -> Link | None:
+        if instance.broken:
+            return None
+        if port not in instance.outputs:
+            similar = nearest(port, instance.outputs)
+            self.problems.add(
+                Code.UNKNOWN_SOURCE,
+                f"{instance.path} ({instance.file}) has no output {port!r}",
+                link.where,
+                at=at,
+                other=instance.path,
+                other_where=instance.where,
+                expected=listing(f"{instance.path}.{name}" for name in instance.outputs),
+                found=link.source,
+                nearest=tuple(f"{instance.path}.{name}" for name in similar),
+                fix=f"{instance.path}.{similar[0]}" if similar else "",
+            )
+            return None
+        return instance.outputs[port]
+
+    def _ring(self, seen: Mapping[str, None], key: str, start: Link, at: str) -> None:
+        names = [name.replace("<", ".inputs.") for name in seen]
+        ring = names[list(seen).index(key) :]
+        self.problems.add(
+            Code.LOOP,
+            f"the wires to {at} run in a ring that holds no block",
+            start.where,
+            at=at,
+            found=" -> ".join([*ring, ring[0]]),
+        )
+
+    def _delayed_twice(self, link: Link, start: Link, at: str) -> None:
+        self.problems.add(
+            Code.DELAY,
+            f"the wire to {at} is delayed inside and outside of a sub-graph",
+            start.where,
+            at=at,
+            other="the other delay",
+            other_where=link.where,
+            fix="give the delay in one of the two places",
+        )
+
+    def _delayed_constant(self, start: Link, at: str) -> None:
+        self.problems.add(
+            Code.DELAY,
+            f"the wire to {at} delays a constant",
+            start.where,
+            at=at,
+            fix="remove 'delay'",
+        )
