@@ -6,7 +6,7 @@ from ...mathematics.arrays import Array, Flags, Indices
 from ...mathematics.kernel import kernel
 from ...robots.five_joint_track import LegTargets
 from ..signals import Phase
-from .followed_plan import Following, PlannedJoints, Soles, follow_plan
+from .followed_plan import Flown, Following, PlannedJoints, Soles, follow_plan, go_on
 
 _FLIGHT = int(Phase.FLIGHT)
 
@@ -27,13 +27,17 @@ def end_targets(
     following: Following,
     soles: Soles,
     plan: PlannedJoints,
+    flown: Flown,
     target: LegTargets,
     known: Flags,
     found: Array,
 ) -> None:
-    """Take the plan's joints instead where it flies and is followed; remember what was ``found``."""
+    """Take the plan's joints instead where it flies, or has just landed, and is followed; remember what
+    was ``found``."""
     if follows and int(plan.phase[()]) == _FLIGHT:
-        follow_plan(following, soles, plan, target)
+        follow_plan(following, soles, plan, flown, target)
+    elif follows:
+        go_on(following, plan, flown, target)
     for joint in range(found.shape[0]):
         found[joint] = target.position[joint]
     known[()] = True

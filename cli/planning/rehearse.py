@@ -58,7 +58,7 @@ def rehearsal(
         was_rehearsed,
     )
     from ...runtime.graph import load
-    from ...runtime.loading.flattening import flatten
+    from ...runtime.loading import flatten
     from ...studies.rehearsal import LEVER, corrected_parameters, rehearse
 
     if not wanted and not was_rehearsed(library, task):

@@ -16,7 +16,7 @@ from ...runtime.language.quantities import Quantity
 from ...runtime.language.signals import Field
 from ...runtime.language.stages import BlockSpec, CheckedGraph
 from ...runtime.language.units import parse_unit
-from ...runtime.loading.flattening import flatten
+from ...runtime.loading import flatten
 from ...runtime.loading.flattening.flat import FlatBlock, FlatGraph, FlatWire
 from ...runtime.loading.load import load
 

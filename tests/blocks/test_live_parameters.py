@@ -164,6 +164,12 @@ def nearly_landed(tick: int) -> Inputs:
     return {"reference": {"phase": int(Phase.FLIGHT), "time": 0.35, "touchdown_time": 0.4}}
 
 
+def landing_late(tick: int) -> Inputs:
+    """A plan that flies and lands in turn, followed by a robot that is still in the air."""
+    phase = Phase.LANDING if tick % 2 else Phase.FLIGHT
+    return {"reference": {"phase": int(phase), "time": 0.002 * tick, "joint_velocity": 1.0}}
+
+
 def leaning(tick: int) -> Inputs:
     """The same with a torso that tilts the other way."""
     inputs = reacting(tick)
@@ -221,6 +227,7 @@ SCENES: Mapping[str, list[Scene]] = {
             Scene({"follow": "plan", "level_time": 0.1, "turn_gain": gain}, nearly_landed)
             for gain in (0.5, 0.002)
         ),
+        Scene({"follow": "plan"}, landing_late),
     ],
     "blocks.WholeBodyController": [
         Scene({"force_max": 20.0, "force_min": 1.0}),

@@ -15,7 +15,7 @@ from aloft.planner.task.read_task import read_task
 from aloft.robots.description import find_robot
 from aloft.runtime.graph import load
 from aloft.runtime.language.errors import AloftError
-from aloft.runtime.loading.flattening import flatten
+from aloft.runtime.loading import flatten
 from aloft.studies.rehearsal import (
     LARGEST,
     NEGLIGIBLE,
