@@ -196,3 +196,30 @@ def test_backwards_feet_may_slide_at_touchdown() -> None:
     margins = resolved(distance_x="-10 cm").margins
     assert margins is not None
     assert (margins.touchdown_speed, margins.touchdown_slide) == (1.7, None)
+
+
+@pytest.mark.parametrize(
+    ("said", "time", "load"),
+    [
+        ({"rise": "18 cm"}, 0.4, 0.4),
+        ({"rise": "23 cm"}, 0.45, 0.5),
+        ({"rise": "25 cm"}, 0.5, 0.6),
+        ({"distance_x": "-12 cm"}, 0.4, 0.4),
+        ({"distance_x": "-30 cm"}, 0.5, 0.6),
+        ({"rise": "25 cm", "twist": "90 deg"}, 0.4, 0.4),
+        ({"rise": "25 cm", "landing_height": "10 cm"}, 0.4, 0.4),
+        ({"rise": "25 cm", "squat_time": "0.45 s", "margins": {"load": 0.5}}, 0.45, 0.5),
+    ],
+)
+def test_a_deep_squat_takes_longer_with_more_load_on_the_ground(
+    said: dict[str, object], time: float, load: float
+) -> None:
+    task = resolved(**{"rise": 0.1, "distance_x": 0.0, "twist": 0.0, **said})
+    assert task.margins is not None
+    assert (task.spans()[0].time, task.margins.load) == (time, load)
+
+
+@pytest.mark.parametrize(("distance", "speed"), [(0.0, 1.7), (0.3, None)])
+def test_high_jumps_in_place_come_down_slowly_too(distance: float, speed: float | None) -> None:
+    margins = resolved(rise="32 cm", distance_x=distance, twist=0.0).margins
+    assert margins is not None and margins.touchdown_speed == speed
