@@ -185,7 +185,7 @@ def _plain(task: Asked, robot: RobotDescription) -> Iterator[Choice]:
         for _ in task.hops()[1:]:
             between = _thrust(half, min(late, 0.5 * half), toes)
             spans += [Span(phase="flight"), Span(phase="landing", time=half), *between]
-        landing = (Span(phase="landing", time=_time(task, "landing_time", slow)),)
+        landing: tuple[Span, ...] = (Span(phase="landing", time=_time(task, "landing_time", slow)),)
         why = f"the heels rise {1000 * late:.0f} ms before the {toes}s leave the ground: the foot lengthens the leg"
         soft = rounded(TOES_LAND * slow)
         if toes_speed(task, robot) is not None and (landing[0].time or 1.0) > 2.0 * soft:
