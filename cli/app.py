@@ -22,6 +22,7 @@ Exit codes:
   1    it ran to its end, but a criterion failed: a fall, a missed target
   2    the graph, an override or the command line is wrong; nothing moved
   3    a block failed, a signal was not finite, or a policy ended the run
+  4    the run went well, but its recording could not be written, or not all of it
   130  stopped cleanly by SIGINT
   137  a block hung in compiled code; the process was killed
   143  stopped cleanly by SIGTERM

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from ..runtime.language.errors import AloftError
+from .shared.observing import As, Keys, Local
 from .shared.options import CompletedOverrides
 from .shared.output import console, errors_reported, print_json, say, table
-from .top import As, Keys, Local
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -140,7 +140,7 @@ def serve(graph: CheckedGraph, values: Values | None = None) -> None:
     """Show the diagram in a browser until Ctrl-C is pressed."""
     from ..runtime.drawing.loopback import ADDRESS
     from ..runtime.drawing.page_server import page_server
-    from .view import open_page
+    from .shared.viewing import open_page
 
     server = page_server(graph, values=values)
     page = f"http://{ADDRESS}:{server.server_address[1]}/"

@@ -9,7 +9,8 @@ import typer
 
 from ..runtime.language.errors import AloftError, ExitCode, UnitError
 from .planning.rehearse import REHEARSE_HELP, rehearsal
-from .run import run_many, run_once
+from .running.run_many import run_many
+from .running.run_once import run_once
 from .shared.jump_graphs import graph_of
 from .shared.options import JsonBesideTables, NoRecord, Overrides, Quiet
 from .shared.output import console, errors_reported, print_json, say

@@ -11,6 +11,7 @@ import typer
 from ..runtime.language.errors import AloftError, ExitCode
 from .shared.options import AsJson
 from .shared.output import console, errors_reported, number, print_json, print_warning, say, table
+from .shared.recordings import read
 
 if TYPE_CHECKING:
     from ..logs.file.reader import RecordedRun
@@ -76,7 +77,8 @@ def export(
     as_json: AsJson = False,
 ) -> None:
     """Write the signals of a recording, every number exact, into a file of another format."""
-    from ..logs.exporting.export import EXPORTS
+    from ..logs.exporting.export import export as write_export
+    from ..logs.recording.remedy import remedy
 
     with errors_reported(as_json):
         kinds = [k for k, on in (("csv", csv), ("parquet", parquet), ("mcap", mcap)) if on]
@@ -85,11 +87,15 @@ def export(
         target = output or file.with_suffix(f".{kinds[0]}")
         run = read(file)
         try:
-            EXPORTS[kinds[0]](run, target, signal or ())
+            write_export(kinds[0], run, target, signal or ())
         except KeyError as error:
             raise AloftError(str(error.args[0])) from None
         except OSError as error:
-            raise AloftError(f"{target} cannot be written: {error.strerror or error}") from None
+            why, fix = (
+                error.strerror or error,
+                remedy(error.errno or 0, target, "-o FILE writes elsewhere"),
+            )
+            raise AloftError(f"{target} cannot be written: {why}; {fix}") from None
     if as_json:
         print_json({"success": True, "file": str(target), "ticks": len(run.ticks)})
     else:
@@ -214,21 +220,6 @@ def merge(
         return
     count = f"{ticks} ticks of {len(parts)} parts"
     typer.echo(f"{written}: {count}, run hash {run_hash}; `aloft replay --check {written}` runs it")
-
-
-def read(file: Path, *, damaged: bool = False) -> RecordedRun:
-    """The recording. Raises ``AloftError`` if it cannot be read."""
-    from ..logs.file import reader
-    from ..logs.recording.place import part_of
-
-    try:
-        return reader.read(file, damaged=damaged)
-    except FileNotFoundError:
-        part = part_of(file)
-        also = f"; {part} is there: it is being written, or was cut off" if part.exists() else ""
-        raise AloftError(f"{file} cannot be read: there is no such file{also}") from None
-    except OSError as error:
-        raise AloftError(f"{file} cannot be read: {error.strerror or error}") from None
 
 
 def summary(run: RecordedRun) -> dict[str, Any]:

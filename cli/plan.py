@@ -22,7 +22,7 @@ from .planning.plan_output import (
 from .planning.rehearse import REHEARSE_HELP, rehearsal_of_file
 from .shared.options import JsonBesideTables
 from .shared.output import console, errors_reported, print_error, print_json, say
-from .view import how_to_view
+from .shared.viewing import how_to_view
 
 if TYPE_CHECKING:
     from rich.console import Console

@@ -3,41 +3,25 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Mapping, Sequence
-from contextlib import closing
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Protocol
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from ..runtime.language.errors import AloftError, ExitCode
-from .running.run_output import print_result, print_verdict
+from ..runtime.language.errors import AloftError
+from .running.run_many import run_many
+from .running.run_once import Runs, run_once
 from .shared.options import CompletedOverrides, JsonBesideTables, NoRecord, Quiet
 from .shared.output import (
     console,
     errors_reported,
-    number,
-    print_json,
-    print_place,
     print_warning,
-    say,
-    table,
 )
-from .shared.stopping import stopped_by_signals
 
 if TYPE_CHECKING:
-    from rich.console import Console
-
     from ..logs.viewing.viewer import Viewer
-    from ..runtime.language.stages import CheckedGraph
     from ..runtime.live.parameter_endpoint import ParameterEndpoint
-    from ..runtime.running.real_time import RealTime
-    from ..runtime.running.run_result import RunResult
-    from ..runtime.running.sinks import Sink
-    from ..studies.batch.seeds import SeedRow
-
-MOST_METRIC_COLUMNS = 5
 
 
 class Live(StrEnum):
@@ -186,7 +170,7 @@ def open_viewer(live: Live, said: list[str]) -> Viewer | None:
     """Open the viewer that shows the run. Without a viewer the run is not shown, and ``said`` gets
     the reason."""
     from ..logs.viewing.viewer import ViewerError, start_viewer
-    from .view import open_page
+    from .shared.viewing import open_page
 
     if live is Live.NONE:
         return None
@@ -204,7 +188,7 @@ def open_viewer(live: Live, said: list[str]) -> Viewer | None:
 
 def leave_viewer(viewer: Viewer, *, wait: bool) -> None:
     """Leave the viewer open after the run: a window until it is closed, a page until Ctrl-C."""
-    from .view import keep_open
+    from .shared.viewing import keep_open
 
     if viewer.kind != "web":
         return
@@ -227,158 +211,3 @@ def open_endpoint(graph: Runs, name: str, default: str) -> ParameterEndpoint | N
             raise
         print_warning(f"`aloft params` cannot reach this run: {error}")
         return None
-
-
-class Runs(Protocol):
-    """What ``run_once`` runs: a graph, or one machine's part of it."""
-
-    @property
-    def checked(self) -> CheckedGraph:
-        """The graph that runs."""
-
-    def run(
-        self, *, sinks: Sequence[Sink], log: bool, plain: bool, fuse: bool, real_time: RealTime
-    ) -> RunResult:
-        """Run it once."""
-
-    def about(self) -> Mapping[str, Any]:
-        """What the JSON object says beside the result of the run."""
-
-
-def run_once(
-    graph: Runs,
-    record: Path | None,
-    out: Console,
-    as_json: bool,
-    sinks: Sequence[Sink] = (),
-    viewer: Viewer | None = None,
-    *,
-    keep: int = 0,
-    split: float = 0.0,
-    said: Sequence[str] = (),
-    also: Mapping[str, Any] | None = None,
-    times: bool = True,
-    traceback: bool = False,
-    plain: bool = False,
-    fuse: bool = True,
-    real_time: RealTime | None = None,
-) -> ExitCode:
-    """Run the graph, record and show it, and print the result; ``said`` are warnings so far,
-    ``also`` is what else the JSON object has, and ``times`` says whether those of blocks are
-    printed."""
-    from ..logs.recording.recorder import Recorder
-    from ..runtime.running.freeze_guard import FreezeGuard
-    from ..runtime.running.real_time import NO_WISHES
-    from .running.last_words import LastWords
-    from .shared.progress import TickCounter, compiling_shown, progress_bar
-    from .view import how_to_view
-
-    name = graph.checked.name
-    recorder = None
-    if record is not None or viewer is not None:
-        live = viewer.source if viewer is not None else ""
-        recorder = Recorder(record, keep=keep, split=split, live=live, on_warning=print_warning)
-    with (
-        progress_bar(out, f"running {name}", graph.checked.ticks) as (progress, task),
-        compiling_shown(progress),
-    ):
-        counter = TickCounter(progress, task)
-        recorders = [recorder] if recorder is not None else []
-        last_words = LastWords(name, as_json)
-        with FreezeGuard(graph.checked, as_json=as_json) as guard:
-            result = graph.run(
-                sinks=[*recorders, counter, last_words, *sinks, guard], log=False, plain=plain,
-                fuse=fuse, real_time=real_time or NO_WISHES,
-            )  # fmt: skip
-    recording = recorder.recording if recorder is not None else None
-    print_result(out, name, result, times=times)
-    if recorder is not None and recording is not None:
-        missing = f" ({recorder.missing} ticks are not in it)" if recorder.missing else ""
-        say(out, f"recording: {recording}{missing}; to see it: {how_to_view(recording)}")
-        if recorder.files:
-            say(out, f"the recording is in {len(recorder.files)} files: "
-                f"{', '.join(file.name for file in recorder.files)}")  # fmt: skip
-        if recorder.before:
-            say(out, recorder.before)
-    for problem in (*result.cautions, *result.stop_problems):
-        print_warning(problem)
-    if as_json:
-        shown = str(recording) if recording else None
-        overrides = dict(graph.checked.overrides)
-        warnings = [*said, *result.warnings]
-        files = [str(file) for file in recorder.files] if recorder is not None else []
-        about = {**result.to_json(), "warnings": warnings, "recording": shown, "files": files}
-        print_json(
-            {"graph": name, "overrides": overrides, **(also or {}), **about, **graph.about()}
-        )
-    else:
-        print_verdict(result)
-        if result.error is not None:
-            print_place(result.error, traceback=traceback)
-    return result.exit_code
-
-
-def run_many(
-    path: Path,
-    overrides: list[str],
-    seeds: list[int],
-    out: Console,
-    as_json: bool,
-    *,
-    plain: bool = False,
-    fuse: bool = True,
-) -> ExitCode:
-    """Run the graph once with each seed; print a row for each, and how many succeeded."""
-    from ..studies.batch.seeds import run_seeds
-    from .shared.progress import progress_bar
-
-    rows: list[SeedRow] = []
-    with (
-        stopped_by_signals() as received,
-        progress_bar(out, f"running {len(seeds)} seeds", len(seeds)) as (progress, task),
-        closing(run_seeds(path, overrides, seeds, plain=plain, fuse=fuse)) as results,
-    ):
-        for row in results:
-            rows.append(row)
-            progress.advance(task)
-    successes = sum(row.success for row in rows)
-    reason = f"{successes} of {len(rows)} seeds succeeded"
-    success = successes == len(seeds)
-    code = ExitCode.SUCCESS if success else ExitCode.NOT_SUCCESSFUL
-    if received:
-        success, code = False, ExitCode(128 + received[0])
-        reason = f"stopped by {received[0].name} after {len(rows)} of {len(seeds)} seeds"
-    print_rows(out, rows)
-    if as_json:
-        summary = {"n": len(rows), "successes": successes, "seeds": seeds}
-        outcome: dict[str, Any] = {"success": success, "reason": reason, "recording": None}
-        outcome |= {"overrides": overrides, "summary": summary}
-        print_json({**outcome, "rows": [vars(row) for row in rows]})
-    else:
-        typer.secho(reason, fg=typer.colors.GREEN if success else typer.colors.RED)
-    return code
-
-
-def print_rows(out: Console, rows: list[SeedRow]) -> None:
-    """Print one line for each seed, with the first few metrics that differ between seeds."""
-    values: dict[str, list[Any]] = {}
-    for row in rows:
-        for name, value in row.metrics.items():
-            values.setdefault(name, []).append(value)
-    differing = [name for name, found in values.items() if len(set(found)) > 1]
-    names = differing[:MOST_METRIC_COLUMNS]
-    out.print(
-        table(
-            "",
-            (">seed", "success", *(f">{name}" for name in names), "reason"),
-            [
-                (
-                    str(row.seed),
-                    "yes" if row.success else "no",
-                    *(number(row.metrics.get(name, "")) for name in names),
-                    row.reason,
-                )
-                for row in rows
-            ],
-        )
-    )

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..runtime.language.errors import AloftError, ExitCode
+from .shared.observing import As, Keys, Local, observer_of
 from .shared.options import Overrides
 from .shared.output import console, errors_reported, print_json, table
 
@@ -19,17 +20,6 @@ if TYPE_CHECKING:
     from ..runtime.links.observer import Observer
 
 PERIOD = 0.5
-
-Keys = Annotated[
-    Path | None, typer.Option(help="The folder of `aloft keys`, or the observer's own, for TLS.")
-]
-Local = Annotated[
-    int,
-    typer.Option(
-        min=0, help="The process of `aloft run --local`, where several run this graph here."
-    ),
-]
-As = Annotated[str, typer.Option("--as", help="The observer's name, of `aloft keys --observer`.")]
 
 
 def top(
@@ -64,28 +54,6 @@ def top(
             else:
                 console().print(_tables(observer))
     raise typer.Exit(ExitCode.NOT_SUCCESSFUL if missing else ExitCode.SUCCESS)
-
-
-def observer_of(
-    graph: Path, overrides: list[str], keys: Path | None, name: str, process: int = 0
-) -> Observer:
-    """An observer of a graph's machines, not yet connected.
-
-    Where ``aloft run --local`` runs the graph here, its settings and endpoints count, and
-    ``process`` says which run where there are several.
-
-    Raises:
-        AloftError: the graph is wrong, names no machines, or does not fit the keys; or it is not
-            clear which run is meant.
-    """
-    from ..runtime.links.key_folder import secured
-    from ..runtime.links.observer import Observer
-    from ..runtime.loading import load
-    from ..runtime.placement.place import place
-    from .shared.local_runs import settings_of
-
-    placed = place(load(graph, [*settings_of(graph, process), *overrides]))
-    return Observer(placed, None if keys is None else secured(placed, keys, name))
 
 
 def report(observer: Observer) -> dict[str, Any]:

@@ -2,23 +2,15 @@
 
 from __future__ import annotations
 
-import io
-import sys
 import tempfile
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from ..runtime.language.errors import AloftError, ExitCode
 from .shared.output import errors_reported
-
-if TYPE_CHECKING:
-    from ..logs.file.reader import RecordedRun
-    from ..logs.viewing.viewer import Viewer
-
-MANY_TICKS = 20_000
-"""Ticks that take some seconds to draw."""
+from .shared.viewing import draw, show
 
 
 def view(
@@ -73,88 +65,3 @@ def compare(first: Path, second: Path, path: Path) -> None:
         write_comparison(path, read(first), read(second))
     except OSError as error:
         raise AloftError(f"{path} cannot be written ({error.strerror or error})") from error
-
-
-def draw(recording: Path, layout: Path | None, path: Path) -> Path:
-    """Write a file for the viewer: all of a run, with the user's layout if there is one.
-
-    What is no recording of a run, such as the motion of a plan or a comparison that was kept, is
-    shown as it is.
-    """
-    from ..logs.file.contents import NoRunError
-    from ..logs.file.reader import read
-    from ..logs.recording.whole_view import write_view
-    from ..logs.viewing.layout_file import blueprint_with, layout_beside, read_layout
-    from ..logs.viewing.robot_meshes import missing_meshes
-
-    try:
-        run = read(recording)
-    except NoRunError as error:
-        if layout is not None:
-            raise AloftError(f"{error}; it has no signals for the layout {layout}") from error
-        return recording
-    if len(run.ticks) >= MANY_TICKS:
-        typer.echo(f"drawing {len(run.ticks)} ticks ...", err=True)
-    for missing in missing_meshes(run.header.robot) if run.header.robot is not None else ():
-        typer.echo(f"warning: {missing}", err=True)
-    chosen = layout or layout_beside(run.header)
-    own = None
-    if chosen is not None:
-        own = blueprint_with(read_layout(chosen, run.header), run.header)
-    try:
-        return write_view(path, run, own, diagram_of(run))
-    except OSError as error:
-        raise AloftError(f"{path} cannot be written ({error.strerror or error})") from error
-
-
-def diagram_of(run: RecordedRun) -> bytes:
-    """The block diagram of the graph that ran, as PNG; nothing where its code has gone since."""
-    from ..logs.replay.opened_run import OpenedRun
-    from ..runtime.drawing.diagram import diagram
-    from ..runtime.drawing.placing import draw as drawn
-    from ..runtime.drawing.png import save_png
-
-    try:
-        graph = OpenedRun(run, Path(run.header.source).parent).graph
-    except (AloftError, OSError):
-        return b""
-    picture = io.BytesIO()
-    save_png(drawn(diagram(graph)), picture)
-    return picture.getvalue()
-
-
-def show(file: Path, *, web: bool) -> None:
-    """Show a file until the window is closed or Ctrl-C is pressed."""
-    from ..logs.viewing.viewer import start_viewer
-
-    keep_open(start_viewer("web" if web else "window", [file]))
-
-
-def keep_open(viewer: Viewer) -> None:
-    """Wait until the window is closed, or for Ctrl-C; then end the viewer."""
-    from .shared.stopping import stopped_by_signals
-
-    try:
-        if viewer.kind == "web":
-            typer.echo(f"{viewer.page}\nthe page is there until you press Ctrl-C")
-            open_page(viewer.page)
-        with stopped_by_signals():
-            viewer.wait()
-    finally:
-        viewer.stop()
-
-
-def open_page(page: str) -> None:
-    """Open a page in the user's browser."""
-    import webbrowser
-
-    if sys.stdout.isatty():
-        webbrowser.open(page)
-
-
-def how_to_view(recording: Path) -> str:
-    """The shortest command that shows a recording."""
-    program = Path(sys.argv[0])
-    here = Path.cwd()
-    name = program.relative_to(here) if program.is_relative_to(here) else program
-    return f"{name if program.name == 'aloft' else 'aloft'} view {recording}"

@@ -10,9 +10,9 @@ from typing import Annotated
 import typer
 
 from ..runtime.language.errors import AloftError
+from .shared.observing import As, Keys, Local, observer_of
 from .shared.options import Overrides
 from .shared.output import errors_reported
-from .top import As, Keys, Local, observer_of
 
 
 def watch(

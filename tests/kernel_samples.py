@@ -129,7 +129,7 @@ SERIES = jump_series.Series(
 BASE = base.BaseTruth(np.ones(3), np.ones(4), np.ones(3), np.ones(3))
 TIMES = jump_following.Times(0.02, 0.5, 0.1, 0.15, 3, True)
 FOLLOWED = (
-    followed_plan.Following(*np.array([[0.009], [0.08], [0.15], [0.3], [0.05]])),
+    followed_plan.Following(*np.array([[0.009], [0.08], [0.15], [0.3], [0.05], [0.005]])),
     followed_plan.Soles(
         np.tile(np.eye(3), (2, 1, 1)),
         np.array([4, 9]),
@@ -149,9 +149,12 @@ FOLLOWED = (
         DRAW(10),
     ),
 )
+FLOWN = followed_plan.Flown(np.array(True), np.array(0.998), *DRAW((3, 10)))
 LEG_TARGETS = LegTargets(np.zeros(10), np.zeros(10), np.zeros(2, np.bool_))
 UNUSED = {
-    "aloft.blocks.control.followed_plan.follow_plan": (*FOLLOWED, LEG_TARGETS),
+    "aloft.blocks.control.followed_plan.follow_plan": (*FOLLOWED, FLOWN, LEG_TARGETS),
+    "aloft.blocks.control.followed_plan.keeps_acceleration": (FOLLOWED[0], FOLLOWED[2], FLOWN),
+    "aloft.blocks.control.followed_plan.go_on": (FOLLOWED[0], FOLLOWED[2], FLOWN, LEG_TARGETS),
     "aloft.blocks.control.followed_plan.share_of_lead": FOLLOWED[2:],
     "aloft.blocks.control.followed_plan.lead_of_turn": (*FOLLOWED, 0.1),
     "aloft.blocks.control.followed_plan.planned_pitch": FOLLOWED[2:],

@@ -5,13 +5,15 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from ...mathematics.arrays import Array, Indices
+from ...mathematics.arrays import Array, Flags, Indices
 from ...mathematics.kernel import kernel
 from ...mathematics.polynomials import minimum_jerk
 from ...robots.five_joint_track import LegTargets
 
 TAPER = 0.5
 """Share of ``turn_time`` at the end of the flight, in which the legs return to the plan's time."""
+BEFORE = 0.006
+"""Accelerations are read ahead of time, so those of the last part [s] of a flight are of its landing."""
 ONSET = 0.3
 """Share of ``turn_time`` at its beginning, in which they leave it."""
 
@@ -38,6 +40,19 @@ class Following(NamedTuple):
     turn_gain: Array
     turn_time: Array
     turn_limit: Array
+    late_time: Array
+
+
+class Flown(NamedTuple):
+    """The targets in the last tick in which the plan flew: the plan's ``time`` [s], and the joints'
+    ``position`` [rad], ``velocity`` [rad/s] and ``acceleration`` [rad/s^2]. Before a flight ``known`` is
+    false."""
+
+    known: Flags
+    time: Array
+    position: Array
+    velocity: Array
+    acceleration: Array
 
 
 class Soles(NamedTuple):
@@ -57,21 +72,57 @@ class Soles(NamedTuple):
 
 @kernel
 def follow_plan(
-    following: Following, soles: Soles, plan: PlannedJoints, target: LegTargets
+    following: Following, soles: Soles, plan: PlannedJoints, flown: Flown, target: LegTargets
 ) -> None:
-    """The plan's joints as the targets: of a later or earlier instant, and with level soles."""
+    """The plan's joints as the targets: of a later or earlier instant, and with level soles. They are
+    remembered in ``flown``."""
     ahead = float(following.plan_lead[0]) * share_of_lead(plan)
     pitch = planned_pitch(plan)
     ahead += lead_of_turn(following, soles, plan, pitch)
+    if not keeps_acceleration(following, plan, flown):
+        for joint in range(flown.acceleration.shape[0]):
+            flown.acceleration[joint] = plan.joint_acceleration[joint]
     for joint in range(plan.joint_position.shape[0]):
         speed = float(plan.joint_velocity[joint])
-        change = float(plan.joint_acceleration[joint]) * ahead
+        change = float(flown.acceleration[joint]) * ahead
         way = ahead * (speed + 0.5 * change)
         target.position[joint] = float(plan.joint_position[joint]) + way
         target.velocity[joint] = speed + change
     for foot in range(target.reachable.shape[0]):
         target.reachable[foot] = True
         level_sole(foot, float(following.level_time[0]), soles, plan, pitch, target)
+    flown.known[()] = True
+    flown.time[()] = plan.time[()]
+    for joint in range(plan.joint_position.shape[0]):
+        flown.position[joint] = target.position[joint]
+        flown.velocity[joint] = target.velocity[joint]
+
+
+@kernel
+def keeps_acceleration(following: Following, plan: PlannedJoints, flown: Flown) -> bool:
+    """Whether the accelerations of before count, because those of the plan may be of its landing.
+
+    A ``touchdown_time`` that has long passed is that of the flight before.
+    """
+    if following.late_time[0] == 0.0 or not flown.known[()]:
+        return False
+    return abs(float(plan.touchdown_time[()]) - float(plan.time[()])) <= BEFORE
+
+
+@kernel
+def go_on(following: Following, plan: PlannedJoints, flown: Flown, target: LegTargets) -> None:
+    """For ``late_time`` after the planned touchdown the joints move on as they did in the plan's flight.
+
+    So the feet of a robot that lands late keep slowing down. After that the ``target`` stays as it is.
+    """
+    since = float(plan.time[()]) - float(flown.time[()])
+    if not flown.known[()] or since > float(following.late_time[0]):
+        return
+    for joint in range(flown.position.shape[0]):
+        change = float(flown.acceleration[joint]) * since
+        speed = float(flown.velocity[joint])
+        target.position[joint] = float(flown.position[joint]) + since * (speed + 0.5 * change)
+        target.velocity[joint] = speed + change
 
 
 @kernel

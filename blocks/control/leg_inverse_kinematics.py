@@ -28,7 +28,7 @@ from ...runtime.language.kernel_block import KernelBlock
 from ...runtime.language.parameters import Parameters, live_parameter, parameter
 from ...runtime.language.signals import Field, Signal
 from ..signals import FootTarget, JointState, JointTarget, JumpReference
-from .followed_plan import Following, PlannedJoints, Soles
+from .followed_plan import Flown, Following, PlannedJoints, Soles
 from .leg_targets import begin_targets, end_targets
 
 LATERAL = 0.9
@@ -42,6 +42,11 @@ class LegMemory(Signal):
     known = Field(dtype="bool", text="whether there was a last tick")
     target = Field(("n_feet", 4, 3), frame="body", text="place [m] and rows of the rotation matrix")
     position = Field("n_joints", unit="rad", text="joint positions found")
+    flew = Field(dtype="bool", text="whether the plan has flown and was followed")
+    flown_time = Field(unit="s", text="the plan's time in the last tick of its flight")
+    flown_position = Field("n_joints", unit="rad", text="the joints' targets then")
+    flown_velocity = Field("n_joints", unit="rad/s", text="their velocities")
+    flown_acceleration = Field("n_joints", unit="rad/s^2", text="their planned accelerations")
 
 
 class LegInverseKinematics(KernelBlock):
@@ -62,7 +67,8 @@ class LegInverseKinematics(KernelBlock):
     For a target out of reach the solution is the nearest pose within reach. With ``beyond: slide``
     errors in the plane of the sole are allowed first, so the foot keeps its height above the ground
     and lands flat, though not where it should; with ``beyond: turn`` errors of orientation are
-    allowed first. (The closed form does this strictly, the least squares by a lower weight.) Every
+    allowed first, and also where the plan lands on the toes first (``reference.toes_first``). (The
+    closed form does this strictly, the least squares by a lower weight.) Every
     joint stays ``margin`` inside its limits. A leg solved in closed form slows down within
     ``softness`` of a full stretch.
 
@@ -92,6 +98,11 @@ class LegInverseKinematics(KernelBlock):
     turned too far leaves its tuck earlier, and turns slower. From ``level_time`` before touchdown on the
     last joint of each leg about the lateral axis turns the sole by -e, so that heel and toe touch
     down together. It reaches that in half of the time. All three are off by default.
+
+    A robot may land later than planned. For ``late_time`` after the planned touchdown the joints of a leg
+    that is still in the air keep their last acceleration of the flight, so that its feet slow down further.
+    Then the accelerations of the last 6 ms before touchdown are not the plan's either: they are read ahead
+    of time, so they would be those of the landing. With 0, the default, the plan's flight ends on time.
 
     Where a thigh is level, hip yaw and roll turn about one axis: a foot a few millimetres beside its
     planned place would ask for any yaw. The closed form keeps the yaw of the plan there, or straight
@@ -154,6 +165,10 @@ class LegInverseKinematics(KernelBlock):
         turn_limit: float = live_parameter(
             0.012, unit="s", ge=0.0, le=0.02, text="how much earlier or later they move at most"
         )
+        late_time: float = live_parameter(
+            0.0, unit="s", ge=0.0, le=0.03,
+            text="how long after the planned touchdown legs that follow a plan go on as in its flight",
+        )  # fmt: skip
         beyond: Literal["turn", "slide"] = live_parameter(
             "turn", text="where errors are allowed first for a target out of reach"
         )
@@ -186,7 +201,7 @@ class LegInverseKinematics(KernelBlock):
 
     def setup(self) -> None:
         robot, p, memory = self.robot, self.params, self.memory
-        self._settings = leg_settings()
+        self._settings, self._may_slide = leg_settings(), np.zeros(1, np.bool_)
         self._following = Following(*(np.zeros(1) for _ in Following._fields))
         self.on_parameters()
         self._target = LegTargets(*(getattr(self.target, name) for name in LegTargets._fields))
@@ -197,7 +212,8 @@ class LegInverseKinematics(KernelBlock):
         }
         begin = KernelCall(
             begin_targets, self.joints.position, np.array(list(held), np.int64),
-            np.array(list(held.values()), np.float64), self._target,
+            np.array(list(held.values()), np.float64), self._may_slide,
+            self.reference.toes_first, self._settings.slides, self._target,
         )  # fmt: skip
         legs: list[KernelCall] = []
         for foot in range(len(robot.feet)):
@@ -205,8 +221,12 @@ class LegInverseKinematics(KernelBlock):
             legs += self._least_squares(foot) if leg is None else self._closed_form(foot, leg)
         plan = PlannedJoints(*(getattr(self.reference, name) for name in PlannedJoints._fields))
         end = KernelCall(
-            end_targets, p.follow == "plan", self._following, self._soles(), plan, self._target,
-            memory.known, memory.position,
+            end_targets, p.follow == "plan", self._following, self._soles(), plan,
+            Flown(
+                memory.flew, memory.flown_time, memory.flown_position, memory.flown_velocity,
+                memory.flown_acceleration,
+            ),
+            self._target, memory.known, memory.position,
         )  # fmt: skip
         self.kernel_calls = (begin, *legs, end)
 
@@ -215,7 +235,7 @@ class LegInverseKinematics(KernelBlock):
         settings.softness[0], settings.turn_length[0] = p.softness, p.turn_length
         settings.damping[0], settings.speed_limit[0] = p.damping, p.speed_limit
         settings.level[0] = p.level
-        settings.slides[0] = p.beyond == "slide"
+        self._may_slide[0] = p.beyond == "slide"
         for name in Following._fields:
             getattr(self._following, name)[0] = getattr(p, name)
 

@@ -6,14 +6,27 @@ from ...mathematics.arrays import Array, Flags, Indices
 from ...mathematics.kernel import kernel
 from ...robots.five_joint_track import LegTargets
 from ..signals import Phase
-from .followed_plan import Following, PlannedJoints, Soles, follow_plan
+from .followed_plan import Flown, Following, PlannedJoints, Soles, follow_plan, go_on
 
 _FLIGHT = int(Phase.FLIGHT)
 
 
 @kernel
-def begin_targets(measured: Array, held: Indices, angles: Array, target: LegTargets) -> None:
-    """Joints that belong to no leg stay where they are measured; the ``held`` ones at ``angles``."""
+def begin_targets(
+    measured: Array,
+    held: Indices,
+    angles: Array,
+    may_slide: Flags,
+    toes_first: Flags,
+    slides: Flags,
+    target: LegTargets,
+) -> None:
+    """Joints that belong to no leg stay where they are measured; the ``held`` ones at ``angles``.
+
+    A foot out of reach ``slides`` (1,) if it ``may_slide`` (1,), but not where the plan lands on the
+    toes first, of shape (): there a sole that was laid flat would land on all of its points.
+    """
+    slides[0] = may_slide[0] and not toes_first[()]
     for joint in range(measured.shape[0]):
         target.position[joint] = measured[joint]
         target.velocity[joint] = 0.0
@@ -27,13 +40,17 @@ def end_targets(
     following: Following,
     soles: Soles,
     plan: PlannedJoints,
+    flown: Flown,
     target: LegTargets,
     known: Flags,
     found: Array,
 ) -> None:
-    """Take the plan's joints instead where it flies and is followed; remember what was ``found``."""
+    """Take the plan's joints instead where it flies, or has just landed, and is followed; remember what
+    was ``found``."""
     if follows and int(plan.phase[()]) == _FLIGHT:
-        follow_plan(following, soles, plan, target)
+        follow_plan(following, soles, plan, flown, target)
+    elif follows:
+        go_on(following, plan, flown, target)
     for joint in range(found.shape[0]):
         found[joint] = target.position[joint]
     known[()] = True

@@ -36,15 +36,19 @@ def give_delay(
     usual: float,
     follows: bool,
     memory: Memory,
+    tolerated: float,
     measured: Array,
     known: NDArray[np.bool_],
     delay: Array,
+    ahead: Array,
 ) -> None:
-    """Write the fields of ``DelayEstimate``: what was measured, whether it counts, and the delay."""
+    """Write the fields of ``DelayEstimate``: what was measured, whether it counts, the delay, and how
+    much of it is more than ``tolerated`` [s]."""
     found = float(memory.delay[()])
     measured[()] = max(found, 0.0)
     known[()] = found >= 0.0
     delay[()] = max(found - usual, 0.0) if found >= 0.0 and follows else told
+    ahead[()] = max(float(delay[()]) - tolerated, 0.0)
 
 
 @kernel

@@ -7,9 +7,9 @@ from collections.abc import Iterable
 
 from ...planner.library.jump_table import JumpTable, JumpTableReader
 from ...robots.description import RobotDescription
-from ...runtime.language.block import Block, Misfit, Output
+from ...runtime.language.block import Block, Input, Misfit, Output
 from ...runtime.language.parameters import Parameters, parameter
-from ..signals import JumpReference
+from ..signals import DelayEstimate, JumpReference
 from .guided_motion import too_few_joints
 
 
@@ -22,11 +22,12 @@ class GuidedParameters(Parameters):
 
 
 class GuidedReference(Block):
-    """A table made at load, whose reader publishes the instant of a tick."""
+    """A table made at load, whose reader publishes the instant of a tick, or ``delay.ahead`` later."""
 
     Params = GuidedParameters
     needs = ("floating base", "feet")
     params: GuidedParameters
+    delay = Input(DelayEstimate, default={}, text="how far ahead of time the controller works")
     reference = Output(JumpReference, text="the plan at the present instant")
 
     @classmethod

@@ -14,11 +14,12 @@ from ...mathematics.constants import GRAVITY
 from ...mathematics.kernel import kernel
 from ...runtime.language.block import Input, Output, State
 from ...runtime.language.kernel_block import KernelBlock
-from ...runtime.language.parameters import Parameters, live_parameter
+from ...runtime.language.parameters import Parameters, live_parameter, parameter
 from ...runtime.language.signals import Field, Signal
-from ..signals import ContactState, DynamicsTerms, JumpReference, Phase, PhaseState
+from ..signals import ContactState, DelayEstimate, DynamicsTerms, JumpReference, Phase, PhaseState
 from .capture_law import PhaseFields
 from .phase_table import (
+    AHEAD,
     IN_PHASE,
     LIFT_OFF,
     NOW,
@@ -54,7 +55,8 @@ class JumpPhase(KernelBlock):
     THRUST        at the planned lift-off; up to ``late_lift_off`` later while any point
                   still has contact; in its second half at once when no point has had
                   contact for ``early_lift_off``
-    FLIGHT        at the first contact after ``touchdown_share`` of the predicted flight
+    FLIGHT        at the first contact after ``touchdown_share`` of the predicted flight; with a
+                  delay at the predicted touchdown, see below
     LANDING       ``landing_time`` after touchdown; where the plan has another flight, with the
                   planned thrust, and THRUST follows again
     RECOVER       never; it follows the last LANDING
@@ -70,11 +72,17 @@ class JumpPhase(KernelBlock):
     stay those of the tick before. In flight there are none. After touchdown they are all points
     that had contact within the last ``contact_hold``, and points of the same foot that are less
     than ``flat_height`` above the lowest of these; if there is none they stay those of the tick
-    before. (A controller that may push with a heel slightly above the ground brings it down by
+    before. A landing without any contact so far begins with all points. (A controller that may push with a heel slightly above the ground brings it down by
     that; otherwise the robot would rock on its toes.)
 
     The time s to touchdown is that of the ballistic fall of the measured centre of mass to its
     planned height at touchdown: z + v s - g s^2 / 2 = z_td.
+
+    **Delay.** A controller that works ahead of time, by a = ``delay.ahead``, gives this block the state
+    of that later instant. Then the landing also begins, without waiting for a contact, when the
+    predicted touchdown is ``early_landing`` a away: a command that waits for the contact would
+    act a later than that, and until then legs that are stiff for flight turn the torso by their
+    hips. The legs may be ready some milliseconds too early, which matters less.
 
     The block does not judge tilt, torques or sensors (``SafetyMonitor`` does), and it never goes
     back to an earlier phase except for another planned flight.
@@ -105,6 +113,12 @@ class JumpPhase(KernelBlock):
         flat_height: float = live_parameter(
             0.006, unit="m", ge=0.0, text="height up to which a foot's other points are in stance"
         )
+        early_landing: float = parameter(
+            1.5,
+            ge=0.0,
+            le=3.0,
+            text="by this times `delay.ahead` a landing begins before the predicted touchdown",
+        )
         lost_contact: float = live_parameter(
             0.2, unit="s", gt=0.0, text="time without contact after which it is a fault"
         )
@@ -114,22 +128,24 @@ class JumpPhase(KernelBlock):
     reference = Input(JumpReference, text="the plan")
     contacts = Input(ContactState, text="which points carry load")
     terms = Input(DynamicsTerms, text="the present state")
+    delay = Input(DelayEstimate, default={}, text="how far ahead of time the controller works")
     phase = Output(PhaseState, text="the phase, its times and the stance points")
     memory = State(PhaseMemory, text="the phase, its times, and contacts lately lost")
 
     def setup(self) -> None:
         reference, terms = self.reference, self.terms
-        self._limits, self._stance_limits = np.zeros(5), np.zeros(2)
+        self._limits, self._stance_limits = np.zeros(6), np.zeros(2)
         self.on_parameters()
         following = KernelCall(
             follow_phases,
             self.period,
             Planned(*(getattr(reference, name) for name in Planned._fields)),
             self.contacts.active,
+            self.delay.ahead,
             Present(terms.com, terms.com_velocity, terms.contact_position),
             np.array(self.robot.foot_of_contact(), np.int64),
             Table(
-                TABLE, self._limits, self._stance_limits, np.zeros(6),
+                TABLE, self._limits, self._stance_limits, np.zeros(7),
                 np.zeros(len(Condition), np.bool_),
             ),
             Memory(*(getattr(self.memory, name) for name in Memory._fields)),
@@ -141,6 +157,7 @@ class JumpPhase(KernelBlock):
         p = self.params
         self._limits[:] = (
             p.late_lift_off, p.early_lift_off, p.touchdown_share, p.landing_time, p.lost_contact,
+            p.early_landing,
         )  # fmt: skip
         self._stance_limits[:] = p.contact_hold, p.flat_height
 
@@ -199,6 +216,7 @@ def follow_phases(
     period: float,
     planned: Planned,
     active: Flags,
+    ahead: Array,
     present: Present,
     foot_of_point: Indices,
     table: Table,
@@ -225,7 +243,9 @@ def follow_phases(
         )  # fmt: skip
     times[NOW], times[IN_PHASE] = now, now - float(memory.began[()])
     times[LIFT_OFF], times[TOUCHDOWN] = lift_off, touchdown
-    times[REMAINING], times[UNLOADED] = remaining, shortest
+    if before == Phase.LANDING:  # it may have begun without a contact, after a long flight
+        shortest = min(shortest, float(times[IN_PHASE]))
+    times[REMAINING], times[UNLOADED], times[AHEAD] = remaining, shortest, float(ahead[()])
     find_conditions(times, table.limits, int(planned.phase[()]), another, table.holds)
     phase = next_phase(table.transitions, before, table.holds)
     if phase != before:
@@ -315,6 +335,11 @@ def choose_stance(
         if unloaded[i] <= hold:
             ground = min(ground, float(position[i, 2]))
     if ground == math.inf:
+        any_held = False
+        for i in range(stance.shape[0]):
+            any_held = any_held or bool(stance[i])
+        for i in range(stance.shape[0]):
+            stance[i] = stance[i] or not any_held
         return
     for i in range(unloaded.shape[0]):
         stance[i] = unloaded[i] <= hold

@@ -65,7 +65,8 @@ class JumpPlan(KernelBlock):
     At the start the robot stands still for ``stand_time``; at the end it stays where the plan
     ended. Between the plan's knots the reference is read from a table of 2 ms steps
     (``planner/library/reference_table``); accelerations and torques are read ``lead`` ahead of
-    time, because they are fed forward.
+    time, because they are fed forward. Where the controller works ahead of time by ``delay.ahead``
+    (``StatePredictor``), all of the plan is read so much ahead, and they by the rest.
 
     **Progress.** With ``by: clock``, as in the paper, the thrust ends at the planned time. With
     ``by: progress``, and ``terms`` wired, it ends when the state of take-off is reached. In the last
@@ -258,8 +259,8 @@ class JumpPlan(KernelBlock):
         lead = self.delay.delay if p.lead is None else np.array(p.lead, np.float64)
         calls = [
             KernelCall(
-                plan_instant, clock.present, clock.base_period, progress.late, lead, period,
-                reader.instant,
+                plan_instant, clock.present, clock.base_period, progress.late, lead,
+                self.delay.ahead, period, reader.instant,
             ),
             reader.call,
         ]  # fmt: skip

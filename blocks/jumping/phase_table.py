@@ -68,13 +68,16 @@ without transitions, such as FAULT, lasts to the end of the run."""
 TABLE = np.array([[int(value) for value in row] for row in TRANSITIONS])
 """The transitions as an array (n, 3), for the kernel."""
 
-NOW, IN_PHASE, LIFT_OFF, TOUCHDOWN, REMAINING, UNLOADED = range(6)
+NOW, IN_PHASE, LIFT_OFF, TOUCHDOWN, REMAINING, UNLOADED, AHEAD = range(7)
 """Elements of ``times`` [s]: the plan's time; how long the phase has lasted; the planned lift-off
 and touchdown of the next flight, the one under way or the last; the predicted time to touchdown;
-and how long no point has had contact."""
+how long no point has had contact; and by how much the controller works ahead of time."""
 
-LATE_LIFT_OFF, EARLY_LIFT_OFF, TOUCHDOWN_SHARE, LANDING_TIME, LOST_CONTACT = range(5)
+LATE_LIFT_OFF, EARLY_LIFT_OFF, TOUCHDOWN_SHARE, LANDING_TIME, LOST_CONTACT, EARLY_LANDING = range(6)
 """Elements of ``limits``: the parameters of ``JumpPhase`` of these names."""
+
+LEAST_AHEAD = 0.0015
+"""A controller that works less ahead of time [s] waits for contact: the prediction is no better."""
 
 
 @kernel
@@ -101,7 +104,9 @@ def find_conditions(
     holds[Condition.LEFT_EARLY] = (
         now + in_phase >= lift_off and not due and unloaded >= limits[EARLY_LIFT_OFF]
     )
-    holds[Condition.TOUCHED_DOWN] = unloaded == 0.0 and in_phase >= share
+    ahead = float(times[AHEAD])
+    early = ahead > LEAST_AHEAD and float(times[REMAINING]) < ahead * float(limits[EARLY_LANDING])
+    holds[Condition.TOUCHED_DOWN] = (unloaded == 0.0 or early) and in_phase >= share
     holds[Condition.OVERDUE] = in_phase > flight + float(limits[LOST_CONTACT])
     holds[Condition.RESTED] = not another and in_phase >= limits[LANDING_TIME]
     holds[Condition.THRUSTS_AGAIN] = another and planned == Phase.THRUST

@@ -88,7 +88,13 @@ class Progress(NamedTuple):
 
 @kernel
 def plan_instant(
-    present: Indices, base_period: float, late: Array, lead: Array, hold: float, instant: Array
+    present: Indices,
+    base_period: float,
+    late: Array,
+    lead: Array,
+    ahead: Array,
+    hold: float,
+    instant: Array,
 ) -> None:
     """The instant at which the plan is read.
 
@@ -97,11 +103,13 @@ def plan_instant(
         base_period: the seconds of a tick.
         late: how much later than by the clock the plan is read [s], of shape ().
         lead: how far ahead the feedforward is read [s], of shape ().
+        ahead: how much of that all of the plan is read ahead [s], of shape ().
         hold: the seconds over which the feedforward is the mean.
         instant: the time, the lead and the hold [s], (3,).
     """
-    instant[0] = base_period * int(present[0]) - float(late[()])
-    instant[1] = float(lead[()])
+    early = min(float(ahead[()]), float(lead[()]))
+    instant[0] = base_period * int(present[0]) - float(late[()]) + early
+    instant[1] = float(lead[()]) - early
     instant[2] = hold
 
 

@@ -89,7 +89,7 @@ class SquatJumpReference(GuidedReference):
         return _plan(robot.model_dump_json(), task)
 
     def step(self) -> None:
-        self._reader.read(self.time, self.params.lead, self.period)
+        self._reader.read(self.time + float(self.delay.ahead), self.params.lead, self.period)
 
 
 @lru_cache(maxsize=8)

@@ -55,7 +55,7 @@ class StandReference(GuidedReference):
         return _plan(self.robot.model_dump_json(), float(p.squat_depth), times)
 
     def step(self) -> None:
-        self._reader.read(self.time, self.params.lead)
+        self._reader.read(self.time + float(self.delay.ahead), self.params.lead)
 
 
 @lru_cache(maxsize=8)

@@ -76,6 +76,7 @@ class DelayEstimate(Signal):
     delay = Field(unit="s", text="the delay to compensate")
     measured = Field(unit="s", text="as measured; zero while it is not known")
     known = Field(dtype="bool", text="whether it has been measured")
+    ahead = Field(unit="s", text="how far ahead of time the controller works")
 
 
 class DynamicsTerms(Signal):

@@ -66,7 +66,7 @@ def identify(
 
 
 def _recorded(file: Path) -> tuple[RecordedRun, RobotDescription]:
-    from ..log import read
+    from ..shared.recordings import read
 
     run = read(file)
     if run.header.robot is None:

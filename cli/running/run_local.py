@@ -29,8 +29,16 @@ from ...runtime.running.memory import BoundGraph
 from ...runtime.running.run_result import RunResult, merge_metrics
 from ...runtime.running.timing import BlockTimes
 from ..shared.local_runs import registered
-from ..shared.output import number, print_json, print_place, print_warning, say, table
-from .run_output import print_result, print_verdict
+from ..shared.output import (
+    number,
+    print_error,
+    print_json,
+    print_place,
+    print_warning,
+    say,
+    table,
+)
+from .run_output import code_with_recording, print_result, print_verdict
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -66,7 +74,8 @@ def run_local(path: Path, wishes: Wishes, out: Console) -> ExitCode:
         AloftError: a part said nothing when it ended.
     """
     from ...logs.recording.merged_run import merge_recordings, path_metrics, read_parts, run_hash_of
-    from ..view import how_to_view
+    from ...logs.recording.remedy import cause_of, remedy
+    from ..shared.viewing import how_to_view
 
     placed = place(load(path, wishes.settings))
     graph = placed.graph
@@ -77,10 +86,22 @@ def run_local(path: Path, wishes: Wishes, out: Console) -> ExitCode:
         run_hash, ticks = run_hash_of(placed, parts) if parts else ("", 0)
         ages = path_metrics(placed, parts) if parts else {}
         result = _whole_result(placed, said, ages, run_hash, ticks)
-        recording = None
-        if parts and wishes.keep:
+        recording, problem = None, ""
+        if wishes.keep:
             target = wishes.record or Path("recordings") / f"{graph.name}.rrd"
-            recording = merge_recordings(target, placed, BoundGraph(graph), parts, result.to_json())
+            problem = next(
+                filter(None, (part.get("recording_problem") for part in said.values())), ""
+            )
+            try:
+                if parts:
+                    recording = merge_recordings(
+                        target, placed, BoundGraph(graph), parts, result.to_json()
+                    )
+            except OSError as error:
+                why = error.strerror or error
+                problem = f"no whole recording: {target} cannot be written ({why})"
+                problem += f"; {remedy(cause_of(error), target)}"
+        code = code_with_recording(result.exit_code, problem)
     print_result(out, graph.name, result)
     _print_links(out, said)
     if recording is not None:
@@ -90,12 +111,15 @@ def run_local(path: Path, wishes: Wishes, out: Console) -> ExitCode:
     if wishes.as_json:
         overrides = dict(graph.overrides)
         about = {**result.to_json(), "recording": str(recording) if recording else None}
+        about |= {"exit_code": int(code), "recording_problem": problem or None}
         print_json({"graph": graph.name, "overrides": overrides, **about, "machines": said})
     else:
         print_verdict(result)
         if result.error is not None:
             print_place(result.error, traceback=wishes.traceback)
-    return result.exit_code
+    if problem:
+        print_error(problem)
+    return code
 
 
 def _run_processes(

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
+from ...runtime.language.errors import ExitCode
 from ..shared.output import number, say, table
 
 if TYPE_CHECKING:
@@ -42,3 +43,9 @@ def print_verdict(result: RunResult) -> None:
         typer.secho(f"success: {result.reason}", fg=typer.colors.GREEN)
     else:
         typer.secho(f"no success: {result.reason}", fg=typer.colors.RED, err=True)
+
+
+def code_with_recording(code: ExitCode, problem: str) -> ExitCode:
+    """The exit code of a run whose own is ``code``, where ``problem`` says what of its recording is
+    missing: a run that failed by itself keeps its own."""
+    return ExitCode.NOT_RECORDED if problem and code is ExitCode.SUCCESS else code

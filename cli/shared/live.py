@@ -148,8 +148,8 @@ def _control(placed: PlacedGraph) -> Path | None:
 def serve_live(run: Watched, save: Path | None = None, opened: Opened = "diagram") -> None:
     """Serve the page until Ctrl-C is pressed."""
     from ...runtime.live.live_server import LiveServer
-    from ..view import open_page
     from .stopping import stopped_by_signals
+    from .viewing import open_page
 
     server = LiveServer(run, save or Path(f"{run.graph.name}-tuned.yaml"), opened)
     with server, stopped_by_signals():

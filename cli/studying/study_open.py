@@ -7,8 +7,9 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
 from ...runtime.language.errors import AloftError, ExitCode
-from ..shared.output import print_json, print_warning, say
-from ..view import draw, how_to_view, show
+from ..running.run_output import code_with_recording
+from ..shared.output import print_error, print_json, print_warning, say
+from ..shared.viewing import draw, how_to_view, show
 from .study_runs import check_cells
 
 if TYPE_CHECKING:
@@ -59,16 +60,22 @@ def open_run(
     result = run_again(run, [recorder])
     if result.run_hash != run.outcome.run_hash:
         print_warning("the run gave other bytes than in the study; something has changed since")
-    say(screen, f"{result.reason}; recording: {path}; to see it: {how_to_view(path)}")
+    kept = recorder.recording
+    if kept is None:
+        raise AloftError(recorder.problem)
+    if recorder.problem:
+        print_error(recorder.problem)
+    say(screen, f"{result.reason}; recording: {kept}; to see it: {how_to_view(kept)}")
     if as_json:
         print_json(
             {"success": True, "reason": result.reason, "run": labels_of(run),
              "run_succeeded": result.success, "run_hash": result.run_hash,
-             "same_bytes": result.run_hash == run.outcome.run_hash, "recording": str(path)}
+             "same_bytes": result.run_hash == run.outcome.run_hash, "recording": str(kept),
+             "recording_problem": recorder.problem or None}
         )  # fmt: skip
     if show:
-        show_recording(path)
-    return ExitCode.SUCCESS
+        show_recording(kept)
+    return code_with_recording(ExitCode.SUCCESS, recorder.problem)
 
 
 def show_recording(path: Path) -> None:

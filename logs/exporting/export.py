@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import csv
 import json
+import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
@@ -158,3 +159,25 @@ EXPORTS: Mapping[str, Callable[[RecordedRun, Path, Sequence[str]], None]] = {
     "mcap": export_mcap,
 }
 """By the file name's ending."""
+
+
+def export(kind: str, run: RecordedRun, path: Path, names: Sequence[str] = ()) -> None:
+    """Write ``path`` with the export of that ``kind``, a key of ``EXPORTS``, whole or not at all.
+
+    Until it is whole it has another name, so that a file that was there before stays where it
+    cannot be written to its end.
+
+    Raises:
+        ExportError, KeyError: see the exports.
+        OSError: the file cannot be written.
+    """
+    if path.exists() and not path.is_file():  # such as /dev/stdout
+        EXPORTS[kind](run, path, names)
+        return
+    part = path.with_name(f"{path.stem}.part{path.suffix}")
+    try:
+        EXPORTS[kind](run, part, names)
+        os.replace(part, path)
+    except BaseException:
+        part.unlink(missing_ok=True)
+        raise

@@ -122,6 +122,7 @@ def project_state(folder: Path) -> str:
 
 
 def _git(folder: Path, *arguments: str) -> str:
-    command = ["git", "-C", str(folder or "."), *arguments]
+    # without the index being written again: nobody's project is locked or changed by a run in it
+    command = ["git", "--no-optional-locks", "-C", str(folder or "."), *arguments]
     done = subprocess.run(command, capture_output=True, text=True, timeout=2.0, check=True)
     return done.stdout.strip()

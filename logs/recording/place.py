@@ -84,6 +84,12 @@ class Place:
         with suppress(OSError):
             os.close(self.descriptor)
 
+    def discard(self) -> None:
+        """Remove the file, into which nothing has come; what had its name before stays."""
+        with suppress(OSError):
+            if self._is_there():
+                self.part.unlink()
+
     def publish(self) -> str:
         """Give the file its name. Returns a warning if somebody had removed it, else nothing.
 

@@ -32,6 +32,7 @@ from . import recorder_link
 from .place import part_of, replaced, take_place
 from .recorder_link import RecorderLink
 from .recorder_process import KEYFRAME, NOTE, ROW, Report
+from .remedy import cause_of, remedy
 from .ring import space_of
 
 WhenFull = Literal["wait", "drop"]
@@ -57,10 +58,16 @@ class Recorder:
             itself. Zero for one file.
         live: where a viewer listens (``viewer.Viewer.source``) that is to show the run while it
             goes on; a viewer that dies or hangs is a warning.
-        on_warning: called with each warning at once, where ``warnings`` is looked at in the end.
+        on_warning: called with each warning at once, where ``warnings`` is looked at in the end;
+            not with ``problem``, which is for whoever tells how the run ended.
 
     Attributes:
         warnings: what went wrong, one text each.
+        problem: why there is no recording or why it is not whole, and what to do about it, when the
+            run has ended; empty if it is whole. It is one of the warnings as well, there without
+            what to do where that was known before the run.
+        waits_for_others: true while a run in virtual time waits for the process, which is no hang;
+            the link knows when the process has stood still for too long.
         path: the file in which the recording is found when the run has ended.
         dropped: how many ticks were run but found no room in the ring.
         before: what becomes of an earlier recording of that name, in words.
@@ -86,6 +93,8 @@ class Recorder:
             raise ValueError("a recording in several files needs keyframes: keyframe_period > 0")
         self.path = Path(path) if path is not None else None
         self.warnings: list[str] = []
+        self.problem = ""
+        self.waits_for_others = False
         self.dropped = 0
         self.missing = 0
         self.before = ""
@@ -109,8 +118,9 @@ class Recorder:
 
     @property
     def recording(self) -> Path | None:
-        """The file that is recorded; ``None`` if the run is only shown."""
-        return self.path if self.link is not None else None
+        """The file that is recorded; ``None`` if there is none, or if the run is only shown."""
+        nothing = self.report is not None and self.problem and not self.report.rows
+        return self.path if self.link is not None and not nothing else None
 
     def open(self, bound: BoundGraph) -> None:
         """Start the process; in a run in real time, wait until it is ready."""
@@ -120,9 +130,10 @@ class Recorder:
         self._every = round(self._keyframe_period * bound.graph.base_rate)
         free = bound.clock.kind == "free"
         self._waits = (self._when_full or ("wait" if free else "drop")) == "wait"
-        problem = self._start()
+        problem, fix = self._start()
         if self.link is None:
             self._warn(f"no recording: {problem}")
+            self.problem = f"no recording: {problem}; {fix}"
             return
         if bound.graph.robot is not None:
             for missing in missing_meshes(bound.graph.robot):
@@ -139,10 +150,14 @@ class Recorder:
         if self._on_warning is not None:
             self._on_warning(text)
 
-    def _start(self) -> str:
-        """Start the process, or say why it cannot be, before anything moves."""
+    def _fail(self, text: str) -> None:
+        self.problem = text
+        self.warnings.append(text)
+
+    def _start(self) -> tuple[str, str]:
+        """Start the process, or say why it cannot be and what to do, before anything moves."""
         if find_spec("rerun") is None:
-            return "Rerun cannot be imported; pip install rerun-sdk"
+            return "Rerun cannot be imported", "pip install rerun-sdk, or --no-record writes none"
         ticks = round(self._ring_time * self._bound.graph.base_rate)
         capacity = ticks * space_of(len(self._bus)) + 4 * space_of(len(self._frame))
         header = header_of(self._bound).to_json()
@@ -155,10 +170,15 @@ class Recorder:
                 for text in place.said:
                     self._warn(text)
             split = round(self._split * self._bound.graph.base_rate)
-            self.link = RecorderLink(place, header, capacity, *self._periods, self._live, split)
+            self.link = RecorderLink(
+                place, header, capacity, *self._periods, self._live, split,
+                least=4 * space_of(len(self._frame)),
+            )  # fmt: skip
         except OSError as error:
-            return f"{self.path} cannot be written ({error.strerror or error})"
-        return ""
+            what = f"{self.path} cannot be written" if self.path else "the recorder cannot start"
+            fix = remedy(cause_of(error), self.path)
+            return f"{what} ({error.strerror or error})", fix
+        return "", ""
 
     def record(self, tick: int) -> None:
         """Copy the bus into the ring, and now and then the graph's whole memory as a keyframe."""
@@ -183,10 +203,14 @@ class Recorder:
     def _wait_for_room(self, tick: int) -> bool:
         assert self.link is not None
         self.link.stirs()
-        while self._waiting_helps():
-            if self._write(ROW, tick, self._bus):
-                return True
-            time.sleep(1e-3)
+        self.waits_for_others = True
+        try:
+            while self._waiting_helps():
+                if self._write(ROW, tick, self._bus):
+                    return True
+                time.sleep(1e-3)
+        finally:
+            self.waits_for_others = False
         self._waits = False  # it has ended or hangs, but the run does not
         return False
 
@@ -202,7 +226,8 @@ class Recorder:
             if not self._told_of_stall:
                 self._told_of_stall = True
                 self._warn(
-                    f"the recorder has not gone on for {stalled:.0f} s; the run waits for it"
+                    f"the recorder has not gone on for {stalled:.0f} s; the run waits for it, "
+                    f"until that has been {recorder_link.GIVE_UP_TIME:.0f} s"
                 )
         return True
 
@@ -260,16 +285,24 @@ class Recorder:
             self.missing += self.report.lost
             if self.dropped:
                 self._warn(f"{self.dropped} ticks were run but not recorded")
-            if self.report.problem:
-                self._warn(
-                    f"the recording {self.path} is not whole: {self.report.problem}; "
-                    f"{self.report.rows} ticks are in it, {self.missing} are not"
-                )
             if self.report.odd:
                 self._warn(self.report.odd)
         if self.report is not None and self.report.live_problem:
             self._warn(f"the viewer did not show all of the run: {self.report.live_problem}")
+        if self.report is not None and self.report.problem:
+            self._tell_of_a_problem(self.report)
         return self.warnings
+
+    def _tell_of_a_problem(self, report: Report) -> None:
+        """Say that nothing, or not all, could be written."""
+        fix = remedy(report.error_number, self.path)
+        if report.rows:
+            self._fail(
+                f"the recording {self.path} is not whole: {report.problem}; {report.rows} ticks are "
+                f"in it, {self.missing} are not; {fix}"
+            )
+        else:
+            self._fail(f"no recording: {report.problem}; none of {self._seen} ticks is kept; {fix}")
 
     def _tell_of_a_cut(self, problem: str) -> None:
         """Warn that the process has not ended the file, and count what is in it."""
@@ -279,7 +312,7 @@ class Recorder:
         count, self.path = self._ticks_found(self.path)
         self.missing = self._seen - count
         what = f"'aloft log repair {self.path}' completes it" if count else "nothing can be saved"
-        self._warn(
+        self._fail(
             f"the recording is not whole: {problem}; {count} ticks are in {self.path}, "
             f"{self.missing} were run but are not recorded; {what}"
         )

@@ -16,7 +16,7 @@ from typing import Any
 
 from .place import Place
 from .recorder_process import HEADER, Report, Task
-from .ring import ALIGNMENT, RingWriter, make_memory, space_of
+from .ring import RingWriter, fitting_capacity, make_memory, space_of
 
 _MAIN = (
     "import sys, json; sys.path[:] = json.loads(sys.argv[2]); "
@@ -25,7 +25,8 @@ _MAIN = (
 START_TIME = 30.0
 """Seconds the process may take to be ready for a run in real time."""
 STALL_TIME = 60.0
-"""Seconds without any progress that are worth a warning, and more than a robot waits."""
+"""Seconds without any progress that are worth a warning, and more than a robot waits. A process
+that is slow, as its disk is slow or the machine has too much to do, makes progress."""
 GIVE_UP_TIME = 600.0
 """Seconds without any progress after which a simulation gives the process up, too."""
 
@@ -38,6 +39,7 @@ class RecorderLink:
         header: of the recording, as text.
         capacity: least size of the ring [bytes].
         flush_period, sync_period, live, split: see ``Task``.
+        least: the size with which the ring makes do where files may not be larger.
 
     Raises:
         OSError: the process cannot be started.
@@ -52,12 +54,14 @@ class RecorderLink:
         sync_period: float,
         live: str = "",
         split: int = 0,
+        least: int = 1 << 16,
     ) -> None:
         text = header.encode()
-        capacity = max(1 << 16, capacity + space_of(len(text)))
-        capacity += -capacity % ALIGNMENT
-        descriptor = make_memory(capacity)
+        head = space_of(len(text))
+        capacity = fitting_capacity(max(1 << 16, capacity + head), least + head)
+        descriptor = -1
         try:
+            descriptor = make_memory(capacity)
             self.ring = RingWriter(descriptor, capacity)
             self.ring.write(HEADER, 0, text)
             path = str(place.target.absolute()) if place is not None else ""
@@ -78,14 +82,19 @@ class RecorderLink:
                 env={"RUST_LOG": "off", **os.environ},
                 start_new_session=True,
             )
+        except BaseException:
+            if place is not None:
+                place.discard()
+            raise
         finally:
-            os.close(descriptor)
+            if descriptor >= 0:
+                os.close(descriptor)
             if place is not None:
                 place.close()  # the process holds the file and its lock
         assert self._process.stdin is not None and self._process.stdout is not None
         self._input, self._output = self._process.stdin, self._process.stdout
         self._said = b""
-        self._seen, self._since = 0, time.monotonic()
+        self._seen, self._since = (0, 0), time.monotonic()
 
     @property
     def process_id(self) -> int:
@@ -97,10 +106,23 @@ class RecorderLink:
         return self._process.poll() is None
 
     def stalled_for(self) -> float:
-        """The seconds since the process last read from the ring, or since ``stirs`` was called."""
-        if self.ring.read_back != self._seen:
-            self._seen, self._since = self.ring.read_back, time.monotonic()
+        """The seconds since the process last made progress, or since ``stirs`` was called.
+
+        It makes progress when it takes something out of the ring, and, where the system tells,
+        when it reads or writes a file, as it does while it starts and while it ends.
+        """
+        seen = self.ring.read_back, self._bytes_moved()
+        if seen != self._seen:
+            self._seen, self._since = seen, time.monotonic()
         return time.monotonic() - self._since
+
+    def _bytes_moved(self) -> int:
+        """The bytes that the process has read and written so far; zero where nothing tells it."""
+        try:
+            with open(f"/proc/{self.process_id}/io", encoding="ascii") as file:
+                return sum(int(line.split()[1]) for line in file if line[1:5] == "char")
+        except (OSError, ValueError, IndexError):
+            return 0
 
     def stirs(self) -> None:
         """Restart the clock of ``stalled_for``, because the process had nothing to read until now."""

@@ -17,7 +17,6 @@ import sys
 import threading
 import time
 from collections.abc import Callable
-from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -30,6 +29,7 @@ from ...runtime.running.notes import Note
 from ..file.format import Header
 from .live_feed import LiveFeed
 from .place import Place, split_name, take_place
+from .remedy import cause_of
 from .ring import Record, RingReader
 from .writer import RecordingWriter, warm_up
 
@@ -87,6 +87,7 @@ class Report:
         files: the files, if there are several.
         memory: the most memory used [bytes].
         problem: what went wrong with the file, if anything.
+        error_number: the system's number of what went wrong, as in ``errno``; zero if it has none.
         lost: the number of ticks that were taken from the ring and are not in the file.
         odd: what the user must know although the recording is whole.
         live_problem: why the viewer did not show all of the run.
@@ -96,6 +97,7 @@ class Report:
     size: int = 0
     memory: int = 0
     problem: str = ""
+    error_number: int = 0
     lost: int = 0
     odd: str = ""
     live_problem: str = ""
@@ -119,6 +121,7 @@ class RecorderProcess:
         self._notes: list[Note] = []
         self._last_tick = header.first_tick
         self._syncing = threading.Thread()
+        self._sync_error: OSError | None = None
         self._header = header
         self._rows_before = self._size_before = 0
         self._files: list[str] = []
@@ -219,12 +222,17 @@ class RecorderProcess:
         """Have what was flushed put on the disk, which a thread waits for: a busy disk may take
         seconds, and the ring must be emptied meanwhile."""
         if self._writer is not None and not self._syncing.is_alive():
-            self._syncing = threading.Thread(target=self._sync, daemon=True)
+            own = os.dup(self._writer.place.descriptor)  # which a split may close meanwhile
+            self._syncing = threading.Thread(target=self._sync, args=(own,), daemon=True)
             self._syncing.start()
 
-    def _sync(self) -> None:
-        with suppress(OSError):  # a disk that cannot take it fails the next flush too
-            os.fsync(self._task.file)
+    def _sync(self, descriptor: int) -> None:
+        try:
+            os.fsync(descriptor)
+        except OSError as error:  # of a disk that is full or lost, which some systems say only now
+            self._sync_error = error
+        finally:
+            os.close(descriptor)
 
     def finish(self, outcome: dict[str, Any] | None) -> Report:
         """Write what is left, close the file and give it its name."""
@@ -240,25 +248,37 @@ class RecorderProcess:
             self.sync()
             if self._syncing.is_alive():
                 self._syncing.join(LAST_SYNC)
+        if self._sync_error is not None and not self.report.problem:
+            why = self._sync_error.strerror or self._sync_error
+            self._note_problem(
+                self._sync_error, f"{self._task.path} may not be on the disk ({why})"
+            )
         self._count()
         self._guard(self._close)
         if self.feed is not None:
             self.feed.finish(outcome)
             self.report.live_problem = self.feed.problem
+        self.report.size = self._size_before
         if self._place is not None and self._place.target.is_file():
-            self.report.size = self._size_before + self._place.target.stat().st_size
+            self.report.size += self._place.target.stat().st_size
             if self._files:
-                self.report.files = (*self._files, str(self._place.target))
+                self._files.append(str(self._place.target))
+        self.report.files = tuple(self._files)
         self.report.memory = _memory()
         return self.report
 
     def _close(self) -> None:
-        """Close the file; one that could not be written to its end gets its name as it is."""
+        """Close the file; one that could not be written to its end gets its name as it is, unless
+        no tick is in it: then what had that name before stays."""
         if self._writer is not None:
             odd = self._writer.close()
             self.report.odd = "; ".join(filter(None, (self.report.odd, odd)))
         elif self._place is not None:
-            self._place.publish()
+            if self._failed is not None and self._failed.recorded:
+                self._place.publish()
+            else:
+                self._place.discard()
+                self._place = None
 
     def _count(self) -> None:
         """Count the ticks in the file, and those that are not."""
@@ -303,8 +323,12 @@ class RecorderProcess:
         try:
             work()
         except Exception as error:  # noqa: BLE001  # whatever it is, the robot goes on
-            self.report.problem = describe(error)
+            self._note_problem(error, str(error) if isinstance(error, OSError) else describe(error))
             self._failed, self._writer = self._writer or self._failed, None
+
+    def _note_problem(self, error: Exception, text: str) -> None:
+        self.report.problem = text
+        self.report.error_number = cause_of(error)
 
 
 def _went_on(path: Path, ticks: int) -> dict[str, Any]:

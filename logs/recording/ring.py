@@ -23,6 +23,11 @@ from dataclasses import dataclass
 from struct import Struct
 from threading import Lock
 
+try:
+    import resource
+except ImportError:  # on Windows, which limits no sizes
+    resource = None  # type: ignore[assignment]  # not on Windows
+
 from ...runtime.running.shared_memory import nameless_memory
 
 ALIGNMENT = 64
@@ -37,6 +42,20 @@ _SKIP = 0
 def make_memory(capacity: int) -> int:
     """A file descriptor of nameless memory for a ring of ``capacity`` bytes."""
     return nameless_memory(CONTROL + capacity, "aloft-ring")
+
+
+def fitting_capacity(wanted: int, least: int) -> int:
+    """The capacity of a ring, ``wanted`` or more where nothing limits it.
+
+    A limit on the size of files (``ulimit -f``) holds for shared memory as well. Then the ring is as
+    large as it may be, but not below ``least``: a smaller one could not do its work.
+    """
+    capacity = max(wanted, least)
+    if resource is not None:
+        limit = resource.getrlimit(resource.RLIMIT_FSIZE)[0]
+        if limit != resource.RLIM_INFINITY and CONTROL + capacity + ALIGNMENT > limit:
+            capacity = max(least, limit - CONTROL - ALIGNMENT)
+    return capacity + -capacity % ALIGNMENT
 
 
 class _Ring:

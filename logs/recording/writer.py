@@ -35,6 +35,8 @@ DRAWN_TICKS, DRAWN_BYTES = 4096, 1 << 25
 """Ticks that are drawn at once and their bytes, at most: the viewer likes few large pieces."""
 ROWS_AT_ONCE = 512
 """Ticks that are packed together, at most."""
+LEAST_ROWS = 16
+"""Ticks that are not packed in smaller pieces on a disk that is nearly full."""
 
 
 class RecordingWriter:
@@ -119,6 +121,21 @@ class RecordingWriter:
                 self.draw()
 
     def _write_packed(self, first: int, rows: NDArray[np.uint8]) -> None:
+        """Write rows as one message; where there is no room for it, as many as there is room for.
+
+        Raises:
+            OSError: not all of them could be written.
+        """
+        try:
+            self._write_whole(first, rows)
+        except OSError:
+            if len(rows) <= LEAST_ROWS:
+                raise
+            half = len(rows) // 2
+            self._write_packed(first, rows[:half])
+            self._write_packed(first + half, rows[half:])
+
+    def _write_whole(self, first: int, rows: NDArray[np.uint8]) -> None:
         import rerun as rr
 
         packed = pack(first, rows)
@@ -177,17 +194,18 @@ class RecordingWriter:
         """Seal and write what Rerun has made of what was sent. Raises ``OSError``."""
         data = self._made.read(flush=True) or b""
         out = bytearray()
-        known = 0
+        known, messages = 0, self._messages
         if data and not self._begun:
             out += data[:FILE_HEAD]
             known, self._begun = crc32(data[:FILE_HEAD]), True
         for head, body in split(data):
             holds = content if HEAD.unpack(head)[0] == ARROW else Content.PICTURE
-            seal = Message(0, 0, ARROW, holds, self._messages, first, last)
+            seal = Message(0, 0, ARROW, holds, messages, first, last)
             out += sealed(head, body, seal, known)
             known = 0
-            self._messages += 1
+            messages += 1
         self._write(bytes(out))
+        self._messages = messages
 
     def _write(self, data: bytes) -> None:
         """Write all of ``data`` at the file's end, or, if there is no room, nothing of it."""

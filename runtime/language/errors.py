@@ -17,6 +17,8 @@ class ExitCode(IntEnum):
     """The graph, an override or the command line is wrong; nothing moved."""
     RUN_FAILED = 3
     """A block failed, a signal was not finite or a deadline policy stopped the run."""
+    NOT_RECORDED = 4
+    """The run itself went well, but its recording could not be written, or not all of it."""
     INTERRUPTED = 130
     """SIGINT: stopped cleanly, the robot in damping."""
     TERMINATED = 143

@@ -22,7 +22,11 @@ class Sink(Protocol):
         """Prepare, once, before the first tick."""
 
     def record(self, tick: int) -> None:
-        """Copy the bus of this tick. The control thread calls this, so it must do no more."""
+        """Copy the bus of this tick. The control thread calls this, so it must do no more.
+
+        A sink that waits in it nevertheless, with a limit of its own, has the attribute
+        ``waits_for_others``, true meanwhile; otherwise the watchdog takes it for hung.
+        """
 
     def close(self) -> None:
         """Finish, once, also after a failure."""

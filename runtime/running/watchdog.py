@@ -127,9 +127,11 @@ class Watchdog:
             waits = path not in blocks or blocks[path].waits_for_others
             return None if waits else (-self._life.calls, path)
         owner = owner_of(frame.f_locals["call"])
+        if getattr(owner, "waits_for_others", False):
+            return None  # it has a limit of its own
         tick = self._ticker.bound.clock.tick
         if isinstance(owner, Block):
-            return None if owner.waits_for_others else (tick, owner.context.path)
+            return tick, owner.context.path
         return None if owner is None or isinstance(owner, Paced) else (tick, "")
 
     def _interrupt(self, *, again: bool) -> None:

@@ -131,23 +131,29 @@ def test_seeds_are_not_recorded(folder: Path, call: Call, call_json: CallJson) -
     assert not (folder / "recordings").exists()
 
 
-def test_a_recording_that_cannot_be_written_is_a_warning(
+def test_a_recording_that_cannot_be_written_ends_in_an_error(
     folder: Path, call: Call, call_json: CallJson
 ) -> None:
     (folder / "file").write_text("")
-    done = call("run", "count.yaml", "--record", "file/count.rrd")
+    done = call("run", "count.yaml", "--record", "file/count.rrd", code=4)
     assert "warning: no recording: file/count.rrd cannot be written" in done.stderr
     assert "success: ran to its end" in done.stdout
-    assert call_json("run", "count.yaml", "--record", "file/count.rrd")["recording"] is None
+    last = done.stderr.splitlines()[-1]
+    assert last.startswith("error: no recording: file/count.rrd cannot be written (")
+    assert last.endswith("; --record FILE writes elsewhere, --no-record writes none")
+    result = call_json("run", "count.yaml", "--record", "file/count.rrd", code=4)
+    assert result["recording"] is None and result["success"] is True
+    assert f"error: {result['recording_problem']}" == last
 
 
 def test_without_rerun_a_run_goes_on(
     folder: Path, monkeypatch: pytest.MonkeyPatch, call: Call
 ) -> None:
     monkeypatch.setitem(sys.modules, "rerun", None)
-    done = call("run", "count.yaml")
-    assert "warning: no recording: Rerun cannot be imported" in done.stderr
+    done = call("run", "count.yaml", code=4)
+    assert "error: no recording: Rerun cannot be imported; pip install rerun-sdk" in done.stderr
     assert "success: ran to its end" in done.stdout
+    assert call("run", "count.yaml", "--no-record").stderr == ""
 
 
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])

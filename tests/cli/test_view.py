@@ -7,7 +7,7 @@ import pytest
 from typer.testing import CliRunner
 
 from aloft.cli import make_app
-from aloft.cli.view import diagram_of
+from aloft.cli.shared.viewing import diagram_of
 from aloft.logs.file.reader import read
 from aloft.logs.replay.opened_run import OpenedRun
 from aloft.runtime.language.errors import AloftError

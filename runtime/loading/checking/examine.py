@@ -19,6 +19,7 @@ from ...language.signals import Signal
 from ...language.stages import BlockSpec, CheckedGraph, Position, Wire
 from ..flattening.flat import FlatBlock, FlatGraph
 from ..flattening.machines import on_machines, read_machines
+from ..flattening.rates import check_hyperperiod, read_offset, read_period
 from ..problems import Code, Problems, nearest
 from .carry import carried_fields, carry, unchecked_wires
 from .compose import put_together
@@ -28,7 +29,6 @@ from .fit import check_fit, lacks_robot
 from .inserted import insert_constant, insert_delay, read_values
 from .link_settings import check_paths, check_watchdog, read_link_settings
 from .parameter_check import check_parameters
-from .rates import check_hyperperiod, read_offset, read_period
 from .settings import Settings, read_settings
 from .sizes import check_sizes
 from .told import resolve_told
@@ -47,7 +47,8 @@ def examine(graph: FlatGraph, problems: Problems) -> CheckedGraph | None:
         problems.add(Code.MISSING_KEY, "the graph has no blocks", where, fix="blocks: ...")
     drafts = {flat.path: _draft(flat, graph, settings, problems) for flat in graph.blocks}
     if settings.base_rate is not None and graph.rate is not None:
-        check_hyperperiod(drafts.values(), graph.rate.key_where, problems)
+        periods = (draft.period_ticks for draft in drafts.values())
+        check_hyperperiod(periods, graph.rate.key_where, problems)
     drafts = put_together(graph, drafts, settings.robot, problems)
     wires = WireCheck(graph, drafts, problems)
     values: dict[str, Any] = {}

@@ -12,8 +12,8 @@ from ...placement.placed import PlacementError
 from ..flattening.flat import FlatGraph
 from ..problems import Code, Problems, listing, nearest
 from ..reading.nodes import Entry, MapNode, kind, plain
+from ..reading.quantity import read_quantity
 from ..reading.written import unknown_key, wrong_kind
-from .settings import read_quantity
 
 POLICY_KEYS = ("max_age", "late", "watch")
 LINK_KEYS = ("mode", *POLICY_KEYS, "of", "paths", "watchdog")

@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from ....robots.description import RobotDescription
-from ...language.errors import UnitError
 from ...language.stages import ClockSpec, Position
-from ...language.units import parse_quantity
 from ..flattening.flat import FlatGraph
 from ..problems import Code, Problems, listing, nearest
-from ..reading.nodes import Entry, Node, ScalarNode, kind, plain
+from ..reading.nodes import Entry, kind, plain
+from ..reading.quantity import read_quantity
 from ..reading.written import CLOCK_KEYS, unknown_key
 from .graph_robot import read_robot
 
@@ -67,32 +65,6 @@ def read_settings(graph: FlatGraph, problems: Problems) -> Settings:
         _read_clock(graph, problems),
         graph.folder,
     )
-
-
-def read_quantity(node: Node, what: str, unit: str, problems: Problems) -> float | None:
-    """A positive quantity as a number, or text with a unit."""
-    value = node.value if isinstance(node, ScalarNode) else None
-    example = {"Hz": "500 Hz", "s": "4 s"}[unit]
-    number: float | None = None
-    reason = ""
-    if isinstance(value, str):
-        try:
-            number = parse_quantity(value, unit)
-        except UnitError as error:
-            reason = str(error)
-    elif isinstance(value, (int, float)) and not isinstance(value, bool):
-        number = float(value) if abs(value) < 1e300 else math.inf
-    if number is not None and math.isfinite(number) and number > 0 and number < 1e12:
-        return number
-    problems.add(
-        Code.BAD_VALUE,
-        f"{what} cannot be {kind(node)}" + (f": {reason}" if reason else ""),
-        node.where,
-        at=what,
-        expected=f"a positive number in {unit}, such as {example}",
-        found=kind(node),
-    )
-    return None
 
 
 def _read_dimensions(

@@ -8,7 +8,6 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from ...language.stages import Position
-from ..checking.rates import wrap_offset
 from ..problems import Code, Problems, listing, nearest
 from ..reading.document import read_file, read_mapping
 from ..reading.files import FileTree, Stack
@@ -22,6 +21,7 @@ from ..shipped import addresses_like
 from .flat import FlatBlock, FlatGraph, FlatWire
 from .links import Link, read_link
 from .machines import placed
+from .rates import wrap_offset
 from .subgraph_parameters import parameter_values
 from .subgraphs import Instance, Resolver
 

@@ -66,3 +66,45 @@ def test_soles_become_level_by_the_ankles_before_touchdown():
     for foot in range(2):
         pitch = [math.atan2(-turn[foot, 2, 0], turn[foot, 0, 0]) for turn in (before, after)]
         assert pitch[1] - pitch[0] == pytest.approx(-0.1, abs=1e-9)
+
+
+@pytest.mark.parametrize("late_time", [0.0, 0.005])
+def test_legs_that_land_late_go_on_as_in_the_flight(late_time):
+    bench = BlockBench(
+        LegInverseKinematics, {"follow": "plan", "late_time": late_time}, robot="bruce"
+    )
+    bench.set("feet", rotation=[np.eye(3)] * 2)
+    found = []
+    for tick, (phase, acceleration) in enumerate(
+        [(Phase.FLIGHT, -50.0), (Phase.FLIGHT, 700.0), *[(Phase.LANDING, 700.0)] * 3]
+    ):
+        bench.set(
+            "reference", phase=int(phase), lift_off_time=1.0, touchdown_time=1.398,
+            time=1.391 + 0.002 * tick + 0.002 * (tick > 0), orientation=[0.0, 0.0, 0.0, 1.0],
+            joint_position=-0.3, joint_velocity=2.0, joint_acceleration=acceleration,
+        )  # fmt: skip
+        bench.step()
+        found.append(bench.get("target").velocity.copy())
+    goes_on = [2.0 - 50.0 * since for since in (0.002, 0.004)]
+    law = found[4][0]
+    assert law != pytest.approx(2.0, abs=0.3)
+    expected = [2.0, 2.0, *(goes_on if late_time else [law, law]), law]
+    assert [velocity[0] for velocity in found] == pytest.approx(expected)
+
+
+def test_the_lead_reads_no_acceleration_of_the_landing():
+    for late_time, expected in ((0.0, 700.0), (0.005, -50.0)):
+        bench = BlockBench(
+            LegInverseKinematics,
+            {"follow": "plan", "late_time": late_time, "plan_lead": 0.01},
+            robot="bruce",
+        )
+        bench.set("feet", rotation=[np.eye(3)] * 2)
+        for time, acceleration in ((1.39, -50.0), (1.396, 700.0)):
+            bench.set(
+                "reference", phase=int(Phase.FLIGHT), lift_off_time=1.0, touchdown_time=1.398,
+                time=time, orientation=[0.0, 0.0, 0.0, 1.0], joint_position=-0.3,
+                joint_velocity=2.0, joint_acceleration=acceleration,
+            )  # fmt: skip
+            bench.step()
+        assert bench.get("target").velocity == pytest.approx(2.0 + 0.01 * expected)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from aloft.blocks.control.tasks.contact_points import ContactGains
 from aloft.blocks.estimation.delay_estimator import LAGS, DelayEstimator
 from aloft.runtime.testing import BlockBench
 
@@ -87,3 +88,21 @@ def test_metrics():
     metrics = drive(0.004, told=0.002).block.metrics()
     assert metrics["delay_told_ms"] == 2.0
     assert metrics["delay_measured_ms"] == pytest.approx(4.0, abs=0.01)
+
+
+@pytest.mark.parametrize(("delay", "ahead"), [(0.0015, 0.0), (0.00475, 0.002), (0.00875, 0.006)])
+def test_what_is_not_tolerated_is_worked_ahead(delay, ahead):
+    out = drive(delay, told=delay, tolerated=0.002).get("estimate")
+    assert float(out.ahead) == pytest.approx(ahead, abs=1e-5)
+
+
+def test_the_phase_margin_is_what_the_description_says():
+    """Of the loop (Kd s + Kp) exp(-s d) / s^2 with the gains of points without load."""
+    stiffness, damping, delay = 3000.0, 110.0, 0.002
+    w = np.sqrt((damping**2 + np.sqrt(damping**4 + 4.0 * stiffness**2)) / 2.0)
+    loop = (damping * 1j * w + stiffness) * np.exp(-1j * w * delay) / (1j * w) ** 2
+    assert abs(loop) == pytest.approx(1.0)
+    margin = np.degrees(np.angle(-loop))
+    assert margin == pytest.approx(76.4 - 6.5 * 2.0, abs=0.1)
+    assert ContactGains().swing_stiffness == stiffness
+    assert ContactGains().swing_damping == damping

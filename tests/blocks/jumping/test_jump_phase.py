@@ -252,3 +252,38 @@ def test_all_points_are_in_stance_in_the_second_thrust():
     assert phase(bench) == Phase.THRUST
     assert bench.get("phase").stance.all()
     assert float(bench.get("phase").time_since_touchdown) == pytest.approx(0.148, abs=3e-3)
+
+
+def test_with_a_delay_the_landing_begins_before_its_predicted_touchdown_without_contact():
+    bench = make(early_landing=1.0)
+    bench.set("delay", ahead=0.006)
+    run(bench, LIFT_OFF)
+    run(bench, TOUCHDOWN - 0.006, active=False)
+    assert phase(bench) == Phase.FLIGHT
+    run(bench, TOUCHDOWN - 0.003)
+    assert phase(bench) == Phase.LANDING
+    assert bench.get("phase").stance.all(), "all points, until one has contact"
+    bench.set("contacts", active=[True, False, False, False])
+    bench.set("terms", contact_position=np.outer([0.0, 0.02, 0.05, 0.05], [0.0, 0.0, 1.0]))
+    run(bench, TOUCHDOWN)
+    assert bench.get("phase").stance.tolist() == [True, False, False, False]
+
+
+@pytest.mark.parametrize("ahead", [0.0, 0.001])
+def test_with_a_short_delay_it_waits_for_the_contact(ahead):
+    bench = make()
+    bench.set("delay", ahead=ahead)
+    run(bench, LIFT_OFF)
+    run(bench, TOUCHDOWN + 0.02, active=False)
+    assert phase(bench) == Phase.FLIGHT
+
+
+def test_a_landing_that_never_finds_the_ground_is_a_fault():
+    """The time without contact counts from its beginning: the flight before was no loss of contact."""
+    bench = make(lost_contact=0.1)
+    bench.set("delay", ahead=0.006)
+    run(bench, LIFT_OFF)
+    run(bench, TOUCHDOWN + 0.09, active=False)
+    assert phase(bench) == Phase.LANDING
+    run(bench, TOUCHDOWN + 0.11)
+    assert phase(bench) == Phase.FAULT

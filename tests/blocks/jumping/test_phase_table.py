@@ -14,15 +14,15 @@ from aloft.blocks.jumping.phase_table import (
 )
 from aloft.blocks.signals import Phase
 
-LIMITS = np.array([0.02, 0.01, 0.5, 0.35, 0.2])
+LIMITS = np.array([0.02, 0.01, 0.5, 0.35, 0.2, 1.5])
 
 
 def conditions(
     now=0.0, in_phase=0.0, lift_off=1.0, touchdown=1.3, remaining=0.0, unloaded=0.0,
-    planned=Phase.STAND, another=False, limits=LIMITS,
+    planned=Phase.STAND, another=False, limits=LIMITS, ahead=0.0,
 ):  # fmt: skip
     holds = np.zeros(len(Condition), bool)
-    times = np.array([now, in_phase, lift_off, touchdown, remaining, unloaded])
+    times = np.array([now, in_phase, lift_off, touchdown, remaining, unloaded, ahead])
     find_conditions(times, limits, int(planned), another, holds)
     return {condition for condition in Condition if holds[condition]}
 
@@ -63,6 +63,14 @@ def test_when_the_conditions_hold():
     assert C.TOUCHED_DOWN not in conditions(in_phase=0.1, remaining=0.2)
     assert C.TOUCHED_DOWN in conditions(in_phase=0.16, remaining=0.1)
     assert C.TOUCHED_DOWN not in conditions(in_phase=0.2, remaining=0.1, unloaded=0.002)
+    assert C.TOUCHED_DOWN in conditions(in_phase=0.2, remaining=0.005, unloaded=0.2, ahead=0.004)
+    assert C.TOUCHED_DOWN not in conditions(
+        in_phase=0.2, remaining=0.007, unloaded=0.2, ahead=0.004
+    )
+    assert C.TOUCHED_DOWN not in conditions(
+        in_phase=0.2, remaining=0.001, unloaded=0.2, ahead=0.001
+    )
+    assert C.TOUCHED_DOWN not in conditions(remaining=0.005, unloaded=0.2, ahead=0.004)
     assert C.OVERDUE in conditions(in_phase=0.51, unloaded=0.5)
     assert C.OVERDUE not in conditions(in_phase=0.49, unloaded=0.5)
     assert C.RESTED in conditions(in_phase=0.35)

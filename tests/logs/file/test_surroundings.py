@@ -1,5 +1,6 @@
 """What a recording says of files, plans and the processor's BLAS kernel."""
 
+import os
 import subprocess
 from hashlib import sha256
 from pathlib import Path
@@ -70,3 +71,14 @@ def test_the_state_of_the_project_is_named(tmp_path: Path) -> None:
     assert len(clean) == 40
     (tmp_path / "a").write_text("2")
     assert project_state(tmp_path) == f"{clean} with changes"
+
+
+def test_asking_for_the_state_of_the_project_writes_nothing(tmp_path: Path) -> None:
+    git = ["git", "-C", str(tmp_path), "-c", "user.name=a", "-c", "user.email=a@b"]
+    (tmp_path / "a").write_text("1")
+    for arguments in (["init", "-q"], ["add", "a"], ["commit", "-qm", "first"]):
+        subprocess.run([*git, *arguments], check=True)
+    os.utime(tmp_path / "a", (1e9, 1e9))  # the index would be refreshed
+    index = (tmp_path / ".git" / "index").read_bytes()
+    assert len(project_state(tmp_path)) == 40
+    assert (tmp_path / ".git" / "index").read_bytes() == index

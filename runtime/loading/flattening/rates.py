@@ -8,11 +8,10 @@ from dataclasses import replace
 from ...language.errors import AloftError
 from ...language.schedule import hyperperiod
 from ...language.stages import Position
-from ..flattening.flat import FlatBlock
 from ..problems import Code, Problems
 from ..reading.nodes import Node, ScalarNode, kind
-from .draft import Draft
-from .settings import read_quantity
+from ..reading.quantity import read_quantity
+from .flat import FlatBlock
 
 
 def read_period(flat: FlatBlock, base_rate: float, problems: Problems) -> int:
@@ -90,10 +89,10 @@ def wrap_offset(flat: FlatBlock, base_rate: Node | None) -> FlatBlock:
     return replace(flat, offset=ScalarNode(offset % period, node.where))
 
 
-def check_hyperperiod(drafts: Iterable[Draft], where: Position, problems: Problems) -> None:
+def check_hyperperiod(periods: Iterable[int], where: Position, problems: Problems) -> None:
     """Report rates whose hyperperiod, the number of ticks after which they repeat, is too long."""
     try:
-        hyperperiod(draft.period_ticks for draft in drafts)
+        hyperperiod(periods)
     except AloftError as error:
         message, _, fix = str(error).partition(". ")
         problems.add(Code.RATE, message, where, at="rate", fix=fix[:1].lower() + fix[1:])

@@ -1,0 +1,179 @@
+"""When the process of a recorder has stood still for too long, and when it is only slow."""
+
+import os
+import re
+import signal
+import time
+from functools import partial
+from pathlib import Path
+from threading import Timer
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from aloft.logs import read
+from aloft.logs.recording import recorder_link
+from aloft.logs.recording.recorder import Recorder
+from aloft.logs.recording.recorder_link import GIVE_UP_TIME, STALL_TIME, RecorderLink
+from aloft.runtime.language.stages import ClockSpec
+from aloft.runtime.running.executor import run
+
+from .test_recorder import At, assert_whole, graph, process_of
+
+
+class SlowProcess:
+    """A process in an hour that passes as fast as it is asked for; what it does is for the test."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.now = 0.0
+        self.moved = 0
+        clock = SimpleNamespace(monotonic=lambda: self.now, sleep=self.sleep)
+        monkeypatch.setattr(recorder_link, "time", clock)
+        monkeypatch.setattr("aloft.logs.recording.recorder.time", clock)
+        self.link: Any = object.__new__(RecorderLink)
+        self.link.ring = SimpleNamespace(read_back=0)
+        self.link._seen, self.link._since = (0, 0), 0.0
+        monkeypatch.setattr(self.link, "_bytes_moved", lambda: self.moved)
+        monkeypatch.setattr(self.link, "lives", lambda: True)
+        self.told: list[str] = []
+        self.recorder: Any = Recorder(None, on_warning=self.told.append)
+        self.recorder.link, self.recorder._waits = self.link, True
+        self.recorder._write, self.recorder._bus = self.write, b""
+        self.waited: list[bool] = []
+
+    def sleep(self, seconds: float) -> None:
+        self.now += 10.0
+        self.go_on()
+
+    def go_on(self) -> None:
+        """Nothing."""
+
+    def write(self, *_: object) -> bool:
+        """Whether there is room: after an hour."""
+        self.waited.append(self.recorder.waits_for_others)
+        return self.now >= 3600.0
+
+
+def test_a_process_that_reads_a_little_now_and_then_is_waited_for(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    slow = SlowProcess(monkeypatch)
+
+    def read() -> None:
+        slow.link.ring.read_back += 64
+
+    monkeypatch.setattr(slow, "go_on", read)
+    assert slow.recorder._wait_for_room(7)
+    assert slow.told == [] and slow.now == 3600.0
+    assert all(slow.waited) and not slow.recorder.waits_for_others
+
+
+def test_a_process_that_reads_and_writes_files_goes_on_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    slow = SlowProcess(monkeypatch)
+
+    def write() -> None:
+        slow.moved += 4096
+
+    monkeypatch.setattr(slow, "go_on", write)
+    assert slow.recorder._wait_for_room(7)
+    assert slow.told == []
+
+
+def test_a_process_that_does_nothing_is_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
+    slow = SlowProcess(monkeypatch)
+    assert not slow.recorder._wait_for_room(7)
+    assert slow.now == GIVE_UP_TIME + 10.0
+    (told,) = slow.told
+    assert told == (
+        f"the recorder has not gone on for {STALL_TIME + 10.0:.0f} s; the run waits for it, until "
+        f"that has been {GIVE_UP_TIME:.0f} s"
+    )
+    assert not slow.recorder.waits_for_others
+
+
+def test_a_robot_waits_for_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    slow = SlowProcess(monkeypatch)
+    slow.recorder._waits = False
+    slow.now = STALL_TIME + 1.0
+    assert not slow.recorder._waiting_helps()
+
+
+@pytest.mark.skipif(not Path("/proc/self/io").exists(), reason="only Linux tells it")
+def test_the_bytes_of_a_process_are_counted() -> None:
+    link: Any = object.__new__(RecorderLink)
+    link._process = SimpleNamespace(pid=os.getpid())
+    before = link._bytes_moved()
+    with Path("/dev/null").open("wb", buffering=0) as file:
+        file.write(bytes(100_000))
+    assert link._bytes_moved() - before >= 100_000
+    link._process = SimpleNamespace(pid=2**30)
+    assert link._bytes_moved() == 0
+
+
+def test_virtual_time_waits_for_a_recorder_that_is_stuck(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(recorder_link, "STALL_TIME", 0.2)
+    told: list[str] = []
+    recorder = Recorder(tmp_path / "a.rrd", ring_time=0.01, on_warning=told.append)
+
+    def stop(tick: int) -> None:
+        os.kill(process_of(recorder), signal.SIGSTOP)
+        go_on = partial(os.kill, process_of(recorder), signal.SIGCONT)
+        Timer(1.0, go_on).start()
+
+    stops = [At(tick, partial(stop, tick)) for tick in (1000, 10_000)]
+    result = run(graph(20_000), sinks=[recorder, *stops])
+    assert recorder.dropped == 0
+    assert result.warnings == tuple(told) and len(told) == 1  # not one for every stop
+    wanted = (
+        r"the recorder has not gone on for \d+ s; the run waits for it, until that has been 600 s"
+    )
+    assert re.fullmatch(wanted, told[0])
+    assert_whole(read(tmp_path / "a.rrd"), result)
+
+
+def test_a_recorder_that_is_stuck_for_very_long_is_given_up(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(recorder_link, "STALL_TIME", 0.1)
+    monkeypatch.setattr(recorder_link, "GIVE_UP_TIME", 0.3)
+    recorder = Recorder(tmp_path / "a.rrd", ring_time=0.01)
+    stop = At(1000, lambda: os.kill(process_of(recorder), signal.SIGSTOP))
+    try:
+        result = run(graph(20_000), sinks=[recorder, stop])
+    finally:
+        os.kill(process_of(recorder), signal.SIGKILL)
+    assert result.success and result.ticks == 20_000
+    assert recorder.dropped > 10_000
+    waits, stuck = result.warnings
+    assert "the run waits for it, until" in waits
+    assert recorder.problem == stuck
+    assert "the recording is not whole: the recorder has been stuck for" in stuck
+    assert f"{recorder.missing} were run but are not recorded" in stuck
+
+
+def test_a_recorder_that_is_slow_is_no_hang(tmp_path: Path) -> None:
+    recorder = Recorder(tmp_path / "a.rrd", ring_time=0.01)
+    go_on = Timer(1.5, lambda: os.kill(process_of(recorder), signal.SIGCONT))
+
+    def stop() -> None:
+        os.kill(process_of(recorder), signal.SIGSTOP)
+        go_on.start()
+
+    clock = ClockSpec(hangs_after=0.3)
+    result = run(graph(20_000), sinks=[recorder, At(1000, stop)], clock=clock)
+    assert result.success, result.reason
+    assert recorder.dropped == 0 and recorder.problem == ""
+    assert not recorder.waits_for_others
+    assert_whole(read(tmp_path / "a.rrd"), result)
+
+
+def test_a_sink_that_hangs_without_waiting_ends_the_run() -> None:
+    hang = At(5, lambda: time.sleep(120.0))
+    result = run(graph(20), sinks=[hang], clock=ClockSpec(hangs_after=0.3))
+    assert not result.success
+    assert (
+        "the runtime (At) hung at tick 5 (0.010 s): it did not return within 0.3 s" in result.reason
+    )
