@@ -56,10 +56,9 @@ LOAD, DEEP_LOAD = 0.4, 0.6
 """The share of the weight that the ground bears until lift-off; and before a deep squat."""
 SQUAT, DEEP_SQUAT = 0.4, 0.5
 """s; the time of the squat, and of a deep one, for a robot of BRUCE's size."""
-HIGH, HIGHER = 0.65, 0.75
-BACK, FAR_BACK = 0.5, 0.9
-"""Rises, and distances backwards, as multiples of the centre of mass's height: above the first the
-squat begins to be a deep one, and from the second on it wholly is."""
+DEEP, DEEPEST = 0.65, 0.75
+"""Rises in place, and distances backwards, as multiples of the centre of mass's height: above the first
+the squat begins to be a deep one, and from the second on it wholly is."""
 TOUCHDOWN_SPEED, TOUCHDOWN_SLIDE = 1.7, 0.6
 """m/s of the feet at touchdown, downwards and along the ground, for a robot of BRUCE's size."""
 FALL, LEVEL_FALL = 0.9, 1.1
@@ -185,7 +184,7 @@ def _plain(task: Asked, robot: RobotDescription) -> Iterator[Choice]:
         for _ in task.hops()[1:]:
             between = _thrust(half, min(late, 0.5 * half), toes)
             spans += [Span(phase="flight"), Span(phase="landing", time=half), *between]
-        landing = (Span(phase="landing", time=_time(task, "landing_time", slow)),)
+        landing: tuple[Span, ...] = (Span(phase="landing", time=_time(task, "landing_time", slow)),)
         why = f"the heels rise {1000 * late:.0f} ms before the {toes}s leave the ground: the foot lengthens the leg"
         soft = rounded(TOES_LAND * slow)
         if toes_speed(task, robot) is not None and (landing[0].time or 1.0) > 2.0 * soft:
@@ -324,20 +323,20 @@ def toes_speed(task: Asked, robot: RobotDescription) -> float | None:
 
 
 def deep(task: Asked, robot: RobotDescription) -> float:
-    """How deep the squat must be, 0 to 1: for a high jump, or one far back.
+    """How deep the squat must be, 0 to 1: for a high jump in place, or one far back.
 
     Such a squat is a fall that the legs must stop, and on soft ground the feet lose the ground as
-    they do. It takes longer then, and the ground bears more. Turns and jumps onto a step do
-    worse so, and keep the usual squat.
+    they do. It takes longer then, and the ground bears more. Other jumps do worse so (turns, steps
+    up, high jumps ahead or aside, shorter ones back), and keep the usual squat.
     """
-    height, found = size_of(robot).height, 0.0
+    far = 0.0
     for hop in task.hops():
+        ahead, aside = hop.distance_x or 0.0, hop.distance_y or 0.0
         if hop.twist or (hop.landing_height or 0.0) > 0.0:
             return 0.0
-        high = (_rise(hop) / height - HIGH) / (HIGHER - HIGH)
-        back = (-(hop.distance_x or 0.0) / height - BACK) / (FAR_BACK - BACK)
-        found = max(found, high, back)
-    return min(1.0, found)
+        far = max(far, -ahead, 0.0 if ahead or aside else _rise(hop))
+    share = (far / size_of(robot).height - DEEP) / (DEEPEST - DEEP)
+    return min(1.0, max(0.0, share))
 
 
 def demand(task: Asked, robot: RobotDescription) -> float:
