@@ -23,6 +23,7 @@ BY = {
     "pydrake": "drake",
     "rerun": "rerun-sdk",
     "serial": "pyserial",
+    "tornado": "distributed",
     "yaml": "pyyaml",
     "zenoh": "eclipse-zenoh",
 }

@@ -67,7 +67,8 @@ class LegInverseKinematics(KernelBlock):
     For a target out of reach the solution is the nearest pose within reach. With ``beyond: slide``
     errors in the plane of the sole are allowed first, so the foot keeps its height above the ground
     and lands flat, though not where it should; with ``beyond: turn`` errors of orientation are
-    allowed first. (The closed form does this strictly, the least squares by a lower weight.) Every
+    allowed first, and also where the plan lands on the toes first (``reference.toes_first``). (The
+    closed form does this strictly, the least squares by a lower weight.) Every
     joint stays ``margin`` inside its limits. A leg solved in closed form slows down within
     ``softness`` of a full stretch.
 
@@ -200,7 +201,7 @@ class LegInverseKinematics(KernelBlock):
 
     def setup(self) -> None:
         robot, p, memory = self.robot, self.params, self.memory
-        self._settings = leg_settings()
+        self._settings, self._may_slide = leg_settings(), np.zeros(1, np.bool_)
         self._following = Following(*(np.zeros(1) for _ in Following._fields))
         self.on_parameters()
         self._target = LegTargets(*(getattr(self.target, name) for name in LegTargets._fields))
@@ -211,7 +212,8 @@ class LegInverseKinematics(KernelBlock):
         }
         begin = KernelCall(
             begin_targets, self.joints.position, np.array(list(held), np.int64),
-            np.array(list(held.values()), np.float64), self._target,
+            np.array(list(held.values()), np.float64), self._may_slide,
+            self.reference.toes_first, self._settings.slides, self._target,
         )  # fmt: skip
         legs: list[KernelCall] = []
         for foot in range(len(robot.feet)):
@@ -233,7 +235,7 @@ class LegInverseKinematics(KernelBlock):
         settings.softness[0], settings.turn_length[0] = p.softness, p.turn_length
         settings.damping[0], settings.speed_limit[0] = p.damping, p.speed_limit
         settings.level[0] = p.level
-        settings.slides[0] = p.beyond == "slide"
+        self._may_slide[0] = p.beyond == "slide"
         for name in Following._fields:
             getattr(self._following, name)[0] = getattr(p, name)
 

@@ -12,8 +12,21 @@ _FLIGHT = int(Phase.FLIGHT)
 
 
 @kernel
-def begin_targets(measured: Array, held: Indices, angles: Array, target: LegTargets) -> None:
-    """Joints that belong to no leg stay where they are measured; the ``held`` ones at ``angles``."""
+def begin_targets(
+    measured: Array,
+    held: Indices,
+    angles: Array,
+    may_slide: Flags,
+    toes_first: Flags,
+    slides: Flags,
+    target: LegTargets,
+) -> None:
+    """Joints that belong to no leg stay where they are measured; the ``held`` ones at ``angles``.
+
+    A foot out of reach ``slides`` (1,) if it ``may_slide`` (1,), but not where the plan lands on the
+    toes first, of shape (): there a sole that was laid flat would land on all of its points.
+    """
+    slides[0] = may_slide[0] and not toes_first[()]
     for joint in range(measured.shape[0]):
         target.position[joint] = measured[joint]
         target.velocity[joint] = 0.0

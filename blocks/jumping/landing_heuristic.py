@@ -111,6 +111,11 @@ class LandingHeuristic(KernelBlock):
     it is fixed in the world, whatever the torso does; with 0 it is fixed in the planned body, as in
     the paper. The target of the sole is flat, with the planned heading.
 
+    A plan that lands on the toes first (``reference.toes_first``) draws the feet in by itself, by a fast
+    turn of torso against thighs. There is then no ``retraction``, and instead of ``alpha`` the legs
+    compensate the share ``toes_alpha``: with all of it the legs would work against that turn whenever
+    the torso is some milliseconds ahead of the plan or behind it.
+
     With z up a push along +x gives l^x > 0 and k^y > 0, and along +y l^y > 0 and k^x < 0, so the
     stabilising signs are W_l > 0, W_k^x > 0 and W_k^y < 0. In LANDING a foot that is still in the
     air moves on to its last target, at the height of the lowest sole; otherwise the target is the
@@ -141,6 +146,10 @@ class LandingHeuristic(KernelBlock):
         alpha: Shares = live_parameter(
             (1.0, 1.0, 1.0),
             text="share of the torso's rotation about x, y and z that the legs compensate",
+        )
+        toes_alpha: Shares = live_parameter(
+            (0.65, 0.65, 0.65),
+            text="the same share where the plan lands on the toes first",
         )
         reach_share: float = live_parameter(
             0.7, gt=0.0, le=1.0, text="share of the predicted flight by which the feet are there"
@@ -190,7 +199,7 @@ class LandingHeuristic(KernelBlock):
             self.period,
         )  # fmt: skip
         self._prediction = landing_prediction(robot, sides)
-        self._settings = Settings(*(np.zeros(size) for size in (2, 2, 2, 3, 1, 1, 1, 1, 1)))
+        self._settings = Settings(*(np.zeros(size) for size in (2, 2, 2, 3, 3, 1, 1, 1, 1, 1)))
         self.on_parameters()
         shapes = (n, 3), (n, 3), 4, 4, (3, 3), (3, 3), 3, 3, 3, 3, 3, 3, 3, 3
         aiming = KernelCall(

@@ -61,6 +61,7 @@ class Plan(NamedTuple):
     foot_position: Array
     foot_velocity: Array
     foot_yaw: Array
+    toes_first: Flags
 
 
 class Memory(NamedTuple):
@@ -109,12 +110,13 @@ class Law(NamedTuple):
 
 
 class Settings(NamedTuple):
-    """Live parameters: arrays of two elements, ``alpha`` of three, from ``w_c`` on of one."""
+    """Live parameters: arrays of two elements, the alphas of three, from ``w_c`` on of one."""
 
     w_l: Array
     w_k: Array
     p_max: Array
     alpha: Array
+    toes_alpha: Array
     w_c: Array
     reach_share: Array
     retraction: Array
@@ -176,9 +178,10 @@ def aim_feet(
         left = predict(plan, terms, elapsed, left, prediction, memory, scratch)
     reach = float(settings.reach_share[0]) * max(elapsed + left, law.period)
     share, rate, _ = minimum_jerk(elapsed / reach)
-    lift, lift_rate = retraction(
-        left, float(settings.retraction[0]), float(settings.retraction_time[0])
-    )
+    drawn_in = float(settings.retraction[0])
+    if plan.toes_first[()]:
+        drawn_in = 0.0  # the plan itself draws the feet in
+    lift, lift_rate = retraction(left, drawn_in, float(settings.retraction_time[0]))
     lowest, lead = lowest_height(terms.foot_position), float(settings.lead_time[0])
     turn_frame(plan, terms, settings, overdue, memory, scratch)
     if law.turned:
@@ -345,18 +348,21 @@ def turn_frame(
     plan: Plan, terms: Terms, settings: Settings, overdue: bool, memory: Memory, scratch: Scratch
 ) -> None:
     """Compute the frame that the targets are fixed in, its rate, and the CoM in the body."""
+    alpha = settings.alpha
+    if plan.toes_first[()]:
+        alpha = settings.toes_alpha
     planned, turn, vector = memory.orientation, scratch.turn, scratch.vector
     from_matrix(terms.base_rotation, scratch.quaternion)
     conjugate(planned, turn)
     multiply(turn, scratch.quaternion, turn)
     logarithm(turn, vector)
     for k in range(3):
-        vector[k] = float(vector[k]) * float(settings.alpha[k])
+        vector[k] = float(vector[k]) * float(alpha[k])
     exponential(vector, turn)
     multiply(planned, turn, turn)
     to_matrix(turn, scratch.rotation)
     for k in range(3):
-        share = float(settings.alpha[k])
+        share = float(alpha[k])
         scratch.rate[k] = float(terms.velocity[3 + k]) * share
         if not overdue:
             kept = float(plan.angular_velocity[k]) * (1.0 - share)

@@ -37,6 +37,10 @@ class JumpReference(Signal):
     angular_momentum = Field(3, unit="N m s", frame="world", text="k about the com")
     angular_momentum_rate = Field(3, unit="N m", frame="world", text="its rate")
     contact = Field("n_contacts", dtype="bool", text="which points are planned to carry load")
+    toes_first = Field(
+        dtype="bool",
+        text="whether the flight under way or next ends on some of the points only, such as the toes",
+    )
     foot_position = Field(("n_feet", 3), unit="m", frame="world", text="sole centres")
     foot_velocity = Field(("n_feet", 3), unit="m/s", frame="world", text="their velocities")
     foot_yaw = Field("n_feet", unit="rad", frame="world", text="heading of each foot")

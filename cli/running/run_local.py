@@ -89,8 +89,10 @@ def run_local(path: Path, wishes: Wishes, out: Console) -> ExitCode:
         recording, problem = None, ""
         if wishes.keep:
             target = wishes.record or Path("recordings") / f"{graph.name}.rrd"
-            problem = next(
-                filter(None, (part.get("recording_problem") for part in said.values())), ""
+            problem = "; ".join(
+                f"machine {name!r}: {part['recording_problem']}"
+                for name, part in said.items()
+                if part.get("recording_problem")
             )
             try:
                 if parts:
@@ -106,8 +108,8 @@ def run_local(path: Path, wishes: Wishes, out: Console) -> ExitCode:
     _print_links(out, said)
     if recording is not None:
         say(out, f"recording: {recording}; to see it: {how_to_view(recording)}")
-    for problem in (*result.cautions, *result.stop_problems, *result.warnings):
-        print_warning(problem)
+    for text in (*result.cautions, *result.stop_problems, *result.warnings):
+        print_warning(text)
     if wishes.as_json:
         overrides = dict(graph.overrides)
         about = {**result.to_json(), "recording": str(recording) if recording else None}
@@ -256,7 +258,12 @@ def _whole_result(
         error=error,
         stop_problems=_collected(said, "stop_problems"),
         cautions=_collected(said, "cautions"),
-        warnings=_collected(said, "warnings"),
+        warnings=tuple(
+            f"{name}: {text}"
+            for name, part in said.items()
+            for text in part.get("warnings", ())
+            if text != part.get("recording_problem")
+        ),
         graph=graph,
     )
 

@@ -13,12 +13,8 @@ from ...robots.description import RobotDescription
 from ...runtime.language.block import Context, Metric, Misfit, State
 from ...runtime.language.parameters import Parameters
 from ..drive_gains import gain_misfits, lost_gains
-from .drives import Drives, Way
-from .holding import RELEASED
 from .motor_feedback import FeedbackState, MotorFeedback
 from .parameters import SimulatorParameters
-from .plant import Plant
-from .random_streams import Purpose, uniform_call
 from .rotors import unfit_motor
 from .simulated_robot import SimulatedRobot
 from .stance import uneven_contacts
@@ -149,6 +145,8 @@ class MujocoRobot(SimulatedRobot):
         cls, params: Parameters, robot: RobotDescription | None
     ) -> Mapping[str, int]:
         """Sizes of the simulator's state, of the random streams' and of the command ring."""
+        from .plant import Plant  # which a check of the graph does not need
+
         assert isinstance(params, SimulatorParameters) and robot is not None
         flight = params.latency + params.jitter + params.timestep
         return {
@@ -158,6 +156,11 @@ class MujocoRobot(SimulatedRobot):
 
     def setup(self) -> None:
         """Draw the world from the seed and build it."""
+        from .drives import Drives, Way
+        from .holding import RELEASED
+        from .plant import Plant
+        from .random_streams import Purpose, uniform_call
+
         robot, params = self.robot, self.params
         plant = self.plant = Plant(robot, params, self.period, self.physics, self.record)
         steps = round(self.period / params.timestep)

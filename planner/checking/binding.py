@@ -24,10 +24,10 @@ def what_binds(plan: JumpPlan, robot: RobotDescription) -> tuple[str, ...]:
     names without the side, in the robot's order; friction comes last."""
     robot = plan.task.equipped(robot)
     evidence = Evidence(plan, robot, replay(plan, robot))
-    effort, motors = plan.task.effort, evidence.motors
+    effort, motors = evidence.effort, evidence.motors
     middle = evidence.middles
     allowed = np.maximum(allowed_motor_torque(evidence, effort)[middle], 1e-6)
-    falling = allowed < NEAR * effort * motors.peak_torque
+    falling = allowed < NEAR * effort[middle] * motors.peak_torque
     full = np.abs(evidence.motor_torque[middle]) > NEAR * allowed
     fast = np.abs(evidence.motor_speed) > NEAR * effort * motors.no_load_speed
     found = list[str]()

@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from ...blocks.signals import Phase
 from ...mathematics.arrays import Array
 from ...mathematics.constants import GRAVITY
 from ...robots.ball_feet import ball_feet
@@ -44,10 +45,12 @@ class Evidence:
     robot: RobotDescription
     replay: Replay
 
-    @property
-    def effort(self) -> float:
-        """The share of the motors' limits the plan may use."""
-        return self.plan.task.effort
+    @cached_property
+    def effort(self) -> Array:
+        """The share of the motors' limits that the plan may use at every sample, (n, 1)."""
+        task = self.plan.task
+        landed = self.plan.phase[self.replay.samples.knot] == Phase.LANDING
+        return np.where(landed, task.landing_effort, task.effort)[:, np.newaxis]
 
     @property
     def motors(self) -> Motors:

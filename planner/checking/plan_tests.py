@@ -196,7 +196,7 @@ def touchdown(e: Evidence) -> Iterator[Found]:
         yield Found("impact", found[k][0], e.model_error(1e-3, 1e-2), "m/s or rad/s",
                     "how far the impulse's velocities miss exact dynamics'", _which(e, k))  # fmt: skip
         kept = np.array([impulse for _, impulse in found])
-        most = e.effort * e.motors.peak_torque * SHORTEST_IMPACT
+        most = plan.task.landing_effort * e.motors.peak_torque * SHORTEST_IMPACT
         k, motor = worst(kept / most)
         yield Found("held_joints", kept[k, motor], most[motor], "N m s",
                     "the impulse of a motor whose joint keeps still",
@@ -277,9 +277,9 @@ def machine(e: Evidence) -> Iterator[Found]:
     motors = e.motors
     # Each motor is compared with its own limits: as a share where they may differ.
     share = np.abs(e.motor_speed) / motors.no_load_speed
-    sample, motor = worst(share)
+    sample, motor = worst(share / e.effort)
     yield Found("motor_speed", share[sample, motor] * motors.no_load_speed[motor],
-                1.01 * e.effort * motors.no_load_speed[motor], "rad/s", "the largest motor speed",
+                1.01 * e.effort[sample, 0] * motors.no_load_speed[motor], "rad/s", "the largest motor speed",
                 f"{robot.transmission.motors[motor]} {e.moment(sample)}")  # fmt: skip
     peak = motors.peak_torque
     over = np.abs(e.motor_torque) - allowed_motor_torque(e, 1.0)
@@ -296,7 +296,7 @@ def machine(e: Evidence) -> Iterator[Found]:
                 f"{robot.transmission.motors[motor]} {e.moment(int(middle[sample]))}")  # fmt: skip
 
 
-def allowed_motor_torque(e: Evidence, effort: float) -> Array:
+def allowed_motor_torque(e: Evidence, effort: float | Array) -> Array:
     """The torque [N m] that a share of the motors' abilities allows at the samples' speeds."""
     motors = e.motors
     # Braking torque is the peak at any speed; driving torque falls between corner and no load.

@@ -155,7 +155,8 @@ def _motor_lines(e: Evidence, shares: Array) -> list[Line]:
     others = [k for k in range(shares.shape[1]) if k not in named]
     lines = [Line("", time, shares[:, k], OTHER) for k in others]
     lines += [Line(_name(e, k), time, shares[:, k]) for k in named]
-    return [*lines, _limit(time, 100.0 * e.effort)]
+    limit = Line("limit", time, 100.0 * e.effort[:, 0], limit=True)
+    return [*lines, limit]
 
 
 def _busiest(shares: Array, lines: Array) -> list[int]:

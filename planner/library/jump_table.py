@@ -82,6 +82,7 @@ class Rows(NamedTuple):
     ``time`` (n,) [s]; ``rows`` (n, width); ``sums`` (n, width), the integrals of what is ``fed`` (width,)
     forward; ``marks`` (2,) [s], when the squat and when the recovery begins; ``jumps`` (n_jumps, 3) [s],
     when thrust, flight and landing begin, and ``touchdowns`` (n_jumps,) the last of these again;
+    ``toes_first`` (n_jumps,), whether only some of the points carry load then;
     ``contact`` (n, n_contacts), or no row where all points carry load but in flight.
     """
 
@@ -92,6 +93,7 @@ class Rows(NamedTuple):
     marks: Array
     jumps: Array
     touchdowns: Array
+    toes_first: Flags
     contact: Flags
 
 
@@ -123,6 +125,7 @@ class Marks(NamedTuple):
     lift_off_time: Array
     touchdown_time: Array
     contact: Flags
+    toes_first: Flags
 
 
 class JumpTableReader:
@@ -150,7 +153,8 @@ class JumpTableReader:
             Rows(
                 np.ascontiguousarray(table.time, dtype=np.float64), rows,
                 integral(table.time, rows), fed, np.array([table.squat_time, table.recover_time]),
-                jumps, jumps[:, 2].copy(), np.ascontiguousarray(contact),
+                jumps, jumps[:, 2].copy(), lands_in_part(table.time, contact, jumps[:, 2]),
+                np.ascontiguousarray(contact),
             ),
             self.instant, np.zeros(rows.shape[1]),
             Fields(*(getattr(reference, name).reshape(-1) for name in Fields._fields)),
@@ -259,6 +263,7 @@ def write_marks(table: Rows, time: float, marks: Marks) -> None:
         lift_off, touchdown = float(table.jumps[jump + 1, 1]), float(table.jumps[jump + 1, 2])
     marks.lift_off_time[()] = lift_off
     marks.touchdown_time[()] = touchdown
+    marks.toes_first[()] = table.toes_first[jump]
     row, _ = locate(table.time, time)
     for point in range(marks.contact.shape[0]):
         planned = table.contact.shape[0] == 0 or bool(table.contact[row, point])
@@ -277,6 +282,15 @@ def read_table(table: Rows, instant: Array, values: Array, fields: Fields, marks
     interpolate_rows(table, time, float(instant[1]), float(instant[2]), values)
     write_fields(values, fields)
     write_marks(table, time, marks)
+
+
+def lands_in_part(times: Array, contact: NDArray[np.bool_], touchdowns: Array) -> NDArray[np.bool_]:
+    """Whether some points carry load right after each of the ``touchdowns`` [s], and others do not."""
+    if not len(contact):
+        return np.zeros(len(touchdowns), np.bool_)
+    after = np.searchsorted(times, touchdowns, side="right")
+    rows = contact[np.minimum(after, len(times) - 1)]
+    return np.asarray(rows.any(axis=1) & ~rows.all(axis=1))
 
 
 def integral(times: Array, rows: Array) -> Array:

@@ -243,17 +243,21 @@ class ProblemBuilder:
                 self.parameters[start : start + size] = values[key]
             start += size
 
-    def _motor_rows(self) -> list[Rows]:
-        peak, top = self._peak_torque(), self._top_speed()
+    def _effort(self, k: int) -> float:
+        """The share of the motors' abilities that the plan may use from knot ``k`` to the next."""
+        landed = self.of_knot[k].phase is Phase.LANDING
+        return self.task.landing_effort if landed else self.task.effort
+
+    def _motor_rows(self, k: int) -> list[Rows]:
+        peak, top = self._peak_torque(k), self._top_speed(k)
         line = self._slope() * top
         links = [
             "",
             *(j.child for i in self.coordinates.joints for j in [self.model.robot.joints[i]]),
         ]
         links[0] = self.model.robot.base
-        held = self.task.effort * np.array(
-            [load.most for load in self.model.loads if load.link in links]
-        )
+        loads = [load.most for load in self.model.loads if load.link in links]
+        held = self._effort(k) * np.array(loads)
         return [
             *rows_of_each("motor torque", -peak, peak),
             *rows_of_each("motor torque at speed", -line, line) * 2,
@@ -261,15 +265,15 @@ class ProblemBuilder:
             *rows_of_each("held joints", -held, held),
         ]
 
-    def _peak_torque(self) -> Array:
+    def _peak_torque(self, k: int) -> Array:
         """The most torque of the computed motors that the plan may use [N m]."""
         chosen = list(self.coordinates.joints)
-        return np.asarray(self.model.robot.motors.peak_torque[chosen] * self.task.effort)
+        return np.asarray(self.model.robot.motors.peak_torque[chosen] * self._effort(k))
 
-    def _top_speed(self) -> Array:
+    def _top_speed(self, k: int) -> Array:
         """The highest speed of the computed motors that the plan may use [rad/s]."""
         chosen = list(self.coordinates.joints)
-        return np.asarray(self.model.robot.motors.no_load_speed[chosen] * self.task.effort)
+        return np.asarray(self.model.robot.motors.no_load_speed[chosen] * self._effort(k))
 
     def _slope(self) -> Array:
         """How steeply the computed motors' torque falls with speed [N m s/rad]."""
@@ -305,14 +309,14 @@ class ProblemBuilder:
         )  # fmt: skip
         base = ("dynamics", len(self.coordinates.rows), 0.0, 0.0)
         pressure = ("pressure", len(self.coordinates.contacts), 0.0, np.inf)
-        self._rows(stretch.piece, k, [base, *self._motor_rows(), self._cones(), pressure])
+        self._rows(stretch.piece, k, [base, *self._motor_rows(k), self._cones(), pressure])
 
     def _cones(self) -> Rows:
         cones = 2 * (len(self.coordinates.axes) - 1) * len(self.coordinates.contacts)
         return ("friction", cones, 0.0, np.inf)
 
     def _fill_impact(self, k: int) -> None:
-        top = self._top_speed()
+        top = self._top_speed(k)
         self._set(
             "impact", k, impulse=self.task.weights.impulse,
             friction=self.task.friction / np.sqrt(2.0),
@@ -324,7 +328,7 @@ class ProblemBuilder:
     def _fill_flight(self, k: int) -> None:
         self._set("flight", k, share=self.steps[k], **self._interval(k))
         balance = len(self.coordinates.rows) + len(self.coordinates.turning)
-        self._rows("flight", k, [("dynamics", balance, 0.0, 0.0), *self._motor_rows()])
+        self._rows("flight", k, [("dynamics", balance, 0.0, 0.0), *self._motor_rows(k)])
 
     def _fill_contact(self, k: int) -> None:
         stretch = self.of_knot[k]

@@ -60,6 +60,11 @@ class Margins(Parameters):
         None, unit="m/s", gt=0.0, le=20.0,
         text="its largest speed there along the foot, and across it; None: any",
     )  # fmt: skip
+    landing_effort: float | None = parameter(
+        None, gt=0.0, le=1.0,
+        text="share of the motors' torque and speed that the plan may use from touchdown on; None: "
+        "the task's effort",
+    )  # fmt: skip
 
 
 def unknown_joints(margins: Margins, names: list[str]) -> list[str]:

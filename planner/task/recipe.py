@@ -10,7 +10,8 @@ the ground follow from the robot:
 - the torso's orientation and the forces have high weights, so that the robot squats no deeper than it must;
 - the last sixth of the thrust is done on the toes, which lengthens the legs by the foot;
 - until lift-off every contact point on the ground bears some load, so that the feet stay flat;
-- feet come down slowly, and more slowly still along the ground, except from high up;
+- feet come down slowly, and more slowly still along the ground; from high up the toes touch down
+  before the heels;
 - from touchdown on the torso leans little and the knees are bent; joints keep off their limits.
 
 A parameter that the task sets is kept: ``effort``, ``impact``, ``phases``, a time, or any single one of
@@ -51,12 +52,28 @@ LANDING_LEAN, KNEE_BEND, JOINTS = 0.1, 0.4, 0.06
 STEP, STEP_HEIGHT, FOOT_CLEARANCE = 0.012, 0.05, 0.12
 """m from a step, how much more for each m that it goes up or down, and the feet's height in the middle of
 the flight as a share of that of the centre of mass."""
-LOAD = 0.4
-"""The share of the weight that the ground bears until lift-off."""
-TOUCHDOWN_SPEED, TOUCHDOWN_SLIDE, FALL = 1.7, 0.6, 0.9
-"""m/s of the feet at touchdown, downwards and along the ground, for a robot of BRUCE's size; and up to
-which fall from the apex, as a multiple of the centre of mass's height, they are asked for. From
-higher up the motors stop the robot only if its legs are nearly stretched, and then feet are fast."""
+LOAD, DEEP_LOAD = 0.4, 0.6
+"""The share of the weight that the ground bears until lift-off; and before a deep squat."""
+SQUAT, DEEP_SQUAT = 0.4, 0.5
+"""s; the time of the squat, and of a deep one, for a robot of BRUCE's size."""
+DEEP, DEEPEST = 0.65, 0.75
+"""Rises in place, and distances backwards, as multiples of the centre of mass's height: above the first
+the squat begins to be a deep one, and from the second on it wholly is."""
+TOUCHDOWN_SPEED, TOUCHDOWN_SLIDE = 1.7, 0.6
+"""m/s of the feet at touchdown, downwards and along the ground, for a robot of BRUCE's size."""
+FALL, LEVEL_FALL = 0.9, 1.1
+"""Up to which fall from the apex, as a multiple of the centre of mass's height, slow feet are asked for:
+in general, and in a jump on level ground that ends where it began. From higher up the motors stop the
+robot only if its legs are nearly stretched, and then flat feet are fast."""
+TOES_LAND, TOE_LANDING_KNOTS = 0.04, 6
+"""s; for how long before the heels the toes touch down in a jump straight ahead from higher up."""
+TOES_SPEEDS = ((1.37, 1.8), (1.46, 2.3))
+"""Up to which fall, again as a multiple of that height, the toes can be as slow as that [m/s], for a
+robot of BRUCE's size. From higher up nothing is asked for."""
+DROP = 0.5
+"""How far down such a jump goes at least, again as a multiple of that height."""
+LANDING_EFFORT = 1.0
+"""From touchdown on, where the toes land first: balance takes over there, and the plan is not followed."""
 SQUAT_LEAN, FAR = 0.9, 1.2
 """rad, and from which distance ahead on, as a multiple of the centre of mass's height."""
 STEP_LEAN = 0.85
@@ -68,6 +85,7 @@ class Asked(Protocol):
 
     recipe: Any
     formulation: Any
+    squat_time: float | None
     thrust_time: float | None
     contact_time: float | None
     margins: Margins | None
@@ -160,16 +178,19 @@ def _plain(task: Asked, robot: RobotDescription) -> Iterator[Choice]:
         late = min(rounded(TOES * slow), 0.5 * whole)
         half = 0.5 * (contact or 0.0)
         spans = [
-            Span(phase="squat", time=_time(task, "squat_time", slow)),
+            Span(phase="squat", time=_squat_time(task, robot)),
             *_thrust(whole, late, toes),
         ]
         for _ in task.hops()[1:]:
             between = _thrust(half, min(late, 0.5 * half), toes)
             spans += [Span(phase="flight"), Span(phase="landing", time=half), *between]
-        last = Span(phase="landing", time=_time(task, "landing_time", slow))
-        yield Choice("phases", (*spans, Span(phase="flight"), last),
-                     f"the heels rise {1000 * late:.0f} ms before the {toes}s leave "
-                     "the ground: the foot lengthens the leg")  # fmt: skip
+        landing: tuple[Span, ...] = (Span(phase="landing", time=_time(task, "landing_time", slow)),)
+        why = f"the heels rise {1000 * late:.0f} ms before the {toes}s leave the ground: the foot lengthens the leg"
+        soft = rounded(TOES_LAND * slow)
+        if toes_speed(task, robot) is not None and (landing[0].time or 1.0) > 2.0 * soft:
+            landing = _landing(landing[0].time, soft, toes)
+            why += f"; they come down {1000 * soft:.0f} ms after them, because flat feet would be too fast"
+        yield Choice("phases", (*spans, Span(phase="flight"), *landing), why)
 
 
 def _thrust(whole: float, late: float, toes: str) -> tuple[Span, Span]:
@@ -177,6 +198,15 @@ def _thrust(whole: float, late: float, toes: str) -> tuple[Span, Span]:
     return (
         Span(phase="thrust", time=round(whole - late, 6)),
         Span(phase="thrust", time=late, contacts=toes, knots=TOE_KNOTS),
+    )
+
+
+def _landing(whole: float | None, early: float, toes: str) -> tuple[Span, ...]:
+    """A landing [s], first on the toes."""
+    rest = None if whole is None else round(whole - early, 6)
+    return (
+        Span(phase="landing", time=early, contacts=toes, knots=TOE_LANDING_KNOTS),
+        Span(phase="landing", time=rest),
     )
 
 
@@ -190,6 +220,14 @@ def _time(task: Asked, name: str, slow: float) -> float | None:
     """A phase's time [s]: what the task says, or its usual one for a robot of that size."""
     value: float | None = getattr(task, name)
     return value if name in task.model_fields_set or value is None else rounded(value * slow)
+
+
+def _squat_time(task: Asked, robot: RobotDescription) -> float | None:
+    """The squat's time [s]: what the task says, or the longer, the deeper it is."""
+    if "squat_time" in task.model_fields_set or task.squat_time is None:
+        return task.squat_time
+    time = SQUAT + deep(task, robot) * (DEEP_SQUAT - SQUAT)
+    return rounded(round(time, 2) * size_of(robot).slow)
 
 
 def _weights(task: Asked, robot: RobotDescription) -> Iterator[Choice]:
@@ -221,8 +259,9 @@ def _margins(task: Asked, robot: RobotDescription) -> Iterator[Choice]:
         why = "the torso lies down in front of a step, as the calves keep away from it"
         yield Choice("margins.squat_lean", STEP_LEAN, why)
     if "load" not in said:
+        share = round(LOAD + deep(task, robot) * (DEEP_LOAD - LOAD), 2)
         yield Choice(
-            "margins.load", LOAD, "it does not squat so fast that its feet lose the ground"
+            "margins.load", share, "it does not squat so fast that its feet lose the ground"
         )
     if "landing_lean" not in said:
         yield Choice("margins.landing_lean", LANDING_LEAN, "it lands upright")
@@ -242,7 +281,17 @@ def _margins(task: Asked, robot: RobotDescription) -> Iterator[Choice]:
 def _slow_feet(task: Asked, robot: RobotDescription, said: set[str]) -> Iterator[Choice]:
     """How slowly the feet come down, where the motors can stop the robot all the same."""
     size = size_of(robot)
-    if max(_rise(hop) - (hop.landing_height or 0.0) for hop in task.hops()) > FALL * size.height:
+    hops = task.hops()
+    level = not any(hop.landing_height or hop.distance_x or hop.distance_y for hop in hops)
+    falls = [_rise(hop) - (hop.landing_height or 0.0) for hop in hops]
+    if max(falls) > (LEVEL_FALL if level else FALL) * size.height:
+        speed = toes_speed(task, robot)
+        if speed is None or "phases" in task.model_fields_set:
+            return
+        if "touchdown_speed" not in said:
+            yield Choice("margins.touchdown_speed", speed, "fast toes sink into soft ground")
+        if "landing_effort" not in said:
+            yield Choice("margins.landing_effort", LANDING_EFFORT, "the legs must stop a deep fall")
         return
     if "touchdown_speed" not in said:
         speed = rounded(TOUCHDOWN_SPEED * size.slow)
@@ -255,6 +304,39 @@ def _slow_feet(task: Asked, robot: RobotDescription, said: set[str]) -> Iterator
             "feet that swing on miss their place if they land early",
         )
         yield Choice("margins.touchdown_slide", slide, why)
+
+
+def toes_speed(task: Asked, robot: RobotDescription) -> float | None:
+    """How fast the toes may be [m/s] where they should touch down before the heels; ``None``: nowhere.
+
+    They should in a single jump straight ahead and down from so high up that flat feet are fast, by a
+    robot that has toes. Aside, or with a turn, no such plans are found.
+    """
+    size, hop = size_of(robot), task.hops()[0]
+    drop = -(hop.landing_height or 0.0) / size.height
+    fall = drop + _rise(hop) / size.height
+    bare = "margins" in task.model_fields_set and task.margins is None
+    other = bare or len(task.hops()) > 1 or hop.distance_y or hop.twist
+    if other or not word_of_toes(robot) or fall <= FALL or drop < DROP:
+        return None
+    return next((rounded(speed * size.slow) for most, speed in TOES_SPEEDS if fall <= most), None)
+
+
+def deep(task: Asked, robot: RobotDescription) -> float:
+    """How deep the squat must be, 0 to 1: for a high jump in place, or one far back.
+
+    Such a squat is a fall that the legs must stop, and on soft ground the feet lose the ground as
+    they do. It takes longer then, and the ground bears more. Other jumps do worse so (turns, steps
+    up, high jumps ahead or aside, shorter ones back), and keep the usual squat.
+    """
+    far = 0.0
+    for hop in task.hops():
+        ahead, aside = hop.distance_x or 0.0, hop.distance_y or 0.0
+        if hop.twist or (hop.landing_height or 0.0) > 0.0:
+            return 0.0
+        far = max(far, -ahead, 0.0 if ahead or aside else _rise(hop))
+    share = (far / size_of(robot).height - DEEP) / (DEEPEST - DEEP)
+    return min(1.0, max(0.0, share))
 
 
 def demand(task: Asked, robot: RobotDescription) -> float:

@@ -288,6 +288,12 @@ class JumpTask(FreeTimes):
             changed["profile"] = robot.motors.profile
         return self.model_copy(update=changed) if changed else self
 
+    @property
+    def landing_effort(self) -> float:
+        """The share of the motors' torque and speed that the plan may use from touchdown on."""
+        most = None if self.margins is None else self.margins.landing_effort
+        return self.effort if most is None else most
+
     def content(self) -> dict[str, Any]:
         """All that decides the plan, as plain data: everything but the name."""
         # What is not given is left out, so that a parameter added later changes no hash.

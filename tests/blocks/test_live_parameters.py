@@ -7,6 +7,7 @@ as one that had the new value from the start.
 import zlib
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from itertools import zip_longest
 from typing import Any
 
@@ -79,6 +80,20 @@ def flying(tick: int) -> Inputs:
     now = 0.002 * tick
     times = {"time_in_phase": now, "time_to_touchdown": 0.3 - now}
     return {"reference": {"phase": Phase.FLIGHT}, "phase": {"phase": Phase.FLIGHT, **times}}
+
+
+def landing_on(toes_first: bool, tick: int) -> Inputs:
+    """The same flight to a landing on the toes first, or on whole feet."""
+    inputs = flying(tick)
+    return {**inputs, "reference": {**inputs["reference"], "toes_first": toes_first}}
+
+
+def beyond_reach(tick: int) -> Inputs:
+    """Feet that should be where the tilted robot's legs do not reach."""
+    turn = np.array([[0.83, 0.0, 0.56], [0.0, 1.0, 0.0], [-0.56, 0.0, 0.83]])
+    place = [-0.27, 0.0, -0.18]
+    feet = {"position": [place, place], "rotation": [turn, turn], "velocity": 0.0}
+    return {"feet": feet, "reference": {"toes_first": False}}
 
 
 def displaced(tick: int) -> Inputs:
@@ -177,6 +192,18 @@ def leaning(tick: int) -> Inputs:
     return {**inputs, "terms": {**inputs["terms"], **turned}}
 
 
+def long_legged(tick: int) -> Inputs:
+    """The robot reacts and falls slowly, on legs that have stroke to draw up and to stop with."""
+    inputs = reacting(tick)
+    feet = {"foot_position": [[0.0, 0.08, -0.3], [0.0, -0.08, -0.3]]}
+    slow = {"com": 0.0, "com_velocity": [0.0, 0.0, -0.5]}
+    return {
+        **inputs,
+        "reference": {**inputs["reference"], **feet},
+        "terms": {**inputs["terms"], **slow},
+    }
+
+
 SCENES: Mapping[str, list[Scene]] = {
     "blocks.Step": [Scene({"at": 0.1})],
     "blocks.Timer": [Scene({"duration": 0.1}, lambda tick: {"u": {"value": True}})],
@@ -199,10 +226,12 @@ SCENES: Mapping[str, list[Scene]] = {
     "blocks.LandingHeuristic": [
         Scene({"p_max": (0.1, 0.1)}),
         Scene({}, flying),
+        *(Scene({}, partial(landing_on, first)) for first in (False, True)),
         Scene({}, pushed),
         Scene({"law": "predicted"}, reacting),
         Scene({"law": "predicted", "height_range": (0.0, 0.0)}, reacting),
         Scene({"law": "predicted", "height_range": (-0.5, 0.0)}, leaning),
+        Scene({"law": "predicted"}, long_legged),
     ],
     "blocks.CaptureStep": [
         Scene({"steps": 1, "after": 0.01, "duration": 0.05, "settle": 0.02}, tottering(-0.8, 0.1)),
@@ -223,6 +252,7 @@ SCENES: Mapping[str, list[Scene]] = {
     "blocks.LegInverseKinematics": [
         Scene({"speed_limit": 0.5}),
         Scene({"level": 0.9}),
+        Scene({}, beyond_reach),
         *(
             Scene({"follow": "plan", "level_time": 0.1, "turn_gain": gain}, nearly_landed)
             for gain in (0.5, 0.002)

@@ -35,15 +35,17 @@ def outcomes(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     monkeypatch.setattr(module, "random_tasks", lambda count, seed: tasks)
     monkeypatch.setattr(module, "plan_and_run", stand_in)
     monkeypatch.setattr(module, "job_results", in_this_process)
+    monkeypatch.setattr(module, "compile_functions", lambda tasks, robot: 9.0)
     return asked
 
 
 def test_the_rows_tell_what_is_refused_and_what_lands(outcomes: list[str], tmp_path: Path) -> None:
-    refused, median, most, worst, landing = jumps(2, 1, range(9000, 9004), tmp_path)
+    refused, median, most, worst, compiling, landing = jumps(2, 1, range(9000, 9004), tmp_path)
     assert refused.value == 0.5
     assert refused.note == "2 tasks of seed 1; refused: high (motor speed)"
     assert (median.value, worst.value, worst.met) == (2.0, 3.0, True)
     assert most.value == pytest.approx(2.9)
+    assert compiling.value == 9.0
     assert landing.value == 0.25
     assert landing.met is False
     assert landing.note.startswith("3 of 4 runs land, 95 % interval 0.301 to 0.954")

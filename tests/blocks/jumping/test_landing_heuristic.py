@@ -300,6 +300,30 @@ def test_alpha_decides_what_the_target_is_fixed_in():
         assert feet.rotation[1] == pytest.approx(frame.T, abs=1e-12)
 
 
+def test_where_the_toes_land_first_the_legs_compensate_less_and_draw_nothing_in():
+    turned = np.zeros((3, 3))
+    to_matrix(rotation_vector([0.0, 0.3, 0.0]), turned)
+    landed = []
+    for toes_first in (False, True):
+        bench = make(toes_alpha=[1.0, 0.25, 1.0], retraction=0.5, retraction_time=0.1)
+        bench.set("reference", toes_first=toes_first)
+        fly(bench, 0.0, 0.3)
+        bench.set("terms", base_rotation=turned)
+        landed.append(fly(bench, 0.25, 0.05))
+    flat, toes = landed
+    frame = np.zeros((3, 3))
+    to_matrix(rotation_vector([0.0, 0.3 * 0.25, 0.0]), frame)
+    assert toes.rotation[1] == pytest.approx(frame.T, abs=1e-12)
+    assert flat.rotation[1] == pytest.approx(turned.T, abs=1e-12)
+    heights = [
+        float((turn @ feet.position[1])[2]) for turn, feet in ((turned, flat), (frame, toes))
+    ]
+    reached_down = retraction(0.05, 0.5, 0.1)[0]
+    to_com = turned.T @ (COM - [0.0, 0.0, 0.37])
+    lifted = heights[1] - float((frame @ to_com)[2]) - heights[0] + float((turned @ to_com)[2])
+    assert lifted == pytest.approx(-reached_down, abs=1e-12)
+
+
 def test_the_foot_heads_as_planned():
     bench = make()
     bench.set("reference", foot_yaw=[0.2, -0.1])

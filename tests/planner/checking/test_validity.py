@@ -14,7 +14,8 @@ from aloft.planner.checking.validity import (
     checked,
     require_valid,
 )
-from aloft.planner.task.plan import JumpPlan
+from aloft.planner.library.library import SHIPPED
+from aloft.planner.task.plan import JumpPlan, read_plan
 from aloft.robots.description import find_robot
 
 ROBOT = find_robot("bruce")
@@ -176,3 +177,19 @@ def test_the_report_is_kept_with_the_plan(by_hand: JumpPlan) -> None:
     plan = checked(by_hand, ROBOT)
     assert not plan.valid
     assert {test["name"] for test in plan.report["tests"] if not test["passed"]} == NOT_MET_BY_HAND
+
+
+def test_a_landing_may_have_more_of_the_motors_than_the_rest() -> None:
+    """The shipped jump down 35 cm brakes with all of them, and does the rest with 85 %."""
+    (path,) = SHIPPED.glob("down_35cm-*.npz")
+    plan = read_plan(path)
+    assert plan.task.margins is not None and plan.task.margins.landing_effort == 1.0
+    assert check_plan(plan, ROBOT).valid
+    plain = plan.task.margins.model_copy(update={"landing_effort": None})
+    less = replace(plan, task=plan.task.model_copy(update={"margins": plain}))
+    failed = {test.name: test.where for test in check_plan(less, ROBOT).failed}
+    assert {"motor_speed", "effort"} <= set(failed)
+    times = [
+        float(where.split(" at ")[1].split()[0]) for where in failed.values() if " at " in where
+    ]
+    assert min(times) >= plan.touchdown_time - 1e-3  # said in milliseconds

@@ -38,7 +38,7 @@ def test_phases_begin_at_their_times():
 def table():
     robot = find_robot("bruce")
     fields = JumpReference.allocate(robot.dimensions).views()
-    skip = {"time", "phase", "lift_off_time", "touchdown_time", "contact"}
+    skip = {"time", "phase", "lift_off_time", "touchdown_time", "contact", "toes_first"}
     columns = {
         name: np.stack([np.full(view.shape, value) for value in (1.0, 3.0)])
         for name, view in fields.items()
@@ -46,6 +46,23 @@ def table():
     }
     columns["orientation"] = np.array([[0.0, 0.0, 0.0, 1.0], [1.0, 0.0, 0.0, 0.0]])
     return JumpTable(np.array([0.0, 1.0]), columns, 0.1, 0.2, 0.3, 0.6, 0.8)
+
+
+def test_it_is_known_before_touchdown_whether_the_toes_land_first():
+    reference = JumpReference.allocate(find_robot("bruce").dimensions)
+    whole = table()
+    times = np.array([0.0, 0.3, 0.6, 0.6, 0.65, 0.7, 1.0])
+    columns = {name: np.repeat(column[:1], 7, axis=0) for name, column in whole.columns.items()}
+    stands, toes, none = [True] * 4, [True, False] * 2, [False] * 4
+    rows = {True: [stands, stands, none, toes, toes, stands, stands],
+            False: [toes, toes, none, stands, stands, stands, stands]}  # fmt: skip
+    for toes_first, contact in rows.items():
+        planned = replace(whole, time=times, columns=columns, contact=np.array(contact))
+        for time in (0.0, 0.45, 0.59, 0.9):
+            JumpTableReader(planned, reference).read(time)
+            assert bool(reference.toes_first) is toes_first
+    JumpTableReader(whole, reference).read(0.45)
+    assert not reference.toes_first, "where nothing is said all points land"
 
 
 def test_reading_interpolates_every_field_and_normalises_the_orientation():

@@ -102,3 +102,10 @@ def test_a_plan_hits_the_ground_no_faster_than_it_may() -> None:
     assert found["touchdown_slide"] <= 0.11
     faster = make_task({**jump, "margins": {"touchdown_speed": 0.2}})
     assert "touchdown_speed" in check_plan(replace(plan, task=faster), ROBOT).explain()
+
+
+def test_the_landing_has_the_tasks_effort_unless_the_margins_say_another() -> None:
+    asked = {"name": "a", "rise": 0.1, "effort": 0.8}
+    assert make_task({**asked, "margins": None}).landing_effort == 0.8
+    assert make_task({**asked, "margins": {"pressure": 0.1}}).landing_effort == 0.8
+    assert make_task({**asked, "margins": {"landing_effort": 0.95}}).landing_effort == 0.95

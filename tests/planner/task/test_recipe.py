@@ -131,16 +131,40 @@ def test_a_step_is_kept_away_from_and_not_lain_down_in_front_of(
 
 @pytest.mark.parametrize(
     ("rise", "height", "speed", "slide"),
-    [("25 cm", "0 cm", 1.7, 0.6), ("8 cm", "-20 cm", 1.7, 0.6), ("8 cm", "-35 cm", None, None)],
-)
-def test_feet_come_down_slowly_except_from_high_up(
+    [("25 cm", "0 cm", 1.7, 0.6), ("8 cm", "-20 cm", 1.7, 0.6), ("8 cm", "-35 cm", 1.8, None),
+     ("12 cm", "-35 cm", 2.3, None), ("12 cm", "-45 cm", None, None)],
+)  # fmt: skip
+def test_feet_come_down_slowly_except_from_very_high_up(
     rise: str, height: str, speed: float | None, slide: float | None
 ) -> None:
-    margins = resolved(rise=rise, distance_x="25 cm", landing_height=height).margins
+    margins = resolved(rise=rise, distance_x="25 cm", twist=0.0, landing_height=height).margins
     assert margins is not None
     assert (margins.touchdown_speed, margins.touchdown_slide) == (speed, slide)
     said = resolved(rise=rise, landing_height=height, margins={"touchdown_slide": 2.0}).margins
     assert said is not None and said.touchdown_slide == 2.0
+
+
+def test_from_high_up_the_toes_land_first_with_all_of_the_motors() -> None:
+    deep = {"rise": "8 cm", "distance_x": "25 cm", "twist": 0.0, "landing_height": "-35 cm"}
+    task = resolved(**deep)
+    landing = [(span.phase, span.time, span.contacts) for span in task.spans()[-2:]]
+    assert landing == [("landing", 0.04, "toe"), ("landing", 0.46, "all")]
+    assert task.margins is not None
+    assert (task.effort, task.margins.landing_effort) == (0.85, 1.0)
+
+
+@pytest.mark.parametrize(
+    "other",
+    [{"twist": "20 deg"}, {"distance_y": "5 cm"}, {"landing_height": "-20 cm"}, {"margins": None},
+     {"landing_height": "-45 cm"}, {"repeat": 2}],
+)  # fmt: skip
+def test_toes_land_first_only_straight_ahead_from_a_height_they_can_bear(
+    other: dict[str, object],
+) -> None:
+    deep = {"rise": "8 cm", "distance_x": "25 cm", "twist": 0.0, "landing_height": "-35 cm"}
+    task = resolved(**(deep | other))
+    assert task.spans()[-1].contacts == task.spans()[-2].contacts == "all"
+    assert task.margins is None or task.margins.landing_effort is None
 
 
 def test_a_robot_without_soles_has_no_toe_phase() -> None:
@@ -172,3 +196,31 @@ def test_backwards_feet_may_slide_at_touchdown() -> None:
     margins = resolved(distance_x="-10 cm").margins
     assert margins is not None
     assert (margins.touchdown_speed, margins.touchdown_slide) == (1.7, None)
+
+
+@pytest.mark.parametrize(
+    ("said", "time", "load"),
+    [
+        ({"rise": "18 cm"}, 0.4, 0.4),
+        ({"rise": "23 cm"}, 0.45, 0.5),
+        ({"rise": "25 cm"}, 0.5, 0.6),
+        ({"distance_x": "-20 cm"}, 0.4, 0.4),
+        ({"rise": "25 cm", "distance_x": "20 cm"}, 0.4, 0.4),
+        ({"distance_x": "-30 cm"}, 0.5, 0.6),
+        ({"rise": "25 cm", "twist": "90 deg"}, 0.4, 0.4),
+        ({"rise": "25 cm", "landing_height": "10 cm"}, 0.4, 0.4),
+        ({"rise": "25 cm", "squat_time": "0.45 s", "margins": {"load": 0.5}}, 0.45, 0.5),
+    ],
+)
+def test_a_deep_squat_takes_longer_with_more_load_on_the_ground(
+    said: dict[str, object], time: float, load: float
+) -> None:
+    task = resolved(**{"rise": 0.1, "distance_x": 0.0, "twist": 0.0, **said})
+    assert task.margins is not None
+    assert (task.spans()[0].time, task.margins.load) == (time, load)
+
+
+@pytest.mark.parametrize(("distance", "speed"), [(0.0, 1.7), (0.3, None)])
+def test_high_jumps_in_place_come_down_slowly_too(distance: float, speed: float | None) -> None:
+    margins = resolved(rise="32 cm", distance_x=distance, twist=0.0).margins
+    assert margins is not None and margins.touchdown_speed == speed
