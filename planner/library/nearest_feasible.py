@@ -1,7 +1,7 @@
 """Searches for the nearest task that can be planned, where the given task cannot.
 
-The search changes one parameter at a time between the given value and a modest one, by bisection over round
-values. It begins at the farthest value that a kept plan of a similar task has, else at the modest one. Where that finds nothing, because more than one is beyond the robot, all that say how far the jump goes
+The search changes one parameter at a time between the given value and a modest one, in strides and then by bisection over
+round values. It begins at the farthest value that a kept plan of a similar task has, else at the modest one. Where that finds nothing, because more than one is beyond the robot, all that say how far the jump goes
 change together, each by the same share of its way. It takes several solves, so only commands whose user waits
 for an answer call it; loading or running a graph never does.
 """
@@ -21,11 +21,14 @@ from ..task.plan import JumpPlan
 from ..task.task import JumpTask
 from .library import SCALES, PlanLibrary, Solver, solve_and_check
 
-MOST_SOLVES = 10
-MOST_SECONDS, LEAST_SECONDS = 6.0, 3.0
+MOST_SOLVES = 14
+MOST_SECONDS, LEAST_SECONDS = 6.0, 2.0
 """Processor time after which no further solve is begun [s]; and where the task itself took long."""
 ALTOGETHER = 8.5
 """s of processor time after which no further solve is begun, with what the task itself took."""
+STRIDES, FIRST_STRIDES = 8, 4
+"""Into so many steps the way to what is asked for is divided at least, from a kept plan's value and from
+a modest one."""
 SINGLE = 2
 """So many parameters are changed on their own before all are changed together."""
 TOGETHER = ("rise", "take_off_speed", "distance_x", "distance_y", "twist", "landing_height")
@@ -259,9 +262,11 @@ class _Search:
         if plan is None:
             return None
         good, bad = begin, len(way) - 1
+        # The solver does not follow a long step, though its end is feasible; least of all from a kept
+        # plan, which is near the robot's limits.
+        most = max(1, (bad - good) // (STRIDES if begin else FIRST_STRIDES))
         while bad - good > 1 and not self.spent:
-            # What fails costs several times what succeeds, so the first step is the smaller one.
-            middle = good + max(1, (bad - good) // (2 if good > begin else 4))
+            middle = good + max(1, min(most, (bad - good) // 2))
             better = self._try(way[middle], plan)
             if better is None:
                 bad = middle
@@ -275,8 +280,8 @@ class _Search:
         )  # fmt: skip
 
     def _kept(self, way: list[dict[str, float]]) -> tuple[int, JumpPlan | None]:
-        """The point of a way that a kept plan of a similar task goes up to, and a plan there, which
-        starts from that one; without such a plan ``None``."""
+        """The point of a way that a kept plan of a similar task goes up to, or where that has no plan
+        one at three quarters of it, and a plan there, which starts from the kept one; else ``None``."""
         parameter, *others = way[0]
         if self._library is None or others or self.spent:
             return 0, None
@@ -286,7 +291,11 @@ class _Search:
             return 0, None
         most = abs(getattr(near.task, parameter) - modest) + 1e-9
         index = sum(abs(point[parameter] - modest) <= most for point in way) - 1
-        return index, self._try(way[index], near) if index else None
+        for begin in dict.fromkeys((index, 3 * index // 4)):
+            plan = self._try(way[begin], near) if begin and not self.spent else None
+            if plan is not None:
+                return begin, plan
+        return 0, None
 
     def _try(self, values: Mapping[str, float], start: JumpPlan | None) -> JumpPlan | None:
         """A valid plan with those values, or ``None``."""

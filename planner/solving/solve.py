@@ -38,6 +38,11 @@ from .whole_robot import for_all_joints, for_moving_joints
 
 QUICK = 60
 """Iterations of a quick solve."""
+QUICK_NEAR = 40
+"""Iterations of a quick solve from a plan with all coordinates; those that come to an end take 20 to 30."""
+LAST = 60
+"""Iterations of IPOPT for one jump with all coordinates, where each takes 60 to 90 ms; all plans that it has
+found there took fewer."""
 Formulation = Callable[[JumpTask, RobotDescription, SolveOptions], JumpPlan]
 """Makes a plan of a task with one set of decision variables, cost and constraints; the plan leaves
 out the robot's held joints."""
@@ -94,10 +99,15 @@ def solve_full(task: JumpTask, robot: RobotDescription, options: SolveOptions) -
         warm_start = None  # the same jump straight ahead is a nearer start
     if warm_start is not None and can_start(problem, warm_start):
         warm = True
-        near, most = pack(problem, warm_start, guess), QUICK if options.quick else LIMIT
+        near, most = pack(problem, warm_start, guess), LIMIT
+        if options.quick:
+            most = QUICK_NEAR if problem.coordinates.name == "full" else QUICK
         solution = solve(
             problem, near, warm=True, barrier=_barrier(problem), solver="fatrop", limit=most
         )
+        if options.quick and not solution.solved and problem.coordinates.name == "full":
+            # The jump straight ahead is farther than the plan, and takes as long again.
+            raise failure(task, solution)
     if solution is None or not solution.solved:
         warm = False
         turns = any(hop.rotation for hop in task.hops()) and not solver
@@ -113,7 +123,7 @@ def solve_full(task: JumpTask, robot: RobotDescription, options: SolveOptions) -
             raise failure(task, solution)
     if solution is None or not solution.solved:
         solution = solve(
-            problem, guess, barrier=_barrier(problem), solver=solver,
+            problem, guess, barrier=_barrier(problem), solver=solver, last=_last(problem),
             other_guess=lambda: _displaced(problem, robot),
         )  # fmt: skip
     if not solution.solved:
@@ -249,6 +259,13 @@ def _barrier(problem: Problem) -> float:
     """The barrier's parameter for starts from another plan. With all coordinates such a plan is further
     from the solution, and a higher barrier takes a fifth fewer iterations."""
     return 1e-3 if problem.coordinates.name == "full" else NEAR
+
+
+def _last(problem: Problem) -> int:
+    """Iterations that the last attempt may take. Longer ones leave no time to look for a task that can be planned."""
+    hops = problem.task.hops()
+    alone = len(hops) == 1 and not hops[0].rotation
+    return LAST if alone and problem.coordinates.name == "full" else LIMIT
 
 
 def _leaves_plane(problem: Problem, plan: JumpPlan) -> bool:

@@ -94,13 +94,15 @@ def solve(
     barrier: float = NEAR,
     solver: str = "",
     limit: int = LIMIT,
+    last: int = LIMIT,
     other_guess: Callable[[], Array | None] = lambda: None,
 ) -> Solution:
     """The first solution found, or the least violated attempt: fatrop from the other guess, which is
     nearer, fatrop from the guess, IPOPT from the guess.
 
     ``warm`` says that the guess is near the solution, and ``barrier`` is the parameter of the logarithmic
-    barrier to begin with near it; ``solver`` insists on one of them.
+    barrier to begin with near it; ``solver`` insists on one of them. ``limit`` is how many iterations each attempt
+    may take, and ``last`` how many IPOPT may take where it is not insisted on.
     """
     tries = [solver] if solver else ["other", "fatrop", "ipopt"]
     best: Solution | None = None
@@ -112,7 +114,8 @@ def solve(
         if start is None or (name == "fatrop" and nearer is not None):
             continue  # what fatrop does not find from near it does not find from afar
         begin = barrier if warm or other else FAR
-        found = _run(problem, start, "fatrop" if other else name, begin, limit)
+        most = min(limit, last) if name == "ipopt" and not solver else limit
+        found = _run(problem, start, "fatrop" if other else name, begin, most)
         if best is None or found.solved or found.violation < best.violation:
             best = found
         if best.solved:
