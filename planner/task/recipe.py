@@ -56,9 +56,9 @@ LOAD, DEEP_LOAD = 0.4, 0.6
 """The share of the weight that the ground bears until lift-off; and before a deep squat."""
 SQUAT, DEEP_SQUAT = 0.4, 0.5
 """s; the time of the squat, and of a deep one, for a robot of BRUCE's size."""
-DEEP, DEEPEST = 0.65, 0.75
+DEEP, DEEP_BACK = (0.65, 0.75), (0.8, 0.9)
 """Rises in place, and distances backwards, as multiples of the centre of mass's height: above the first
-the squat begins to be a deep one, and from the second on it wholly is."""
+number the squat begins to be a deep one, and from the second on it wholly is."""
 TOUCHDOWN_SPEED, TOUCHDOWN_SLIDE = 1.7, 0.6
 """m/s of the feet at touchdown, downwards and along the ground, for a robot of BRUCE's size."""
 FALL, LEVEL_FALL = 0.9, 1.1
@@ -329,14 +329,21 @@ def deep(task: Asked, robot: RobotDescription) -> float:
     they do. It takes longer then, and the ground bears more. Other jumps do worse so (turns, steps
     up, high jumps ahead or aside, shorter ones back), and keep the usual squat.
     """
-    far = 0.0
+    back, high = 0.0, 0.0
     for hop in task.hops():
         ahead, aside = hop.distance_x or 0.0, hop.distance_y or 0.0
         if hop.twist or (hop.landing_height or 0.0) > 0.0:
             return 0.0
-        far = max(far, -ahead, 0.0 if ahead or aside else _rise(hop))
-    share = (far / size_of(robot).height - DEEP) / (DEEPEST - DEEP)
-    return min(1.0, max(0.0, share))
+        back = max(back, -ahead)
+        high = max(high, 0.0 if ahead or aside else _rise(hop))
+    height = size_of(robot).height
+    return max(_share(high / height, DEEP), _share(back / height, DEEP_BACK))
+
+
+def _share(value: float, between: tuple[float, float]) -> float:
+    """How far a value has come from the one to the other of two, from 0 to 1."""
+    low, high = between
+    return min(1.0, max(0.0, (value - low) / (high - low)))
 
 
 def demand(task: Asked, robot: RobotDescription) -> float:

@@ -204,7 +204,7 @@ def test_backwards_feet_may_slide_at_touchdown() -> None:
         ({"rise": "18 cm"}, 0.4, 0.4),
         ({"rise": "23 cm"}, 0.45, 0.5),
         ({"rise": "25 cm"}, 0.5, 0.6),
-        ({"distance_x": "-20 cm"}, 0.4, 0.4),
+        ({"distance_x": "-25 cm"}, 0.4, 0.4),
         ({"rise": "25 cm", "distance_x": "20 cm"}, 0.4, 0.4),
         ({"distance_x": "-30 cm"}, 0.5, 0.6),
         ({"rise": "25 cm", "twist": "90 deg"}, 0.4, 0.4),
