@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from math import atan2, cos, degrees, radians, sin
+from math import atan2, cos, degrees, pi, radians, sin
 
 from ...mathematics.arrays import Array
 from ...mathematics.kernel import kernel
@@ -92,12 +92,23 @@ def feet_turned(record: JumpRecord) -> float:
 
 @kernel
 def mean_turn(start: Array, now: Array) -> float:
-    """The mean angle [rad] from each row of ``start`` (n, 2) to that of ``now``, to the left."""
-    total = 0.0
+    """The mean angle [rad] from each row of ``start`` (n, 2) to that of ``now``, to the left.
+
+    Half a turn is the same to the left and to the right, so all angles count as within half a turn
+    of the first.
+    """
+    total, first = 0.0, 0.0
     for foot in range(start.shape[0]):
         ax, ay = float(start[foot, 0]), float(start[foot, 1])
         bx, by = float(now[foot, 0]), float(now[foot, 1])
-        total += atan2(ax * by - ay * bx, ax * bx + ay * by)
+        angle = atan2(ax * by - ay * bx, ax * bx + ay * by)
+        if foot == 0:
+            first = angle
+        elif angle - first > pi:
+            angle -= 2.0 * pi
+        elif angle - first < -pi:
+            angle += 2.0 * pi
+        total += angle
     count: int = start.shape[0]
     return total / count
 

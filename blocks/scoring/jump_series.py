@@ -6,7 +6,7 @@ their apex and where they land.
 
 from __future__ import annotations
 
-from math import degrees, sqrt
+from math import degrees, pi, sqrt
 from typing import NamedTuple
 
 from ...mathematics.arrays import Array, Counts
@@ -142,7 +142,9 @@ def note_place(foot: Array, jump: Jump, planned: Planned, series: Series) -> Non
         y += (moved - (float(planned.foot[k, 1]) - float(planned.start[k, 1]))) / feet
     series.place_now[()] = sqrt(x * x + y * y)
     turn = float(planned.yaw[()]) - float(planned.yaw_start[()])
-    series.turn_now[()] = abs(mean_turn(jump.start_direction, jump.direction) - turn)
+    error = abs(mean_turn(jump.start_direction, jump.direction) - turn)
+    # Half a turn to the left is the same as half a turn to the right.
+    series.turn_now[()] = abs(error - 2.0 * pi) if error > pi else error
 
 
 @kernel
