@@ -97,12 +97,21 @@ Ports = Mapping[str, Mapping[str, RecordedField]]
 
 
 def ports_of(header: Header) -> dict[str, dict[str, RecordedField]]:
-    """Every output as ``block.port``, with its fields by their own names, in file order."""
+    """Every output as ``block.port``, with its fields by their own names.
+
+    They have the order in which their blocks are executed, so that what is measured comes before what
+    is computed from it, a prediction for example. What a wire has delayed comes last.
+    """
     ports: dict[str, dict[str, RecordedField]] = {}
     for field in header.bus.fields:
         if not field.constant:
             ports.setdefault(field.name.rpartition(".")[0], {})[field.field_name] = field
-    return ports
+    place = {block: index for index, block in enumerate(header.order)}
+
+    def rank(port: str) -> tuple[bool, int]:
+        return "~" in port, place.get(block_of(port), len(place))
+
+    return {port: ports[port] for port in sorted(ports, key=rank)}
 
 
 def port_of(ports: Ports, role: Role) -> str | None:

@@ -42,11 +42,12 @@ def all_lanes(header: Header) -> list[Lane]:
     The viewer writes the entity above a lane, so ``states/left_heel`` reads better than
     ``states/contacts/state/active/left_heel``. Where two lanes would be called the same, both
     have the name of the field, then that of the block, and at last the full name of the signal.
+    What a wire delays (a block with ``~`` in its path) is shown where it comes from.
     """
     lanes = [
         lane
         for field in header.bus.fields
-        if not field.constant
+        if not field.constant and "~" not in field.name
         for lane in lanes_of(field, header.robot)
     ]
     names = [_short_names(lane) for lane in lanes]
