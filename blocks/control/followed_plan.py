@@ -116,7 +116,7 @@ def go_on(following: Following, plan: PlannedJoints, flown: Flown, target: LegTa
     So the feet of a robot that lands late keep slowing down. After that the ``target`` stays as it is.
     """
     since = float(plan.time[()]) - float(flown.time[()])
-    if not flown.known[()] or since > float(following.late_time[0]):
+    if not flown.known[()] or since >= float(following.late_time[0]):
         return
     for joint in range(flown.position.shape[0]):
         change = float(flown.acceleration[joint]) * since

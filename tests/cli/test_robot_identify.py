@@ -52,7 +52,7 @@ def test_what_was_injected_is_found_and_makes_the_jump_better(tmp_path: Path) ->
     for value in body["coulomb"].values():
         close(value, 1.6 * 0.07, 0.06)
     for value in body["viscous"].values():
-        close(value, 1.6 * 0.01, 0.04)
+        close(value, 1.6 * 0.01, 0.05)
     mean = np.mean([value["value"] for value in body["coulomb"].values()])
     assert mean == pytest.approx(1.6 * 0.07, rel=0.15), "and not what the description says"
     before = aloft.load(GRAPHS / "jump.yaml", {"robot.seed": 5})

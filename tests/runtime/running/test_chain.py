@@ -284,7 +284,7 @@ def test_the_jumps_controller_has_no_python_where_its_blocks_are_kernels() -> No
     made = Ticker(bound, ClockSpec(), WallTime())
     assert made.fuse()
     found = chains(made)
-    before = "contacts", "estimator", "dynamics", "plan", "phase", "step", "switches", "targets"
+    before = "contacts", "estimator", "ahead", "dynamics", "plan", "phase", "step", "switches"
     assert any(chain[: len(before)] == before for chain in found)
     assert any("wbc" in chain for chain in found)
 
