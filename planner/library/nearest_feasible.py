@@ -281,7 +281,8 @@ class _Search:
 
     def _kept(self, way: list[dict[str, float]]) -> tuple[int, JumpPlan | None]:
         """The point of a way that a kept plan of a similar task goes up to, or where that has no plan
-        one at three quarters of it, and a plan there, which starts from the kept one; else ``None``."""
+        one at three quarters of it, and a plan there, which is the kept one or starts from it; else
+        ``None``."""
         parameter, *others = way[0]
         if self._library is None or others or self.spent:
             return 0, None
@@ -291,6 +292,9 @@ class _Search:
             return 0, None
         most = abs(getattr(near.task, parameter) - modest) + 1e-9
         index = sum(abs(point[parameter] - modest) <= most for point in way) - 1
+        there = self._task.model_copy(update=way[index])
+        if index and there.hash(self._robot) == near.task.hash(self._robot):
+            return index, near
         for begin in dict.fromkeys((index, 3 * index // 4)):
             plan = self._try(way[begin], near) if begin and not self.spent else None
             if plan is not None:

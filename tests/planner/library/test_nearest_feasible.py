@@ -163,19 +163,30 @@ def test_the_search_is_bounded() -> None:
 
 
 def test_it_begins_where_a_kept_plan_of_a_similar_task_ends(tmp_path: Path) -> None:
-    """A turn of 120 degrees at 15 cm is among the shipped plans."""
+    """A turn of 180 degrees at 20 cm is among the shipped plans."""
     task = make_task({"name": "round", "rise": 0.12, "twist": "360 deg"})
     library = PlanLibrary(ROBOT, tmp_path, (SHIPPED,))
     kept = library.farthest(task, "twist", 0.0)
     assert kept is not None
-    assert (kept.task.rise, kept.task.twist) == pytest.approx((0.15, 2.0 * math.pi / 3.0))
-    solve = Planner(lambda asked: asked.twist < 2.2)
+    assert (kept.task.rise, kept.task.twist) == pytest.approx((0.2, math.pi))
+    solve = Planner(lambda asked: asked.twist < 3.2)
     found = nearest_feasible(task, ROBOT, solve=solve, library=library)
     assert found is not None
     degrees = [round(math.degrees(asked.twist)) for asked in solve.asked]
-    assert degrees[:2] == [120, 150], "a longer step from a turn near the limits is not found"
+    assert degrees[:2] == [180, 202], "a longer step from a turn near the limits is not found"
     assert solve.warm[0]
-    assert math.degrees(found.value) == pytest.approx(126.0)
+    assert math.degrees(found.value) == pytest.approx(182.0)
+
+
+def test_a_kept_plan_of_that_very_task_is_not_solved_again(tmp_path: Path) -> None:
+    task = make_task({"name": "high", "rise": 0.6})
+    solve = Planner(lambda _: False)
+    found = nearest_feasible(
+        task, ROBOT, solve=solve, library=PlanLibrary(ROBOT, tmp_path, (SHIPPED,))
+    )
+    assert found is not None
+    assert (found.value, found.beyond) == (0.32, 0.325)
+    assert all(asked.rise > 0.32 for asked in solve.asked)
 
 
 @pytest.mark.parametrize(
@@ -200,7 +211,7 @@ def test_from_what_a_kept_plan_cannot_help_with_it_begins_at_the_modest_value(
     )
     assert found is not None
     degrees = [round(math.degrees(asked.twist)) for asked in solve.asked]
-    assert degrees[:3] == [120, 90, 0]
+    assert degrees[:3] == [180, 134, 0]
     assert found.value < 0.5
 
 
@@ -208,11 +219,11 @@ def test_where_a_kept_plans_value_is_beyond_this_task_three_quarters_of_it_are_t
     tmp_path: Path,
 ) -> None:
     task = make_task({"name": "round", "rise": 0.12, "twist": "360 deg"})
-    solve = Planner(lambda asked: asked.twist < 1.8)
+    solve = Planner(lambda asked: asked.twist < 2.7)
     found = nearest_feasible(
         task, ROBOT, solve=solve, library=PlanLibrary(ROBOT, tmp_path, (SHIPPED,))
     )
     assert found is not None
     degrees = [round(math.degrees(asked.twist)) for asked in solve.asked]
-    assert degrees[:3] == [120, 90, 122]
+    assert degrees[:3] == [180, 134, 162]
     assert solve.warm[:2] == [True, True], "both start from the kept plan"
