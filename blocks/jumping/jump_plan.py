@@ -18,10 +18,13 @@ from ...runtime.language.parameters import Parameters, parameter
 from ...runtime.language.signals import Field, Signal
 from ..signals import DelayEstimate, DynamicsTerms, JumpReference
 from .plan_progress import (
+    FallSettings,
+    Flight,
     Motion,
     Planned,
     Progress,
     ProgressSettings,
+    follow_fall,
     follow_motion,
     plan_instant,
 )
@@ -78,7 +81,10 @@ class JumpPlan(KernelBlock):
     The plan is read later by this delay, which is within ``progress_limit``; so a robot that is too
     slow is pushed longer, as far as its legs reach. Everything behind, flight and landing too, is
     shifted with it, and ``reference.time`` with them. For this the feedforward is the mean over the
-    tick in which the command holds: a thrust may end between two ticks.
+    tick in which the command holds: a thrust may end between two ticks. A flight whose toes land
+    first (``reference.toes_first``) must end when the robot lands, because its toes slow down in the
+    last 10 ms only. With f the time in which the measured centre of mass falls to its planned height
+    at touchdown, there ``delay' = toes_gain (f - touchdown_time + time)``.
 
     What follows from the task it tells other blocks of the graph: the ``scene`` with its steps, for
     the simulator, and for the score the number of ``jumps`` and, of the last one, where it ends:
@@ -87,8 +93,8 @@ class JumpPlan(KernelBlock):
     ``momentum_correction`` [N m s] that a rehearsal of the plan with this controller has learnt
     (``aloft plan --rehearse``), which are zero where there was none, or with ``rehearsed: false``.
 
-    But for this and the progress the block follows time alone. It raises ``BlockError`` at load where the task cannot be read or is for another robot, where it cannot be
-    planned, or where its plan must be valid and is not; the message says which constraint or test.
+    But for this the block follows time alone. It raises ``BlockError`` at load where the task cannot be
+    read or is for another robot, where it cannot be planned, or where its plan must be valid and is not; the message says which constraint or test.
     """
 
     class Params(Parameters):
@@ -117,6 +123,9 @@ class JumpPlan(KernelBlock):
         )
         progress_limit: float = parameter(
             0.008, unit="s", ge=0.0, le=0.05, text="how much later or earlier a thrust may end"
+        )
+        toes_gain: float = parameter(
+            20.0, unit="1/s", ge=0.0, text="rate at which the plan is kept in time with such a fall"
         )
         library: str = parameter(
             "", text="folder where new plans are kept; the user's cache if empty"
@@ -278,6 +287,11 @@ class JumpPlan(KernelBlock):
                 KernelCall(
                     follow_motion, reader.instant, measured, planned, others, settings, progress
                 )
+            )
+            flight = Flight(*(getattr(reference, name) for name in Flight._fields))
+            fall = FallSettings(float(p.toes_gain), FASTEST, period)
+            calls.append(
+                KernelCall(follow_fall, reader.instant, measured, planned, flight, fall, progress)
             )
         return calls
 

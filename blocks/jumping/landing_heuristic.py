@@ -148,7 +148,7 @@ class LandingHeuristic(KernelBlock):
             text="share of the torso's rotation about x, y and z that the legs compensate",
         )
         toes_alpha: Shares = live_parameter(
-            (0.65, 0.65, 0.65),
+            (0.8, 0.8, 0.8),
             text="the same share where the plan lands on the toes first",
         )
         reach_share: float = live_parameter(

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
-from ...mathematics.arrays import Array, Indices
+from ...mathematics.arrays import Array, Flags, Indices
 from ...mathematics.constants import GRAVITY
 from ...mathematics.kernel import kernel
 from ..signals import Phase
@@ -79,6 +80,23 @@ class ProgressSettings(NamedTuple):
     period: float
 
 
+class Flight(NamedTuple):
+    """What else the plan says of a flight: its phase, when it ends [s], and whether the toes land first,
+    of shape () each."""
+
+    phase: Indices
+    touchdown_time: Array
+    toes_first: Flags
+
+
+class FallSettings(NamedTuple):
+    """The parameters of ``JumpPlan`` about such a flight, the largest rate of the delay, and the period."""
+
+    gain: float
+    fastest: float
+    period: float
+
+
 class Progress(NamedTuple):
     """The fields of ``PlanProgress``, of shape () each."""
 
@@ -142,6 +160,38 @@ def follow_motion(
     late += delay_change(error, push, settings.gain, settings.fastest, settings.period)
     late = min(max(late, -settings.limit), settings.limit)
     progress.late[()] = before + late
+
+
+@kernel
+def follow_fall(
+    instant: Array,
+    measured: Motion,
+    reference: Motion,
+    planned: Flight,
+    settings: FallSettings,
+    progress: Progress,
+) -> None:
+    """Hasten or delay a flight whose toes land first, so that it ends when the fall does.
+
+    Args:
+        instant: as ``plan_instant`` writes it; all others but ``measured`` are of that instant.
+    """
+    if int(planned.phase[()]) != Phase.FLIGHT or not planned.toes_first[()]:
+        return
+    left = float(planned.touchdown_time[()]) - float(instant[0])
+    sinking = GRAVITY * left - float(reference.com_velocity[2])
+    lowest = float(reference.com[2]) - 0.5 * (sinking - float(reference.com_velocity[2])) * left
+    fall = time_to_fall(float(measured.com[2]) - lowest, float(measured.com_velocity[2]))
+    rate = settings.gain * (fall - left)
+    rate = min(max(rate, -settings.fastest), settings.fastest)
+    progress.late[()] = float(progress.late[()]) + rate * settings.period
+
+
+@kernel
+def time_to_fall(height: float, speed: float) -> float:
+    """The time [s] in which a body that is thrown up at ``speed`` [m/s] falls by ``height`` [m]."""
+    square = speed * speed + 2.0 * GRAVITY * max(height, 0.0)
+    return (speed + math.sqrt(square)) / GRAVITY
 
 
 @kernel
