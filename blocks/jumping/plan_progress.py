@@ -6,9 +6,10 @@ import math
 from typing import NamedTuple
 
 from ...mathematics.arrays import Array, Flags, Indices
+from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.constants import GRAVITY
 from ...mathematics.kernel import kernel
-from ..signals import Phase
+from ..signals import DynamicsTerms, JumpReference, Phase
 
 SLOWEST = 0.5
 """Vertical speed [m/s] below which a height makes no difference to the apex yet."""
@@ -201,3 +202,23 @@ def mean_height(position: Array) -> float:
     for i in range(position.shape[0]):
         total += float(position[i, 2])
     return total / len(position)
+
+
+def following_calls(
+    instant: Array,
+    terms: DynamicsTerms,
+    reference: JumpReference,
+    thrust: ProgressSettings,
+    fall: FallSettings,
+    progress: Progress,
+) -> tuple[KernelCall, KernelCall]:
+    """The calls of ``follow_motion`` and ``follow_fall``, with the measured ``terms``."""
+    measured, planned = (
+        Motion(*(getattr(signal, name) for name in Motion._fields)) for signal in (terms, reference)
+    )
+    others = Planned(*(getattr(reference, name) for name in Planned._fields))
+    flight = Flight(*(getattr(reference, name) for name in Flight._fields))
+    return (
+        KernelCall(follow_motion, instant, measured, planned, others, thrust, progress),
+        KernelCall(follow_fall, instant, measured, planned, flight, fall, progress),
+    )
