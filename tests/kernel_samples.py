@@ -3,7 +3,7 @@
 import numpy as np
 
 from aloft.blocks.control import balance_law, followed_plan
-from aloft.blocks.jumping import capture_law
+from aloft.blocks.jumping import capture_law, turn_timing
 from aloft.blocks.scoring import footing, jump_following, jump_series, stand_following, stand_score
 from aloft.hal.simulated import base, external_force
 from aloft.mathematics.body_tree import BodyMotion
@@ -129,7 +129,7 @@ SERIES = jump_series.Series(
 BASE = base.BaseTruth(np.ones(3), np.ones(4), np.ones(3), np.ones(3))
 TIMES = jump_following.Times(0.02, 0.5, 0.1, 0.15, 3, True)
 FOLLOWED = (
-    followed_plan.Following(*np.array([[0.009], [0.08], [0.15], [0.3], [0.05], [0.005]])),
+    followed_plan.Following(*np.array([[0.009], [0.08], [0.005]])),
     followed_plan.Soles(
         np.tile(np.eye(3), (2, 1, 1)),
         np.array([4, 9]),
@@ -143,7 +143,6 @@ FOLLOWED = (
         np.array(0.7),
         np.array(1.05),
         np.array([0.02, 0.2, -0.03, 0.98]),
-        np.array([0.1, 0.8, -0.05]),
         DRAW(10),
         DRAW(10),
         DRAW(10),
@@ -151,12 +150,31 @@ FOLLOWED = (
 )
 FLOWN = followed_plan.Flown(np.array(True), np.array(0.998), *DRAW((3, 10)))
 LEG_TARGETS = LegTargets(np.zeros(10), np.zeros(10), np.zeros(2, np.bool_))
+TURNING = (
+    np.array([1.23, 0.002, 0.002]),
+    turn_timing.Body(
+        np.eye(3), np.array([0.1, 0.0, 0.5]), np.array([0.1, 0.0, -0.9]), np.array([0.0, 0.9, 0.0]),
+        NORMAL((6, 16)),
+    ),
+    turn_timing.Pose(
+        np.array(3), np.array(1.35), np.array([0.1, 0.0, 0.5]), np.array([0.1, 0.0, -0.9]),
+        np.array([0.0, 0.1, 0.0, 0.99]),
+    ),
+    turn_timing.Rotation(
+        np.array([1.0, 1.1, 1.25, 1.35]), np.array([10.0, 20.0, 20.0, 11.0]),
+        np.array([6.0, 4.5, 1.5, 0.0]), np.array([1.08, 1.29, 20.0, 1.0]),
+    ),
+    turn_timing.TurnSettings(50.0, 0.04, 0.005, -0.04, 0.002),
+    turn_timing.TurnProgress(np.array(0.001), np.array(1.01)),
+)  # fmt: skip
 UNUSED = {
+    "aloft.blocks.jumping.turn_timing.follow_turn": TURNING,
+    "aloft.blocks.jumping.turn_timing.value_at": (*TURNING[3][:2], 1.23),
+    "aloft.blocks.jumping.turn_timing.turned_beyond": (TURNING[1].base_rotation, TURNING[2].orientation),
     "aloft.blocks.control.followed_plan.follow_plan": (*FOLLOWED, FLOWN, LEG_TARGETS),
     "aloft.blocks.control.followed_plan.keeps_acceleration": (FOLLOWED[0], FOLLOWED[2], FLOWN),
     "aloft.blocks.control.followed_plan.go_on": (FOLLOWED[0], FOLLOWED[2], FLOWN, LEG_TARGETS),
     "aloft.blocks.control.followed_plan.share_of_lead": FOLLOWED[2:],
-    "aloft.blocks.control.followed_plan.lead_of_turn": (*FOLLOWED, 0.1),
     "aloft.blocks.control.followed_plan.planned_pitch": FOLLOWED[2:],
     "aloft.blocks.control.followed_plan.turned_too_far": (1, FOLLOWED[1], 0.1),
     "aloft.blocks.control.followed_plan.level_sole": (1, 0.08, *FOLLOWED[1:], 0.1, LEG_TARGETS),

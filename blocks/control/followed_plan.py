@@ -10,12 +10,8 @@ from ...mathematics.kernel import kernel
 from ...mathematics.polynomials import minimum_jerk
 from ...robots.five_joint_track import LegTargets
 
-TAPER = 0.5
-"""Share of ``turn_time`` at the end of the flight, in which the legs return to the plan's time."""
 BEFORE = 0.006
 """Accelerations are read ahead of time, so those of the last part [s] of a flight are of its landing."""
-ONSET = 0.3
-"""Share of ``turn_time`` at its beginning, in which they leave it."""
 
 
 class PlannedJoints(NamedTuple):
@@ -26,7 +22,6 @@ class PlannedJoints(NamedTuple):
     lift_off_time: Array
     touchdown_time: Array
     orientation: Array
-    angular_momentum: Array
     joint_position: Array
     joint_velocity: Array
     joint_acceleration: Array
@@ -37,9 +32,6 @@ class Following(NamedTuple):
 
     plan_lead: Array
     level_time: Array
-    turn_gain: Array
-    turn_time: Array
-    turn_limit: Array
     late_time: Array
 
 
@@ -78,7 +70,6 @@ def follow_plan(
     remembered in ``flown``."""
     ahead = float(following.plan_lead[0]) * share_of_lead(plan)
     pitch = planned_pitch(plan)
-    ahead += lead_of_turn(following, soles, plan, pitch)
     if not keeps_acceleration(following, plan, flown):
         for joint in range(flown.acceleration.shape[0]):
             flown.acceleration[joint] = plan.joint_acceleration[joint]
@@ -136,23 +127,6 @@ def share_of_lead(plan: PlannedJoints) -> float:
     if since < 0.0 or lasts <= 0.0:
         return 1.0
     return min(2.0 * since / lasts, 1.0)
-
-
-@kernel
-def lead_of_turn(following: Following, soles: Soles, plan: PlannedJoints, pitch: float) -> float:
-    """How much earlier [s] the legs move because the base has turned further about its y axis than the
-    ``pitch`` [rad] of the plan; negative: later."""
-    left = float(plan.touchdown_time[()]) - float(plan.time[()])
-    gain, lasts = float(following.turn_gain[0]), float(following.turn_time[0])
-    if gain == 0.0 or left > lasts or left <= 0.0:
-        return 0.0
-    onset, _, _ = minimum_jerk((lasts - left) / (ONSET * lasts))
-    taper, _, _ = minimum_jerk(left / (TAPER * lasts))
-    most = float(following.turn_limit[0])
-    ahead = gain * turned_too_far(0, soles, pitch)
-    if plan.angular_momentum[1] < 0.0:
-        ahead = -ahead
-    return onset * taper * min(max(ahead, -most), most)
 
 
 @kernel

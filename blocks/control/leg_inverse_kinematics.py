@@ -86,18 +86,12 @@ class LegInverseKinematics(KernelBlock):
     somersault depends on how far the legs are tucked, so its rotation is right only if all joints
     follow the plan.
 
-    A robot never turns exactly as planned, so the plan can be followed with regard to that, from the
-    targets of feet whose soles are level in the world (``landing.alpha`` 1). Let e be by how much the
-    base has turned further about its lateral axis than in the plan. The joints are those of the plan
-    later by::
-
-        plan_lead + turn_gain e,     the latter within turn_limit, and negative in a backward rotation
-
-    The lead grows until the middle of the flight and makes up for what drives lag behind. The term
-    with e counts from ``turn_time`` before the planned touchdown and ends with it: a robot that has
-    turned too far leaves its tuck earlier, and turns slower. From ``level_time`` before touchdown on the
-    last joint of each leg about the lateral axis turns the sole by -e, so that heel and toe touch
-    down together. It reaches that in half of the time. All three are off by default.
+    The plan can be followed in two other ways, both off by default. The joints are ahead of the plan by
+    ``plan_lead``, which makes up for what drives lag behind, and grows until the middle of the flight. A
+    robot never turns exactly as planned: let e be by how much the base has turned further about its
+    lateral axis, from the targets of feet whose soles are level in the world (``landing.alpha`` 1). From
+    ``level_time`` before touchdown on the last joint of each leg about the lateral axis turns the sole by
+    -e, so that heel and toe touch down together. It reaches that in half of the time.
 
     A robot may land later than planned. For ``late_time`` after the planned touchdown the joints of a leg
     that is still in the air keep their last acceleration of the flight, so that its feet slow down further.
@@ -154,17 +148,6 @@ class LegInverseKinematics(KernelBlock):
             text="how long before touchdown the soles of a plan that is followed begin to become "
             "level; never with 0",
         )  # fmt: skip
-        turn_gain: float = live_parameter(
-            0.0, unit="s/rad", ge=0.0, le=1.0,
-            text="by how much earlier the legs move for every rad that the base has turned further than in "
-            "the plan",
-        )  # fmt: skip
-        turn_time: float = live_parameter(
-            0.2, unit="s", gt=0.0, text="how long before touchdown they begin to do that"
-        )
-        turn_limit: float = live_parameter(
-            0.012, unit="s", ge=0.0, le=0.02, text="how much earlier or later they move at most"
-        )
         late_time: float = live_parameter(
             0.0, unit="s", ge=0.0, le=0.03,
             text="how long after the planned touchdown legs that follow a plan go on as in its flight",

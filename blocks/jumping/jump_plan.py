@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from difflib import get_close_matches
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
+from ...mathematics.arrays import Array
 from ...mathematics.compiling.kernel_call import KernelCall
-from ...planner.library.jump_table import JumpTableReader
+from ...planner.library.jump_table import JumpTable, JumpTableReader
 from ...runtime.language.block import Context, Input, Metric, Misfit, Output, State
 from ...runtime.language.errors import BlockError
 from ...runtime.language.kernel_block import KernelBlock
@@ -25,6 +26,7 @@ from .plan_progress import (
     follow_motion,
     plan_instant,
 )
+from .turn_timing import Body, Pose, Rotation, Turning, TurnProgress, TurnSettings, follow_turn
 
 if TYPE_CHECKING:
     from ...planner.checking.validity import ValidityReport
@@ -43,6 +45,7 @@ class PlanProgress(Signal):
 
     late = Field(unit="s", text="how much later than by the clock the plan is read")
     before = Field(unit="s", text="the same before the thrust's last part")
+    spin = Field(unit="", text="how fast a somersault turns, as a share of the plan's rate")
 
 
 class JumpPlan(KernelBlock):
@@ -80,6 +83,9 @@ class JumpPlan(KernelBlock):
     shifted with it, and ``reference.time`` with them. For this the feedforward is the mean over the
     tick in which the command holds: a thrust may end between two ticks.
 
+    **Somersaults.** With ``turning`` a plan that turns over is timed in flight by how far the robot has
+    turned and how long it will fly (``turn_timing.follow_turn``). Other plans are followed as without.
+
     What follows from the task it tells other blocks of the graph: the ``scene`` with its steps, for
     the simulator, and for the score the number of ``jumps`` and, of the last one, where it ends:
     ``landing_height``, ``distance`` [m, forward and left], ``yaw`` [rad], and ``rise`` [m] where the
@@ -87,8 +93,9 @@ class JumpPlan(KernelBlock):
     ``momentum_correction`` [N m s] that a rehearsal of the plan with this controller has learnt
     (``aloft plan --rehearse``), which are zero where there was none, or with ``rehearsed: false``.
 
-    But for this and the progress the block follows time alone. It raises ``BlockError`` at load where the task cannot be read or is for another robot, where it cannot be
-    planned, or where its plan must be valid and is not; the message says which constraint or test.
+    But for this, the progress and the rotation the block follows time alone. It raises ``BlockError`` at
+    load where the task cannot be read or is for another robot, where it cannot be planned, or where its
+    plan must be valid and is not; the message says which constraint or test.
     """
 
     class Params(Parameters):
@@ -117,6 +124,9 @@ class JumpPlan(KernelBlock):
         )
         progress_limit: float = parameter(
             0.008, unit="s", ge=0.0, le=0.05, text="how much later or earlier a thrust may end"
+        )
+        turning: Turning | None = parameter(
+            None, text="how a somersault is timed by its rotation in flight; none: by the clock"
         )
         library: str = parameter(
             "", text="folder where new plans are kept; the user's cache if empty"
@@ -247,10 +257,9 @@ class JumpPlan(KernelBlock):
         robot, task = self.robot, planned_task(self.params, self.context)
         plan = self._plan(task, robot)
         self._report = self._report_validity(plan)
-        reader = JumpTableReader(
-            reference_table_once(plan, robot, self.params.stand_time), self.reference
-        )
-        self.kernel_calls = self._calls(reader)
+        table = reference_table_once(plan, robot, self.params.stand_time)
+        reader = JumpTableReader(table, self.reference)
+        self.kernel_calls = [*self._calls(reader), *self._turning(reader.instant, table)]
 
     def _calls(self, reader: JumpTableReader) -> list[KernelCall]:
         """Find the instant of the plan, read it, and follow the motion where that is asked for."""
@@ -280,6 +289,22 @@ class JumpPlan(KernelBlock):
                 )
             )
         return calls
+
+    def _turning(self, instant: Array, table: JumpTable) -> Iterator[KernelCall]:
+        """Follow the rotation of a somersault in flight where that is asked for."""
+        from ...planner.library.flight_rotation import flight_rotation
+
+        given, terms, reference = self.params.turning, self.terms, self.reference
+        if given is None or "terms" not in self.context.wired:
+            return
+        rotation = flight_rotation(table, self.robot)
+        if rotation is not None:
+            yield KernelCall(
+                follow_turn, instant, Body(*(getattr(terms, name) for name in Body._fields)),
+                Pose(*(getattr(reference, name) for name in Pose._fields)), Rotation(*rotation),
+                TurnSettings(given.gain, given.early, given.late, given.aim, self.period),
+                TurnProgress(self.progress.late, self.progress.spin),
+            )  # fmt: skip
 
     def metrics(self) -> Mapping[str, Metric]:
         report = self._report

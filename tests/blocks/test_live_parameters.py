@@ -253,10 +253,7 @@ SCENES: Mapping[str, list[Scene]] = {
         Scene({"speed_limit": 0.5}),
         Scene({"level": 0.9}),
         Scene({}, beyond_reach),
-        *(
-            Scene({"follow": "plan", "level_time": 0.1, "turn_gain": gain}, nearly_landed)
-            for gain in (0.5, 0.002)
-        ),
+        Scene({"follow": "plan", "level_time": 0.1}, nearly_landed),
         Scene({"follow": "plan"}, landing_late),
     ],
     "blocks.WholeBodyController": [

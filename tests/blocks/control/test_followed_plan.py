@@ -25,7 +25,7 @@ def in_flight(params, **reference):
     bench.set(
         "reference", phase=int(Phase.FLIGHT), lift_off_time=1.0, touchdown_time=1.4,
         orientation=[0.0, 0.0, 0.0, 1.0], joint_velocity=2.0, joint_acceleration=-50.0,
-        **{"angular_momentum": [0.0, 0.9, 0.0], "joint_position": -0.3, **reference},
+        **{"joint_position": -0.3, **reference},
     )  # fmt: skip
     bench.step()
     return bench.get("target")
@@ -38,19 +38,6 @@ def test_the_joints_are_ahead_of_the_plan_by_the_lead_from_mid_flight_on(time, a
     target = in_flight({"plan_lead": 0.01}, time=time)
     assert target.position == pytest.approx(-0.3 + 2.0 * ahead - 25.0 * ahead**2)
     assert target.velocity == pytest.approx(2.0 - 50.0 * ahead)
-
-
-@pytest.mark.parametrize(("momentum", "sign"), [(0.9, 1.0), (-0.9, -1.0)])
-def test_legs_move_earlier_where_the_base_has_turned_too_far(momentum, sign):
-    turning = {"time": 1.3, "angular_momentum": [0.0, momentum, 0.0]}
-    ahead = sign * 0.05 * 0.1
-    target = in_flight({"turn_gain": 0.05}, **turning)
-    assert target.velocity == pytest.approx(2.0 - 50.0 * ahead, abs=1e-9)
-    most = in_flight({"turn_gain": 1.0, "turn_limit": 0.003}, **turning)
-    assert most.velocity == pytest.approx(2.0 - 50.0 * sign * 0.003, abs=1e-9)
-    for time in (1.19, 1.4):
-        before = in_flight({"turn_gain": 0.05}, **{**turning, "time": time})
-        assert before.velocity == pytest.approx(2.0)
 
 
 def test_soles_become_level_by_the_ankles_before_touchdown():

@@ -86,7 +86,8 @@ def test_predicted_without_a_price_on_tilt_is_the_capture_point():
     moved = pushed(bench, [0.5, -0.3, 0.0], [0.03, 0.05, 0.0]) - planned
     rate = math.sqrt(GRAVITY / -float(standing_feet(ROBOT)[:, 2].mean()))
     linear, angular = 1.0 / (MASS * rate), rate / (MASS * GRAVITY)
-    expected = [linear * 0.5 + angular * 0.05, -linear * 0.3 - angular * 0.03, 0.0]
+    aside = -0.5 * (linear * 0.3 + angular * 0.03)  # half of the way
+    expected = [linear * 0.5 + angular * 0.05, aside, 0.0]
     assert moved == pytest.approx(np.tile(expected, (2, 1)), abs=1e-12)
 
 
