@@ -17,7 +17,8 @@ REHEARSED := in_situ_18cm in_situ_25cm in_situ_32cm forward_38cm forward_60cm ba
 	sideways_35cm turn_180deg up_8cm up_12cm
 # One thread for each test process: the workers already take every core.
 SINGLE := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
-# Each worker takes a half of the tests in their order, so that what many tests share is made once.
+# Each worker takes a part of the tests in their order, so that what many tests share is made once;
+# tests/conftest.py makes one worker more than there are cores, as some tests wait.
 WORKERS := --numprocesses auto --dist worksteal
 
 .PHONY: setup jump test test-all lint format bench plans docs clean help

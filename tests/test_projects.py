@@ -61,6 +61,7 @@ def project(request: pytest.FixtureRequest, tmp_path: Path) -> Path:
     return folder
 
 
+@pytest.mark.long
 def test_every_command_of_the_page_works(bin_folder: Path, project: Path) -> None:
     where = run(bin_folder, project, "python -c 'import aloft; print(aloft.__file__)'")
     assert Path(where.stdout.strip()).is_relative_to(bin_folder.parent)

@@ -16,6 +16,7 @@ from ...planner.task.task import JumpTask, make_task
 from ...robots.description import find_robot
 from ..jumps.random_tasks import random_rows
 from ..rows import Row
+from .neighbours import neighbour_rows
 from .reach import reach_rows
 from .solvers import solver_rows
 
@@ -88,7 +89,7 @@ def planner(rounds: int = 3) -> list[Row]:
         note = "no plan" if plan_of is None else f"{plan_of.statistics['iterations']} iterations"
         rows.append(Row(f"plan in situ 15 cm, formulation {formulation}", seconds, "s", note=note))
     rows += solver_rows({name: BASIC[name] for name in BESIDE}, rounds)
-    return [*rows, *reach_rows(), *random_rows()]
+    return [*rows, *neighbour_rows(), *reach_rows(), *random_rows()]
 
 
 def _measure(task: JumpTask, rounds: int, warm: Any = None) -> tuple[float, Any]:

@@ -6,6 +6,7 @@ import json
 import os
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ import numpy as np
 
 from ...robots.description import RobotDescription
 from ..task.errors import PlanError
+from ..task.multipliers import multipliers_path, read_multipliers, write_multipliers
 from ..task.plan import JumpPlan, PlanFileError, read_plan, task_of_header, write_plan
 from ..task.task import JumpTask, TaskError
 from .shipped import shipped_folder
@@ -201,7 +203,8 @@ class PlanLibrary:
             except PlanFileError:
                 continue
             if plan.valid and plan.task.hash(self.robot) in name:
-                return plan
+                beside = multipliers_path(Path(name).parent, plan.task.hash(self.robot))
+                return replace(plan, multipliers=read_multipliers(beside))
         return None
 
     def farthest(self, task: JumpTask, parameter: str, modest: float) -> JumpPlan | None:
@@ -241,11 +244,9 @@ class PlanLibrary:
         """Every file with its header; broken files are left out."""
         for folder in self._folders:
             for path in sorted(folder.glob("*-*.npz")):
-                try:
-                    with np.load(path, allow_pickle=False) as file:
-                        yield path, json.loads(str(file["header"]))
-                except Exception:  # noqa: BLE001, S112  # a damaged archive raises nearly anything
-                    continue
+                header = _header(path)
+                if header is not None:
+                    yield path, header
 
     def prune(self, tasks: Iterable[JumpTask]) -> list[Path]:
         """Remove from this library's own folder every plan of a task that is none of these. Plans
@@ -261,6 +262,8 @@ class PlanLibrary:
         ]
         for path in others:
             path.unlink(missing_ok=True)
+            beside = multipliers_path(self.folder, path.stem.rpartition("-")[2])
+            beside.unlink(missing_ok=True)
         return others
 
     def add(self, plan: JumpPlan) -> Path:
@@ -270,6 +273,11 @@ class PlanLibrary:
         for other in self.folder.glob(f"*-{plan.task.hash(self.robot)}.npz"):
             if other != path:
                 other.unlink(missing_ok=True)
+        beside = multipliers_path(self.folder, plan.task.hash(self.robot))
+        if plan.multipliers is None:
+            beside.unlink(missing_ok=True)
+        else:
+            write_multipliers(beside, plan.multipliers)
         return path
 
     def plan(
@@ -296,6 +304,27 @@ class PlanLibrary:
         plan = solve_and_check(task, self.robot, near[0] if near else None, solve)
         self.add(plan)
         return plan, False
+
+
+_headers: dict[Path, tuple[tuple[int, int, int], dict[str, Any] | None]] = {}
+"""The headers that this process has read, with the state of their files then."""
+
+
+def _header(path: Path) -> dict[str, Any] | None:
+    """The header of a plan's file, not to be changed; ``None`` if it is broken. It is read again only
+    where the file was replaced."""
+    try:
+        found = path.stat()
+    except OSError:
+        return None
+    state = (found.st_mtime_ns, found.st_size, found.st_ino)
+    if path not in _headers or _headers[path][0] != state:
+        try:
+            with np.load(path, allow_pickle=False) as file:
+                _headers[path] = (state, json.loads(str(file["header"])))
+        except Exception:  # noqa: BLE001  # a damaged archive raises nearly anything
+            _headers[path] = (state, None)
+    return _headers[path][1]
 
 
 def _robot_of(path: Path) -> str | None:

@@ -47,7 +47,7 @@ def use_panel_product() -> bool:
     if not sys.platform.startswith("linux"):
         return False
     blasfeo = _blasfeo()
-    if blasfeo is None or _is_loaded(blasfeo):
+    if blasfeo is None or is_loaded(blasfeo):
         return False
     try:
         library = _compiled(blasfeo)
@@ -68,7 +68,7 @@ def _blasfeo() -> Path | None:
     return next(iter(sorted(folder.glob("libblasfeo.so.?"))), None)
 
 
-def _is_loaded(library: Path) -> bool:
+def is_loaded(library: Path) -> bool:
     """Whether this process has loaded a library, which then has found its functions already."""
     try:
         ctypes.CDLL(str(library), os.RTLD_NOLOAD)

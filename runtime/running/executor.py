@@ -341,8 +341,11 @@ class Executor:
 
 @contextmanager
 def _quiet_collector(*, collect: bool) -> Iterator[None]:
-    """Switch the garbage collector off within, and exempt all existing objects from later
-    collections, so that no collection interrupts a tick.
+    """Switch the garbage collector off within, and exempt all existing objects from collections that
+    are asked for, so that no collection interrupts a tick.
+
+    Where the caller, or Python at its start, has frozen objects already, they stay frozen and no
+    others are: ``gc.unfreeze`` knows only all.
 
     With ``collect`` garbage is collected before. That takes tens of milliseconds, which count where
     many short runs follow each other as fast as possible.
@@ -351,8 +354,9 @@ def _quiet_collector(*, collect: bool) -> Iterator[None]:
     with ExitStack() as after:
         if collect:
             gc.collect()
-        gc.freeze()
-        after.callback(gc.unfreeze)
+        if not gc.get_freeze_count():
+            gc.freeze()
+            after.callback(gc.unfreeze)
         gc.disable()
         if enabled:
             after.callback(gc.enable)

@@ -29,6 +29,7 @@ def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
+@pytest.mark.long
 @needs_vulkan
 def test_the_viewer_finds_no_fault(recording: Path, tmp_path: Path) -> None:
     from rerun.experimental import ViewerClient

@@ -24,7 +24,7 @@ import json, sys
 sys.path[:] = json.loads(sys.argv[1])
 from aloft.planner.solving import panel_product as product
 used = product.use_panel_product()
-again = product._is_loaded(product._blasfeo())
+again = product.is_loaded(product._blasfeo())
 import casadi as ca
 x, y = ca.SX.sym("x"), ca.SX.sym("y")
 nlp = {"x": ca.vertcat(x, y), "f": (x - 1) ** 2 + y**2, "g": ca.vertcat()}

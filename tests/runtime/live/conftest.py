@@ -2,6 +2,7 @@
 
 import threading
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -59,11 +60,26 @@ def start(file: Path, path: Path) -> Running:
     return Running(bound, path, file, thread)
 
 
+def write_graph(folder: Path) -> Path:
+    """The file of the graph, written there."""
+    (folder / "part.yaml").write_text(PART)
+    (folder / "waves.yaml").write_text(GRAPH)
+    return folder / "waves.yaml"
+
+
+@contextmanager
+def serving(live: LiveRun, save: Path) -> Iterator[LiveServer]:
+    """The page of a graph that runs, served in a thread."""
+    made = LiveServer(live, save)
+    threading.Thread(target=made.serve_forever, args=(0.02,), daemon=True).start()
+    yield made
+    made.shutdown()
+    made.server_close()
+
+
 @pytest.fixture
 def graph_file(tmp_path: Path) -> Path:
-    (tmp_path / "part.yaml").write_text(PART)
-    (tmp_path / "waves.yaml").write_text(GRAPH)
-    return tmp_path / "waves.yaml"
+    return write_graph(tmp_path)
 
 
 @pytest.fixture
@@ -89,8 +105,5 @@ def live(running: Running) -> Iterator[LiveRun]:
 @pytest.fixture
 def server(live: LiveRun, tmp_path: Path) -> Iterator[LiveServer]:
     """The page of the graph that runs, served in a thread."""
-    made = LiveServer(live, tmp_path / "waves-tuned.yaml")
-    threading.Thread(target=made.serve_forever, args=(0.02,), daemon=True).start()
-    yield made
-    made.shutdown()
-    made.server_close()
+    with serving(live, tmp_path / "waves-tuned.yaml") as made:
+        yield made

@@ -2,14 +2,16 @@
 
 import http.client
 import json
+from collections.abc import Iterator
 from typing import Any
 
 import pytest
 
+from aloft.runtime.live.live_run import LiveRun
 from aloft.runtime.live.live_server import LONGEST_BODY, LiveServer
 from aloft.runtime.loading import load
 
-from .conftest import Running
+from .conftest import Running, serving, start, write_graph
 
 JSON = "application/json"
 
@@ -63,6 +65,20 @@ def test_what_it_answers(server: LiveServer) -> None:
     assert load(server.save).block("wave").params.frequency == 5.0  # type: ignore[attr-defined]
 
 
+@pytest.fixture(scope="module")
+def refusing(tmp_path_factory: pytest.TempPathFactory) -> Iterator[LiveServer]:
+    """A server for all requests that are refused: each leaves everything as it was."""
+    running = start(
+        write_graph(tmp_path_factory.mktemp("refusing")),
+        tmp_path_factory.mktemp("s") / "waves.sock",
+    )
+    live = LiveRun(running.path)
+    with serving(live, running.file.with_name("waves-tuned.yaml")) as server:
+        yield server
+    live.close()
+    running.stop()
+
+
 @pytest.mark.parametrize(
     ("method", "path", "body", "headers", "status", "said"),
     [
@@ -94,13 +110,13 @@ def test_what_it_answers(server: LiveServer) -> None:
     ],
 )  # fmt: skip
 def test_what_it_refuses(
-    server: LiveServer, method: str, path: str, body: Any, headers: dict[str, str | None],
+    refusing: LiveServer, method: str, path: str, body: Any, headers: dict[str, str | None],
     status: int, said: str,
 ) -> None:  # fmt: skip
-    found, answer = ask(server, method, path, body, **headers)
+    found, answer = ask(refusing, method, path, body, **headers)
     assert found == status
     assert said in (answer["error"] if isinstance(answer, dict) else answer)
-    _, now = ask(server, "GET", "/parameters")
+    _, now = ask(refusing, "GET", "/parameters")
     assert all(row["value"] == row["start"] for row in now["parameters"]), "nothing was changed"
 
 

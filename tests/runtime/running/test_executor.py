@@ -349,8 +349,10 @@ def test_two_runs_of_one_executor_are_refused() -> None:
         executor.run()
 
 
-def test_the_collector_is_quiet_while_running_and_as_before_afterwards() -> None:
+@pytest.mark.parametrize("frozen_before", [False, True])
+def test_the_collector_is_quiet_while_running_and_as_before_afterwards(frozen_before: bool) -> None:
     seen = []
+    (gc.freeze if frozen_before else gc.unfreeze)()
 
     class Witness(Ticks):
         def step(self) -> None:
@@ -358,9 +360,13 @@ def test_the_collector_is_quiet_while_running_and_as_before_afterwards() -> None
 
     assert gc.isenabled()
     frozen = gc.get_freeze_count()
-    run(checked_graph({"w": Use(Witness)}, ticks=2))
-    assert seen == [False, False]
-    assert gc.isenabled() and gc.get_freeze_count() == frozen
+    assert (frozen > 0) == frozen_before
+    try:
+        run(checked_graph({"w": Use(Witness)}, ticks=2))
+        assert seen == [False, False]
+        assert gc.isenabled() and gc.get_freeze_count() == frozen
+    finally:
+        gc.freeze()  # as tests/conftest.py leaves it
 
 
 def test_it_runs_in_another_thread() -> None:
