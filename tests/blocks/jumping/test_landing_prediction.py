@@ -166,7 +166,7 @@ def ahead(off, speed, **params):
 
 
 def test_predicted_feet_make_good_for_a_small_miss_of_their_place():
-    capture = 0.04 / math.sqrt(GRAVITY / -float(standing_feet(ROBOT)[:, 2].mean()))
+    capture = 0.75 * 0.04 / math.sqrt(GRAVITY / -float(standing_feet(ROBOT)[:, 2].mean()))
     off, speed, miss = 0.01, 0.04, 0.01 + 0.2 * 0.04
     assert ahead(off, speed) == pytest.approx([capture] * 2, abs=1e-9)
     corrected = ahead(off, speed, place_gain=0.5, place_range=1e3)
