@@ -19,7 +19,7 @@ from .planning.plan_output import (
     recorded_motion,
     summary,
 )
-from .planning.rehearse import REHEARSE_HELP, rehearsal_of_file
+from .planning.rehearse import LANDING_HELP, REHEARSE_HELP, rehearsal_of_file
 from .shared.options import JsonBesideTables
 from .shared.output import console, errors_reported, print_error, print_json, say
 from .shared.viewing import how_to_view
@@ -68,6 +68,9 @@ def plan(
         ),
     ] = True,
     rehearse: Annotated[bool, typer.Option("--rehearse", help=REHEARSE_HELP)] = False,
+    rehearse_landing: Annotated[
+        bool, typer.Option("--rehearse-landing", help=LANDING_HELP)
+    ] = False,
     as_json: JsonBesideTables = False,
 ) -> None:
     """Plan jumps, check each with exact dynamics, and keep the valid ones in the plan library."""
@@ -75,8 +78,11 @@ def plan(
         raise typer.BadParameter("give task files, or --library with a grid file, or --list")
     if prune and (keep is None or not tasks):
         raise typer.BadParameter("--prune goes with task files and --keep")
-    if rehearse and not tasks:
-        raise typer.BadParameter("--rehearse goes with task files")
+    if rehearse and rehearse_landing:
+        raise typer.BadParameter("give --rehearse or --rehearse-landing")
+    if (rehearse or rehearse_landing) and not tasks:
+        named = "--rehearse" if rehearse else "--rehearse-landing"
+        raise typer.BadParameter(f"{named} goes with task files")
     screen = console(to_stderr=as_json)
     with errors_reported(as_json):
         if listed:
@@ -86,8 +92,9 @@ def plan(
         else:
             folder = None if no_pictures else out
             code = plan_tasks(
-                tasks or [], keep, anew, folder, nearest, prune, rehearse, screen, as_json
-            )
+                tasks or [], keep, anew, folder, nearest, prune, rehearse, screen, as_json,
+                rehearse_landing,
+            )  # fmt: skip
     raise typer.Exit(code)
 
 
@@ -101,6 +108,7 @@ def plan_tasks(
     rehearse: bool,
     screen: Console,
     as_json: bool,
+    landing: bool = False,
 ) -> ExitCode:
     """Plan each task file, also after one has failed. All files are read before anything is planned.
 
@@ -125,7 +133,8 @@ def plan_tasks(
         library = PlanLibrary(find_robot(task.robot, path.parent), keep)
         row = plan_task(task, library, anew, out, nearest, screen)
         if row["success"]:
-            row |= rehearsal_of_file(path, task, library, keep, rehearse, screen)
+            wanted = rehearse or landing
+            row |= rehearsal_of_file(path, task, library, keep, wanted, screen, landing)
         rows.append(row)
     failed = [row["task"] for row in rows if not row["success"]]
     if prune and not failed:

@@ -19,11 +19,10 @@ from ...runtime.language.parameters import Parameters, parameter
 from ...runtime.language.signals import Field, Signal
 from ..signals import DelayEstimate, DynamicsTerms, JumpReference
 from .plan_progress import (
-    Motion,
-    Planned,
+    FallSettings,
     Progress,
     ProgressSettings,
-    follow_motion,
+    following_calls,
     plan_instant,
 )
 from .turn_timing import Body, Pose, Rotation, Turning, TurnProgress, TurnSettings, follow_turn
@@ -81,7 +80,10 @@ class JumpPlan(KernelBlock):
     The plan is read later by this delay, which is within ``progress_limit``; so a robot that is too
     slow is pushed longer, as far as its legs reach. Everything behind, flight and landing too, is
     shifted with it, and ``reference.time`` with them. For this the feedforward is the mean over the
-    tick in which the command holds: a thrust may end between two ticks.
+    tick in which the command holds: a thrust may end between two ticks. A flight whose toes land
+    first (``reference.toes_first``) must end when the robot lands, because its toes slow down in the
+    last 10 ms only. With f the time in which the measured centre of mass falls to its planned height
+    at touchdown, there ``delay' = toes_gain (f - touchdown_time + time)``.
 
     **Somersaults.** With ``turning`` a plan that turns over is timed in flight by how far the robot has
     turned and how long it will fly (``turn_timing.follow_turn``). Other plans are followed as without.
@@ -124,6 +126,9 @@ class JumpPlan(KernelBlock):
         )
         progress_limit: float = parameter(
             0.008, unit="s", ge=0.0, le=0.05, text="how much later or earlier a thrust may end"
+        )
+        toes_gain: float = parameter(
+            20.0, unit="1/s", ge=0.0, text="rate at which the plan is kept in time with such a fall"
         )
         turning: Turning | None = parameter(
             None, text="how a somersault is timed by its rotation in flight; none: by the clock"
@@ -274,20 +279,12 @@ class JumpPlan(KernelBlock):
             reader.call,
         ]  # fmt: skip
         if p.by == "progress" and "terms" in self.context.wired:
-            measured, planned = (
-                Motion(*(getattr(signal, name) for name in Motion._fields))
-                for signal in (self.terms, reference)
-            )
-            settings = ProgressSettings(
+            thrust = ProgressSettings(
                 float(p.progress_time), float(p.progress_gain), float(p.progress_limit), FASTEST,
                 period,
             )  # fmt: skip
-            others = Planned(*(getattr(reference, name) for name in Planned._fields))
-            calls.append(
-                KernelCall(
-                    follow_motion, reader.instant, measured, planned, others, settings, progress
-                )
-            )
+            fall = FallSettings(float(p.toes_gain), FASTEST, period)
+            calls += following_calls(reader.instant, self.terms, reference, thrust, fall, progress)
         return calls
 
     def _turning(self, instant: Array, table: JumpTable) -> Iterator[KernelCall]:

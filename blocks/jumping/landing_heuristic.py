@@ -91,8 +91,8 @@ class LandingHeuristic(KernelBlock):
         g_y = capture l^y / (m w) - capture_turn k^x w / (m g),    g_a = clearance |l^y| / (m w)
 
     These gains have no unit, so they are the same for robots of any size. p_max applies as above.
-    Aside they are a half: two feet that stand apart hold a capture point that is off their middle,
-    and a wide sideways step out of drawn up legs is at the end of the hips' reach.
+    They are less than 1, aside even more, because two feet that stand apart hold a capture point that
+    is off their middle, and a long way with drawn up legs is at the end of the hips' reach.
 
     A robot that lifts off with a slightly wrong velocity lands beside its place, and feet that go to
     the capture point land even further off. Let e be by how much unshifted feet would miss their
@@ -150,7 +150,7 @@ class LandingHeuristic(KernelBlock):
             text="share of the torso's rotation about x, y and z that the legs compensate",
         )
         toes_alpha: Shares = live_parameter(
-            (0.65, 0.65, 0.65),
+            (0.8, 0.8, 0.8),
             text="the same share where the plan lands on the toes first",
         )
         reach_share: float = live_parameter(

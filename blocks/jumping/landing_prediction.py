@@ -33,10 +33,10 @@ class PredictionGains(Parameters):
     """The gains of the law; the block's docstring has the equations."""
 
     capture: tuple[float, float] = live_parameter(
-        (1.0, 0.5), text="way per linear momentum ahead and aside, in units of 1/(m w)"
+        (0.75, 0.5), text="way per linear momentum ahead and aside, in units of 1/(m w)"
     )
     capture_turn: tuple[float, float] = live_parameter(
-        (1.0, 0.5), text="way per angular momentum about y and x, in units of w/(m g)"
+        (0.75, 0.5), text="way per angular momentum about y and x, in units of w/(m g)"
     )
     clearance: float = live_parameter(
         0.5, ge=0.0, text="feet apart per lateral momentum, in units of 1/(m w)"

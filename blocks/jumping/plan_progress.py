@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
-from ...mathematics.arrays import Array, Indices
+from ...mathematics.arrays import Array, Flags, Indices
+from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.constants import GRAVITY
 from ...mathematics.kernel import kernel
-from ..signals import Phase
+from ..signals import DynamicsTerms, JumpReference, Phase
 
 SLOWEST = 0.5
 """Vertical speed [m/s] below which a height makes no difference to the apex yet."""
@@ -79,6 +81,23 @@ class ProgressSettings(NamedTuple):
     period: float
 
 
+class Flight(NamedTuple):
+    """What else the plan says of a flight: its phase, when it ends [s], and whether the toes land first,
+    of shape () each."""
+
+    phase: Indices
+    touchdown_time: Array
+    toes_first: Flags
+
+
+class FallSettings(NamedTuple):
+    """The parameters of ``JumpPlan`` about such a flight, the largest rate of the delay, and the period."""
+
+    gain: float
+    fastest: float
+    period: float
+
+
 class Progress(NamedTuple):
     """The fields of ``PlanProgress``, of shape () each."""
 
@@ -145,9 +164,61 @@ def follow_motion(
 
 
 @kernel
+def follow_fall(
+    instant: Array,
+    measured: Motion,
+    reference: Motion,
+    planned: Flight,
+    settings: FallSettings,
+    progress: Progress,
+) -> None:
+    """Hasten or delay a flight whose toes land first, so that it ends when the fall does.
+
+    Args:
+        instant: as ``plan_instant`` writes it; all others but ``measured`` are of that instant.
+    """
+    if int(planned.phase[()]) != Phase.FLIGHT or not planned.toes_first[()]:
+        return
+    left = float(planned.touchdown_time[()]) - float(instant[0])
+    sinking = GRAVITY * left - float(reference.com_velocity[2])
+    lowest = float(reference.com[2]) - 0.5 * (sinking - float(reference.com_velocity[2])) * left
+    fall = time_to_fall(float(measured.com[2]) - lowest, float(measured.com_velocity[2]))
+    rate = settings.gain * (fall - left)
+    rate = min(max(rate, -settings.fastest), settings.fastest)
+    progress.late[()] = float(progress.late[()]) + rate * settings.period
+
+
+@kernel
+def time_to_fall(height: float, speed: float) -> float:
+    """The time [s] in which a body that is thrown up at ``speed`` [m/s] falls by ``height`` [m]."""
+    square = speed * speed + 2.0 * GRAVITY * max(height, 0.0)
+    return (speed + math.sqrt(square)) / GRAVITY
+
+
+@kernel
 def mean_height(position: Array) -> float:
     """The mean height [m] of positions (n, 3)."""
     total = 0.0
     for i in range(position.shape[0]):
         total += float(position[i, 2])
     return total / len(position)
+
+
+def following_calls(
+    instant: Array,
+    terms: DynamicsTerms,
+    reference: JumpReference,
+    thrust: ProgressSettings,
+    fall: FallSettings,
+    progress: Progress,
+) -> tuple[KernelCall, KernelCall]:
+    """The calls of ``follow_motion`` and ``follow_fall``, with the measured ``terms``."""
+    measured, planned = (
+        Motion(*(getattr(signal, name) for name in Motion._fields)) for signal in (terms, reference)
+    )
+    others = Planned(*(getattr(reference, name) for name in Planned._fields))
+    flight = Flight(*(getattr(reference, name) for name in Flight._fields))
+    return (
+        KernelCall(follow_motion, instant, measured, planned, others, thrust, progress),
+        KernelCall(follow_fall, instant, measured, planned, flight, fall, progress),
+    )

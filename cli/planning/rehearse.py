@@ -22,10 +22,12 @@ REHEARSE_HELP = (
     "Run the plan in simulation and learn what the controller misses at lift-off: 3 to 9 runs."
 )
 
+LANDING_HELP = "Rehearse the landing: learn what lands the torso upright and in its place; 72 runs of the robust trial."
+
 
 def rehearsal_of_file(
     file: Path, task: JumpTask, library: PlanLibrary, keep: Path | None, wanted: bool,
-    screen: Console,
+    screen: Console, landing: bool = False,
 ) -> dict[str, Any]:  # fmt: skip
     """As ``rehearsal``, of a task's file in the shipped graph of its robot."""
     from ...runtime.loading.reading.nodes import text_of
@@ -35,14 +37,16 @@ def rehearsal_of_file(
     settings = [f"plan.task={text_of(str(file.resolve()))}"]
     if keep is not None:
         settings.append(f"plan.library={text_of(str(keep.resolve()))}")
-    return rehearsal(graph_of(task.robot), settings, task, library, wanted, screen)
+    return rehearsal(graph_of(task.robot), settings, task, library, wanted, screen, landing)
 
 
 def rehearsal(
     path: Path, settings: Sequence[str], task: JumpTask, library: PlanLibrary, wanted: bool,
-    screen: Console,
+    screen: Console, landing: bool = False,
 ) -> dict[str, Any]:  # fmt: skip
     """Rehearse a kept plan in a graph if that is ``wanted``, and show what was learnt now or before.
+
+    With ``landing`` it is rehearsed as far as its landing (``studies/landing_rehearsal``).
 
     Returns:
         What the plan's JSON object says of it: nothing where nothing was rehearsed.
@@ -59,6 +63,7 @@ def rehearsal(
     )
     from ...runtime.graph import load
     from ...runtime.loading import flatten
+    from ...studies.landing_rehearsal import rehearse_landing, response
     from ...studies.rehearsal import LEVER, corrected_parameters, rehearse
 
     if not wanted and not was_rehearsed(library, task):
@@ -76,10 +81,15 @@ def rehearsal(
         raise AloftError(f"there is no valid plan of {task.name} to rehearse")
     unit = library.robot.total_mass * LEVER * float(plan.com[0, 2])
     with screen.status(f"rehearsing {task.name}") as status:
-        learnt = rehearse(
-            path, settings, parameters, unit,
-            on_try=lambda text: status.update(f"rehearsing {task.name}: {text}"),
-        )  # fmt: skip
+
+        def on_try(text: str) -> None:
+            status.update(f"rehearsing {task.name}: {text}")
+
+        if landing:
+            answer = response(plan, library.robot.total_mass)
+            learnt = rehearse_landing(path, settings, parameters, answer, unit, on_try=on_try)
+        else:
+            learnt = rehearse(path, settings, parameters, unit, on_try=on_try)
     kept = keep_rehearsed(library, task, controller, learnt)
     shown = show(learnt, task, screen)
     say(screen, f"rehearsal: {kept}")

@@ -128,6 +128,10 @@ def test_pruning_keeps_the_tasks_that_are_given(
     assert [name for name in left if not name.startswith(("g1_", "go2_", "solo12_"))] == ["in_situ"]
     assert len(left) == 6
     assert "--prune goes with" in call("plan", one, "--prune", code=2).stderr
+    both = call("plan", one, "--rehearse", "--rehearse-landing", code=2).stderr
+    assert "give --rehearse or" in both
+    listed = call("plan", "--list", "--rehearse-landing", code=2).stderr
+    assert "--rehearse-landing goes" in listed
 
 
 def test_a_wrong_task_is_refused(folder: Path, call_json: CallJson, call: Call) -> None:

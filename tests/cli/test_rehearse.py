@@ -13,6 +13,7 @@ from aloft.planner.library.library import SHIPPED, PlanLibrary
 from aloft.planner.library.rehearsed import Deviation, Rehearsed
 from aloft.planner.task.read_task import read_task
 from aloft.robots.description import find_robot
+from aloft.studies import landing_rehearsal as landings
 from aloft.studies import rehearsal as study
 
 FILE = SHIPPED.parent / "tasks" / "in_situ_12cm.yaml"
@@ -51,3 +52,26 @@ def test_it_is_made_once_kept_and_shown(tmp_path: Path, monkeypatch: pytest.Monk
         assert words in text.replace("\n", ""), words
     again, shown = show(wanted=False)
     assert len(made) == 1 and again == row and "3 of 3" in shown
+
+
+def test_the_landing_is_rehearsed_where_that_is_asked_for(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made: list[Any] = []
+
+    def rehearse_landing(*arguments: Any, **more: Any) -> Rehearsed:
+        made.append(arguments)
+        return replace(LEARNT, trial="robust")
+
+    def other(*arguments: Any, **more: Any) -> Rehearsed:
+        raise AssertionError("the lift-off alone was rehearsed")
+
+    monkeypatch.setattr(landings, "rehearse_landing", rehearse_landing)
+    monkeypatch.setattr(study, "rehearse", other)
+    task, library = read_task(FILE), PlanLibrary(find_robot("bruce"), tmp_path)
+    screen = Console(file=io.StringIO(), width=120)
+    row = verb.rehearsal_of_file(FILE, task, library, tmp_path, True, screen, landing=True)
+    assert len(made) == 1 and made[0][3].shape == (5, 5)
+    assert row["rehearsal"]["trial"] == "robust" and row["rehearsal"]["corrects"]
+    again = verb.rehearsal_of_file(FILE, task, library, tmp_path, False, screen)
+    assert len(made) == 1 and again == row, "it is found where the graph finds it"

@@ -86,8 +86,8 @@ def test_predicted_without_a_price_on_tilt_is_the_capture_point():
     moved = pushed(bench, [0.5, -0.3, 0.0], [0.03, 0.05, 0.0]) - planned
     rate = math.sqrt(GRAVITY / -float(standing_feet(ROBOT)[:, 2].mean()))
     linear, angular = 1.0 / (MASS * rate), rate / (MASS * GRAVITY)
-    aside = -0.5 * (linear * 0.3 + angular * 0.03)  # half of the way
-    expected = [linear * 0.5 + angular * 0.05, aside, 0.0]
+    ahead, aside = linear * 0.5 + angular * 0.05, -linear * 0.3 - angular * 0.03
+    expected = [0.75 * ahead, 0.5 * aside, 0.0]  # the shares of the way that the law goes
     assert moved == pytest.approx(np.tile(expected, (2, 1)), abs=1e-12)
 
 
@@ -166,7 +166,7 @@ def ahead(off, speed, **params):
 
 
 def test_predicted_feet_make_good_for_a_small_miss_of_their_place():
-    capture = 0.04 / math.sqrt(GRAVITY / -float(standing_feet(ROBOT)[:, 2].mean()))
+    capture = 0.75 * 0.04 / math.sqrt(GRAVITY / -float(standing_feet(ROBOT)[:, 2].mean()))
     off, speed, miss = 0.01, 0.04, 0.01 + 0.2 * 0.04
     assert ahead(off, speed) == pytest.approx([capture] * 2, abs=1e-9)
     corrected = ahead(off, speed, place_gain=0.5, place_range=1e3)

@@ -2,9 +2,20 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
-from aloft.blocks.jumping.plan_progress import delay_change, speed_error
+from aloft.blocks.jumping.plan_progress import (
+    FallSettings,
+    Flight,
+    Motion,
+    Progress,
+    delay_change,
+    follow_fall,
+    speed_error,
+    time_to_fall,
+)
+from aloft.blocks.signals import Phase
 from aloft.mathematics.constants import GRAVITY
 
 
@@ -48,3 +59,51 @@ def test_the_rate_is_limited(error):
 
 def test_without_a_push_the_change_stays_finite():
     assert delay_change(-0.01, -9.8, 40.0, 0.9, 0.002) == pytest.approx(1e-4)
+
+
+PERIOD, LASTS, SPEED = 0.002, 0.39, 1.05
+"""s, s and m/s: the period, the planned flight and its speed at lift-off."""
+
+
+def ballistic(since, lower, slower):
+    height = 0.4 - lower + (SPEED - slower) * since - 0.5 * GRAVITY * since**2
+    speed = SPEED - slower - GRAVITY * since
+    return Motion(np.array([0.0, 0.0, height]), np.array([0.0, 0.0, speed]), np.zeros((2, 3)))
+
+
+def fly(lower=0.0, slower=0.0, gain=20.0, phase=Phase.FLIGHT, toes_first=True):
+    """By how much later the plan is read in the end [s], and when a robot comes down that flies off
+    ``lower`` [m] and ``slower`` [m/s] than in the plan, after its planned touchdown [s]."""
+    progress = Progress(np.array(0.0), np.array(0.0))
+    planned = Flight(np.array(int(phase)), np.array(LASTS), np.array(toes_first))
+    settings = FallSettings(gain, 0.5, PERIOD)
+    for tick in range(round(0.97 * LASTS / PERIOD)):
+        present = tick * PERIOD
+        read = np.array([present - float(progress.late), 0.0, 0.0])
+        follow_fall(
+            read, ballistic(present, lower, slower), ballistic(read[0], 0.0, 0.0), planned,
+            settings, progress,
+        )  # fmt: skip
+    lowest = float(ballistic(LASTS, 0.0, 0.0).com[2])
+    return float(progress.late), time_to_fall(0.4 - lower - lowest, SPEED - slower) - LASTS
+
+
+def test_a_fall_takes_its_time():
+    assert time_to_fall(0.0, 1.0) == pytest.approx(2.0 / GRAVITY)
+    assert time_to_fall(0.5 * GRAVITY, 0.0) == pytest.approx(1.0)
+    assert time_to_fall(-0.1, -1.0) == 0.0, "it is down already"
+
+
+@pytest.mark.parametrize(("lower", "slower"), [(0.01, 0.0), (0.0, 0.05), (-0.01, -0.03)])
+def test_toes_land_in_the_plan_when_the_robot_does(lower, slower):
+    late, due = fly(lower, slower)
+    assert abs(due) > 0.003
+    assert late == pytest.approx(due, abs=2e-4)
+
+
+@pytest.mark.parametrize(
+    "other",
+    [{"phase": Phase.THRUST}, {"phase": Phase.LANDING}, {"toes_first": False}, {"gain": 0.0}],
+)
+def test_other_parts_of_a_plan_keep_their_time(other):
+    assert fly(0.01, 0.05, **other)[0] == 0.0
