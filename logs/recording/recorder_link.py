@@ -151,7 +151,8 @@ class RecorderLink:
             self._input.close()
         self.stirs()
         while self._listen(0.05):
-            if self.lives() and not goes_on():
+            # In this order: the process may end just now, and then ``goes_on`` says no as well.
+            if not goes_on() and self.lives():
                 return None, f"the recorder has been stuck for {self.stalled_for():.0f} s"
         self._output.close()
         code = self._process.wait()

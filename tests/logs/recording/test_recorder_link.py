@@ -177,3 +177,24 @@ def test_a_sink_that_hangs_without_waiting_ends_the_run() -> None:
     assert (
         "the runtime (At) hung at tick 5 (0.010 s): it did not return within 0.3 s" in result.reason
     )
+
+
+def test_a_recorder_that_ends_between_two_looks_is_not_stuck(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    lives, finish = RecorderLink.lives, RecorderLink.finish
+
+    def ends_then(link: RecorderLink) -> bool:
+        alive = lives(link)
+        link._process.wait(60.0)
+        return alive
+
+    def finish_so(link: RecorderLink, *arguments: Any) -> Any:
+        monkeypatch.setattr(RecorderLink, "lives", ends_then)
+        return finish(link, *arguments)
+
+    monkeypatch.setattr(RecorderLink, "finish", finish_so)
+    recorder = Recorder(tmp_path / "a.rrd")
+    result = run(graph(5), sinks=[recorder])
+    assert result.warnings == ()
+    assert recorder.report is not None and recorder.report.rows == 5
