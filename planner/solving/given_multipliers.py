@@ -20,6 +20,7 @@ import subprocess
 import sys
 from functools import lru_cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -137,12 +138,13 @@ def works(library: str) -> bool:
 
     _load(Path(library))
     x, u, y = ca.MX.sym("x"), ca.MX.sym("u"), ca.MX.sym("y")
-    nlp = {"x": ca.vertcat(x, u, y), "f": (x - 1) ** 2 + u**2 + (y - 0.5) ** 2,
-           "g": ca.vertcat(y - x - 0.1 * u, x * x)}  # fmt: skip
-    options = {"structure_detection": "manual", "nx": [1, 1], "nu": [1, 0], "ng": [1, 0], "N": 1,
-               "print_time": False}  # fmt: skip
-    own = {"print_level": 0, "mu_init": 1e-7, "tol": 1e-6}
-    solver = ca.nlpsol("trial", "fatrop", nlp, {**options, "fatrop": own})
+    cost, rows = (x - 1) ** 2 + u**2 + (y - 0.5) ** 2, ca.vertcat(y - x - 0.1 * u, x * x)
+    nlp: dict[str, Any] = {"x": ca.vertcat(x, u, y), "f": cost, "g": rows}
+    options: dict[str, Any] = {
+        "structure_detection": "manual", "nx": [1, 1], "nu": [1, 0], "ng": [1, 0], "N": 1,
+        "print_time": False, "fatrop": {"print_level": 0, "mu_init": 1e-7, "tol": 1e-6},
+    }  # fmt: skip
+    solver = ca.nlpsol("trial", "fatrop", nlp, options)
     given = {"lbg": [0.0, -1.0], "ubg": [0.0, 0.5]}
     first = solver(**given)
     cold, found = solver.stats()["iter_count"], take()
