@@ -128,7 +128,7 @@ class JumpPlan(KernelBlock):
             0.008, unit="s", ge=0.0, le=0.05, text="how much later or earlier a thrust may end"
         )
         toes_gain: float = parameter(
-            20.0, unit="1/s", ge=0.0, text="rate at which the plan is kept in time with such a fall"
+            5.0, unit="1/s", ge=0.0, text="rate at which the plan is kept in time with such a fall"
         )
         turning: Turning | None = parameter(
             None, text="how a somersault is timed by its rotation in flight; none: by the clock"
