@@ -3,7 +3,7 @@
 import numpy as np
 
 from aloft.blocks.control import balance_law, followed_plan
-from aloft.blocks.jumping import capture_law, turn_timing
+from aloft.blocks.jumping import capture_law, plan_progress, turn_timing
 from aloft.blocks.scoring import footing, jump_following, jump_series, stand_following, stand_score
 from aloft.hal.simulated import base, external_force
 from aloft.mathematics.body_tree import BodyMotion
@@ -150,6 +150,16 @@ FOLLOWED = (
 )
 FLOWN = followed_plan.Flown(np.array(True), np.array(0.998), *DRAW((3, 10)))
 LEG_TARGETS = LegTargets(np.zeros(10), np.zeros(10), np.zeros(2, np.bool_))
+FALLING = (
+    np.array([1.23, 0.002, 0.002]),
+    *(
+        plan_progress.Motion(np.array([0.1, 0.0, z]), np.array([0.1, 0.0, -0.9]), np.zeros((2, 3)))
+        for z in (0.4, 0.41)
+    ),
+    plan_progress.Flight(np.array(3), np.array(1.35), np.array(True)),
+    plan_progress.FallSettings(5.0, 0.5, 0.002),
+    plan_progress.Progress(np.array(0.001), np.array(0.0)),
+)
 TURNING = (
     np.array([1.23, 0.002, 0.002]),
     turn_timing.Body(
@@ -168,6 +178,8 @@ TURNING = (
     turn_timing.TurnProgress(np.array(0.001), np.array(1.01)),
 )  # fmt: skip
 UNUSED = {
+    "aloft.blocks.jumping.plan_progress.follow_fall": FALLING,
+    "aloft.blocks.jumping.plan_progress.time_to_fall": (0.35, -0.8),
     "aloft.blocks.jumping.turn_timing.follow_turn": TURNING,
     "aloft.blocks.jumping.turn_timing.value_at": (*TURNING[3][:2], 1.23),
     "aloft.blocks.jumping.turn_timing.turned_beyond": (TURNING[1].base_rotation, TURNING[2].orientation),

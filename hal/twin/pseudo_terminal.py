@@ -29,6 +29,7 @@ class PseudoTerminal:
         self.path = os.ttyname(theirs)
         self._theirs = theirs
         self._write_lock = threading.Lock()
+        self._close_lock, self._closed = threading.Lock(), False
         self._wake, self._woken = os.pipe()
         self._thread = threading.Thread(target=self._serve, name=f"twin {self.path}", daemon=True)
         self._thread.start()
@@ -41,8 +42,14 @@ class PseudoTerminal:
                 data = data[written:]
 
     def close(self) -> None:
-        """Close both sides: from now on reading and writing fail, as with an unplugged cable."""
-        if self._thread.is_alive():
+        """Close both sides: from now on reading and writing fail, as with an unplugged cable.
+
+        More than one thread may call it, at any time: who comes later waits until all is closed.
+        """
+        with self._close_lock:
+            if self._closed:
+                return
+            self._closed = True
             os.write(self._woken, b"x")
             self._thread.join()
             for descriptor in (self._ours, self._theirs, self._wake, self._woken):
