@@ -16,7 +16,6 @@ the middle of a foot then touches. A try is kept if more runs land, or as many w
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -28,13 +27,8 @@ from ..mathematics.reproducible import inverse, product
 from ..planner.library.rehearsed import ZERO, Deviation, Rehearsed, Vector
 from ..planner.task.plan import JumpPlan
 from ..runtime.graph import load
-from ..runtime.language.errors import AloftError
-from ..runtime.loading.reading.nodes import text_of
 from ..runtime.running.run_result import RunResult
-from .batch.jobs import job_results
-from .batch.seeds import overrides_for
-from .rehearsal import LiftOff, deviation, missed_at_lift_off
-from .trials import trial_settings
+from .rehearsal import LiftOff, deviation, in_all_worlds, missed_at_lift_off, parts_of
 
 TRIAL = "robust"
 SEEDS = tuple(range(7001, 7013))
@@ -139,7 +133,7 @@ def learn_landing(
         changed = np.clip(correction - gain * step, -LARGEST * unit, LARGEST * unit).round(5)
         landed, used = _quality(best)
         on_try(f"correction {number} of {tries}; {landed} of {len(best)} land, {used:.0%} used")
-        found = measure(*_parts(changed))
+        found = measure(*parts_of(changed))
         better = _quality(found)
         if (-better[0], better[1]) < (-landed, used):
             correction, best, kept = changed, found, kept + 1
@@ -153,7 +147,7 @@ def learn_landing(
         )
     else:
         reason = f"no correction of {tries} tried lands more often, or with more room left"
-    velocity, momentum = _parts(correction)
+    velocity, momentum = parts_of(correction)
     return Rehearsed(
         velocity, momentum, _at_lift_off(before, unit), _at_lift_off(best, unit), tuple(seeds),
         TRIAL, reason,
@@ -167,11 +161,6 @@ def _quality(runs: Sequence[Touchdown]) -> tuple[int, float]:
 
 def _at_lift_off(runs: Sequence[Touchdown], unit: Array) -> Deviation:
     return deviation([run.lift_off for run in runs], unit)
-
-
-def _parts(values: Array) -> tuple[Vector, Vector]:
-    x, y, z, kx, ky, kz = (float(value) for value in values)
-    return (x, y, z), (kx, ky, kz)
 
 
 def rehearse_landing(
@@ -191,22 +180,7 @@ def rehearse_landing(
         LoadError: the graph may not run.
         AloftError: a run could not be made.
     """
-    trial = [f"{key}={text_of(value)}" for key, value in trial_settings(TRIAL).items()]
-    common = [*overrides, *trial, "plan.rehearsed=false"]
-    graph = load(path, common)
-
-    def measure(velocity: Vector, momentum: Vector) -> list[Touchdown]:
-        values = {"velocity_correction": velocity, "momentum_correction": momentum}
-        given = [f"{parameters[kind]}={text_of(list(value))}" for kind, value in values.items()]
-        jobs = [(path, overrides_for(graph, [*common, *given], seed)) for seed in seeds]
-        found: dict[int, Touchdown] = {}
-        with closing(job_results(run_landing, jobs)) as results:
-            for result in results:
-                if result.error:
-                    raise AloftError(f"the landing cannot be rehearsed: {result.error}")
-                found[result.index] = result.value
-        return [found[index] for index in range(len(jobs))]
-
+    measure = in_all_worlds(path, overrides, parameters, TRIAL, seeds, run_landing, "the landing")
     return learn_landing(measure, answer, momentum_unit, tries=tries, seeds=seeds, on_try=on_try)
 
 

@@ -12,6 +12,7 @@ from collections.abc import Callable, Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 
@@ -27,6 +28,8 @@ from ..runtime.running.run_result import RunResult
 from .batch.jobs import job_results
 from .batch.seeds import overrides_for
 from .trials import trial_settings
+
+Found = TypeVar("Found")
 
 TRIAL = "standard"
 SEEDS = (7001, 7002, 7003)
@@ -82,7 +85,7 @@ def learn(
         changed = np.clip(correction - gain * missed, -LARGEST * unit, LARGEST * unit).round(5)
         tried += 1
         on_try(f"correction {tried} of at most {tries}; {1e3 * best.size:.0f} mm/s are left")
-        found = deviation(measure(*_parts(changed)), unit)
+        found = deviation(measure(*parts_of(changed)), unit)
         too_much = float(missed / unit @ (np.array(found.velocity + found.momentum) / unit)) < 0.0
         better = found.size < best.size and found.flown >= best.flown
         if better and found.landed >= best.landed:
@@ -99,7 +102,7 @@ def learn(
         correction, best = np.zeros(6), before
     else:
         reason = f"the correction leaves {best.size / before.size:.0%} of the deviation"
-    velocity, momentum = _parts(correction)
+    velocity, momentum = parts_of(correction)
     return Rehearsed(velocity, momentum, before, best, tuple(seeds), TRIAL, reason)
 
 
@@ -112,7 +115,7 @@ def deviation(runs: Sequence[LiftOff], unit: Array) -> Deviation:
     mean = missed.mean(axis=0)
     spread = missed.std(axis=0, ddof=1) if len(missed) > 1 else np.zeros(6)
     return Deviation(
-        *_parts(mean),
+        *parts_of(mean),
         size=float(np.linalg.norm(mean / unit)),
         scatter=float(np.linalg.norm(spread / unit) / np.sqrt(len(missed))),
         landed=landed,
@@ -121,7 +124,8 @@ def deviation(runs: Sequence[LiftOff], unit: Array) -> Deviation:
     )
 
 
-def _parts(values: Array) -> tuple[Vector, Vector]:
+def parts_of(values: Array) -> tuple[Vector, Vector]:
+    """Of a correction (6,) the velocity's, and the angular momentum's."""
     x, y, z, kx, ky, kz = (float(value) for value in values)
     return (x, y, z), (kx, ky, kz)
 
@@ -161,24 +165,43 @@ def rehearse(
         LoadError: the graph may not run.
         AloftError: a run could not be made.
     """
-    trial = [f"{key}={text_of(value)}" for key, value in trial_settings(TRIAL).items()]
-    common = [*overrides, *trial, "plan.rehearsed=false"]
+    measure = in_all_worlds(path, overrides, parameters, TRIAL, seeds, run_once, "the plan")
+    learnt = learn(measure, momentum_unit, tries=tries, seeds=seeds, on_try=on_try)
+    return replace(learnt, trial=TRIAL)
+
+
+def in_all_worlds(
+    path: Path, overrides: Sequence[str], parameters: dict[str, str], trial: str, seeds: Sequence[int],
+    run: Callable[[tuple[Path, Sequence[str]]], Found], what: str,
+) -> Callable[[Vector, Vector], list[Found]]:  # fmt: skip
+    """What runs a graph in a trial with a correction of velocity and one of angular momentum, on all processors.
+
+    Args:
+        path, overrides, parameters: as ``rehearse`` takes them.
+        run: makes one run in a process of its own; what it finds comes in the order of ``seeds``.
+        what: is rehearsed, for the text of an error.
+
+    Raises:
+        LoadError: the graph may not run.
+        AloftError: a run could not be made; raised by what is returned.
+    """
+    settings = [f"{key}={text_of(value)}" for key, value in trial_settings(trial).items()]
+    common = [*overrides, *settings, "plan.rehearsed=false"]
     graph = load(path, common)
 
-    def measure(velocity: Vector, momentum: Vector) -> list[LiftOff]:
+    def measure(velocity: Vector, momentum: Vector) -> list[Found]:
         values = {"velocity_correction": velocity, "momentum_correction": momentum}
         given = [f"{parameters[kind]}={text_of(list(value))}" for kind, value in values.items()]
         jobs = [(path, overrides_for(graph, [*common, *given], seed)) for seed in seeds]
-        found: dict[int, LiftOff] = {}
-        with closing(job_results(run_once, jobs)) as results:
+        found: dict[int, Found] = {}
+        with closing(job_results(run, jobs)) as results:
             for result in results:
                 if result.error:
-                    raise AloftError(f"the plan cannot be rehearsed: {result.error}")
+                    raise AloftError(f"{what} cannot be rehearsed: {result.error}")
                 found[result.index] = result.value
         return [found[index] for index in range(len(jobs))]
 
-    learnt = learn(measure, momentum_unit, tries=tries, seeds=seeds, on_try=on_try)
-    return replace(learnt, trial=TRIAL)
+    return measure
 
 
 def run_once(job: tuple[Path, Sequence[str]]) -> LiftOff:

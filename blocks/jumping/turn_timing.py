@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 from ...mathematics.arrays import Array, Indices
 from ...mathematics.kernel import kernel
+from ...planner.library.jump_table import locate
 from ...runtime.language.parameters import Parameters, parameter
 from ..signals import Phase
 from .jump_phase import planned_touchdown_height, time_to_height
@@ -159,16 +160,8 @@ def follow_turn(
 @kernel
 def value_at(times: Array, values: Array, time: float) -> float:
     """The value at a time in a table that is linear between its rows; (n,) each."""
-    low, high = 0, times.shape[0] - 1
-    while high - low > 1:
-        middle = (low + high) // 2
-        if times[middle] <= time:
-            low = middle
-        else:
-            high = middle
-    share = (time - float(times[low])) / (float(times[high]) - float(times[low]))
-    share = min(max(share, 0.0), 1.0)
-    return float(values[low]) + share * (float(values[high]) - float(values[low]))
+    low, share = locate(times, time)
+    return float(values[low]) + share * (float(values[low + 1]) - float(values[low]))
 
 
 @kernel
