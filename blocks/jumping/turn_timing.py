@@ -152,6 +152,8 @@ def follow_turn(
         progress.spin[()] += (spin - float(progress.spin[()])) * settings.period / SPIN_TIME
     surplus = sign * turned_beyond(body.base_rotation, pose.orientation)
     surplus += (float(progress.spin[()]) - 1.0) * left - lands * shift - settings.aim
+    if rate == lands:  # the plan turns as fast as with its legs out: a shift would change nothing
+        return
     change = settings.gain * surplus / (rate - lands)
     change = min(max(change, -TUCKED_SHIFT), TUCKED_SHIFT) * settings.period
     progress.late[()] -= min(max(change, shift - settings.late), shift + settings.early)

@@ -50,6 +50,7 @@ class Flight:
     early: float = 0.04
     late: float = 0.03
     aim: float = 0.0
+    rates: np.ndarray = field(default_factory=lambda: RATES)
     delays: list[float] = field(default_factory=list)
 
     def fly(self) -> tuple[float, float]:
@@ -58,7 +59,7 @@ class Flight:
         instant, matrix = np.zeros(3), np.zeros((6, 16))
         body = Body(np.eye(3), np.zeros(3), np.zeros(3), np.zeros(3), matrix)
         pose = Pose(np.array(int(Phase.FLIGHT)), np.array(FLIGHT), *np.zeros((2, 3)), np.zeros(4))
-        rotation = Rotation(TIMES, RATES, LEFT, np.array([0.075, 0.295, FAST, self.sign]))
+        rotation = Rotation(TIMES, self.rates, LEFT, np.array([0.075, 0.295, FAST, self.sign]))
         progress = TurnProgress(np.array(0.0), np.array(0.0))
         settings = TurnSettings(50.0, self.early, self.late, self.aim, PERIOD)
         momentum = 0.05 * FAST
@@ -116,6 +117,13 @@ def test_a_robot_on_the_plan_is_left_alone():
     flight = Flight()
     flight.fly()
     assert np.abs(flight.delays).max() < 0.002
+
+
+def test_a_plan_that_turns_no_faster_in_the_tuck_is_read_by_the_clock():
+    flight = Flight(ahead=0.2, rates=np.full_like(RATES, FAST))
+    flight.fly()
+    before_the_legs_are_out = flight.delays[: int(0.29 / PERIOD)]
+    assert before_the_legs_are_out == [0.0] * len(before_the_legs_are_out)
 
 
 def test_who_turns_too_far_leaves_the_tuck_earlier_and_else_later_within_the_limits():

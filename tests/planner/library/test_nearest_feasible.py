@@ -227,3 +227,17 @@ def test_where_a_kept_plans_value_is_beyond_this_task_three_quarters_of_it_are_t
     degrees = [round(math.degrees(asked.twist)) for asked in solve.asked]
     assert degrees[:3] == [180, 134, 162]
     assert solve.warm[:2] == [True, True], "both start from the kept plan"
+
+
+def test_with_little_time_left_three_quarters_of_a_kept_plans_value_come_first(
+    tmp_path: Path,
+) -> None:
+    """A machine that is slow today finds what a fast one finds, if not as near."""
+    task = make_task({"name": "round", "rise": 0.12, "twist": "360 deg"})
+    solve = Planner(lambda asked: asked.twist < 2.7)
+    found = nearest_feasible(
+        task, ROBOT, solve=solve, seconds=seconds_left(20.0),
+        library=PlanLibrary(ROBOT, tmp_path, (SHIPPED,)),
+    )  # fmt: skip
+    assert found is not None
+    assert [round(math.degrees(asked.twist)) for asked in solve.asked][:2] == [134, 162]
