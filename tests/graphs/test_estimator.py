@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
+
 import aloft
 
 GRAPH = Path(aloft.__file__).parent / "graphs" / "estimator.yaml"
@@ -21,6 +23,20 @@ def test_a_jump_driven_by_the_invariant_filter() -> None:
     ):  # fmt: skip
         value = found[f"estimator_{name}"]
         assert isinstance(value, float) and 0.0 < value < bound, name
+
+
+def test_every_onlooker_sees_the_same_jump() -> None:
+    path = GRAPH.with_name("estimator_watching.yaml")
+    onlookers = ({}, {"estimator.use": "blocks.ComplementaryFilter", "contacts.hold": "0 s"})
+    runs = [aloft.load(path, {"robot.seed": 5, **settings}).run() for settings in onlookers]
+    driven = aloft.load(GRAPH, {"robot.seed": 5}).run()
+    for name in ("safety.command.torque", "robot.truth.com", "phase.phase.phase"):
+        values = [run.signal(name) for run in (*runs, driven)]
+        assert len(values[0]) > 500, name
+        assert np.array_equal(values[0], values[1]), name
+        assert np.array_equal(values[0], values[2]), name
+    bases = [run.signal("estimator.base.linear_velocity") for run in runs]
+    assert not np.array_equal(*bases), "the onlookers themselves differ"
 
 
 def test_an_onlooker_is_wrong_without_a_fall() -> None:
