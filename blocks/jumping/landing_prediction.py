@@ -46,7 +46,7 @@ class PredictionGains(Parameters):
         text="cost of a rad of roll and pitch at touchdown, in standing heights off the best place",
     )
     free_tilt: tuple[float, float, float] = live_parameter(
-        (0.35, 0.05, 0.5),
+        (0.35, 0.1, 0.5),
         unit="rad",
         text="tilt that costs nothing: to either side, back and ahead",
     )
