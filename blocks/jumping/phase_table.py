@@ -98,19 +98,20 @@ def find_conditions(
     due = now >= lift_off
     waiting = unloaded == 0.0 and now < lift_off + float(limits[LATE_LIFT_OFF])
     share = float(limits[TOUCHDOWN_SHARE]) * (in_phase + float(times[REMAINING]))
-    holds[Condition.PLAN_SQUATS] = planned >= Phase.SQUAT
-    holds[Condition.PLAN_THRUSTS] = planned >= Phase.THRUST or due
-    holds[Condition.LIFT_OFF_DUE] = due and not waiting
-    holds[Condition.LEFT_EARLY] = (
+    # `.value`: before its version 0.68 Numba takes no member of an enumeration as an index.
+    holds[Condition.PLAN_SQUATS.value] = planned >= Phase.SQUAT
+    holds[Condition.PLAN_THRUSTS.value] = planned >= Phase.THRUST or due
+    holds[Condition.LIFT_OFF_DUE.value] = due and not waiting
+    holds[Condition.LEFT_EARLY.value] = (
         now + in_phase >= lift_off and not due and unloaded >= limits[EARLY_LIFT_OFF]
     )
     ahead = float(times[AHEAD])
     early = ahead > LEAST_AHEAD and float(times[REMAINING]) < ahead * float(limits[EARLY_LANDING])
-    holds[Condition.TOUCHED_DOWN] = (unloaded == 0.0 or early) and in_phase >= share
-    holds[Condition.OVERDUE] = in_phase > flight + float(limits[LOST_CONTACT])
-    holds[Condition.RESTED] = not another and in_phase >= limits[LANDING_TIME]
-    holds[Condition.THRUSTS_AGAIN] = another and planned == Phase.THRUST
-    holds[Condition.LOST_CONTACT] = unloaded > limits[LOST_CONTACT]
+    holds[Condition.TOUCHED_DOWN.value] = (unloaded == 0.0 or early) and in_phase >= share
+    holds[Condition.OVERDUE.value] = in_phase > flight + float(limits[LOST_CONTACT])
+    holds[Condition.RESTED.value] = not another and in_phase >= limits[LANDING_TIME]
+    holds[Condition.THRUSTS_AGAIN.value] = another and planned == Phase.THRUST
+    holds[Condition.LOST_CONTACT.value] = unloaded > limits[LOST_CONTACT]
 
 
 @kernel
