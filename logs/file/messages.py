@@ -221,9 +221,12 @@ class _Scanner:
 
     def _is_damage(self, place: int) -> bool:
         """Whether what is at ``place``, behind which nothing is intact, is no message cut short."""
-        if self._sealed and self._size - place > len(CLOSING):
-            self._file.seek(self._size - len(CLOSING))
-            if self._file.read() == CLOSING:
+        if self._sealed and self._size - place >= SEAL_SIZE + len(CLOSING):
+            # The closing message is sixteen zeros, which stand inside of messages too, as in many
+            # seals. It closes the file only where it follows a seal.
+            self._file.seek(self._size - SEAL_SIZE - len(CLOSING))
+            tail = self._file.read()
+            if tail.startswith(_MARK) and tail.endswith(CLOSING):
                 return True
         self._file.seek(place)
         head = self._file.read(HEAD.size)
