@@ -43,12 +43,15 @@ import sys
 import tomllib
 
 with open("pyproject.toml", "rb") as file:
-    project = tomllib.load(file)["project"]
-for text in project["dependencies"]:
+    told = tomllib.load(file)
+for text in told["project"]["dependencies"]:
     name, oldest = re.match(r"([\w.-]+)>=([\d.]+)", text).groups()
     exact = f"{name}~={oldest}.0" if oldest.count(".") == 1 else f"{name}=={oldest}"
     print(exact if sys.argv[1] == "oldest" else text)
-print("pytest>=8\npytest-xdist>=3.6\nhypothesis>=6.100\njsonschema>=4.21\nscipy>=1.13\nsetuptools>=77\nquadprog>=0.1.13")
+for_tests = "pytest", "pytest-xdist", "hypothesis", "jsonschema", "quadprog", "scipy", "setuptools"
+for text in told["dependency-groups"]["dev"]:
+    if text.partition(">=")[0] in for_tests:
+        print(text)
 PROGRAM
 pip="$folder/bin/python -m pip install -qq --disable-pip-version-check"
 if ! timeout "$limit" $pip -r "$folder/wanted.txt" || ! $pip --no-deps --no-build-isolation --editable .; then

@@ -93,6 +93,13 @@ STRIDE = 23
 """Of so many bytes one is changed: all of them would take a quarter of an hour."""
 
 
+def test_a_changed_head_of_the_last_message_is_found(whole: Path, tmp_path: Path) -> None:
+    """With a greater length it looks like a message that was cut short."""
+    last = read(whole).scan.messages[-1]
+    places = np.arange(last.place, last.place + HEAD.size)
+    expect_found(whole, tmp_path, np.repeat(places, 8), np.tile(np.arange(8), HEAD.size))
+
+
 @pytest.mark.long
 def test_changed_bytes_all_over_the_file_are_found(whole: Path, tmp_path: Path) -> None:
     places = np.arange(0, whole.stat().st_size, STRIDE)
@@ -149,9 +156,10 @@ def test_any_prefix_is_useful(whole: Path, tmp_path: Path) -> None:
     path = tmp_path / "a.rrd"
     begun = scan.of(Content.START)[-1].end
     # Sixteen zeros close a file, and stand inside of messages too.
-    closed_in_looks = [n for n in range(begun + 16, len(data)) if data[n - 16 : n] == CLOSING]
-    assert len(closed_in_looks) > 10
-    for size in [*range(begun, len(data), 997), *closed_in_looks]:
+    before_a_close = range(begun + len(CLOSING), len(data))
+    seem_closed = [size for size in before_a_close if data.endswith(CLOSING, 0, size)]
+    assert len(seem_closed) > 10
+    for size in [*range(begun, len(data), 997), *seem_closed]:
         path.write_bytes(data[:size])
         run = read(path)
         there = [m.last + 1 for m in scan.of(Content.ROWS) if m.end <= size]
