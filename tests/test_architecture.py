@@ -108,7 +108,7 @@ HEAVY = {
     "zenoh",
     "matplotlib",
 }
-LONGEST = 400
+LONGEST = 600
 NESTING = (ast.stmt, ast.excepthandler, ast.match_case)
 """What a statement can stand in."""
 ROOMS_BY_NAME = tuple(name for name in PACKAGES if name != "planner")
