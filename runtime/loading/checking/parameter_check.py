@@ -13,12 +13,10 @@ from ...language.block import Block
 from ...language.errors import UnitError
 from ...language.parameters import Parameters, unit_of
 from ...language.per_joint import BY_POSITION, by_name
-from ...language.registry import block_name
 from ...language.stages import Position
 from ...language.units import parse_quantity
 from ..flattening.flat import FlatBlock
 from ..problems import Code, Problems, instead, listing, nearest
-from ..reading.earlier_versions import fix_of_parameter
 from ..reading.nodes import Entry, ListNode, MapNode, Node, ScalarNode, kind, plain, text_of
 
 _WORDS: Mapping[str, str] = {
@@ -158,10 +156,9 @@ def _report(
         if kind_of == "extra_forbidden" and entry is not None:
             legal = _siblings(model, error["loc"])
             near = nearest(entry.key, legal)
-            fix = fix_of_parameter(block_name(block_type), entry.key, entry.value)
             mistakes[Code.UNKNOWN_PARAMETER, place] = _Mistake(
                 Code.UNKNOWN_PARAMETER, place, entry.key_where, None, entry.key,
-                [listing(legal)], [], () if fix else near, fix or _right_name(entry, near),
+                [listing(legal)], [], near, _right_name(entry, near),
             )  # fmt: skip
             continue
         where = node.where if steps and node is not None else _end(node, flat)
