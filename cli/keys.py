@@ -32,7 +32,7 @@ def keys(
     from ..runtime.links.access import keys_from
     from ..runtime.links.key_folder import make_keys
     from ..runtime.loading import load
-    from ..runtime.placement.place import place
+    from ..runtime.placement.placed import place
 
     with errors_reported(as_json):
         placed = place(load(graph, overrides or []))

@@ -30,8 +30,7 @@ from ...runtime.links.message import HEADER, MessageReader, MessageWriter
 from ...runtime.links.transport import Transport, data_key
 from ...runtime.links.zenoh_transport import ZenohTransport
 from ...runtime.loading import load_text
-from ...runtime.placement.place import place
-from ...runtime.placement.placed import Link, PlacedGraph
+from ...runtime.placement.placed import Link, PlacedGraph, place
 from ...runtime.running.memory import Memory
 from ..other_process import other_process
 from ..rows import Row, compare, take_turns

@@ -64,7 +64,7 @@ def _whole(run: LiveRun, path: Path, elsewhere: Elsewhere | None) -> Watched:
     """The whole of the graph of which ``run`` is the part that answers at ``path``."""
     from ...runtime.links.key_folder import secured
     from ...runtime.live.spread_run import SpreadRun
-    from ...runtime.placement.place import place
+    from ...runtime.placement.placed import place
 
     placed = place(run.graph)
     keys = elsewhere.keys if elsewhere is not None else None
@@ -96,7 +96,7 @@ def _spread_elsewhere(elsewhere: Elsewhere) -> SpreadRun | None:
     from ...runtime.links.key_folder import secured
     from ...runtime.live.spread_run import SpreadRun
     from ...runtime.loading import load
-    from ...runtime.placement.place import place
+    from ...runtime.placement.placed import place
     from .local_runs import settings_of
 
     def settings() -> tuple[str, ...]:

@@ -37,7 +37,7 @@ def observer_of(
     from ...runtime.links.key_folder import secured
     from ...runtime.links.observer import Observer
     from ...runtime.loading import load
-    from ...runtime.placement.place import place
+    from ...runtime.placement.placed import place
     from .local_runs import settings_of
 
     placed = place(load(graph, [*settings_of(graph, process), *overrides]))

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any, Protocol
 from urllib.parse import parse_qs, urlsplit
 
-from ..drawing.loopback import ADDRESS, LoopbackHandler
+from ..drawing.page import ADDRESS, LoopbackHandler
 from ..language.errors import AloftError
 from ..language.stages import CheckedGraph
 from .live_page import Opened, live_page, live_policy

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from aloft.runtime.links.hub import Hub
 from aloft.runtime.links.others import Others
-from aloft.runtime.placement.place import place
+from aloft.runtime.placement.placed import place
 from aloft.runtime.running.executor import run
 from aloft.runtime.testing.spread import run_spread
 

@@ -19,8 +19,7 @@ from aloft.runtime.links.certificates import AUTHORITY_KEY, KEY, Authority
 from aloft.runtime.links.key_folder import SESSION, host_of, make_keys, secured
 from aloft.runtime.links.transport import data_key
 from aloft.runtime.links.zenoh_transport import ZenohTransport, session_config
-from aloft.runtime.placement.place import place
-from aloft.runtime.placement.placed import PlacedGraph
+from aloft.runtime.placement.placed import PlacedGraph, place
 
 from ...waiting import free_port, wait_for
 from .example_graphs import ring

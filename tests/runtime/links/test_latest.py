@@ -10,7 +10,7 @@ from aloft.runtime.language.stages import LinkPolicy
 from aloft.runtime.links.clock_offset import ClockOffset
 from aloft.runtime.links.latest import LatestInbox, LinkHealth
 from aloft.runtime.links.message import MessageReader, MessageWriter
-from aloft.runtime.placement.place import place
+from aloft.runtime.placement.placed import place
 from aloft.runtime.running.memory import Memory
 
 from .example_graphs import ring

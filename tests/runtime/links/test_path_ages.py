@@ -17,7 +17,7 @@ from aloft.runtime.language.stages import CheckedGraph, LinkPolicy
 from aloft.runtime.links.hub import Hub
 from aloft.runtime.links.path_ages import NAME, judged, path_sinks, timeline_of
 from aloft.runtime.loading import load_text
-from aloft.runtime.placement.place import place
+from aloft.runtime.placement.placed import place
 from aloft.runtime.running.executor import run
 from aloft.runtime.testing.spread import run_parts_of, run_spread
 

@@ -18,8 +18,7 @@ from aloft.runtime.links.observer import Observer
 from aloft.runtime.links.part import BoundPart, run_part
 from aloft.runtime.links.showing import ROW_HEADER, Showing, read_row
 from aloft.runtime.links.zenoh_transport import ZenohTransport
-from aloft.runtime.placement.place import place
-from aloft.runtime.placement.placed import PlacedGraph
+from aloft.runtime.placement.placed import PlacedGraph, place
 from aloft.runtime.running.run_result import RunResult
 
 from ...waiting import free_port

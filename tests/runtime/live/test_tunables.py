@@ -5,7 +5,7 @@ from typing import Any
 
 from aloft.runtime.live.tunables import Tunables
 from aloft.runtime.loading import load
-from aloft.runtime.loading.checking.adjust import entries
+from aloft.runtime.loading.checking.parameters import entries
 from aloft.runtime.running.memory import BoundGraph
 
 
