@@ -21,14 +21,13 @@ from ...mathematics.compiling.compile_calls import compile_calls
 from ..language.block import Metric
 from ..language.errors import AloftError
 from ..language.stages import CheckedGraph, ClockSpec
-from ..links.hub import Hub
-from ..links.part import CONDUCTOR, PREPARED, STARTED, BoundPart, run_part
-from ..links.transport import Take
-from ..links.whole import Whole, hash_of
+from ..links.part import CONDUCTOR, PREPARED, STARTED, BoundPart, Whole, hash_of, run_part
 from ..placement.placed import PlacedGraph, place
 from ..running.run_result import RunResult, merge_metrics
 from ..running.sinks import Sink
 from ..running.ticker import Ticker
+from ..transports.hub import Hub
+from ..transports.transport import Take
 
 Interfere = Callable[[str, bytes], Iterable[bytes]]
 

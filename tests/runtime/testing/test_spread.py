@@ -7,7 +7,7 @@ import pytest
 
 from aloft.runtime.language.errors import AloftError
 from aloft.runtime.language.stages import CheckedGraph, LinkPolicy, LinkSettings
-from aloft.runtime.links.latest import LatestInbox
+from aloft.runtime.links.free_link import LatestInbox
 from aloft.runtime.links.part import BoundPart
 from aloft.runtime.testing.spread import VirtualRun, run_spread, run_virtual
 
