@@ -142,7 +142,7 @@ def driving() -> Driver:
 
 
 @pytest.mark.parametrize(
-    ("age", "objection", "text"),
+    ("age", "stop_reason", "text"),
     [
         (0.02, "", "no new command has come for "),
         (PATIENCE, "the dead man's switch was let go", "the dead man's switch was let go"),
