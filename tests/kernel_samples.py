@@ -348,7 +348,7 @@ UNUSED = {
         np.ones((3, 3)), np.zeros(4), np.zeros((3, 3)), np.zeros(4),
     ),
     "aloft.blocks.control.balance_law.add_quadratic_growth": (np.ones(3), 0.6, 0.25, np.zeros(3), np.zeros(3)),
-    "aloft.blocks.general.periods.first_tick": (0.5, 0.002),
+    "aloft.blocks.general.sources.first_tick": (0.5, 0.002),
     "aloft.mathematics.linear.add_product": (POSE, POSE[0], np.ones(4)),
     "aloft.mathematics.linear.multiply_matrices": (POSE, TARGET[1:], np.zeros((4, 3))),
     "aloft.mathematics.discretisation.matrix_exponential": (

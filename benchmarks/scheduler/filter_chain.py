@@ -11,7 +11,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from ...blocks.general.vector import Vector
+from ...blocks.general.vectors import Vector
 from ...runtime.language.block import Block, Input, Output, State
 from ...runtime.language.stages import BlockSpec, CheckedGraph, Wire
 

@@ -10,11 +10,17 @@ from ...runtime.language.parameters import Parameters, live_parameter
 from ...runtime.language.quantities import Carried, Given
 from ...runtime.language.signals import Field, Signal
 from ...runtime.language.unit_algebra import read_unit
-from .bounds import Bounded
-from .elements import Elements, PerElement, spread, spread_bound
-from .flags import NEVER, Flag
-from .quantity_parameters import InUnit
-from .vector import Vector
+from .vectors import (
+    NEVER,
+    Bounded,
+    Elements,
+    Flag,
+    InUnit,
+    PerElement,
+    Vector,
+    spread,
+    spread_bound,
+)
 
 
 class Memory(Signal):

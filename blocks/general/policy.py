@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ...runtime.language.block import Block, Context, Input, Misfit, Output, State
 from ...runtime.language.parameters import Parameters, parameter
 from ...runtime.language.signals import Field, Signal
-from .quantity_parameters import Says, SourceParameters
+from .vectors import Says, SourceParameters
 
 EXAMPLE = Path(__file__).with_name("example_policy.onnx")
 """y = tanh(A u) of two inputs and one output, made by the test of this block."""

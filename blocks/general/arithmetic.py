@@ -1,0 +1,175 @@
+"""Gains, sums and products of vectors."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any, Literal
+
+import numpy as np
+
+from ...mathematics.linear import multiply_vector
+from ...robots.description import RobotDescription
+from ...runtime.language.block import Block, Input, Output
+from ...runtime.language.parameters import Parameters, live_parameter, parameter
+from ...runtime.language.quantities import Carried, Given
+from ...runtime.language.signals import Field, Signal
+from ...runtime.language.unit_algebra import read_unit
+from .vectors import (
+    Elements,
+    InUnit,
+    Matrix,
+    PerElement,
+    Scales,
+    SourceParameters,
+    Vector,
+    matrix_rows,
+)
+
+
+class Gain(Scales, Block):
+    """The input times a constant: y = gain u.
+
+    There may be one gain for each element. ``MatrixGain`` multiplies by a matrix.
+    """
+
+    class Params(Elements, InUnit):
+        in_unit = ("gain",)
+
+        gain: PerElement = live_parameter(1.0, text="the factor")
+
+    params: Params
+    u = Input(Vector, text="what is scaled")
+    y = Output(Vector, text="gain times u")
+
+    def setup(self) -> None:
+        """Keep the factor at hand."""
+        self.on_parameters()
+
+    def on_parameters(self) -> None:
+        """Keep the factor as an array, so that no tick allocates one."""
+        self._gain = np.array(self.params.gain)
+
+    def step(self) -> None:
+        """Multiply."""
+        np.multiply(self.u.value, self._gain, out=self.y.value)
+
+
+class Sum(Block):
+    """The weighted sum of two inputs: y = weights[0] a + weights[1] b; [1, -1] subtracts."""
+
+    class Params(Parameters):
+        n: int = parameter(1, ge=1, text="elements")
+        weights: list[float] = live_parameter(
+            [1.0, 1.0], min_length=2, max_length=2, text="factors of a and b"
+        )
+
+    params: Params
+    a = Input(Vector, text="the first")
+    b = Input(Vector, text="the second")
+    y = Output(Vector, text="the sum")
+
+    @classmethod
+    def carried(cls, params: Parameters, given: Given) -> Carried:
+        """Both inputs must be the same quantity, and so is the sum."""
+        return {"y": given.alike("a", "b")}
+
+    def setup(self) -> None:
+        """Keep the factors at hand."""
+        self._product = np.zeros(self.params.n)
+        self.on_parameters()
+
+    def on_parameters(self) -> None:
+        """Keep the factors as arrays, so that no tick allocates any."""
+        self._first, self._second = (np.array(weight) for weight in self.params.weights)
+
+    def step(self) -> None:
+        """Add."""
+        np.multiply(self.b.value, self._second, out=self._product)
+        np.multiply(self.a.value, self._first, out=self.y.value)
+        np.add(self.y.value, self._product, out=self.y.value)
+
+
+class Product(Block):
+    """Element by element: y = a b, or y = a / b.
+
+    A division by zero makes an element infinite, which ends the run with the block's name.
+    """
+
+    class Params(Elements):
+        operation: Literal["multiply", "divide"] = parameter("multiply", text="what is done")
+
+    params: Params
+    a = Input(Vector, text="the first factor, or the dividend")
+    b = Input(Vector, text="the second factor, or the divisor")
+    y = Output(Vector, text="the product or quotient")
+
+    @classmethod
+    def carried(cls, params: Parameters, given: Given) -> Carried:
+        """The product or quotient of the units; a frame is kept."""
+        assert isinstance(params, cls.Params)
+        a, b = given["a"], given["b"]
+        if a is None or b is None:
+            return {}
+        y = a.times(b.unit, 1 if params.operation == "multiply" else -1)
+        return {"y": replace(y, frame=a.frame or b.frame)}
+
+    def setup(self) -> None:
+        """Choose the operation."""
+        self._operation = np.multiply if self.params.operation == "multiply" else np.divide
+
+    def step(self) -> None:
+        """Multiply or divide."""
+        self._operation(self.a.value, self.b.value, out=self.y.value)
+
+
+class Rows(Signal):
+    """A vector of ``m`` numbers, one for each row of the matrix."""
+
+    value = Field("m", carried=True, text="the vector's elements")
+
+
+class MatrixGain(Block):
+    """A constant matrix times the input: y = K u, K with m rows and n columns.
+
+    Sums run from the first column to the last, so results are the same on every machine.
+    """
+
+    class Params(SourceParameters):
+        in_unit = ("matrix",)
+
+        matrix: Matrix = parameter(text="K, as a list of its rows", min_length=1)
+
+        _rows = matrix_rows("matrix")
+
+    params: Params
+    u = Input(Vector, text="what is multiplied")
+    y = Output(Rows, text="K u")
+
+    @classmethod
+    def local_dimensions(
+        cls, params: Parameters, robot: RobotDescription | None
+    ) -> Mapping[str, int]:
+        """``m`` rows and ``n`` columns."""
+        assert isinstance(params, cls.Params)
+        return {"m": len(params.matrix), "n": len(params.matrix[0])}
+
+    @classmethod
+    def example_parameters(cls) -> Mapping[str, Any]:
+        """Two rows and three columns."""
+        return {"matrix": [[1.0, 2.0, -1.0], [0.0, 0.5, 3.0]]}
+
+    @classmethod
+    def carried(cls, params: Parameters, given: Given) -> Carried:
+        """The unit of u times that of the matrix; the frame is what the parameter says."""
+        assert isinstance(params, cls.Params)
+        u = given["u"]
+        return {"y": u and replace(u.times(read_unit(params.unit)), frame=params.frame)}
+
+    def setup(self) -> None:
+        """Make the matrix."""
+        self._matrix = np.array(self.params.matrix)
+
+    def step(self) -> None:
+        """Multiply."""
+        multiply_vector(self._matrix, self.u.value, self.y.value)

@@ -1,0 +1,231 @@
+"""Finite-state machines, and assertions that a run must keep."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import Any, Literal
+
+import numpy as np
+from pydantic import Field as Key
+
+from ...robots.description import RobotDescription
+from ...runtime.language.block import Block, Input, Metric, Misfit, Output, State
+from ...runtime.language.parameters import Parameters, parameter
+from ...runtime.language.signals import Field, Signal
+from .vectors import (
+    Elements,
+    Flag,
+    Flags,
+    PerElement,
+    Seconds,
+    Vector,
+    crossed_bounds,
+    spread_bound,
+)
+
+
+class Transition(Parameters):
+    """One way from a state to another."""
+
+    source: str = Key(alias="from", description="the state it leaves")
+    to: str = parameter(text="the state it enters")
+    when: str | None = parameter(
+        None, text="the condition that must hold, or `not` and the condition that must not"
+    )
+    after: float = parameter(
+        0.0, unit="s", ge=0.0, text="how long the state must have lasted at least"
+    )
+
+
+class StateName(Signal):
+    """Which state is present."""
+
+    index = Field((), dtype="int64", text="its place in the list of states, from 0")
+    value = Field("n_states", dtype="bool", text="one truth value for each state")
+
+
+class Present(Signal):
+    """What a state machine remembers."""
+
+    index = Field((), dtype="int64", text="the present state")
+    runs = Field((), dtype="int64", text="runs that have passed since it was entered")
+
+
+class StateMachine(Block):
+    """A finite-state machine: ``states``, of which the first is the initial one, and transitions.
+
+    In every run the transitions from the present state are tried in the order they are written, and
+    the first whose condition holds and whose time has come is taken, at most one in a run. The
+    outputs show the state after it::
+
+        states: [idle, running]
+        conditions: [start, stop]          # the names of u's elements
+        transitions:
+          - {from: idle, to: running, when: start}
+          - {from: running, to: idle, when: stop, after: 0.5 s}
+    """
+
+    class Params(Parameters):
+        states: list[str] = parameter(text="the names of all states", min_length=1)
+        conditions: list[str] = parameter(
+            text="the names of the input's elements, in order", min_length=1
+        )
+        transitions: list[Transition] = parameter(text="the ways between states")
+
+    params: Params
+    u = Input(Flags, text="the conditions")
+    state = Output(StateName, text="the present state")
+    elapsed = Output(Seconds, text="how long it has lasted")
+    x = State(Present, text="the present state")
+
+    @classmethod
+    def local_dimensions(
+        cls, params: Parameters, robot: RobotDescription | None
+    ) -> Mapping[str, int]:
+        """``n`` conditions and ``n_states``."""
+        assert isinstance(params, cls.Params)
+        return {"n": len(params.conditions), "n_states": len(params.states)}
+
+    @classmethod
+    def requires(cls, params: Parameters, robot: RobotDescription | None) -> Iterable[Misfit]:
+        """Every name of a transition must be one of a state or of a condition."""
+        assert isinstance(params, cls.Params)
+        for key, names in (("states", params.states), ("conditions", params.conditions)):
+            for name in dict.fromkeys(name for name in names if names.count(name) > 1):
+                yield Misfit(f"{name!r} is twice in {key}", parameter=key)
+        for transition in params.transitions:
+            for state in (transition.source, transition.to):
+                if state not in params.states:
+                    yield _unknown("state", state, params.states)
+            if transition.when is not None:
+                name = transition.when.removeprefix("not ").strip()
+                if name not in params.conditions:
+                    yield _unknown("condition", name, params.conditions)
+
+    @classmethod
+    def example_parameters(cls) -> Mapping[str, Any]:
+        """Two states and two conditions."""
+        return {
+            "states": ["idle", "running"],
+            "conditions": ["start", "stop"],
+            "transitions": [
+                {"from": "idle", "to": "running", "when": "start"},
+                {"from": "running", "to": "idle", "when": "not stop", "after": 0.004},
+            ],
+        }
+
+    def setup(self) -> None:
+        """Turn names into places: for each state its transitions."""
+        p = self.params
+        ways: list[list[tuple[int, int, bool, int]]] = [[] for _ in p.states]
+        for way in p.transitions:
+            when = way.when or ""
+            place = p.conditions.index(when.removeprefix("not ").strip()) if when else -1
+            runs = int(np.ceil(way.after / self.period - 1e-6))
+            ways[p.states.index(way.source)].append(
+                (p.states.index(way.to), place, not when.startswith("not "), runs)
+            )
+        self._ways = tuple(tuple(of_state) for of_state in ways)
+
+    def step(self) -> None:
+        """Take a transition if there is one."""
+        index, runs = int(self.x.index), int(self.x.runs)
+        for target, place, wanted, least in self._ways[index]:
+            if runs >= least and (place < 0 or bool(self.u.value[place]) == wanted):
+                index, runs = target, 0
+                break
+        self.x.index[...] = index
+        self.x.runs[...] = runs + 1
+        self.state.index[...] = index
+        self.state.value.fill(False)
+        self.state.value[index] = True
+        self.elapsed.value.fill(runs * self.period)
+
+
+def _unknown(kind: str, name: str, known: list[str]) -> Misfit:
+    return Misfit(
+        f"there is no {kind} {name!r}",
+        parameter="transitions",
+        expected=", ".join(known),
+        found=name,
+    )
+
+
+class Violations(Signal):
+    """What an assertion remembers."""
+
+    count = Field((), dtype="int64", text="runs in which a bound was broken")
+    first = Field((), unit="s", text="when that was first")
+    value = Field((), text="the element's value then")
+    element = Field((), dtype="int64", text="the element that broke it then")
+
+
+class Assertion(Block):
+    """Bounds that every element must keep: lower <= u <= upper.
+
+    A run in which one was broken is not successful, and its reason names the first: the element, its
+    value, and when. With ``action: stop`` the run ends there; with ``mark`` it goes on.
+    """
+
+    class Params(Elements):
+        lower: PerElement | None = parameter(None, text="what u must not be below")
+        upper: PerElement | None = parameter(None, text="what u must not be above")
+        action: Literal["stop", "mark"] = parameter("stop", text="what a broken bound does")
+
+    params: Params
+    u = Input(Vector, text="what must keep the bounds")
+    ok = Output(Flag, text="whether it does in this run")
+    x = State(Violations, text="what was broken")
+
+    @classmethod
+    def requires(cls, params: Parameters, robot: RobotDescription | None) -> Iterable[Misfit]:
+        """The bounds must not cross, and one must be there."""
+        assert isinstance(params, cls.Params)
+        yield from crossed_bounds(params.lower, params.upper, params.n)
+        if params.lower is None and params.upper is None:
+            yield Misfit("it has no bound", fix="with: {upper: 1.0}")
+
+    @classmethod
+    def example_parameters(cls) -> Mapping[str, object]:
+        """A bound that is broken now and then."""
+        return {"n": 2, "lower": -0.9, "upper": 0.9}
+
+    def setup(self) -> None:
+        """Keep the bounds at hand."""
+        p = self.params
+        self._lower = spread_bound(p.lower, p.n, -np.inf)
+        self._upper = spread_bound(p.upper, p.n, np.inf)
+        self._broken, self._above = np.zeros(p.n, bool), np.zeros(p.n, bool)
+
+    def step(self) -> None:
+        """Look at every element."""
+        np.less(self.u.value, self._lower, out=self._broken)
+        np.greater(self.u.value, self._upper, out=self._above)
+        np.logical_or(self._broken, self._above, out=self._broken)
+        broken = bool(self._broken.any())
+        self.ok.value[...] = not broken
+        if not broken:
+            return
+        x = self.x
+        if x.count == 0:
+            element = int(self._broken.argmax())
+            x.first[...], x.element[...] = self.time, element
+            x.value[...] = self.u.value[element]
+        x.count[...] = int(x.count) + 1
+        if self.params.action == "stop":
+            self.request_stop(self._reason())
+
+    def _reason(self) -> str:
+        element = int(self.x.element)
+        return (
+            f"{self.context.path}: element {element} was {float(self.x.value):.6g} at "
+            f"{float(self.x.first):.6g} s, outside [{self._lower[element]:g}, "
+            f"{self._upper[element]:g}]"
+        )
+
+    def metrics(self) -> Mapping[str, Metric]:
+        """Whether the bounds were kept, and in how many runs they were not."""
+        count = int(self.x.count)
+        if not count:
+            return {"success": True, "violations": 0}
+        return {"success": False, "reason": self._reason(), "violations": count}
