@@ -16,27 +16,27 @@ from ...runtime.language.quantities import Carried, Given
 from ...runtime.language.signals import Field, Signal
 from ...runtime.language.unit_algebra import read_unit
 from .vectors import (
-    Elements,
     InUnit,
     Matrix,
-    PerElement,
-    Scales,
+    ScalarOrVector,
     SourceParameters,
+    UnitOfProduct,
     Vector,
+    VectorParameters,
     matrix_rows,
 )
 
 
-class Gain(Scales, Block):
+class Gain(UnitOfProduct, Block):
     """The input times a constant: y = gain u.
 
     There may be one gain for each element. ``MatrixGain`` multiplies by a matrix.
     """
 
-    class Params(Elements, InUnit):
+    class Params(VectorParameters, InUnit):
         in_unit = ("gain",)
 
-        gain: PerElement = live_parameter(1.0, text="the factor")
+        gain: ScalarOrVector = live_parameter(1.0, text="the factor")
 
     params: Params
     u = Input(Vector, text="what is scaled")
@@ -96,7 +96,7 @@ class Product(Block):
     A division by zero makes an element infinite, which ends the run with the block's name.
     """
 
-    class Params(Elements):
+    class Params(VectorParameters):
         operation: Literal["multiply", "divide"] = parameter("multiply", text="what is done")
 
     params: Params

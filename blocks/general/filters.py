@@ -16,7 +16,7 @@ from ...runtime.language.parameters import Parameters, live_parameter, parameter
 from ...runtime.language.quantities import Carried, Given
 from ...runtime.language.signals import Field, Signal
 from ...runtime.language.unit_algebra import SECOND
-from .vectors import Elements, Keeps, Vector
+from .vectors import UnitOfInput, Vector, VectorParameters
 
 
 class FilterMemory(Signal):
@@ -26,7 +26,7 @@ class FilterMemory(Signal):
     started = Field((), dtype="bool", text="whether there was an input")
 
 
-class LinearFilter(Keeps, Block):
+class LinearFilter(UnitOfInput, Block):
     """The base of the filters: ``coefficients`` says which filter it is."""
 
     u = Input(Vector, text="what is filtered")
@@ -64,7 +64,7 @@ def too_fast(name: str, frequency: float, period: float) -> list[Misfit]:
     ]
 
 
-class ButterworthParameters(Elements):
+class ButterworthParameters(VectorParameters):
     """A cutoff and an order."""
 
     cutoff: float = parameter(unit="Hz", gt=0.0, text="where the gain is 1 / sqrt(2)")
@@ -138,7 +138,7 @@ class BandStop(LinearFilter):
     first input.
     """
 
-    class Params(Elements):
+    class Params(VectorParameters):
         centre: float = parameter(unit="Hz", gt=0.0, text="the frequency that is taken out")
         width: float = parameter(1.0, unit="Hz", gt=0.0, text="how broad the notch is")
 
@@ -167,14 +167,14 @@ class Window(Signal):
     count = Field((), dtype="int64", text="how many inputs there were")
 
 
-class MovingAverage(Keeps, Block):
+class MovingAverage(UnitOfInput, Block):
     """The mean of the last inputs: y[n] = (u[n] + ... + u[n-k+1]) / k with k = ``samples``.
 
     At the start it is the mean of the inputs so far. The sum is made anew in every run, so no
     error of rounding grows.
     """
 
-    class Params(Elements):
+    class Params(VectorParameters):
         samples: int = parameter(10, ge=1, text="k, how many inputs are averaged")
 
     params: Params
@@ -213,7 +213,7 @@ class FilteredDerivative(Block):
     T is the block's period. With ``time_constant`` 0 it is the plain difference (u[n] - u[n-1]) / T.
     """
 
-    class Params(Elements):
+    class Params(VectorParameters):
         time_constant: float = live_parameter(0.01, unit="s", ge=0.0, text="tau, of the smoothing")
 
     params: Params

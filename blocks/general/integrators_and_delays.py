@@ -12,13 +12,13 @@ from ...runtime.language.unit_algebra import SECOND
 from .vectors import (
     NEVER,
     Bounded,
-    Elements,
     Flag,
-    InitialParameters,
-    Keeps,
-    PerElement,
+    InitialValueParameters,
+    ScalarOrVector,
+    UnitOfInput,
     Vector,
-    spread_bound,
+    VectorParameters,
+    broadcast_bound,
 )
 
 
@@ -30,9 +30,9 @@ class Integrator(Bounded, Block):
     ``TrapezoidalIntegrator`` is more exact and does not.
     """
 
-    class Params(InitialParameters):
-        lower: PerElement | None = parameter(None, text="the least integral")
-        upper: PerElement | None = parameter(None, text="the greatest integral")
+    class Params(InitialValueParameters):
+        lower: ScalarOrVector | None = parameter(None, text="the least integral")
+        upper: ScalarOrVector | None = parameter(None, text="the greatest integral")
 
     params: Params
     u = Input(Vector, text="the rate")
@@ -50,8 +50,8 @@ class Integrator(Bounded, Block):
         """Start from the initial value, and keep the bounds at hand."""
         p = self.params
         self._initial = p.start_value()
-        self._lower = spread_bound(p.lower, p.n, -np.inf)
-        self._upper = spread_bound(p.upper, p.n, np.inf)
+        self._lower = broadcast_bound(p.lower, p.n, -np.inf)
+        self._upper = broadcast_bound(p.upper, p.n, np.inf)
         self._step = np.zeros(p.n)
         self._period = np.array(self.period)
         np.copyto(self.x.value, self._initial)
@@ -86,8 +86,8 @@ class TrapezoidalIntegrator(Block):
     from the input of the same tick, so it breaks no loop; ``Integrator`` does.
     """
 
-    Params = InitialParameters
-    params: InitialParameters
+    Params = InitialValueParameters
+    params: InitialValueParameters
     u = Input(Vector, text="the rate")
     reset = Input(Flag, text="whether to start anew from the initial value", default=NEVER)
     y = Output(Vector, text="its integral")
@@ -119,14 +119,14 @@ class TrapezoidalIntegrator(Block):
         np.copyto(self.y.value, x.integral)
 
 
-class UnitDelay(Keeps, Block):
+class UnitDelay(UnitOfInput, Block):
     """The input of the run before: y[n] = x[n], x[n+1] = u[n], x[0] = initial.
 
     A Moore block, so it breaks a loop.
     """
 
-    Params = InitialParameters
-    params: InitialParameters
+    Params = InitialValueParameters
+    params: InitialValueParameters
     u = Input(Vector, text="what is delayed")
     y = Output(Vector, text="u one run ago")
     x = State(Vector, text="u of the last run")
@@ -151,13 +151,13 @@ class Line(Signal):
     next = Field((), dtype="int64", text="the place of the oldest, which is the next to be written")
 
 
-class Delay(Keeps, Block):
+class Delay(UnitOfInput, Block):
     """The input of k runs before: y[n] = u[n-k] with k = ``samples``, and initial for n < k.
 
     A Moore block, so it breaks a loop. A wire delays as well: ``{from: a.y, delay: 3}``.
     """
 
-    class Params(InitialParameters):
+    class Params(InitialValueParameters):
         samples: int = parameter(1, ge=1, text="k, by how many runs of the block")
 
     params: Params
@@ -180,14 +180,14 @@ class Delay(Keeps, Block):
         self.x.next[...] = (place + 1) % self.params.samples
 
 
-class SampleHold(Keeps, Block):
+class SampleHold(UnitOfInput, Block):
     """The input where ``trigger`` holds, and its last such value where it does not.
 
     Before the first sample y = initial.
     """
 
-    Params = InitialParameters
-    params: InitialParameters
+    Params = InitialValueParameters
+    params: InitialValueParameters
     u = Input(Vector, text="what is sampled")
     trigger = Input(Flag, text="whether to sample")
     y = Output(Vector, text="the last sample")
@@ -211,14 +211,14 @@ class Held(Signal):
     age = Field((), dtype="int64", text="runs since it was taken")
 
 
-class ZeroOrderHold(Keeps, Block):
+class ZeroOrderHold(UnitOfInput, Block):
     """A sample of the input in every k-th run, held in between: y[n] = u[k floor(n / k)].
 
     Between blocks of different rates none is needed: there a slower reader samples and a faster
     one holds by itself.
     """
 
-    class Params(Elements):
+    class Params(VectorParameters):
         samples: int = parameter(2, ge=1, text="k, from one sample to the next in runs")
 
     params: Params

@@ -15,7 +15,16 @@ from ...robots.description import RobotDescription
 from ...runtime.language.block import Block, Input, Misfit, Output, State
 from ...runtime.language.parameters import Parameters, parameter
 from ...runtime.language.signals import Field, Signal
-from .vectors import Elements, InUnit, Matrix, Says, Scales, SourceParameters, Vector, matrix_rows
+from .vectors import (
+    InUnit,
+    Matrix,
+    SourceParameters,
+    UnitFromParameters,
+    UnitOfProduct,
+    Vector,
+    VectorParameters,
+    matrix_rows,
+)
 
 
 class SystemInput(Signal):
@@ -70,7 +79,7 @@ class SystemParameters(SourceParameters):
         return discretise(self.a, self.b, period)
 
 
-class LinearSystem(Says, Block):
+class LinearSystem(UnitFromParameters, Block):
     """The base of the linear systems in state space."""
 
     Params = SystemParameters
@@ -192,7 +201,7 @@ class TransferMemory(Signal):
     value = Field(("n", "order"), text="states in the controllable canonical form")
 
 
-class TransferFunction(Scales, Block):
+class TransferFunction(UnitOfProduct, Block):
     """A proper rational transfer function, the same for every element, from rest.
 
     Coefficients are of falling powers, of s for a continuous function and of z for a discrete one:
@@ -202,7 +211,7 @@ class TransferFunction(Scales, Block):
     strictly proper system use ``StateSpace``.
     """
 
-    class Params(Elements, InUnit):
+    class Params(VectorParameters, InUnit):
         numerator: list[float] = parameter(text="coefficients of falling powers", min_length=1)
         denominator: list[float] = parameter(text="coefficients of falling powers", min_length=2)
         time: Literal["continuous", "discrete"] = parameter(

@@ -11,7 +11,7 @@ from ...runtime.language.block import Block, Input, Output, State
 from ...runtime.language.parameters import Parameters, live_parameter, parameter
 from ...runtime.language.quantities import Carried, Given
 from ...runtime.language.signals import Field, Signal
-from .vectors import NEVER, Elements, Flag, Flags, Number, Seconds, Tally, Vector
+from .vectors import NEVER, Flag, Flags, Number, Seconds, Tally, Vector, VectorParameters
 
 UFUNCS: Mapping[str, tuple[Any, bool]] = {
     "and": (np.logical_and, False),
@@ -26,7 +26,7 @@ UFUNCS: Mapping[str, tuple[Any, bool]] = {
 class Logic(Block):
     """Element by element: y = a and b, a or b, a xor b, not (a and b), not (a or b)."""
 
-    class Params(Elements):
+    class Params(VectorParameters):
         operation: Literal["and", "or", "xor", "nand", "nor"] = parameter(
             "and", text="what is done"
         )
@@ -59,7 +59,7 @@ class Compare(Block):
     To compare with a constant, wire the constant: ``in: {a: sensor.y, b: {value: {value: 0.5}}}``.
     """
 
-    class Params(Elements):
+    class Params(VectorParameters):
         operation: Literal["<", "<=", "==", "!=", ">=", ">"] = parameter(
             ">", text="the comparison of a with b"
         )
@@ -87,8 +87,8 @@ class Compare(Block):
 class Not(Block):
     """Element by element: y = not u."""
 
-    Params = Elements
-    params: Elements
+    Params = VectorParameters
+    params: VectorParameters
     u = Input(Flags, text="the truth values")
     y = Output(Flags, text="their opposites")
 
@@ -110,7 +110,7 @@ class EdgeDetector(Block):
     The first run has no edge.
     """
 
-    class Params(Elements):
+    class Params(VectorParameters):
         edge: Literal["rising", "falling", "either"] = parameter("rising", text="which change")
 
     params: Params
@@ -190,8 +190,8 @@ class Timer(Block):
 class Switch(Block):
     """The first vector where the condition holds, else the second: y = a if condition else b."""
 
-    Params = Elements
-    params: Elements
+    Params = VectorParameters
+    params: VectorParameters
     condition = Input(Flag, text="whether a is taken")
     a = Input(Vector, text="taken where the condition holds")
     b = Input(Vector, text="taken where it does not")

@@ -10,24 +10,31 @@ from ...runtime.language.block import Block, Output, State
 from ...runtime.language.parameters import live_parameter, parameter
 from ...runtime.language.random_stream import RandomStream, StreamState
 from ...runtime.language.signals import Field
-from .vectors import Elements, PerElement, Says, SourceParameters, Vector, spread
+from .vectors import (
+    ScalarOrVector,
+    SourceParameters,
+    UnitFromParameters,
+    Vector,
+    VectorParameters,
+    broadcast,
+)
 
 
-class WhiteNoise(Says, Block):
+class WhiteNoise(UnitFromParameters, Block):
     """Gaussian noise: every element of every run is drawn anew, y = mean + std N(0, 1).
 
     ``std`` is that of one sample. For a noise density d per square root of Hz it is d sqrt(f / 2)
     at a rate f. The stream depends on ``seed`` and on the block's path.
     """
 
-    class Params(Elements, SourceParameters):
+    class Params(VectorParameters, SourceParameters):
         in_unit = (
             "std",
             "mean",
         )
 
-        std: PerElement = live_parameter(1.0, text="standard deviation of one sample")
-        mean: PerElement = live_parameter(0.0, text="the mean")
+        std: ScalarOrVector = live_parameter(1.0, text="standard deviation of one sample")
+        mean: ScalarOrVector = live_parameter(0.0, text="the mean")
         seed: int = parameter(0, ge=0, text="of the random stream")
 
     params: Params
@@ -41,8 +48,8 @@ class WhiteNoise(Says, Block):
 
     def on_parameters(self) -> None:
         """Keep mean and deviation as arrays."""
-        self._std = spread(self.params.std, self.params.n)
-        self._mean = spread(self.params.mean, self.params.n)
+        self._std = broadcast(self.params.std, self.params.n)
+        self._mean = broadcast(self.params.mean, self.params.n)
 
     def step(self) -> None:
         """Draw."""
@@ -66,7 +73,7 @@ class NoiseState(StreamState):
     started = Field((), dtype="bool", text="whether there was a run")
 
 
-class ColouredNoise(Says, Block):
+class ColouredNoise(UnitFromParameters, Block):
     """First-order Gauss-Markov noise, sampled exactly: y = std x with
 
     x[n] = f x[n-1] + sqrt(1 - f^2) N(0, 1), f = exp(-T / correlation_time), x[0] = N(0, 1).
@@ -75,10 +82,10 @@ class ColouredNoise(Says, Block):
     correlation time. T is the block's period. The stream depends on ``seed`` and the block's path.
     """
 
-    class Params(Elements, SourceParameters):
+    class Params(VectorParameters, SourceParameters):
         in_unit = ("std",)
 
-        std: PerElement = live_parameter(1.0, text="standard deviation")
+        std: ScalarOrVector = live_parameter(1.0, text="standard deviation")
         correlation_time: float = parameter(
             0.1, unit="s", gt=0.0, text="in which the autocorrelation falls to 1 / e"
         )
@@ -99,7 +106,7 @@ class ColouredNoise(Says, Block):
 
     def on_parameters(self) -> None:
         """Keep the deviation as an array."""
-        self._std = spread(self.params.std, self.params.n)
+        self._std = broadcast(self.params.std, self.params.n)
 
     def step(self) -> None:
         """Forget a little, and add something new."""

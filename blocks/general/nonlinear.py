@@ -12,27 +12,27 @@ from ...runtime.language.parameters import Parameters, live_parameter
 from ...runtime.language.signals import Field, Signal
 from .vectors import (
     Bounded,
-    Elements,
     Flags,
-    Keeps,
-    PerElement,
-    Says,
+    ScalarOrVector,
     SourceParameters,
+    UnitFromParameters,
+    UnitOfInput,
     Vector,
-    spread,
-    spread_bound,
+    VectorParameters,
+    broadcast,
+    broadcast_bound,
 )
 
 
-class Saturation(Bounded, Keeps, Block):
+class Saturation(Bounded, UnitOfInput, Block):
     """Every element kept within its bounds: y = min(max(u, lower), upper).
 
     A bound that is left out does not bind.
     """
 
-    class Params(Elements):
-        lower: PerElement | None = live_parameter(None, text="the least output")
-        upper: PerElement | None = live_parameter(None, text="the greatest output")
+    class Params(VectorParameters):
+        lower: ScalarOrVector | None = live_parameter(None, text="the least output")
+        upper: ScalarOrVector | None = live_parameter(None, text="the greatest output")
 
     params: Params
     u = Input(Vector, text="what is bounded")
@@ -44,8 +44,8 @@ class Saturation(Bounded, Keeps, Block):
 
     def on_parameters(self) -> None:
         """Keep them as arrays, so that no tick makes them."""
-        self._lower = spread_bound(self.params.lower, self.params.n, -np.inf)
-        self._upper = spread_bound(self.params.upper, self.params.n, np.inf)
+        self._lower = broadcast_bound(self.params.lower, self.params.n, -np.inf)
+        self._upper = broadcast_bound(self.params.upper, self.params.n, np.inf)
 
     def step(self) -> None:
         """Apply the bounds."""
@@ -53,12 +53,12 @@ class Saturation(Bounded, Keeps, Block):
         np.minimum(self.y.value, self._upper, out=self.y.value)
 
 
-class DeadZone(Bounded, Keeps, Block):
+class DeadZone(Bounded, UnitOfInput, Block):
     """Nothing within a zone, and what goes beyond it outside: y = u - min(max(u, lower), upper)."""
 
-    class Params(Elements):
-        lower: PerElement = live_parameter(-0.5, text="where the zone begins")
-        upper: PerElement = live_parameter(0.5, text="where the zone ends")
+    class Params(VectorParameters):
+        lower: ScalarOrVector = live_parameter(-0.5, text="where the zone begins")
+        upper: ScalarOrVector = live_parameter(0.5, text="where the zone ends")
 
     params: Params
     u = Input(Vector, text="what is passed on outside the zone")
@@ -70,8 +70,8 @@ class DeadZone(Bounded, Keeps, Block):
 
     def on_parameters(self) -> None:
         """Keep them as arrays, so that no tick makes them."""
-        self._lower = spread(self.params.lower, self.params.n)
-        self._upper = spread(self.params.upper, self.params.n)
+        self._lower = broadcast(self.params.lower, self.params.n)
+        self._upper = broadcast(self.params.upper, self.params.n)
 
     def step(self) -> None:
         """Take off what is within the zone."""
@@ -80,11 +80,11 @@ class DeadZone(Bounded, Keeps, Block):
         np.subtract(self.u.value, self.y.value, out=self.y.value)
 
 
-class Backlash(Keeps, Block):
+class Backlash(UnitOfInput, Block):
     """Play: y[n] = min(max(y[n-1], u[n] - width / 2), u[n] + width / 2), from y = 0."""
 
-    class Params(Elements):
-        width: PerElement = live_parameter(1.0, text="the play from one side to the other")
+    class Params(VectorParameters):
+        width: ScalarOrVector = live_parameter(1.0, text="the play from one side to the other")
 
     params: Params
     u = Input(Vector, text="position of the driving part")
@@ -98,7 +98,7 @@ class Backlash(Keeps, Block):
 
     def on_parameters(self) -> None:
         """As an array, so that no tick makes one; a negative play counts as none."""
-        self._half = 0.5 * np.maximum(spread(self.params.width, self.params.n), 0.0)
+        self._half = 0.5 * np.maximum(broadcast(self.params.width, self.params.n), 0.0)
 
     def step(self) -> None:
         """Push the driven part along, if it is reached."""
@@ -109,10 +109,10 @@ class Backlash(Keeps, Block):
         np.copyto(self.y.value, self.x.value)
 
 
-class Quantiser(Keeps, Block):
+class Quantiser(UnitOfInput, Block):
     """The nearest whole multiple of a step: y = interval round(u / interval), halves to even."""
 
-    class Params(Elements):
+    class Params(VectorParameters):
         interval: float = live_parameter(0.5, gt=0.0, text="from one output value to the next")
 
     params: Params
@@ -141,16 +141,16 @@ class LastOutput(Signal):
     started = Field((), dtype="bool", text="whether there was one")
 
 
-class RateLimiter(Keeps, Block):
+class RateLimiter(UnitOfInput, Block):
     """The input, followed only so fast: y[n] = min(max(u[n], y[n-1] - T f), y[n-1] + T r).
 
     r and f are the rates ``rising`` and ``falling`` and T is the block's period. The first output
     is the first input.
     """
 
-    class Params(Elements):
-        rising: PerElement = live_parameter(1.0, text="the fastest growth per second, positive")
-        falling: PerElement = live_parameter(1.0, text="the fastest fall per second, positive")
+    class Params(VectorParameters):
+        rising: ScalarOrVector = live_parameter(1.0, text="the fastest growth per second, positive")
+        falling: ScalarOrVector = live_parameter(1.0, text="the fastest fall per second, positive")
 
     params: Params
     u = Input(Vector, text="what is followed")
@@ -166,8 +166,8 @@ class RateLimiter(Keeps, Block):
     def on_parameters(self) -> None:
         """Compute the greatest steps of one period; a negative rate counts as zero."""
         n = self.params.n
-        self._rise = self.period * np.maximum(spread(self.params.rising, n), 0.0)
-        self._fall = self.period * np.maximum(spread(self.params.falling, n), 0.0)
+        self._rise = self.period * np.maximum(broadcast(self.params.rising, n), 0.0)
+        self._fall = self.period * np.maximum(broadcast(self.params.falling, n), 0.0)
 
     def step(self) -> None:
         """Go towards the input."""
@@ -182,13 +182,13 @@ class RateLimiter(Keeps, Block):
         np.copyto(self.y.value, x.value)
 
 
-class Relay(Says, Block):
+class Relay(UnitFromParameters, Block):
     """Two values with hysteresis: on from u >= switch_on, off from u <= switch_off.
 
     In between every element stays as it was; all begin off. y = on_value or off_value.
     """
 
-    class Params(Elements, SourceParameters):
+    class Params(VectorParameters, SourceParameters):
         in_unit = (
             "on_value",
             "off_value",

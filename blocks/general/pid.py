@@ -13,13 +13,13 @@ from ...runtime.language.unit_algebra import read_unit
 from .vectors import (
     NEVER,
     Bounded,
-    Elements,
     Flag,
     InUnit,
-    PerElement,
+    ScalarOrVector,
     Vector,
-    spread,
-    spread_bound,
+    VectorParameters,
+    broadcast,
+    broadcast_bound,
 )
 
 
@@ -50,20 +50,22 @@ class PID(Bounded, Block):
     second, and kd in it times seconds.
     """
 
-    class Params(Elements, InUnit):
-        kp: PerElement = live_parameter(1.0, text="proportional gain")
-        ki: PerElement = live_parameter(0.0, text="integral gain, per second")
-        kd: PerElement = live_parameter(0.0, text="derivative gain, in seconds")
-        b: PerElement = live_parameter(1.0, text="the setpoint's weight in the proportional part")
-        c: PerElement = live_parameter(0.0, text="the setpoint's weight in the derivative part")
+    class Params(VectorParameters, InUnit):
+        kp: ScalarOrVector = live_parameter(1.0, text="proportional gain")
+        ki: ScalarOrVector = live_parameter(0.0, text="integral gain, per second")
+        kd: ScalarOrVector = live_parameter(0.0, text="derivative gain, in seconds")
+        b: ScalarOrVector = live_parameter(
+            1.0, text="the setpoint's weight in the proportional part"
+        )
+        c: ScalarOrVector = live_parameter(0.0, text="the setpoint's weight in the derivative part")
         derivative_time_constant: float = live_parameter(
             0.01, unit="s", ge=0.0, text="tau, of the derivative's filter"
         )
         tracking_time: float = live_parameter(
             0.1, unit="s", gt=0.0, text="how fast the integral gives way to a bound"
         )
-        lower: PerElement | None = live_parameter(None, text="the least output")
-        upper: PerElement | None = live_parameter(None, text="the greatest output")
+        lower: ScalarOrVector | None = live_parameter(None, text="the least output")
+        upper: ScalarOrVector | None = live_parameter(None, text="the greatest output")
 
     params: Params
     setpoint = Input(Vector, text="r, what is wanted")
@@ -92,13 +94,13 @@ class PID(Bounded, Block):
         """Keep the gains as arrays."""
         p = self.params
         self._gains = PidGains(
-            spread(p.kp, p.n),
-            spread(p.ki, p.n),
-            spread(p.kd, p.n),
-            spread(p.b, p.n),
-            spread(p.c, p.n),
-            spread_bound(p.lower, p.n, -np.inf),
-            spread_bound(p.upper, p.n, np.inf),
+            broadcast(p.kp, p.n),
+            broadcast(p.ki, p.n),
+            broadcast(p.kd, p.n),
+            broadcast(p.b, p.n),
+            broadcast(p.c, p.n),
+            broadcast_bound(p.lower, p.n, -np.inf),
+            broadcast_bound(p.upper, p.n, np.inf),
             p.derivative_time_constant,
             min(self.period / p.tracking_time, 1.0),
             self.period,

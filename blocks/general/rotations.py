@@ -52,7 +52,7 @@ def random_unit(rng: np.random.Generator) -> Mapping[str, Any]:
     return {"value": value / np.sqrt(np.sum(value * value))}
 
 
-class OfQuaternion:
+class QuaternionInput:
     """The base of blocks whose input ``u`` is a unit quaternion."""
 
     @classmethod
@@ -137,7 +137,7 @@ class QuaternionProduct(Block):
         multiply(a, self.b.value, self.y.value)
 
 
-class QuaternionToMatrix(OfQuaternion, Block):
+class QuaternionToMatrix(QuaternionInput, Block):
     """The rotation matrix (3, 3) of a unit quaternion; it takes body vectors to the world."""
 
     u = Input(Quaternion, text="the unit quaternion")
@@ -168,7 +168,7 @@ class MatrixToQuaternion(Block):
         from_matrix(self.u.value, self.y.value)
 
 
-class QuaternionToEuler(OfQuaternion, Block):
+class QuaternionToEuler(QuaternionInput, Block):
     """Roll, pitch and yaw of a unit quaternion: R = Rz(yaw) Ry(pitch) Rx(roll).
 
     Roll and yaw jump where they pass pi, and near a pitch of +-pi/2 they are ill-conditioned: use

@@ -12,7 +12,14 @@ from ...mathematics.kernel import kernel
 from ...robots.description import RobotDescription
 from ...runtime.language.block import Block, Output
 from ...runtime.language.parameters import Parameters, live_parameter, parameter
-from .vectors import Elements, PerElement, Says, SourceParameters, Vector, spread
+from .vectors import (
+    ScalarOrVector,
+    SourceParameters,
+    UnitFromParameters,
+    Vector,
+    VectorParameters,
+    broadcast,
+)
 
 
 @kernel
@@ -21,7 +28,7 @@ def first_tick(seconds: float, base_period: float) -> int:
     return math.ceil(seconds / base_period - 1e-6)
 
 
-class Constant(Says, Block):
+class Constant(UnitFromParameters, Block):
     """A constant vector: y[n] = value. It has as many elements as ``value``."""
 
     class Params(SourceParameters):
@@ -58,21 +65,21 @@ class Constant(Says, Block):
         np.copyto(self.y.value, self._value)
 
 
-class Step(Says, Block):
+class Step(UnitFromParameters, Block):
     """A vector that jumps once: y = before while t < at, y = after from then on.
 
     The jump comes in the first tick that is not before ``at``.
     """
 
-    class Params(Elements, SourceParameters):
+    class Params(VectorParameters, SourceParameters):
         in_unit = (
             "before",
             "after",
         )
 
         at: float = parameter(1.0, unit="s", ge=0.0, text="when the step comes")
-        before: PerElement = live_parameter(0.0, text="the value before the step")
-        after: PerElement = live_parameter(1.0, text="the value from the step on")
+        before: ScalarOrVector = live_parameter(0.0, text="the value before the step")
+        after: ScalarOrVector = live_parameter(1.0, text="the value from the step on")
 
     params: Params
     y = Output(Vector, text="the step")
@@ -84,27 +91,27 @@ class Step(Says, Block):
 
     def on_parameters(self) -> None:
         """Keep both values as arrays."""
-        self._before = spread(self.params.before, self.params.n)
-        self._after = spread(self.params.after, self.params.n)
+        self._before = broadcast(self.params.before, self.params.n)
+        self._after = broadcast(self.params.after, self.params.n)
 
     def step(self) -> None:
         """Write the value of the present tick."""
         np.copyto(self.y.value, self._before if self.tick < self._tick else self._after)
 
 
-class Ramp(Says, Block):
+class Ramp(UnitFromParameters, Block):
     """Even growth: y = offset + slope min(max(t - start, 0), duration).
 
     Without ``duration`` it grows for ever.
     """
 
-    class Params(Elements, SourceParameters):
+    class Params(VectorParameters, SourceParameters):
         in_unit = ("offset",)
 
         start: float = parameter(0.0, unit="s", ge=0.0, text="when it begins to grow")
         duration: float | None = parameter(None, unit="s", ge=0.0, text="how long it grows")
-        slope: PerElement = live_parameter(1.0, text="growth per second")
-        offset: PerElement = live_parameter(0.0, text="the value before the start")
+        slope: ScalarOrVector = live_parameter(1.0, text="growth per second")
+        offset: ScalarOrVector = live_parameter(0.0, text="the value before the start")
 
     params: Params
     y = Output(Vector, text="the ramp")
@@ -116,8 +123,8 @@ class Ramp(Says, Block):
 
     def on_parameters(self) -> None:
         """Keep them as arrays, so that no tick makes them."""
-        self._slope = spread(self.params.slope, self.params.n)
-        self._offset = spread(self.params.offset, self.params.n)
+        self._slope = broadcast(self.params.slope, self.params.n)
+        self._offset = broadcast(self.params.offset, self.params.n)
 
     def step(self) -> None:
         """Evaluate at the present time."""
@@ -129,14 +136,14 @@ class Ramp(Says, Block):
         np.add(self.y.value, self._offset, out=self.y.value)
 
 
-class Pulse(Says, Block):
+class Pulse(UnitFromParameters, Block):
     """Rectangular pulses: y = offset + amplitude in the first ``width`` share of every period.
 
     In between, and before ``start``, y = offset. Edges fall on the first tick that is not before
     them.
     """
 
-    class Params(Elements, SourceParameters):
+    class Params(VectorParameters, SourceParameters):
         in_unit = (
             "amplitude",
             "offset",
@@ -145,8 +152,8 @@ class Pulse(Says, Block):
         duration: float = parameter(1.0, unit="s", gt=0.0, text="from one pulse to the next")
         width: float = parameter(0.5, ge=0.0, le=1.0, text="share of it that the pulse lasts")
         start: float = parameter(0.0, unit="s", ge=0.0, text="when the first pulse begins")
-        amplitude: PerElement = live_parameter(1.0, text="height of the pulses")
-        offset: PerElement = live_parameter(0.0, text="the value between pulses")
+        amplitude: ScalarOrVector = live_parameter(1.0, text="height of the pulses")
+        offset: ScalarOrVector = live_parameter(0.0, text="the value between pulses")
 
     params: Params
     y = Output(Vector, text="the pulses")
@@ -157,8 +164,8 @@ class Pulse(Says, Block):
 
     def on_parameters(self) -> None:
         """Keep them as arrays, so that no tick makes them."""
-        self._low = spread(self.params.offset, self.params.n)
-        self._high = self._low + spread(self.params.amplitude, self.params.n)
+        self._low = broadcast(self.params.offset, self.params.n)
+        self._high = self._low + broadcast(self.params.amplitude, self.params.n)
 
     def step(self) -> None:
         """Write the level of the present time."""
@@ -169,7 +176,7 @@ class Pulse(Says, Block):
         np.copyto(self.y.value, self._high if high else self._low)
 
 
-class SineWave(Says, Block):
+class SineWave(UnitFromParameters, Block):
     """A sine of time in every element: y = offset + amplitude sin(2 pi frequency t + phase)."""
 
     class Params(SourceParameters):
@@ -194,7 +201,7 @@ class SineWave(Says, Block):
         self.y.value.fill(p.offset + p.amplitude * math.sin(angle))
 
 
-class Chirp(Says, Block):
+class Chirp(UnitFromParameters, Block):
     """A sine that sweeps from one frequency to another: y = offset + amplitude sin(phi(t)).
 
     With frequencies f0 to f1 and duration D the phase is, for t <= D,
@@ -205,7 +212,7 @@ class Chirp(Says, Block):
     After D the sine goes on at f1 with no jump of its phase.
     """
 
-    class Params(Elements, SourceParameters):
+    class Params(VectorParameters, SourceParameters):
         in_unit = (
             "amplitude",
             "offset",

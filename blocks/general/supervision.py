@@ -13,14 +13,14 @@ from ...runtime.language.block import Block, Input, Metric, Misfit, Output, Stat
 from ...runtime.language.parameters import Parameters, parameter
 from ...runtime.language.signals import Field, Signal
 from .vectors import (
-    Elements,
     Flag,
     Flags,
-    PerElement,
+    ScalarOrVector,
     Seconds,
     Vector,
+    VectorParameters,
+    broadcast_bound,
     crossed_bounds,
-    spread_bound,
 )
 
 
@@ -167,9 +167,9 @@ class Assertion(Block):
     value, and when. With ``action: stop`` the run ends there; with ``mark`` it goes on.
     """
 
-    class Params(Elements):
-        lower: PerElement | None = parameter(None, text="what u must not be below")
-        upper: PerElement | None = parameter(None, text="what u must not be above")
+    class Params(VectorParameters):
+        lower: ScalarOrVector | None = parameter(None, text="what u must not be below")
+        upper: ScalarOrVector | None = parameter(None, text="what u must not be above")
         action: Literal["stop", "mark"] = parameter("stop", text="what a broken bound does")
 
     params: Params
@@ -193,8 +193,8 @@ class Assertion(Block):
     def setup(self) -> None:
         """Keep the bounds at hand."""
         p = self.params
-        self._lower = spread_bound(p.lower, p.n, -np.inf)
-        self._upper = spread_bound(p.upper, p.n, np.inf)
+        self._lower = broadcast_bound(p.lower, p.n, -np.inf)
+        self._upper = broadcast_bound(p.upper, p.n, np.inf)
         self._broken, self._above = np.zeros(p.n, bool), np.zeros(p.n, bool)
 
     def step(self) -> None:

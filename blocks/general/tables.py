@@ -16,7 +16,7 @@ from ...robots.description import RobotDescription
 from ...runtime.language.block import Block, Context, Input, Misfit, Output
 from ...runtime.language.parameters import Parameters, parameter
 from ...runtime.language.signals import Field, Signal
-from .vectors import Elements, Says, SourceParameters, Vector
+from .vectors import SourceParameters, UnitFromParameters, Vector, VectorParameters
 
 
 def unsorted_points(name: str, points: Sequence[float]) -> Iterable[Misfit]:
@@ -32,14 +32,14 @@ def unsorted_points(name: str, points: Sequence[float]) -> Iterable[Misfit]:
             return
 
 
-class LookupTable(Says, Block):
+class LookupTable(UnitFromParameters, Block):
     """The line through the points (points[k], values[k]), evaluated at every element of the input.
 
     Beyond the first and last point the outer values hold (``clamp``) or the outer lines go on
     (``extrapolate``).
     """
 
-    class Params(Elements, SourceParameters):
+    class Params(VectorParameters, SourceParameters):
         in_unit = ("values",)
 
         points: list[float] = parameter(text="inputs, rising", min_length=2)
@@ -88,7 +88,7 @@ class TableValue(Signal):
     value = Field(1, carried=True, text="the number")
 
 
-class LookupGrid(Says, Block):
+class LookupGrid(UnitFromParameters, Block):
     """One number from a table on a grid, multilinear between its points: y = table(u[0], u[1], ...).
 
     ``axes`` holds the rising points of every variable; ``values`` the table in row-major order: the
@@ -168,7 +168,7 @@ class LookupGrid(Says, Block):
         )
 
 
-class TablePlayback(Says, Block):
+class TablePlayback(UnitFromParameters, Block):
     """Columns of a table over time, from a CSV or NPZ file beside the graph or from ``rows``.
 
     A CSV file has the columns' names in its first line, an NPZ file one array for each. Times [s]

@@ -17,7 +17,13 @@ from ...runtime.language.parameters import Parameters, parameter
 from ...runtime.language.quantities import Carried, Given, Quantity
 from ...runtime.language.unit_algebra import ONE, SECOND, over, read_unit, root, times
 from ...runtime.language.units import Unit, parse_unit
-from .vectors import Elements, InitialParameters, Says, SourceParameters, Vector
+from .vectors import (
+    InitialValueParameters,
+    SourceParameters,
+    UnitFromParameters,
+    Vector,
+    VectorParameters,
+)
 
 Name = Literal[
     "abs", "sign", "negative", "reciprocal", "square", "sqrt", "exp", "log", "log10",
@@ -67,7 +73,7 @@ class Function(Block):
     block's name.
     """
 
-    class Params(Elements):
+    class Params(VectorParameters):
         function: Name = parameter("abs", text="which function")
 
     params: Params
@@ -109,7 +115,7 @@ class Expression(Block):
     may be outside a function's domain.
     """
 
-    class Params(Elements):
+    class Params(VectorParameters):
         expression: str = parameter(text="the formula")
         constants: dict[str, float] = parameter({}, text="numbers by the names the formula has")
         units: dict[str, str] = parameter({}, text="units of constants, by name")
@@ -304,14 +310,14 @@ def _call(name: str, arguments: list[ast.expr], units: Mapping[str, Unit | None]
     return _RAD if name in _EXPRESSION_UNITS_TO_ANGLES else ONE
 
 
-class External(Says, Block):
+class External(UnitFromParameters, Block):
     """A vector that Python sets between two ticks: ``run["action"] = [0.1, 0.2]``.
 
     It holds what was set last, and ``initial`` before. See ``aloft.Graph.open`` and ``aloft.gym``.
     In a run that nobody steps it is a constant.
     """
 
-    class Params(InitialParameters, SourceParameters):
+    class Params(InitialValueParameters, SourceParameters):
         in_unit = ("initial",)
 
     params: Params

@@ -42,15 +42,15 @@ class Tally(Signal):
     count = Field((), dtype="int64", text="the number")
 
 
-PerElement = float | list[float]
+ScalarOrVector = float | list[float]
 """One number for all elements of a vector, or a list with one number for each."""
-_CHECKED = (PerElement, PerElement | None)
+_CHECKED = (ScalarOrVector, ScalarOrVector | None)
 
 
-class Elements(Parameters):
+class VectorParameters(Parameters):
     """The base of the parameters of blocks on a vector with ``n`` elements.
 
-    A parameter of type ``PerElement`` that is a list must have n numbers, which is part of the
+    A parameter of type ``ScalarOrVector`` that is a list must have n numbers, which is part of the
     load report.
     """
 
@@ -67,16 +67,16 @@ class Elements(Parameters):
         return value
 
 
-def spread(value: PerElement, n: int) -> NDArray[np.float64]:
+def broadcast(value: ScalarOrVector, n: int) -> NDArray[np.float64]:
     """The value as an array of its own with n elements."""
     result = np.empty(n)
     result[...] = value
     return result
 
 
-def spread_bound(value: PerElement | None, n: int, absent: float) -> NDArray[np.float64]:
+def broadcast_bound(value: ScalarOrVector | None, n: int, absent: float) -> NDArray[np.float64]:
     """The same for a bound that may be missing and is then ``absent``, such as minus infinity."""
-    return spread(absent if value is None else value, n)
+    return broadcast(absent if value is None else value, n)
 
 
 class Flags(Signal):
@@ -95,21 +95,23 @@ NEVER = {"value": False}
 """The default of an optional trigger or condition that is not wired."""
 
 
-class InitialParameters(Elements):
+class InitialValueParameters(VectorParameters):
     """The parameters of blocks that start from a vector."""
 
-    initial: PerElement = parameter(
+    initial: ScalarOrVector = parameter(
         0.0, text="the first output: n numbers, or one for all elements"
     )
 
     def start_value(self) -> NDArray[np.float64]:
         """``initial`` as an array of n elements."""
-        return spread(self.initial, self.n)
+        return broadcast(self.initial, self.n)
 
 
-def crossed_bounds(lower: PerElement | None, upper: PerElement | None, n: int) -> Iterable[Misfit]:
+def crossed_bounds(
+    lower: ScalarOrVector | None, upper: ScalarOrVector | None, n: int
+) -> Iterable[Misfit]:
     """A misfit where a lower bound is above its upper one."""
-    low, high = spread_bound(lower, n, -np.inf), spread_bound(upper, n, np.inf)
+    low, high = broadcast_bound(lower, n, -np.inf), broadcast_bound(upper, n, np.inf)
     for i in np.flatnonzero(low > high)[:1]:
         yield Misfit(
             f"the lower bound of element {i} is above the upper one",
@@ -194,7 +196,7 @@ def _numbers(value: Any, unit: str) -> Any:
     return value
 
 
-class Says:
+class UnitFromParameters:
     """A block whose output ``y`` is what its parameters ``unit`` and ``frame`` say."""
 
     @classmethod
@@ -204,7 +206,7 @@ class Says:
         return {"y": params.quantity()}
 
 
-class Keeps:
+class UnitOfInput:
     """A block whose output ``y`` is the same quantity as its input ``u``."""
 
     @classmethod
@@ -213,7 +215,7 @@ class Keeps:
         return {"y": given["u"]}
 
 
-class Scales:
+class UnitOfProduct:
     """A block whose output ``y`` is its input ``u`` times the parameter ``unit``."""
 
     @classmethod

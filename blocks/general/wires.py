@@ -12,7 +12,7 @@ from ...runtime.language.block import Block, Input, Misfit, Output
 from ...runtime.language.parameters import Parameters, parameter
 from ...runtime.language.quantities import UNCHECKED, Carried, Given
 from ...runtime.language.signals import Field, Signal
-from .vectors import Keeps, Vector
+from .vectors import UnitOfInput, Vector
 
 
 class First(Signal):
@@ -101,7 +101,7 @@ class Selected(Signal):
     value = Field("m", carried=True, text="the elements, in the order asked for")
 
 
-class Selector(Keeps, Block):
+class Selector(UnitOfInput, Block):
     """Some elements of the input, in any order, also repeated: y[i] = u[elements[i]], from 0."""
 
     class Params(Parameters):
