@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 
 from ..mathematics.arrays import Array
-from ..mathematics.reproducible import product
+from ..mathematics.linear_algebra import product
 from ..robots.robot_description import RobotDescription
 from ..robots.transmission import MotorGains, motor_gains
 from ..runtime.language.block import Misfit

@@ -29,7 +29,7 @@ import numpy as np
 from ..mathematics.arrays import Array
 from ..mathematics.compiling.kernel_call import KernelCall
 from ..mathematics.kernel import kernel
-from ..mathematics.linear import multiply_vector
+from ..mathematics.linear_algebra import multiply_vector
 from ..robots.robot_description import RobotDescription
 
 

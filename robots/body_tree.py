@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..mathematics.body_tree import BodyTree
+from ..mathematics.body_dynamics import BodyTree
 from .robot_description import RobotDescription
 
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..mathematics.arrays import Array, Indices
-from ..mathematics.body_tree import (
+from ..mathematics.body_dynamics import (
     BodyMotion,
     BodyTree,
     body_motion,

@@ -18,9 +18,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..mathematics.arrays import Array
-from ..mathematics.directions import unit
 from ..mathematics.kernel import kernel
-from ..mathematics.rotations import wrap
+from ..mathematics.rotations import unit, wrap
 from .limb import FootKind, chain_to, foot_shape
 from .robot_description import RobotDescription
 

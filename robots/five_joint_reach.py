@@ -11,8 +11,7 @@ import math
 
 from ..mathematics.arrays import Array
 from ..mathematics.kernel import kernel
-from ..mathematics.least_squares import solve_damped
-from ..mathematics.linear import multiply_matrices
+from ..mathematics.linear_algebra import multiply_matrices, solve_damped
 from .five_joint_leg import inverse
 
 _LEVEL = 0.3

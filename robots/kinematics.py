@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..mathematics.arrays import Array
-from ..mathematics.reproducible import product
+from ..mathematics.linear_algebra import product
 from .parts import Joint
 from .robot_description import RobotDescription
 

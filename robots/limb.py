@@ -14,7 +14,7 @@ import numpy as np
 
 from ..mathematics.arrays import Array
 from ..mathematics.kernel import kernel
-from ..mathematics.reproducible import product
+from ..mathematics.linear_algebra import product
 from .robot_description import RobotDescription
 
 _COLLINEAR = 1e-6

@@ -11,8 +11,8 @@ from __future__ import annotations
 import math
 
 from ..mathematics.arrays import Array
-from ..mathematics.directions import unit
 from ..mathematics.kernel import kernel
+from ..mathematics.rotations import unit
 
 _FAR = 10.0
 """Targets are limited to this distance [m], so that no square overflows."""

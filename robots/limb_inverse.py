@@ -29,7 +29,7 @@ import numpy as np
 
 from ..mathematics.arrays import Array
 from ..mathematics.kernel import kernel
-from ..mathematics.least_squares import solve_positive
+from ..mathematics.linear_algebra import solve_positive
 from .limb import limb_jacobian, place_limb
 from .limb_error import foot_error, weigh_rows
 

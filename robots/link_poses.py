@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..mathematics.arrays import Array
-from ..mathematics.reproducible import product
+from ..mathematics.linear_algebra import product
 
 if TYPE_CHECKING:
     from .robot_description import RobotDescription

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..mathematics.arrays import Array
-from ..mathematics.reproducible import inverse, product
+from ..mathematics.linear_algebra import inverse, product
 from .parts import (
     ActuatorProfile,
     ContactPoint,

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from ..mathematics.arrays import Array
-from ..mathematics.reproducible import product
+from ..mathematics.linear_algebra import product
 from .description import RobotDescription
 from .kinematics import link_poses
 

@@ -8,16 +8,14 @@ import numpy as np
 
 from ...mathematics.arrays import Array, Indices
 from ...mathematics.body_dynamics import (
-    Inertias,
-    MotionTerms,
-    equations_of_motion,
-    inertias,
-)
-from ...mathematics.body_tree import (
     BodyMotion,
     BodyTree,
+    Inertias,
+    MotionTerms,
     acceleration_at,
     body_motion,
+    equations_of_motion,
+    inertias,
     move_bodies,
     place_bodies,
     place_of,

@@ -10,7 +10,7 @@ import numpy as np
 from ...mathematics.arrays import Array
 from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.constants import GRAVITY
-from ...mathematics.invariant_propagation import error_transition
+from ...mathematics.invariant_filter import error_transition
 from ...robots.ball_feet import ball_feet
 from ...robots.contact_kinematics import (
     ContactKinematics,

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 from ...mathematics.arrays import Array, Counts
 from ...mathematics.kernel import kernel
-from ...mathematics.linear import multiply_vector
+from ...mathematics.linear_algebra import multiply_vector
 
 
 class Motors(NamedTuple):

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...mathematics.arrays import Array
+from ...mathematics.capture_step import support_margin
 from ...mathematics.constants import GRAVITY
-from ...mathematics.reproducible import product
-from ...mathematics.support_margin import support_margin
+from ...mathematics.linear_algebra import product
 from ...robots.description import RobotDescription
 from .base import FixedBase
 from .stance import StartError

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...mathematics.arrays import Array
-from ...mathematics.reproducible import product
+from ...mathematics.linear_algebra import product
 from ...robots.ball_feet import ball_feet
 from ...robots.description import RobotDescription
 from ...robots.pinocchio_model import build_pinocchio_model

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ...mathematics.reproducible import product
+from ...mathematics.linear_algebra import product
 from ...robots.description import RobotDescription
 from ...robots.link_poses import contact_centres, link_poses
 from .errors import TaskError

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from aloft.blocks.control.dynamics import Dynamics
-from aloft.mathematics.flight_prediction import (
+from aloft.mathematics.landing_law import (
     LandingCost,
     choose_shift,
     flight_map,

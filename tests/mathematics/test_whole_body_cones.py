@@ -10,7 +10,7 @@ from aloft.mathematics.active_set import (
     price_again,
     solve_program,
 )
-from aloft.mathematics.friction_cones import (
+from aloft.mathematics.whole_body_cones import (
     PLANES,
     add_bending,
     add_curvature,
