@@ -14,8 +14,7 @@ from aloft.robots.description import find_robot
 from aloft.robots.five_joint_leg import read_leg
 from aloft.robots.five_joint_track import FootMotion, LegSettings, LegTargets
 from aloft.robots.limb import read_limb
-from aloft.robots.limb_inverse import limb_scratch
-from aloft.robots.limb_track import limb_geometry, limb_memory
+from aloft.robots.limb_inverse import limb_geometry, limb_memory, limb_scratch
 
 LEG = read_leg(find_robot("bruce"), 0)
 LIMB = read_limb(find_robot("bruce"), 0)
@@ -276,11 +275,11 @@ UNUSED = {
         LIMB.links, LIMB.tip, MIDDLE, np.zeros((5, 6)), np.zeros((4, 3)),
     ),
     "aloft.robots.limb.limb_jacobian": (LIMB.links, np.ones((5, 6)), POSE, np.zeros((6, 5))),
-    "aloft.robots.limb_error.aim": (POSE[0], POSE[1:], np.zeros((4, 3))),
-    "aloft.robots.limb_error.foot_error": (
+    "aloft.robots.limb.aim": (POSE[0], POSE[1:], np.zeros((4, 3))),
+    "aloft.robots.limb.foot_error": (
         LIMB.tip, POSE, TARGET, np.array([1.0, 0.9, 0.3]), np.zeros(6),
     ),
-    "aloft.robots.limb_error.weigh_rows": (
+    "aloft.robots.limb.weigh_rows": (
         LIMB.tip, POSE, TARGET, np.array([1.0, 0.9, 0.3]), np.ones((6, 5)),
     ),
     "aloft.robots.limb_inverse.approach": (*CHAIN, 3, limb_scratch(5), MIDDLE),
@@ -290,23 +289,23 @@ UNUSED = {
     "aloft.robots.limb_inverse.limb_velocity": (
         *CHAIN, MIDDLE, np.ones(6), 3e-4, limb_scratch(5), np.zeros(5),
     ),
-    "aloft.robots.limb_track.watch_foot": (
+    "aloft.robots.limb_inverse.watch_foot": (
         LIMB_GEOMETRY, FOOT, True, np.array(0.1), 0.002, np.array(True), TARGET, limb_memory(5),
     ),
-    "aloft.robots.limb_track.follow_limb": (
+    "aloft.robots.limb_inverse.follow_limb": (
         LIMB_GEOMETRY, 0, FOOT, np.tile(MIDDLE, 2), np.array(True), np.tile(MIDDLE + 0.1, 2), *FOLLOWING,
     ),
-    "aloft.robots.limb_error.turning": (LIMB.tip, POSE, TARGET, 0.002, 10.0, np.zeros(3)),
+    "aloft.robots.limb.turning": (LIMB.tip, POSE, TARGET, 0.002, 10.0, np.zeros(3)),
     "aloft.robots.limb_inverse._stuck": (LIMB.limits, 1, 0.3, 1.0),
-    "aloft.robots.limb_error._along": (POSE, LIMB.tip),
-    "aloft.robots.limb_error._product": (POSE, TARGET, 1, 2),
+    "aloft.robots.limb._along": (POSE, LIMB.tip),
+    "aloft.robots.limb._product": (POSE, TARGET, 1, 2),
     "aloft.mathematics.rotations.unit": (0.1, 0.2, 0.3, 1.0, 0.0, 0.0),
-    "aloft.robots.five_joint_reach.slide": (
+    "aloft.robots.five_joint_leg.slide": (
         LEG.hip, LEG.plane, LEG.signs, LEG.limits, np.add(LEG.hip, [0.25, 0.02, -0.3]), np.eye(3), 0.005,
         0.1, 0.05, np.zeros(3), np.zeros(5),
     ),
     "aloft.mathematics.rotations.skew": (np.ones(3), np.zeros((3, 3))),
-    "aloft.robots.five_joint_reach.pitched_line": (np.eye(3), 0.4, np.zeros(3)),
+    "aloft.robots.five_joint_leg.pitched_line": (np.eye(3), 0.4, np.zeros(3)),
     "aloft.mathematics.rotations.yaw": (np.array([0.1, 0.2, 0.3, 0.9]),),
     "aloft.blocks.control.balance_law.lengthen": (
         np.array([0.01, -0.04, 0.0]), 0.7, 0.02, 0.25, 0.2, 0.6, *(np.ones(3) for _ in range(3)),
@@ -327,7 +326,7 @@ UNUSED = {
         SoftStops(np.tile([-0.8, 0.7], (5, 1)), np.array([0.1]), np.array([2.0]), np.full(5, 60.0), np.full(5, 1.5)),
         Feedback(*(np.full(5, x) for x in (40.0, 0.2, 1.0, 0.3))),
     ),
-    "aloft.robots.five_joint_reach.keep_along": (
+    "aloft.robots.five_joint_leg.keep_along": (
         np.array([0.0, 0.6, 0.8]), np.array([0.1, 0.2, 0.3]),
     ),
     "aloft.mathematics.inertial_filter.right_up": (

@@ -24,8 +24,8 @@ from ...mathematics.body_dynamics import (
 from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.kernel import kernel
 from ...mathematics.rotations import normalise, rotate_back, to_matrix
-from ...robots.ball_feet import ball_feet
-from ...robots.body_tree import body_tree
+from ...robots.contact_kinematics import body_tree
+from ...robots.kinematics import ball_feet
 from ...runtime.language.block import Input, Output
 from ...runtime.language.kernel_block import KernelBlock
 from ..signals import BaseState, DynamicsTerms, JointState, MassEstimate

@@ -10,7 +10,7 @@ import pydantic
 
 from ...mathematics.compiling.kernel_call import KernelCall
 from ...robots.description import RobotDescription
-from ...robots.standing_feet import foot_sides, standing_feet
+from ...robots.kinematics import foot_sides, standing_feet
 from ...runtime.language.block import Input, Misfit, Output, State
 from ...runtime.language.kernel_block import KernelBlock
 from ...runtime.language.parameters import Parameters, live_parameter, parameter

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from ...mathematics.arrays import Array
 from ...mathematics.constants import GRAVITY
 from ...robots.description import RobotDescription
-from ...robots.link_poses import joints_above, standing_com, standing_heights
+from ...robots.kinematics import joints_above, standing_com, standing_heights
 from .base import BASES
 
 if TYPE_CHECKING:

@@ -30,9 +30,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...mathematics.constants import GRAVITY
-from ...robots.ball_feet import ball_feet
 from ...robots.description import RobotDescription
-from ...robots.link_poses import contact_centres
+from ...robots.kinematics import ball_feet, contact_centres
 from .base import BASES
 from .rotors import add_rotors, joint_armature
 from .scenes import Scene

@@ -17,7 +17,7 @@ import numpy as np
 
 from ...mathematics.arrays import Array
 from ...robots.description import RobotDescription
-from ...robots.link_poses import joints_above
+from ...robots.kinematics import joints_above
 
 if TYPE_CHECKING:
     from mujoco import MjSpec

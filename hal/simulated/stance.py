@@ -12,9 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...mathematics.arrays import Array
-from ...robots.ball_feet import ball_feet
 from ...robots.description import RobotDescription
-from ...robots.link_poses import joints_above, standing_heights
+from ...robots.kinematics import ball_feet, joints_above, standing_heights
 from ...runtime.language.errors import BlockError
 from .base import FixedBase
 from .mujoco_model import body_name

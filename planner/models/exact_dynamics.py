@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 
 from ...mathematics.arrays import Array
 from ...mathematics.linear_algebra import product
-from ...robots.ball_feet import ball_feet
 from ...robots.description import RobotDescription
+from ...robots.kinematics import ball_feet
 from ...robots.pinocchio_model import build_pinocchio_model
 from .coasting import coast, joint_side
 from .pushing import push, pushed_side

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from difflib import get_close_matches
 
-from ....robots.description import RobotDescription, RobotError, find_robot
-from ....robots.shipped import robot_names
+from ....robots.description import RobotDescription, RobotError, find_robot, robot_names
 from ...language.fit import fix_without_robot
 from ...language.stages import Position
 from ..flattening.flat import ROBOT_FILES, FlatGraph

@@ -12,8 +12,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from ....robots.description import RobotDescription, find_robot
-from ....robots.shipped import robot_names
+from ....robots.description import RobotDescription, find_robot, robot_names
 from ...language.per_joint import by_name
 from ...language.registry import MOVED
 from ..problems import Problems

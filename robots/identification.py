@@ -1,4 +1,7 @@
-"""Mass, torso's centre of mass and joint friction from a run, by least squares on inverse dynamics.
+"""What a recorded run says about a robot: its mass, its torso, its friction, and its delay.
+
+Mass, the torso's centre of mass and joint friction follow by least squares on inverse dynamics. The delay is
+that from a tick's instant to the torques computed in it, from commanded and measured torques.
 
 Between two ticks the motion is taken as uniformly accelerated, so velocities are the means of both ticks
 and accelerations their differences, as torques and specific forces are means over the same time. With
@@ -18,15 +21,67 @@ residuals), and what an unknown offset of every encoder and an unknown tilt woul
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...mathematics.arrays import Array
-from ..pinocchio_model import build_pinocchio_model
-from ..robot_description import RobotDescription
-from .motion import Motion
+from ..mathematics.arrays import Array
+from ..mathematics.constants import GRAVITY
+from .pinocchio_model import build_pinocchio_model
+from .robot_description import RobotDescription
+
+MARGIN = 8
+"""Ticks before and after a change of the contacts that are not used: impacts, and switches that bounce."""
+STILL = 0.15
+"""The mean joint speed of a robot that stands still, noise included [rad/s]."""
+
+
+@dataclass(frozen=True)
+class Motion:
+    """The measurements of a run, one row a tick, as ``hal.Robot`` publishes them.
+
+    Attributes:
+        period: from tick to tick [s].
+        position, velocity: of the joints at the tick [rad, rad/s], (n, n_joints).
+        torque: the mean over the tick before [N m], (n, n_joints).
+        angular_velocity: of the base at the tick [rad/s, body], (n, 3).
+        specific_force: the mean over the tick before [m/s^2, body], (n, 3).
+        up: the vertical by the estimated orientation, in the body's frame, (n, 3).
+        closed: the foot switches, (n, n_contacts).
+    """
+
+    period: float
+    position: Array
+    velocity: Array
+    torque: Array
+    angular_velocity: Array
+    specific_force: Array
+    up: Array
+    closed: NDArray[np.bool_]
+
+    def sensor_biases(self) -> tuple[Array, Array]:
+        """The biases of accelerometer [m/s^2] and gyroscope [rad/s], from where the robot stands
+        still at first; zero where it never does."""
+        speeds = np.abs(self.velocity).mean(axis=1)
+        moving = np.flatnonzero(speeds > STILL)
+        still = slice(1, max(1, int(moving[0]) if len(moving) else len(speeds)))
+        if len(self.up[still]) < 10:
+            return np.zeros(3), np.zeros(3)
+        force = self.specific_force[still].mean(axis=0) - GRAVITY * self.up[still].mean(axis=0)
+        return force, self.angular_velocity[still].mean(axis=0)
+
+    def usable(self) -> NDArray[np.int64]:
+        """The ticks, each with the one before it, in which the contacts have been the same for a while
+        and stay so for a while."""
+        n = len(self.closed)
+        changed = np.zeros(n, dtype=np.bool_)
+        changed[1:] = (self.closed[1:] != self.closed[:-1]).any(axis=1)
+        near = np.convolve(changed, np.ones(2 * MARGIN + 1), mode="same") > 0.5
+        near[: MARGIN + 1] = True
+        return np.flatnonzero(~near)
+
 
 BLOCK = 8
 """Ticks that are averaged to one equation."""
@@ -257,3 +312,87 @@ def _clustered(rows: Array, error: Array, where: NDArray[np.int64]) -> Array:
     count = len(np.unique(cluster))
     result: Array = inverse @ middle @ inverse * (count / max(1, count - 1))
     return result
+
+
+LONGEST = 20
+"""Delays up to so many ticks are looked for."""
+_FEWEST = 50
+_RESOLUTION = 0.05
+"""The smallest standard deviation that is claimed, in ticks: commands may come a little earlier or later."""
+_PARTS = 10
+"""The parts of a run whose delays are compared."""
+
+
+@dataclass(frozen=True)
+class Delay:
+    """What was found.
+
+    Attributes:
+        delay: from a tick's instant until its command acts [s].
+        correlation: between the changes of the measured torques and those expected with this delay.
+        ticks: how many were used.
+    """
+
+    delay: Value
+    correlation: float
+    ticks: int
+
+
+def identify_delay(
+    period: float, commanded: Array, measured: Array, feedback: NDArray[np.bool_]
+) -> Delay:
+    """Find the delay between commands and torques.
+
+    The command of tick k acts from t_k + d until the next one acts. A measured torque is the mean over
+    the tick before, so with d = (j + share) T its change is ``(1 - share)`` of the command's change
+    j + 1 ticks earlier and ``share`` of the one before that. Of all whole j and shares that pair is
+    taken for which expected and measured changes correlate most.
+
+    Args:
+        period: T [s].
+        commanded: feedforward torques [N m], (n, n_joints).
+        measured: mean torques over the tick before [N m], (n, n_joints).
+        feedback: the ticks whose commands have joint feedback; they are not used, (n,).
+
+    Raises:
+        IdentificationError: too few ticks have torques without joint feedback.
+    """
+    lags = LONGEST + 2
+    clean = np.convolve(feedback, np.ones(lags + 1))[: len(feedback)] < 0.5
+    clean[: lags + 1] = False
+    used = np.flatnonzero(clean)
+    if len(used) < _FEWEST:
+        raise IdentificationError(
+            f"only {len(used)} ticks have commands without joint feedback; {_FEWEST} are needed to find "
+            "the delay: record a run in which the robot stands or squats"
+        )
+    changes = np.diff(commanded, axis=0, prepend=commanded[:1])
+    best = (-1.0, 0, 0.0)
+    for j in range(LONGEST):
+        correlation, share = _fit(changes, measured, used, j)
+        if correlation > best[0]:
+            best = (correlation, j, share)
+    correlation, j, share = best
+    if correlation < 0.3:
+        raise IdentificationError(
+            "the measured torques do not follow the commanded ones at any delay up to "
+            f"{1e3 * LONGEST * period:g} ms (correlation {correlation:.2f})"
+        )
+    parts = [_fit(changes, measured, part, j)[1] for part in np.array_split(used, _PARTS)]
+    std = max(float(np.std(parts, ddof=1)) / math.sqrt(_PARTS), _RESOLUTION)
+    return Delay(Value((j + share) * period, std * period), correlation, len(used))
+
+
+def _fit(changes: Array, measured: Array, used: NDArray[np.int64], j: int) -> tuple[float, float]:
+    """How well measured changes correlate with those of the commands j + 1 and j + 2 ticks earlier,
+    and the share of the latter."""
+    seen = (measured[used] - measured[used - 1]).ravel()
+    first = changes[used - 1 - j].ravel()
+    step = changes[used - 2 - j].ravel() - first
+    square = float(step @ step)
+    if square <= 0.0:
+        return 0.0, 0.0
+    share = min(1.0, max(0.0, float(step @ (seen - first)) / square))
+    expected = first + share * step
+    size = float(np.linalg.norm(expected) * np.linalg.norm(seen))
+    return (float(expected @ seen) / size if size > 0.0 else 0.0), share

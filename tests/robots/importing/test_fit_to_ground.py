@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from aloft.robots.description import RobotDescription, find_robot
-from aloft.robots.standing_pose import find_standing_pose
+from aloft.robots.importing.fit_to_ground import find_standing_pose
 
-from .example_robots import needs_robots
-from .limbed_robots import humanoid, quadruped
-from .validation.wrong_robots import hopper
+from ..example_robots import needs_robots
+from ..limbed_robots import humanoid, quadruped
+from ..validation.wrong_robots import hopper
 
 
 @pytest.mark.parametrize("robot", [find_robot("bruce"), quadruped(), humanoid()])
