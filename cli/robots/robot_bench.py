@@ -45,7 +45,7 @@ def scan(
     if as_json:
         print_json({"drives": [vars(each) for each in found], "missing": missing})
         return
-    rows = [(str(f.device), f.motor or "-", f.version, f.trouble or "healthy") for f in found]
+    rows = [(str(f.device), f.motor or "-", f.version, f.problem or "healthy") for f in found]
     console().print(table("", (">address", "motor", "version", "condition"), rows))
     if missing:
         say(console(), f"no answer from {', '.join(missing)}")
@@ -144,7 +144,7 @@ def jog(
 ) -> None:
     """Move one motor there and back with little current. Without --arm nothing moves."""
     from ...hal.bear import bench
-    from ...hal.bear.dead_man import open_switch, wait_until_held
+    from ...hal.bear.watchdog import open_switch, wait_until_held
 
     with errors_reported(as_json):
         if not arm:

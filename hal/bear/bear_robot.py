@@ -10,16 +10,13 @@ from typing import Literal
 from ...blocks.signals import DrivePhase
 from ...runtime.language.block import Context, Misfit
 from ...runtime.language.parameters import Parameters, parameter
-from ..drive_gains import joint_gains
+from ..drive_control import joint_gains
 from .bus import BusError, open_port
-from .command_queue import CommandQueue
 from .configuration import Hardware, HardwareError
-from .dead_man import AlwaysHeld, DeadMansSwitch, open_switch, wait_until_held
-from .drive_law import DriveLaw
 from .driven_robot import DrivenRobot, DriveParameters, read_hardware
-from .driver import Driver
-from .motor_thread import MotorThread
-from .watchdog import Watchdog
+from .driver import DriveLaw, Driver
+from .motor_loop import CommandQueue, MotorThread
+from .watchdog import AlwaysHeld, DeadMansSwitch, Watchdog, open_switch, wait_until_held
 
 _HOLDING_TIME = 30.0
 """How long somebody has to take the dead man's switch [s]."""
@@ -136,7 +133,7 @@ class BearRobot(DrivenRobot):
             driver.arm(self._next_cycle)
         if params.time == "real":
             age = min(params.command_age, self.context.clock.command_limit or params.command_age)
-            self._thread = MotorThread(driver.loop, age, self._objection)
+            self._thread = MotorThread(driver.loop, age, self._stop_reason)
             self._thread.start()
         else:
             self._queue = CommandQueue(driver.loop, self.robot, params.latency, self.period)
@@ -149,11 +146,11 @@ class BearRobot(DrivenRobot):
 
     def write(self) -> None:
         """Give the command to the motor thread, or to the next exchanges."""
-        heard = self.context.clock.commands_heard()
+        last_command = self.context.clock.commands_heard()
         if self._watchdog is not None:
-            self._watchdog.beat(heard)
+            self._watchdog.beat(last_command)
         if self._thread is not None:
-            self._thread.follow(self.command, heard)
+            self._thread.follow(self.command, last_command)
         elif self._queue is not None:
             self._queue.give(self.command)
         self.stop_after_fault()
@@ -199,7 +196,7 @@ class BearRobot(DrivenRobot):
         if self.driver is not None:
             self.driver.close()
 
-    def _objection(self) -> str:
+    def _stop_reason(self) -> str:
         """Why the motor thread must not go on; empty if it may."""
         if self._watchdog is not None and self._watchdog.tripped:
             limit, silence = 1e3 * self.params.graph_timeout, 1e3 * self.context.clock.command_limit

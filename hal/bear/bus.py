@@ -9,8 +9,16 @@ from typing import Protocol
 
 from ...blocks.signals.drive_conditions import describe, is_critical
 from ...runtime.language.errors import AloftError
-from .frames import BROADCAST, Frame, FrameReader, Instruction, frame_bytes
-from .registers import CONFIG, STATUS, Register
+from .protocol import (
+    BROADCAST,
+    CONFIG,
+    STATUS,
+    Frame,
+    FrameReader,
+    Instruction,
+    Register,
+    frame_bytes,
+)
 
 BAUDRATE = 8_000_000
 """The rate of a new actuator [bit/s]."""
@@ -59,7 +67,7 @@ class Reply:
     data: bytes
 
     @property
-    def trouble(self) -> str:
+    def problem(self) -> str:
         """What the error byte reports, in words."""
         return describe(self.error_byte)
 

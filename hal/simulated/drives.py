@@ -1,4 +1,10 @@
-"""The drives of a simulated robot: delayed commands, joint feedback and motor limits."""
+"""The drives of a simulated robot: delayed commands, joint feedback, motor torque limits by speed.
+
+Motors are not joints. With ``A`` the transmission's ``joint_to_motor``, motor speed is ``A qd``,
+motor torque is ``kappa = A^-T tau`` and joint torque is ``tau = A^T kappa``. A motor limit is
+therefore a box in motor space and a rotated box in joint space. Where every motor is geared 1:1 to
+at most two joints, as in BRUCE, these products round the same on every CPU.
+"""
 
 from __future__ import annotations
 
@@ -11,22 +17,148 @@ from ...blocks.signals import CommandMode, JointCommand
 from ...mathematics.arrays import Array, Counts, Flags
 from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.kernel import kernel
+from ...mathematics.linear_algebra import multiply_vector
 from ...robots.description import RobotDescription
-from ..drive_goals import Targets
-from .actuator import (
-    MotorRecord,
-    Motors,
-    MotorScratch,
-    drive_motors,
-    joint_feedback_torque,
-)
-from .motor_feedback import Loops, MotorFeedback, close_loops
-from .state import DriveState, TickRecord
+from ..drive_control import Targets
+from .motor_feedback import MotorFeedback, MotorLoops, close_loops
+from .state import DriveState, TickRecord, update_maximum, update_minimum
+
+
+class Motors(NamedTuple):
+    """What the motors of a robot can do, and how they move its joints.
+
+    ``joint_to_motor``, ``torque_to_motor`` and ``motor_to_torque``, each (n, n), map joint
+    velocities to motor speeds, joint torques to motor torques, and motor torques to joint torques.
+    ``peak`` [N m], ``slope`` [N m s/rad] and ``no_load`` [rad/s], each (n,), are the curves of
+    ``motor_torque_limits``.
+    """
+
+    joint_to_motor: Array
+    torque_to_motor: Array
+    motor_to_torque: Array
+    peak: Array
+    slope: Array
+    no_load: Array
+
+
+class MotorRecord(NamedTuple):
+    """Sums and extremes of the motors over some physics steps, each (n,): see ``TickRecord``."""
+
+    saturated: Counts
+    torque_high: Array
+    torque_low: Array
+    speed_high: Array
+    speed_low: Array
+    overload: Array
+    joint_torque: Array
+
+
+class MotorScratch(NamedTuple):
+    """What the motors do in the present physics step, each (n,): their speeds [rad/s], torque limits,
+    the torques asked of them and those that they produce [N m]."""
+
+    speed: Array
+    lower: Array
+    upper: Array
+    requested: Array
+    torque: Array
+
+
+@kernel
+def motor_torque_limits(
+    speed: Array, peak: Array, slope: Array, no_load: Array, lower: Array, upper: Array
+) -> None:
+    """Write the torque limits [N m] of motors at ``speed`` [rad/s] to ``lower`` and ``upper``.
+
+    ``peak`` is available up to the corner speed and falls linearly, by ``slope`` [N m s/rad],
+    to zero at ``no_load``; above that the motor cannot drive at all. Against the
+    motion (braking) ``peak`` is available at any speed. A motor with a peak of zero does nothing.
+    All arguments have one element a motor.
+    """
+    for k in range(speed.shape[0]):
+        turning, most = float(speed[k]), float(peak[k])
+        idle, fall = float(no_load[k]), float(slope[k])
+        upper[k] = max(min(most, (idle - turning) * fall), 0.0)
+        lower[k] = min(-min(most, (idle + turning) * fall), 0.0)
+
+
+@kernel
+def joint_feedback_torque(
+    feedforward: Array,
+    stiffness: Array,
+    damping: Array,
+    position_target: Array,
+    velocity_target: Array,
+    position: Array,
+    velocity: Array,
+    out: Array,
+) -> None:
+    """Write feedforward plus joint feedback [N m] to ``out`` (paper, V, first equation):
+    ``tau_ff + Kp (q_d - q) + Kd (qd_d - qd)``."""
+    for k in range(out.shape[0]):
+        spring = (float(position_target[k]) - float(position[k])) * float(stiffness[k])
+        damper = (float(velocity_target[k]) - float(velocity[k])) * float(damping[k])
+        out[k] = (spring + float(feedforward[k])) + damper
+
+
+@kernel
+def clip_joint_torque(
+    torque: Array,
+    torque_to_motor: Array,
+    motor_to_torque: Array,
+    lower: Array,
+    upper: Array,
+    motor_requested: Array,
+    motor_torque: Array,
+) -> None:
+    """Limit the joint ``torque`` [N m] to what the motors can produce.
+
+    ``motor_requested`` receives the motor torques that are asked for, and ``motor_torque`` those that
+    are produced, within ``lower`` and ``upper``. ``torque_to_motor`` is the inverse of
+    ``motor_to_torque``, which is the transpose of ``joint_to_motor``. What is not a number stays so.
+    """
+    multiply_vector(torque_to_motor, torque, motor_requested)
+    for k in range(motor_torque.shape[0]):
+        produced = float(motor_requested[k])
+        if produced < lower[k]:
+            produced = float(lower[k])
+        if produced > upper[k]:
+            produced = float(upper[k])
+        motor_torque[k] = produced
+    multiply_vector(motor_to_torque, motor_torque, torque)
+
+
+@kernel
+def drive_motors(
+    velocity: Array, torque: Array, motors: Motors, scratch: MotorScratch, record: MotorRecord
+) -> None:
+    """Limit the joint ``torque`` [N m] at the joint ``velocity`` [rad/s] in place, and record how near
+    the motors come to their limits. Of what is not a number the record says so too."""
+    multiply_vector(motors.joint_to_motor, velocity, scratch.speed)
+    motor_torque_limits(
+        scratch.speed, motors.peak, motors.slope, motors.no_load, scratch.lower, scratch.upper
+    )
+    clip_joint_torque(
+        torque, motors.torque_to_motor, motors.motor_to_torque, scratch.lower, scratch.upper,
+        scratch.requested, scratch.torque,
+    )  # fmt: skip
+    for k in range(torque.shape[0]):
+        produced, speed = float(scratch.torque[k]), float(scratch.speed[k])
+        if produced != scratch.requested[k]:
+            record.saturated[k] += 1
+        update_maximum(record.torque_high, k, produced)
+        update_minimum(record.torque_low, k, produced)
+        update_maximum(record.speed_high, k, speed)
+        update_minimum(record.speed_low, k, speed)
+        update_maximum(record.overload, k, produced - float(scratch.upper[k]))
+        update_maximum(record.overload, k, float(scratch.lower[k]) - produced)
+        record.joint_torque[k] += torque[k]
+
 
 _ACTIVE, _DAMPING = int(CommandMode.ACTIVE), int(CommandMode.DAMPING)
 
 
-class Commands(NamedTuple):
+class CommandRing(NamedTuple):
     """A ring of commands, of which one is active and some are on their way: see ``DriveState``."""
 
     active: Counts
@@ -49,7 +181,7 @@ class Joints(NamedTuple):
 
 
 @kernel
-def follow_commands(commands: Commands, released: Array, joints: Joints) -> None:
+def follow_commands(commands: CommandRing, released: Array, joints: Joints) -> None:
     """Let the commands act that are due, and write the joint torques that the active one asks for.
 
     Args:
@@ -81,7 +213,7 @@ def follow_commands(commands: Commands, released: Array, joints: Joints) -> None
 
 @kernel
 def drive_joints(
-    commands: Commands,
+    commands: CommandRing,
     released: Array,
     joints: Joints,
     motors: Motors,
@@ -95,15 +227,15 @@ def drive_joints(
 
 @kernel
 def drive_loops(
-    commands: Commands,
+    commands: CommandRing,
     released: Array,
-    loops: Loops,
+    loops: MotorLoops,
     joints: Joints,
     motors: Motors,
     scratch: MotorScratch,
     record: MotorRecord,
 ) -> None:
-    """The same where the drives close the loops per motor, once a command has arrived."""
+    """As ``drive_joints``, but once a command has arrived each drive closes the loop of its motor."""
     follow_commands(commands, released, joints)
     active = int(commands.active[()])
     if int(commands.mode[active]) == _ACTIVE:
@@ -114,7 +246,7 @@ def drive_loops(
     drive_motors(joints.velocity, joints.torque, motors, scratch, record)
 
 
-class Given(NamedTuple):
+class CommandFields(NamedTuple):
     """The fields of ``JointCommand``."""
 
     mode: Counts
@@ -125,39 +257,43 @@ class Given(NamedTuple):
     damping: Array
 
 
-class Way(NamedTuple):
-    """How long a command is on its way: ``shortest`` (1,) [s], and up to ``jitter`` [s] longer, as a
-    number ``drawn`` (1,) between zero and one says, in physics steps of ``timestep`` [s]."""
+class CommandLatency(NamedTuple):
+    """The latency of a command: ``minimum + draw * jitter`` [s], rounded up to physics steps of
+    ``timestep`` [s]. ``minimum`` and ``draw``, a random number from zero to one, are (1,)."""
 
-    shortest: Array
+    minimum: Array
     jitter: float
-    drawn: Array
+    draw: Array
     timestep: float
 
 
 @kernel
 def send_command(
-    given: Given, step: Counts, way: Way, commands: Commands, last_due: Counts
+    command: CommandFields,
+    step: Counts,
+    latency: CommandLatency,
+    commands: CommandRing,
+    last_due: Counts,
 ) -> None:
-    """Put a command into the ring, behind those that are on their way.
+    """Put a command into the ring, behind those that have not arrived.
 
     ``step`` and ``last_due``, the arrival of the command sent last, have no dimension.
     """
-    delay = float(way.shortest[0])
-    if way.jitter != 0.0:
-        delay += way.jitter * float(way.drawn[0])
-    due = int(step[()]) + math.ceil(delay / way.timestep - 1e-9)
+    delay = float(latency.minimum[0])
+    if latency.jitter != 0.0:
+        delay += latency.jitter * float(latency.draw[0])
+    due = int(step[()]) + math.ceil(delay / latency.timestep - 1e-9)
     due = max(due, int(last_due[()]))
     pending = int(commands.pending[()])
     slot = (int(commands.active[()]) + 1 + pending) % commands.due.shape[0]
     targets = commands.targets
-    commands.mode[slot] = int(given.mode[()])
-    for k in range(given.torque.shape[0]):
-        targets.torque[slot, k] = given.torque[k]
-        targets.position[slot, k] = given.position[k]
-        targets.velocity[slot, k] = given.velocity[k]
-        targets.stiffness[slot, k] = given.stiffness[k]
-        targets.damping[slot, k] = given.damping[k]
+    commands.mode[slot] = int(command.mode[()])
+    for k in range(command.torque.shape[0]):
+        targets.torque[slot, k] = command.torque[k]
+        targets.position[slot, k] = command.position[k]
+        targets.velocity[slot, k] = command.velocity[k]
+        targets.stiffness[slot, k] = command.stiffness[k]
+        targets.damping[slot, k] = command.damping[k]
     commands.due[slot] = due
     last_due[()] = due
     commands.pending[()] = pending + 1
@@ -210,7 +346,7 @@ class Drives:
         self._feedback = feedback
         self._state = state
         limits = MotorLimits(robot, record)
-        self._commands = Commands(
+        self._commands = CommandRing(
             state.active, state.pending, state.due, state.mode,
             Targets(*(getattr(state, name) for name in Targets._fields)),
         )  # fmt: skip
@@ -256,8 +392,8 @@ class Drives:
         self._state.pending[()] = 0
         self._state.mode[int(self._state.active)] = CommandMode.DAMPING
 
-    def sending(self, command: JointCommand, step: Counts, way: Way) -> KernelCall:
+    def sending(self, command: JointCommand, step: Counts, latency: CommandLatency) -> KernelCall:
         """Sends a command in the physics step ``step``, a count without a dimension. It arrives as
-        late as its ``way`` is long, but not before earlier commands."""
-        given = Given(*(getattr(command, name) for name in Given._fields))
-        return KernelCall(send_command, given, step, way, self._commands, self._state.last_due)
+        late as its ``latency`` is long, but not before earlier commands."""
+        fields = CommandFields(*(getattr(command, name) for name in CommandFields._fields))
+        return KernelCall(send_command, fields, step, latency, self._commands, self._state.last_due)

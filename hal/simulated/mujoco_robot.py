@@ -12,11 +12,10 @@ from ...mathematics.compiling.call_sequence import CallSequence
 from ...robots.description import RobotDescription
 from ...runtime.language.block import Context, Metric, Misfit, State
 from ...runtime.language.parameters import Parameters
-from ..drive_gains import gain_misfits, lost_gains
+from ..drive_control import gain_misfits, lost_gains
 from .motor_feedback import FeedbackState, MotorFeedback
-from .parameters import SimulatorParameters
-from .rotors import unfit_motor
-from .simulated_robot import SimulatedRobot
+from .mujoco_model import unsupported_motor
+from .simulated_robot import SimulatedRobot, SimulatorParameters
 from .stance import uneven_contacts
 from .state import DriveState, TickRecord
 
@@ -37,7 +36,7 @@ class MujocoRobot(SimulatedRobot):
     gains that are fixed for the run (``stiffness`` and ``damping`` of the joints, through the
     transmission), around goals that a driver renews when a command arrives and once a period, from the
     measurement of the exchange before. The command's gains are met at the instant of each measurement
-    (``hal/drive_goals.py``). Without it the driver is taken as infinitely fast: every joint gets its
+    (``hal/drive_control.py``). Without it the driver is taken as infinitely fast: every joint gets its
     command's own gains in every physics step, as no real drives could give them.
 
     Command modes: ``OFF`` gives no torque, ``ACTIVE`` feedforward plus joint feedback, ``DAMPING``
@@ -45,7 +44,7 @@ class MujocoRobot(SimulatedRobot):
 
     Start: the robot stands in its description's pose (torso turned by a drawn
     ``initial_attitude_error``, soles flat), held by its drives around the static torques with gains
-    that follow from its weight and inertia (``holding.py``), settles for 0.3 s, and is centred: the
+    that follow from its weight and inertia (``stance.py``), settles for 0.3 s, and is centred: the
     middle between the soles is the world's origin. It is held so until the first command arrives.
     Joints without a working motor are kept in the standing pose until the run begins. A fixed base
     is at the world's origin from the start, and a robot without feet lies on its lowest shape.
@@ -88,7 +87,7 @@ class MujocoRobot(SimulatedRobot):
         """Report a transmission that the simulator cannot express, gains that no drives can give, and
         feet that cannot stand."""
         assert isinstance(params, SimulatorParameters) and robot is not None
-        complaint = unfit_motor(robot)
+        complaint = unsupported_motor(robot)
         if complaint:
             yield Misfit(complaint, fix="correct `transmission` in the robot's description")
         elif params.bus_period is not None:
@@ -126,7 +125,7 @@ class MujocoRobot(SimulatedRobot):
             )
 
     @classmethod
-    def usual_delay(cls, params: Parameters) -> float:
+    def nominal_delay(cls, params: Parameters) -> float:
         """The latency that is simulated."""
         assert isinstance(params, SimulatorParameters)
         return params.latency
@@ -156,10 +155,10 @@ class MujocoRobot(SimulatedRobot):
 
     def setup(self) -> None:
         """Draw the world from the seed and build it."""
-        from .drives import Drives, Way
-        from .holding import RELEASED
+        from .drives import CommandLatency, Drives
         from .plant import Plant
         from .random_streams import Purpose, uniform_call
+        from .stance import RELEASED
 
         robot, params = self.robot, self.params
         plant = self.plant = Plant(robot, params, self.period, self.physics, self.record)
@@ -177,11 +176,13 @@ class MujocoRobot(SimulatedRobot):
             *plant.sensors.reading_switches(self.physics.step, self.record, self.contacts.closed),
             *plant.truth.reporting(self.truth), self.reporting(),
         ])  # fmt: skip
-        way = self._way = Way(np.zeros(1), float(params.jitter), np.zeros(1), params.timestep)
-        jitter, _ = uniform_call(plant.streams[Purpose.JITTER], way.drawn)
+        latency = self._latency = CommandLatency(
+            np.zeros(1), float(params.jitter), np.zeros(1), params.timestep
+        )
+        jitter, _ = uniform_call(plant.streams[Purpose.JITTER], latency.draw)
         self._sending = CallSequence([
             *([jitter] if params.jitter else []),
-            drives.sending(self.command, self.physics.step, way),
+            drives.sending(self.command, self.physics.step, latency),
         ])  # fmt: skip
         self._settling = plant.simulating(drives, 1)
         self._ticking = plant.simulating(drives, steps, self.push)
@@ -196,7 +197,7 @@ class MujocoRobot(SimulatedRobot):
             self._settling,
             lambda pose, torque: drives.hold(pose, torque, plant.stiffness, plant.damping),
         )
-        self._way.shortest[0] = self.params.latency + plant.late
+        self._latency.minimum[0] = self.params.latency + plant.start_delay
 
     def read(self) -> None:
         """Publish the sensors, the truth at the present instant, and that all is well."""

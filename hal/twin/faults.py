@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
+from pydantic import ValidationError
 
+from ...runtime.language.errors import AloftError
 from ...runtime.language.parameters import Parameters, parameter
 
 Kind = Literal[
@@ -62,7 +64,7 @@ class Faults:
         return [
             fault
             for fault in self.active(*kinds)
-            if fault.target in ("", target) and self._befalls(fault, target)
+            if fault.target in ("", target) and self._applies(fault, target)
         ]
 
     def draw(self, target: str, purpose: int) -> np.random.Generator:
@@ -70,21 +72,45 @@ class Faults:
         place = int.from_bytes(target.encode()[:6].ljust(6, b"_"), "big")
         return np.random.default_rng([self._seed, self.exchange, place, len(target), purpose])
 
-    def _befalls(self, fault: Fault, target: str) -> bool:
+    def _applies(self, fault: Fault, target: str) -> bool:
         return fault.share >= 1.0 or bool(self.draw(target, 0).random() < fault.share)
 
 
-def spoil(fault: Fault, answer: bytes, draws: np.random.Generator) -> bytes:
+def apply_fault(fault: Fault, answer: bytes, draws: np.random.Generator) -> bytes:
     """The bytes of a drive's answer that really travel; empty where none do in time."""
     if fault.kind == "truncated":
         return answer[: int(draws.integers(0, len(answer)))]
     if fault.kind == "corrupted":
-        return flip(answer, draws)
+        return corrupt_byte(answer, draws)
     return b""
 
 
-def flip(data: bytes, draws: np.random.Generator) -> bytes:
-    """The same bytes with one of them changed."""
+def corrupt_byte(data: bytes, draws: np.random.Generator) -> bytes:
+    """The data with one byte changed at random."""
     hurt = bytearray(data)
     hurt[int(draws.integers(0, len(hurt)))] ^= int(draws.integers(1, 256))
     return bytes(hurt)
+
+
+def read_fault(text: str) -> Fault:
+    """The fault of a text such as ``dead 0.5 left_knee_motor`` or ``lost 1 * share=0.1``: the kind,
+    its start in seconds, its target (``*`` for all), and further settings.
+
+    Raises:
+        AloftError: it is none; the message says what is wrong.
+    """
+    settings: dict[str, Any] = {}
+    names = ["kind", "start", "target"]
+    for word in text.split():
+        name, equals, value = word.partition("=")
+        if not equals:
+            if not names:
+                raise AloftError(f"fault {text!r}: {word!r} is one word too many")
+            name, value = names.pop(0), word
+        settings[name] = "" if value == "*" else value
+    try:
+        return Fault.model_validate(settings)
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        what = ".".join(str(part) for part in first["loc"])
+        raise AloftError(f"fault {text!r}: {what}: {first['msg']}") from error

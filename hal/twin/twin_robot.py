@@ -9,22 +9,78 @@ from ...robots.description import RobotDescription
 from ...runtime.language.block import Context, Metric, Misfit, State
 from ...runtime.language.parameters import Parameters, parameter
 from ...runtime.language.signals import Field, Signal
-from ..bear.command_queue import CommandQueue
 from ..bear.configuration import Hardware
-from ..bear.drive_law import DriveLaw
 from ..bear.driven_robot import DrivenRobot, DriveParameters, read_hardware
-from ..bear.driver import Driver
-from ..drive_gains import joint_gains
-from ..simulated.parameters import SimulatorParameters
+from ..bear.driver import DriveLaw, Driver
+from ..bear.motor_loop import CommandQueue
+from ..drive_control import joint_gains
+from ..simulated.mujoco_model import unsupported_motor
 from ..simulated.plant import Plant
-from ..simulated.rotors import unfit_motor
-from ..simulated.simulated_robot import SimulatedRobot
+from ..simulated.simulated_robot import SimulatedRobot, SimulatorParameters
 from ..simulated.stance import uneven_contacts
 from ..simulated.state import DriveState, PhysicsState, TickRecord
 from .faults import Fault
-from .frozen import Frozen, Part
+from .snapshot import Attributes, ObjectSnapshot
 from .twin import Twin
-from .virtual_port import VirtualBoardPort, VirtualBusPort
+
+
+class VirtualBusPort:
+    """The master's end of the bus of a twin's drives.
+
+    Waiting takes no real time: where nothing has come, ``read`` lets ``timeout`` seconds of virtual
+    time pass. So a driver with time limits runs the same way on any machine.
+    """
+
+    def __init__(self, twin: Twin) -> None:
+        self.timeout: float | None = None
+        self._twin = twin
+        self._received = bytearray()
+        self._now = 0.0
+
+    def now(self) -> float:
+        """The virtual time [s]."""
+        return self._now
+
+    @property
+    def in_waiting(self) -> int:
+        """How many bytes were received and not read, with those that came late."""
+        self._received += self._twin.read_late()
+        return len(self._received)
+
+    def write(self, data: bytes | bytearray) -> int:
+        """Send bytes to the twin; its answers are there at once."""
+        self._received += self._twin.write_bus(bytes(data))
+        return len(data)
+
+    def read(self, size: int = 1) -> bytes:
+        """Up to ``size`` bytes; none after ``timeout`` of virtual time without any."""
+        if not self._received:
+            self._now += self.timeout or 0.0
+            return b""
+        part = bytes(self._received[:size])
+        del self._received[:size]
+        return part
+
+    def reset_input_buffer(self) -> None:
+        """Discard what was received and not read."""
+        self._received.clear()
+
+    def close(self) -> None:
+        """Nothing to give back."""
+
+
+class VirtualBoardPort(VirtualBusPort):
+    """The host's end of a twin's sensor board."""
+
+    def write(self, data: bytes | bytearray) -> int:
+        """Send a command to the board."""
+        self._twin.write_board(bytes(data))
+        return len(data)
+
+    def read(self, size: int = 1) -> bytes:
+        """Up to ``size`` bytes of what the board has sent."""
+        self._received += self._twin.read_board()
+        return super().read(size)
 
 
 class TwinParameters(SimulatorParameters, DriveParameters):
@@ -73,7 +129,7 @@ class TwinRobot(SimulatedRobot, DrivenRobot):
         """Report what the simulator cannot express, and gains that the drives cannot give."""
         assert robot is not None
         yield from super().requires(params, robot)
-        complaint = unfit_motor(robot) or uneven_contacts(robot)
+        complaint = unsupported_motor(robot) or uneven_contacts(robot)
         if complaint:
             yield Misfit(complaint, fix="correct the robot's description")
         if len(robot.contacts) > 7:
@@ -121,7 +177,7 @@ class TwinRobot(SimulatedRobot, DrivenRobot):
         )  # fmt: skip
         driver = _driver(robot, params, hardware, twin)
         queue = CommandQueue(driver.loop, robot, params.latency, hardware.bus.period)
-        kept = Frozen(_parts(twin, driver, queue))
+        kept = ObjectSnapshot(_parts(twin, driver, queue))
         return {**sizes, "n_kept": kept.size}
 
     def setup(self) -> None:
@@ -136,12 +192,12 @@ class TwinRobot(SimulatedRobot, DrivenRobot):
             robot, params, hardware, self.period, self.physics, self.record, self.gantry,
             tuple(params.faults),
         )  # fmt: skip
-        self.twin.push_by(self.push)
+        self.twin.set_push(self.push)
         self._reporting = self.twin.plant.truth.reporting(self.truth)
         self._hardware = hardware
         self.driver = _driver(robot, params, hardware, self.twin)
         self._queue = CommandQueue(self.driver.loop, robot, params.latency, self.period)
-        self._kept = Frozen(_parts(self.twin, self.driver, self._queue))
+        self._kept = ObjectSnapshot(_parts(self.twin, self.driver, self._queue))
 
     def open(self) -> None:
         """Stand in the gantry, find the drives and, if armed, lead them to the standing pose."""
@@ -174,7 +230,7 @@ class TwinRobot(SimulatedRobot, DrivenRobot):
 
     def damp(self) -> None:
         """One tick with the drives in damping and no external force."""
-        self.twin.push_by(None)
+        self.twin.set_push(None)
         self._pass_time(lambda: self._driver.damp(self._queue.cycles))
 
     def _pass_time(self, exchange: Callable[[], None]) -> None:
@@ -224,6 +280,6 @@ def _driver(
     return Driver(robot, hardware, VirtualBusPort(twin), VirtualBoardPort(twin), law)
 
 
-def _parts(twin: Twin, driver: Driver, queue: CommandQueue) -> list[Part]:
+def _parts(twin: Twin, driver: Driver, queue: CommandQueue) -> list[Attributes]:
     """All that changes in a run and lies in no declared state."""
     return [*twin.parts(), *driver.loop.parts(), *queue.parts()]

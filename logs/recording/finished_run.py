@@ -9,8 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ...runtime.running.notes import parameter_note
 from ...runtime.running.run_result import RunResult
+from ...runtime.running.sinks import parameter_note
 from ..file.header import make_header
 from .writer import RecordingWriter
 

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...runtime.running.failures import describe
-from ...runtime.running.notes import Note
+from ...runtime.running.sinks import Note
 from ..file.format import Header
 from ..viewing.blueprint import recording_blueprint
 from ..viewing.detail import LIVE

@@ -17,11 +17,11 @@ from typing import Any
 import numpy as np
 
 from ...runtime.language.errors import AloftError, ExitCode
+from ...runtime.links.part import Whole
 from ...runtime.links.path_ages import LATEST, judged, timeline_of
-from ...runtime.links.whole import Whole
 from ...runtime.placement.placed import PlacedGraph
 from ...runtime.running.memory import BoundGraph, Memory, Snapshot
-from ...runtime.running.notes import Note
+from ...runtime.running.sinks import Note
 from ..file.header import header_of
 from ..file.reader import RecordedRun, read
 from .writer import RecordingWriter

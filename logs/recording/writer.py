@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...runtime.running.memory import Snapshot
-from ...runtime.running.notes import Note
+from ...runtime.running.sinks import Note
 from ..file.format import BUS, KEYFRAMES, NOTE, PACKED, ROWS, STATE, Header, spans
 from ..file.messages import ARROW, CLOSING, FILE_HEAD, HEAD, Content, Message, sealed, split
 from ..file.row_codec import pack

@@ -6,6 +6,8 @@ hashing a run and comparing two runs each take one memory copy. Views of inputs 
 
 from __future__ import annotations
 
+import os
+import tempfile
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -220,3 +222,19 @@ class BoundGraph:
         self.clock.stopped_by = ""
         for block in self.blocks.values():
             block.thaw()
+
+
+def nameless_memory(size: int, name: str) -> int:
+    """A file descriptor of ``size`` zero bytes that two processes can share.
+
+    On Linux it is a ``memfd``, elsewhere a file that is deleted at once. So a process that is killed
+    leaves nothing behind, and the other one keeps what had been written. ``name`` is what the
+    system's tools show.
+    """
+    if hasattr(os, "memfd_create"):
+        descriptor = os.memfd_create(name)
+    else:
+        with tempfile.TemporaryFile() as file:
+            descriptor = os.dup(file.fileno())
+    os.ftruncate(descriptor, size)
+    return descriptor

@@ -23,8 +23,8 @@ from .chain import Chain, can_be_chained
 from .failures import Hang, describe
 from .finite import FiniteCheck, NotFiniteError
 from .memory import BoundGraph
-from .notes import Note
 from .pacing import RobotDriven, TimeSource, make_pacer
+from .sinks import Note
 from .timing import Program
 
 

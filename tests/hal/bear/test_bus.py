@@ -5,10 +5,9 @@ from collections.abc import Iterator
 import pytest
 
 from aloft.hal.bear.bus import BearBus, BusError, NoReplyError, open_port
-from aloft.hal.bear.registers import Torque
-from aloft.hal.twin.actuator import EmulatedActuator
-from aloft.hal.twin.bus import EmulatedBus
-from aloft.hal.twin.pseudo_terminal import PseudoTerminal
+from aloft.hal.bear.protocol import Torque
+from aloft.hal.twin.devices import EmulatedActuator, EmulatedBus
+from aloft.hal.twin.server import PseudoTerminal
 
 
 @pytest.fixture
@@ -26,7 +25,7 @@ def bus(emulated: EmulatedBus) -> Iterator[BearBus]:
 
 def test_ping_and_scan(bus: BearBus) -> None:
     assert bus.ping(2).data == b"\x01\x00\x02\x00"
-    assert bus.ping(2).trouble == ""
+    assert bus.ping(2).problem == ""
     bus.reply_time = 0.02
     assert list(bus.scan(range(1, 5))) == [1, 2]
 

@@ -1,0 +1,514 @@
+"""Keeps the parts of a graph together: in lockstep they start, end each tick and stop as one; free
+parts start together, and each keeps its own time.
+
+A change of live parameters takes effect in one tick on all machines, or on none.
+"""
+
+from __future__ import annotations
+
+import json
+import threading
+from collections import deque
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from enum import IntEnum
+from struct import Struct
+from typing import Any
+
+from ..language.block import Block, Clock
+from ..language.errors import AloftError, RunError
+from ..language.parameter_change import Adjustment
+from ..language.parameters import Parameters
+from ..loading.checking.adjust import adjust
+from ..running.failures import describe
+from ..running.live_parameters import LiveParameters
+from ..running.memory import BoundGraph
+from ..running.sinks import Note
+from ..transports.transport import Take, Transport, tick_key
+from .command_watch import CommandWatch
+from .free_link import LatestInbox
+from .lockstep_link import Inbox, Mailbox, MailTimeoutError, Send
+from .peers import Others, PeerError, Phase
+
+
+class PartClock(Clock):
+    """A clock that ends the run only when all parts have agreed to end after the same tick.
+
+    A block or a signal asks for the end as ever, by ``stop_reason`` and ``stopped_by``. The wish of
+    whoever asks first is kept in ``wish``, and the conductor tells it to the others. A signal may
+    come at any time, so without this a part could end a tick before the others.
+    """
+
+    def __init__(self, base_period: float) -> None:
+        self.wish: tuple[str, str] | None = None
+        self._agreed: tuple[str, str] | None = None
+        self._heeded = False
+        self.heard: Callable[[], int] | None = None
+        """What says when commands were last heard; see ``CommandWatch.heard``."""
+        super().__init__(base_period)
+
+    def commands_heard(self) -> int:
+        """When the most silent link that brings commands last brought one [ns]."""
+        return 0 if self.heard is None else self.heard()
+
+    def agree(self, reason: str, block: str) -> None:
+        """End the run after this tick."""
+        self._agreed = (reason, block)
+
+    @property
+    def stop_reason(self) -> str | None:
+        """Why all parts end after this tick."""
+        return self._agreed[0] if self._agreed else None
+
+    @stop_reason.setter
+    def stop_reason(self, reason: str | None) -> None:
+        if reason is None:
+            self.wish = self._agreed = None
+        self._heeded = reason is not None and self.wish is None
+        if reason is not None and self._heeded:
+            self.wish = (reason, "")
+
+    @property
+    def stopped_by(self) -> str:
+        """The path of the block that asked first."""
+        return self._agreed[1] if self._agreed else ""
+
+    @stopped_by.setter
+    def stopped_by(self, block: str) -> None:
+        if self._heeded and self.wish is not None:
+            self.wish = (self.wish[0], block)
+
+
+class SpreadParameters(LiveParameters):
+    """The parameters of one part, and of what stands for the other parts' blocks.
+
+    An adjustment that is handed in here waits until the tick ends. Then all parts get it as a
+    proposal, each tries it, and only if all can take it over it stays.
+    """
+
+    def __init__(self, blocks: Mapping[str, Block]) -> None:
+        super().__init__(blocks)
+        self.handed_in: deque[Adjustment] = deque(maxlen=1)
+        self._tried: Adjustment | None = None
+        self._before: Mapping[str, Parameters] = {}
+
+    def proposal(self) -> Adjustment | None:
+        """The adjustment that waits here, if any."""
+        return self.handed_in.popleft() if self.handed_in else None
+
+    def try_settings(self, settings: Mapping[str, Any]) -> str:
+        """Take over another part's proposal for now. Returns why it cannot be, or an empty text."""
+        try:
+            return self.try_out(adjust(self.blocks, settings))
+        except AloftError as error:
+            return str(error)
+
+    def try_out(self, adjustment: Adjustment) -> str:
+        """Take over an adjustment for now. Returns why it cannot be, or an empty text."""
+        self._before = {path: self.blocks[path].params for path in adjustment.params}
+        self._tried = adjustment
+        for path, params in adjustment.params.items():
+            self.blocks[path].params = params
+            try:
+                self.blocks[path].on_parameters()
+            except Exception as error:  # noqa: BLE001  # the block's reason goes to whoever asked
+                self.undo()
+                return f"block '{path}' refuses the change: {describe(error)}"
+        return ""
+
+    def undo(self) -> None:
+        """Go back to the parameters before what was tried, if anything was."""
+        for path, params in self._before.items():
+            self.blocks[path].params = params
+            self.blocks[path].on_parameters()
+        self._before, self._tried = {}, None
+
+    def keep(self, tick: int) -> None:
+        """Keep what was tried; it holds from ``tick`` on."""
+        assert self._tried is not None
+        self._tried.tick = tick
+        for change in self._tried.changes():
+            self.changes.append(change)
+            for listener in self.listeners:
+                listener(change)
+        self._before, self._tried = {}, None
+
+
+_HEAD = Struct("<8sqB")
+_ROUNDS = 16
+"""The most messages that a part sends to another about one tick."""
+REST_TIME = 2.0
+"""Seconds that a part waits at its end until the actuators of the others are in damping."""
+
+
+class Kind(IntEnum):
+    """What a part says about a tick."""
+
+    DONE = 0
+    """All its blocks have run."""
+    STOP = 1
+    """They have run, and a block or a signal asks for the end."""
+    FAULT = 2
+    """A block failed; the tick counts for nobody."""
+    WRONG_VALUE = 3
+    """A value is not finite; the tick is recorded and is the last."""
+    PROPOSE = 4
+    """The tick is done, and parameters are to change before the next one."""
+    ANSWER = 5
+    """Whether this part can take over a proposal."""
+
+
+@dataclass(frozen=True)
+class Word:
+    """What another part said about a tick."""
+
+    kind: Kind
+    data: Mapping[str, Any] = field(default_factory=dict)
+
+
+class Conductor(Block):
+    """The block of the runtime that starts first and ends each tick last.
+
+    ``start`` waits until every part runs the same graph and a message has come through every link
+    in both directions. ``update`` tells the others how the tick ended here, and waits until all
+    have said so. Hence a stop, a fault and a change of parameters take effect everywhere in one
+    tick.
+    """
+
+    waits_for_others = True
+
+    def connect(
+        self,
+        others: Others,
+        transport: Transport,
+        inboxes: Sequence[Inbox | LatestInbox],
+        senders: Mapping[str, Send],
+        parameters: SpreadParameters,
+        *,
+        clock: PartClock,
+        on_open: Callable[[], None],
+        patience: float,
+        connect_time: float,
+        watch: CommandWatch,
+        moves: bool = False,
+        elsewhere: Mapping[str, str] | None = None,
+    ) -> None:
+        """Take what it needs: the other parts, and the ends of all links, senders by the link's name.
+
+        Args:
+            on_open: declares the links; it is called once the transport is open.
+            patience: the seconds to wait for a message.
+            connect_time: the seconds to wait for the other parts to start.
+            watch: watches the links that bring commands.
+            moves: whether this part has actuators.
+            elsewhere: which machine runs each block that is not here.
+        """
+        self.moves, self.elsewhere = moves, elsewhere or {}
+        self._watch = watch
+        self.others = others
+        self._transport = transport
+        self._inboxes = inboxes
+        self._senders = senders
+        self._parameters = parameters
+        self._clock = clock
+        self._on_open = on_open
+        self._patience, self._connect_time = patience, connect_time
+        self._tell: dict[str, Take] = {}
+        self._mail: dict[str, Mailbox[Word]] = {}
+        self._tick = 0
+        self._opened = self._told = False
+
+    # -- before the first tick ---------------------------------------------------------------------
+
+    def start(self) -> None:
+        """Connect, compare graphs, and try every link both ways."""
+        self._opened = True
+        self.others.open()
+        self.listen()
+        self._on_open()
+        self.others.reach(Phase.HELLO, self._connect_time)
+        self.others.reach(Phase.LINKED, self._connect_time, before=self._all_links_work)
+
+    def listen(self) -> None:
+        """Listen to what the others say of each tick."""
+        for name in self.others.names:
+            box: Mailbox[Word] = Mailbox(lambda: self.others.check(self._tick))
+            self._mail[name] = box
+            self.others.mailboxes.append(box.wake)
+            self._tell[name] = self._transport.publisher(tick_key(self.others.machine, name))
+            self._transport.subscribe(
+                tick_key(name, self.others.machine), self._listener(name, box)
+            )
+
+    def _all_links_work(self) -> bool:
+        """Send a message through each link that has not been heard; whether all were, both ways."""
+        waiting = [
+            sender
+            for link, sender in self._senders.items()
+            if not any(self.others.has_checked(name, link) for name in self.others.names)
+        ]
+        for sender in waiting:
+            sender.probe()
+        return not waiting and all(self.others.checked(box.link.name) for box in self._inboxes)
+
+    def reach(self, phase: Phase) -> None:
+        """Wait until all parts have started those blocks that ``phase`` says."""
+        self.others.reach(phase, self._connect_time)
+
+    # -- at the end of each tick -------------------------------------------------------------------
+
+    def emit(self) -> None:
+        """Do nothing: this block has no outputs."""
+
+    def update(self) -> None:
+        """Say how the tick ended here, and hear how it ended elsewhere.
+
+        Raises:
+            PeerError: another part failed in this tick, or is gone.
+            RunError: another part said nothing for too long.
+        """
+        clock = self._clock
+        tick = self._tick = clock.tick
+        own: Adjustment | None = None
+        wish = clock.wish
+        if wish is not None:
+            self._say(tick, 0, Kind.STOP, {"reason": wish[0], "block": wish[1]})
+        elif self._parameters.handed_in and (own := self._parameters.proposal()) is not None:
+            settings = {path: new for path, _, new in own.values}
+            self._say(tick, 0, Kind.PROPOSE, {"settings": settings})
+        else:
+            self._say(tick, 0, Kind.DONE)
+        words = {name: self._hear(name, tick, 0) for name in self.others.names}
+        for name, word in words.items():
+            if word.kind in (Kind.FAULT, Kind.WRONG_VALUE):
+                raise self._error(name, word)
+        wishes = {self.others.machine: wish} if wish is not None else {}
+        for name, word in words.items():
+            if word.kind is Kind.STOP:
+                wishes[name] = (str(word.data["reason"]), str(word.data["block"]))
+        if wishes:
+            clock.agree(*wishes[min(wishes)])  # of several wishes all take the same one
+        if own is not None or any(word.kind is Kind.PROPOSE for word in words.values()):
+            self._agree(tick, own, words)
+
+    def _agree(self, tick: int, own: Adjustment | None, words: Mapping[str, Word]) -> None:
+        """Try all proposals, one after the other, and keep those that every part can take over."""
+        ended = self._clock.stop_reason is not None
+        for number, name in enumerate(sorted([self.others.machine, *self.others.names])):
+            mine = name == self.others.machine
+            if (mine and own is None) or (not mine and words[name].kind is not Kind.PROPOSE):
+                continue
+            if ended:
+                refusal = "the run has ended"
+            elif mine and own is not None:
+                refusal = self._parameters.try_out(own)
+            else:
+                refusal = self._parameters.try_settings(words[name].data["settings"])
+            self._say(tick, number + 1, Kind.ANSWER, {"refusal": refusal})
+            answers = [self._hear(n, tick, number + 1).data["refusal"] for n in self.others.names]
+            refusals = [text for text in (refusal, *answers) if text]
+            if not refusals:
+                self._parameters.keep(tick + 1)
+            elif not refusal:
+                self._parameters.undo()
+            if mine and own is not None:
+                own.error = refusals[0] if refusals else ""
+                own.answered = True
+
+    def _say(
+        self, tick: int, round_: int, kind: Kind, data: Mapping[str, Any] | None = None
+    ) -> None:
+        head = _HEAD.pack(self.others.run, tick * _ROUNDS + round_, kind)
+        message = head + json.dumps(data).encode() if data is not None else head
+        for tell in self._tell.values():
+            tell(message)
+
+    def _hear(self, name: str, tick: int, round_: int) -> Word:
+        try:
+            # longer than for a message, so that who misses one can say which
+            return self._mail[name].take(tick * _ROUNDS + round_, 2.0 * self._patience)
+        except MailTimeoutError:
+            text = f"machine {name!r} has not ended tick {tick} in {2.0 * self._patience:g} s"
+            raise RunError(text, tick=tick) from None
+
+    def _listener(self, name: str, box: Mailbox[Word]) -> Callable[[bytes], None]:
+        def hear(data: bytes) -> None:
+            try:
+                run, number, kind = _HEAD.unpack_from(data)
+                if run != self.others.run_of(name):
+                    return
+                word = Word(
+                    Kind(kind), json.loads(data[_HEAD.size :]) if data[_HEAD.size :] else {}
+                )
+                if not isinstance(word.data, dict):
+                    return
+            except Exception:  # noqa: BLE001  # damaged; the tick's end is waited for in vain
+                return
+            if word.kind in (Kind.FAULT, Kind.WRONG_VALUE):
+                error = self._error(name, word)
+                at = number // _ROUNDS
+                self.others.fail(name, at + (word.kind is Kind.WRONG_VALUE), error)
+            box.put(number, word)
+
+        return hear
+
+    @staticmethod
+    def _error(name: str, word: Word) -> PeerError:
+        data = word.data
+        error = PeerError(
+            f"machine {name!r}: {data.get('message', 'failed')}",
+            block=str(data.get("block", "")),
+            tick=int(data.get("tick", -1)),
+        )
+        error.heard = True
+        error.record_tick = word.kind is Kind.WRONG_VALUE
+        error.where, error.traceback = str(data.get("where", "")), str(data.get("traceback", ""))
+        return error
+
+    # -- at the end of the run ---------------------------------------------------------------------
+
+    def tell_fault(self, note: Note, last_recorded: int) -> None:
+        """Tell the others of a fault here, once, unless they told of it."""
+        if not self._opened or self._told:
+            return
+        data = {"message": note.text, **note.data, "traceback": ""}
+        if not self.others.started:  # all hear why, from whomever they hear it first
+            self._told = True
+            self.others.say(str(data["message"]))
+            return
+        if self.others.heard_fault:
+            return
+        self._told = True
+        tick = self.context.clock.tick
+        self._say(tick, 0, Kind.WRONG_VALUE if last_recorded == tick else Kind.FAULT, data)
+
+    def close(self) -> None:
+        """Say that the actuators here are in damping, wait until the others' are, and disconnect."""
+        if self._opened:
+            try:
+                self.others.rest(REST_TIME, self.context.clock.tick)
+            finally:
+                self._transport.close()
+
+
+class FaultTeller:
+    """The sink through which a conductor hears of faults in its own part."""
+
+    def __init__(self, conductor: Conductor) -> None:
+        self._conductor = conductor
+        self._last = -1
+
+    def open(self, bound: BoundGraph) -> None:
+        """Nothing to do."""
+
+    def record(self, tick: int) -> None:
+        """Remember which tick was recorded last."""
+        self._last = tick
+
+    def note(self, note: Note) -> None:
+        """Pass on a fault."""
+        if note.kind == "fault":
+            self._conductor.tell_fault(note, self._last)
+
+    def close(self) -> None:
+        """Nothing to do."""
+
+
+class Gate(Block):
+    """A block of the runtime whose ``start`` waits until all parts have come as far as this one."""
+
+    waits_for_others = True
+
+    def connect(self, conductor: Conductor, phase: Phase) -> None:
+        """Take what it waits with, and how far all must be."""
+        self._conductor, self._phase = conductor, phase
+
+    def start(self) -> None:
+        """Wait for the others."""
+        self._conductor.reach(self._phase)
+
+    def step(self) -> None:
+        """Never called: a gate is not in the order of execution."""
+
+
+BEACON_PERIOD = 0.5
+"""Seconds between two beacons during the run, from which clock offsets are estimated."""
+
+
+class FreeConductor(Conductor):
+    """Starts the parts together, as in lockstep, and then lets each keep its own time.
+
+    A tick waits for nobody. A part whose run ends in order ends the others too, and so does a
+    fault. One that is gone does not: what its links' policies say of late messages holds, and it
+    may come back. Beacons during the run are sent by a thread of their own.
+    """
+
+    _quiet: threading.Event | None = None
+
+    def listen(self) -> None:
+        """Nothing to listen to: a tick ends when it ends here."""
+
+    def reach(self, phase: Phase) -> None:
+        """Wait for the others; a part that moves actuators does not join a run that goes on.
+
+        Raises:
+            AloftError: the others are running, and this part has actuators.
+        """
+        if phase is Phase.PREPARED and self.moves and self.others.are_running():
+            raise AloftError(
+                "the other machines are running already, and this part moves actuators, which it "
+                "never enables by itself. Stop the run everywhere and start it again"
+            )
+        super().reach(phase)
+        if phase is Phase.STARTED:
+            self._quiet = threading.Event()
+            threading.Thread(target=self._repeat, args=(self._quiet,), daemon=True).start()
+
+    def _repeat(self, quiet: threading.Event) -> None:
+        while not quiet.wait(BEACON_PERIOD):
+            self.others.say()
+
+    def update(self) -> None:
+        """Look whether another part has ended or failed and whether commands still come, and take
+        over changed parameters.
+
+        Raises:
+            PeerError: another part failed.
+        """
+        clock = self._clock
+        ended = self.others.ended() or self._watch.complaint()
+        if ended:
+            clock.stop_reason = ended
+        if clock.wish is not None:
+            clock.agree(*clock.wish)
+        if self._parameters.handed_in:
+            self._change(clock.tick)
+
+    def _change(self, tick: int) -> None:
+        adjustment = self._parameters.proposal()
+        if adjustment is None:
+            return
+        away = [path for path in adjustment.params if path in self.elsewhere]
+        if away:
+            adjustment.error = (
+                f"block '{away[0]}' runs on {self.elsewhere[away[0]]}, and parts that run free "
+                "change only their own parameters; change it there"
+            )
+        else:
+            adjustment.error = self._parameters.try_out(adjustment)
+            if not adjustment.error:
+                self._parameters.keep(tick + 1)
+        adjustment.answered = True
+
+    def tell_fault(self, note: Note, last_recorded: int) -> None:
+        """Tell the others of a fault here, by a beacon."""
+        known = self.others.started and self.others.heard_fault
+        if self._opened and not self._told and not known:
+            self._told = True
+            self.others.say(str(note.data.get("message", note.text)))
+
+    def close(self) -> None:
+        """Stop the beacons, and disconnect as in lockstep."""
+        if self._quiet is not None:
+            self._quiet.set()
+        super().close()

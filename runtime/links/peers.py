@@ -1,0 +1,410 @@
+"""What one part knows of the others: how far each is, what each has checked, and what went wrong.
+
+Every part tells all others how far it is in *beacons*, which it repeats until all have answered. So
+a beacon that is lost, doubled or late does no harm. A beacon says what its sender has heard of the
+receiver, which answers at once if that is old. Beacons also give the offset of the other machine's
+clock.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import suppress
+from enum import IntEnum
+from typing import Any
+
+from ..language.errors import RunError
+from ..placement.placed import PlacedGraph
+from ..transports.transport import Take, Transport, beacon_key
+from .identity import Identity
+
+KEPT = 20
+"""Estimates among which the best is chosen: as clocks drift, older ones are forgotten."""
+
+
+class ClockOffset:
+    """Estimates how far the monotonic clock of one other machine is ahead. All times are in nanoseconds.
+
+    The method is that of NTP. With t1 when a beacon left here, t2 when it arrived there, t3 when one
+    left there and t4 when that arrived here, the other clock is ahead by
+    ((t2 - t1) + (t3 - t4)) / 2. The error is at most half of the time on the way,
+    (t4 - t1) - (t3 - t2), whatever share of it each direction took. Of the last ``KEPT`` estimates
+    the one with the shortest time on the way counts.
+
+    Attributes:
+        offset: how far the other clock is ahead; zero before there is an estimate.
+        uncertainty: the largest possible error of ``offset``; -1 before there is an estimate.
+    """
+
+    def __init__(self) -> None:
+        self.offset = 0
+        self.uncertainty = -1
+        self._estimates: deque[tuple[int, int]] = deque(maxlen=KEPT)
+        self._theirs = self._arrived = 0
+
+    def stamp(self, now: int) -> list[int]:
+        """What a beacon that leaves now carries: its time, and the latest beacon that has come."""
+        return [now, self._theirs, self._arrived]
+
+    def hear(self, stamp: Sequence[int], now: int) -> None:
+        """Take the stamp of a beacon that has arrived now."""
+        left_there, left_here, arrived_there = (int(value) for value in stamp)
+        self._theirs, self._arrived = left_there, now
+        if not left_here:
+            return
+        on_the_way = (now - left_here) - (left_there - arrived_there)
+        if on_the_way < 0:
+            return  # the clock of a machine that was started again
+        ahead = ((arrived_there - left_here) + (left_there - now)) // 2
+        self._estimates.append((on_the_way, ahead))
+        shortest, self.offset = min(self._estimates)
+        self.uncertainty = shortest // 2
+
+
+REPEAT = 0.05
+"""Seconds between two beacons while a part waits for the others."""
+
+
+class Phase(IntEnum):
+    """How far a part is."""
+
+    HELLO = 0
+    """It is there and says what it would run."""
+    LINKED = 1
+    """Its graph is that of the others, and a message has come through each of its links."""
+    PREPARED = 2
+    """All its blocks have started except those that move actuators."""
+    STARTED = 3
+    """All its blocks have started."""
+    RESTING = 4
+    """Its actuators are in damping."""
+
+
+class PeerError(RunError):
+    """Another machine failed or is gone. ``heard`` is true if it said so itself."""
+
+    heard = False
+
+
+class Others:
+    """The other parts of a graph, as one part sees them.
+
+    Args:
+        placed: the graph.
+        machine: the name of this part's machine.
+        transport: an open transport.
+        wanted: called while waiting; a text says why this part must not wait any longer.
+        free: whether parts keep their own time. Then one that is gone may come back.
+
+    Attributes:
+        run: the number by which this run of this part is known.
+        names: the other machines.
+    """
+
+    def __init__(
+        self,
+        placed: PlacedGraph,
+        machine: str,
+        transport: Transport,
+        wanted: Callable[[], str | None],
+        *,
+        free: bool = False,
+    ) -> None:
+        self.machine = machine
+        self.run = os.urandom(8)
+        self.names = tuple(spec.name for spec in placed.machines if spec.name != machine)
+        self.mailboxes: list[Callable[[], None]] = []
+        self._endpoints = {spec.name: spec.endpoint for spec in placed.machines}
+        self._identity = Identity.of(placed)
+        self._hashes = [self._identity.graph_hash, self._identity.schema_hash]
+        self._senders = {link.name: link.sender for link in placed.links}
+        self._free = free
+        self._clocks = {name: ClockOffset() for name in self.names}
+        self._wanted = wanted
+        self._phase = Phase.HELLO
+        self._problem = ""
+        self._ended = -1
+        self._checked: dict[str, None] = {}
+        self._heard: dict[str, Mapping[str, Any]] = {}
+        self._failed: dict[str, tuple[int, PeerError]] = {}
+        self._gone: dict[str, None] = {}
+        self._news = threading.Event()
+        self._transport = transport
+        self._tell: dict[str, Take] = {}
+
+    def open(self) -> None:
+        """Connect, and begin to listen to the others' beacons."""
+        self._transport.open(self.machine, self._lose)
+        for name in self.names:
+            self._tell[name] = self._transport.publisher(beacon_key(self.machine, name))
+            self._transport.subscribe(beacon_key(name, self.machine), self._hear)
+
+    def run_of(self, name: str) -> bytes | None:
+        """The number of the present run of another part; ``None`` before it was heard."""
+        return bytes.fromhex(self._heard[name]["run"]) if name in self._heard else None
+
+    def assume_started(self, name: str, run: bytes) -> None:
+        """Take another part for started without having heard it: for runs in virtual time."""
+        state = {"run": run.hex(), "phase": int(Phase.STARTED), "checked": [], "ended": -1}
+        self._heard[name] = state
+
+    def note_checked(self, link: str) -> None:
+        """A message has come through this link; any thread may say so."""
+        if link not in self._checked:
+            self._checked[link] = None
+            self._news.set()
+
+    def checked(self, link: str) -> bool:
+        """Whether a message has come through this link here."""
+        return link in self._checked
+
+    @property
+    def graph_hash(self) -> str:
+        """The hash of the graph that this part runs."""
+        return self._hashes[0]
+
+    @property
+    def phase(self) -> Phase:
+        """How far this part is."""
+        return self._phase
+
+    @property
+    def started(self) -> bool:
+        """Whether all blocks of this part have started."""
+        return self._phase >= Phase.STARTED
+
+    def are_running(self) -> bool:
+        """Whether some other part is past its start."""
+        return any(heard["phase"] >= Phase.STARTED for heard in tuple(self._heard.values()))
+
+    def ended(self) -> str:
+        """Why this part is to end, where another has ended in order; else empty.
+
+        Raises:
+            PeerError: another part failed.
+        """
+        for _, error in self._failures():
+            if error.heard:
+                raise error
+            return str(error)
+        return ""
+
+    def _failures(self) -> tuple[tuple[int, PeerError], ...]:
+        """A copy, as a thread of the network may add one at any time."""
+        return tuple(self._failed.values())
+
+    def clock_of(self, name: str) -> ClockOffset:
+        """The estimate of another machine's clock."""
+        return self._clocks[name]
+
+    @property
+    def heard_fault(self) -> bool:
+        """Whether another part has said that it failed."""
+        return any(error.heard for _, error in self._failures())
+
+    def has_checked(self, name: str, link: str) -> bool:
+        """Whether another part has received a message through this link."""
+        return link in self._heard.get(name, {}).get("checked", ())
+
+    def fail(self, name: str, tick: int, error: PeerError) -> None:
+        """Another part failed at ``tick``; whoever waits for it looks up."""
+        self._failed.setdefault(name, (tick, error))
+        self._news.set()
+        for wake in self.mailboxes:
+            wake()
+
+    def check(self, tick: int | None = None) -> None:
+        """Raise if waiting in ``tick`` has no sense any more.
+
+        Raises:
+            PeerError: another part failed at this tick or before, or is gone.
+        """
+        for at, error in self._failures():
+            if tick is None or at <= tick:
+                raise error
+
+    def reach(
+        self,
+        phase: Phase,
+        patience: float,
+        *,
+        before: Callable[[], bool] | None = None,
+        names: Iterable[str] | None = None,
+    ) -> None:
+        """Wait until this part may enter ``phase``, enter it, and wait until the others have.
+
+        Args:
+            phase: the phase.
+            patience: the seconds to wait for the others.
+            before: called every ``REPEAT`` seconds; this part enters the phase when it returns true.
+            names: the parts to wait for; by default all others.
+
+        Raises:
+            RunError: the others did not come so far in time; it names them.
+            PeerError: another part failed, is gone, or would run another graph.
+        """
+        expected = tuple(self.names if names is None else names)
+        now = time.monotonic()
+        end, next_time = now + patience, now
+        while True:
+            self.check()
+            self._compare()
+            now = time.monotonic()
+            if now >= next_time:  # not on all news, or two parts would answer each other for ever
+                if self._phase < phase and (before is None or before()):
+                    self._phase = phase
+                self.say()
+                next_time = now + REPEAT
+            missing = [n for n in expected if self._heard.get(n, {}).get("phase", -1) < phase]
+            if self._phase >= phase and not missing:
+                return
+            reason = self._wanted()
+            if reason:
+                raise RunError(f"stopped while waiting for {self._listed(missing)}: {reason}")
+            if now > end:
+                raise RunError(self._absence(missing, phase, patience))
+            self._news.wait(max(0.0, next_time - now))
+            self._news.clear()
+
+    def rest(self, patience: float, tick: int) -> None:
+        """Say that the actuators here are in damping, and wait until the others have said so.
+
+        It never raises, and does not wait for a part that is gone. Where this part could not start,
+        it says why until all have heard it. ``tick`` is the first that this part will not run.
+        """
+        end = time.monotonic() + patience
+        self._phase, self._ended = Phase.RESTING, tick
+        next_time = 0.0
+        while (now := time.monotonic()) < end:
+            if now >= next_time:
+                self.say()
+                next_time = now + REPEAT
+            waiting = [
+                name
+                for name in self.names
+                if name not in self._gone
+                and (self._problem or name in self._heard)
+                and self._heard.get(name, {}).get("phase", -1) < Phase.RESTING
+            ]
+            if not waiting:
+                return
+            self._news.wait(max(0.0, next_time - now))
+            self._news.clear()
+
+    def say(self, problem: str = "") -> None:
+        """Tell all others how far this part is, and what keeps it from going on."""
+        self._problem = self._problem or problem
+        for name in self.names:
+            self._say_to(name)
+
+    def _say_to(self, name: str) -> None:
+        state: dict[str, Any] = {
+            "machine": self.machine,
+            "run": self.run.hex(),
+            "phase": int(self._phase),
+            "problem": self._problem,
+            "ended": self._ended,
+            "hashes": self._hashes,
+            "clock": self._clocks[name].stamp(time.monotonic_ns()),
+            "checked": list(self._checked),
+            "heard": self._heard.get(name, {}).get("phase", -1),
+        }
+        if self._phase is Phase.HELLO:
+            state["graph"] = self._identity.graph
+            state["schema"] = self._identity.schema
+        if name in self._tell:
+            self._tell[name](json.dumps(state).encode())
+
+    def _hear(self, data: bytes) -> None:
+        """Keep a beacon; whatever is none is thrown away."""
+        with suppress(Exception):  # whatever bytes do, a thread of the network goes on
+            state = json.loads(data)
+            name, phase, checked = state["machine"], int(state["phase"]), list(state["checked"])
+            if name not in self.names or len(bytes.fromhex(state["run"])) != len(self.run):
+                return
+            now = time.monotonic_ns()
+            before = self._heard.get(name, {})
+            if before and before["run"] != state["run"]:
+                self._forget(name)
+                before = {}
+            self._clocks[name].hear(state["clock"], now)
+            if before.get("run") == state["run"]:
+                # beacons may come in another order
+                phase = max(phase, before["phase"])
+                checked = list(dict.fromkeys([*before["checked"], *checked]))
+            self._heard[name] = {**before, **state, "phase": phase, "checked": checked}
+            if state["problem"]:
+                what = "does not start" if phase < Phase.STARTED else "failed"
+                error = PeerError(f"machine {name!r} {what}: {state['problem']}")
+                error.heard = True
+                self.fail(name, -1, error)
+            elif phase >= Phase.RESTING:
+                error = PeerError(f"machine {name!r} has ended its run")
+                self.fail(name, int(state["ended"]), error)
+            self._news.set()
+            if int(state["heard"]) < self._phase:
+                self._say_to(name)
+
+    def _lose(self, name: str) -> None:
+        heard = self._heard.get(name)
+        if heard is None or heard["phase"] >= Phase.RESTING:
+            return  # it was not there yet, or has ended in good order
+        self._gone[name] = None
+        if self._free and self._phase >= Phase.STARTED:
+            return  # its links say what to do without it
+        text = f"machine {name!r} is gone: its process ended or froze, or the network to it is cut"
+        self.fail(name, -1, PeerError(text))
+
+    def _forget(self, name: str) -> None:
+        """Another part was started again: what was known of it no longer holds."""
+        self._gone.pop(name, None)
+        self._failed.pop(name, None)
+        for link in [link for link, sender in self._senders.items() if sender == name]:
+            self._checked.pop(link, None)
+
+    def _compare(self) -> None:
+        """Refuse to go on beside a part that would run something else.
+
+        Raises:
+            PeerError: both hashes, and the first difference.
+        """
+        if self._phase > Phase.HELLO:
+            return
+        for name in self.names:
+            heard = self._heard.get(name, {})
+            if "graph" not in heard:
+                if heard and heard["hashes"] != self._hashes:
+                    raise PeerError(
+                        f"{self.machine} and {name} do not fit together: graph and schema are "
+                        f"{' and '.join(self._hashes)} on {self.machine}, "
+                        f"{' and '.join(heard['hashes'])} on {name}, which is running already"
+                    )
+                continue
+            other = Identity(tuple(heard["graph"]), tuple(heard["schema"]))
+            difference = self._identity.difference(other, self.machine, name)
+            if difference:
+                error = PeerError(f"{self.machine} and {name} do not fit together: {difference}")
+                self.say(str(error))
+                raise error
+
+    def _absence(self, missing: list[str], phase: Phase, patience: float) -> str:
+        silent = [name for name in missing if name not in self._heard]
+        if silent:
+            return (
+                f"nothing was heard of {self._listed(silent)} for {patience:g} s. Start each part "
+                "with 'aloft run GRAPH --machine NAME', and see that its endpoint can be reached"
+            )
+        if missing:
+            return (
+                f"{self._listed(missing)} did not become {phase.name.lower()} in {patience:g} s; "
+                "see what is printed there"
+            )
+        return f"this machine did not become {phase.name.lower()} in {patience:g} s"
+
+    def _listed(self, names: Iterable[str]) -> str:
+        return ", ".join(f"{name} ({self._endpoints[name]})" for name in names) or "the others"
