@@ -8,7 +8,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from ...mathematics.linear import multiply_vector
+from ...mathematics.kernel import kernel
 from ...robots.description import RobotDescription
 from ...runtime.language.block import Block, Input, Output
 from ...runtime.language.parameters import Parameters, live_parameter, parameter
@@ -42,17 +42,10 @@ class Gain(UnitOfProduct, Block):
     u = Input(Vector, text="what is scaled")
     y = Output(Vector, text="gain times u")
 
-    def setup(self) -> None:
-        """Keep the factor at hand."""
-        self.on_parameters()
-
-    def on_parameters(self) -> None:
-        """Keep the factor as an array, so that no tick allocates one."""
-        self._gain = np.array(self.params.gain)
-
-    def step(self) -> None:
-        """Multiply."""
-        np.multiply(self.u.value, self._gain, out=self.y.value)
+    @kernel
+    @staticmethod
+    def step(u: Vector, y: Vector, params: Params) -> None:
+        y.value[:] = params.gain * u.value
 
 
 class Sum(Block):
@@ -74,20 +67,10 @@ class Sum(Block):
         """Both inputs must be the same quantity, and so is the sum."""
         return {"y": given.alike("a", "b")}
 
-    def setup(self) -> None:
-        """Keep the factors at hand."""
-        self._product = np.zeros(self.params.n)
-        self.on_parameters()
-
-    def on_parameters(self) -> None:
-        """Keep the factors as arrays, so that no tick allocates any."""
-        self._first, self._second = (np.array(weight) for weight in self.params.weights)
-
-    def step(self) -> None:
-        """Add."""
-        np.multiply(self.b.value, self._second, out=self._product)
-        np.multiply(self.a.value, self._first, out=self.y.value)
-        np.add(self.y.value, self._product, out=self.y.value)
+    @kernel
+    @staticmethod
+    def step(a: Vector, b: Vector, y: Vector, params: Params) -> None:
+        y.value[:] = a.value * params.weights[0] + b.value * params.weights[1]
 
 
 class Product(Block):
@@ -114,13 +97,13 @@ class Product(Block):
         y = a.times(b.unit, 1 if params.operation == "multiply" else -1)
         return {"y": replace(y, frame=a.frame or b.frame)}
 
-    def setup(self) -> None:
-        """Choose the operation."""
-        self._operation = np.multiply if self.params.operation == "multiply" else np.divide
-
-    def step(self) -> None:
-        """Multiply or divide."""
-        self._operation(self.a.value, self.b.value, out=self.y.value)
+    @kernel
+    @staticmethod
+    def step(a: Vector, b: Vector, y: Vector, params: Params) -> None:
+        if params.operation == "multiply":
+            y.value[:] = a.value * b.value
+        else:
+            np.divide(a.value, b.value, y.value)
 
 
 class Rows(Signal):
@@ -166,10 +149,7 @@ class MatrixGain(Block):
         u = given["u"]
         return {"y": u and replace(u.times(read_unit(params.unit)), frame=params.frame)}
 
-    def setup(self) -> None:
-        """Make the matrix."""
-        self._matrix = np.array(self.params.matrix)
-
-    def step(self) -> None:
-        """Multiply."""
-        multiply_vector(self._matrix, self.u.value, self.y.value)
+    @kernel
+    @staticmethod
+    def step(u: Vector, y: Rows, params: Params) -> None:
+        y.value[:] = params.matrix @ u.value

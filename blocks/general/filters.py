@@ -7,10 +7,8 @@ from abc import abstractmethod
 from collections.abc import Iterable
 from typing import Literal
 
-import numpy as np
-from numpy.typing import NDArray
-
-from ...mathematics.second_order_filter import advance, band_stop, first_order, second_order, settle
+from ...mathematics.kernel import kernel
+from ...mathematics.linear_systems import advance, band_stop, first_order, second_order, settle
 from ...runtime.language.block import Block, Context, Input, Misfit, Output, State
 from ...runtime.language.parameters import Parameters, live_parameter, parameter
 from ...runtime.language.quantities import Carried, Given
@@ -19,7 +17,7 @@ from ...runtime.language.unit_algebra import SECOND
 from .vectors import UnitOfInput, Vector, VectorParameters
 
 
-class FilterMemory(Signal):
+class FilterState(Signal):
     """The memory of a second-order filter in transposed direct form II."""
 
     memory = Field(("n", 2), text="two numbers for each element")
@@ -27,27 +25,28 @@ class FilterMemory(Signal):
 
 
 class LinearFilter(UnitOfInput, Block):
-    """The base of the filters: ``coefficients`` says which filter it is."""
+    """The base of the filters: ``prepare`` says which filter it is."""
+
+    class Constants(Signal):
+        """The filter."""
+
+        coefficients = Field(5, text="b0, b1, b2, a1 and a2")
 
     u = Input(Vector, text="what is filtered")
     y = Output(Vector, text="u, filtered")
-    x = State(FilterMemory, text="the filter's memory")
+    x = State(FilterState, text="the filter's memory")
 
     @abstractmethod
-    def coefficients(self, out: NDArray[np.float64]) -> None:
+    def prepare(self) -> None:
         """Write b0, b1, b2, a1 and a2 for the block's parameters and period."""
 
-    def setup(self) -> None:
-        """Compute the coefficients."""
-        self._coefficients = np.zeros(5)
-        self.coefficients(self._coefficients)
-
-    def step(self) -> None:
-        """Filter one sample; before the first the input is taken to have been constant."""
-        if not self.x.started:
-            settle(self._coefficients, self.u.value, self.x.memory)
-            self.x.started[...] = True
-        advance(self._coefficients, self.u.value, self.x.memory, self.y.value)
+    @kernel
+    @staticmethod
+    def step(u: Vector, y: Vector, x: FilterState, constants: Constants) -> None:
+        if not x.started:  # as if the input had always been this one
+            settle(constants.coefficients, u.value, x.memory)
+            x.started = True
+        advance(constants.coefficients, u.value, x.memory, y.value)
 
 
 def too_fast(name: str, frequency: float, period: float) -> list[Misfit]:
@@ -94,16 +93,16 @@ class Butterworth(LinearFilter):
         return {"cutoff": 20.0, "n": 2, "order": 2}
 
     @abstractmethod
-    def coefficients(self, out: NDArray[np.float64]) -> None:
-        """Those of ``design``, for slow changes or for fast ones."""
+    def prepare(self) -> None:
+        """Say by ``design`` which of the two filters it is."""
 
-    def design(self, passes_fast: bool, out: NDArray[np.float64]) -> None:
-        """Write the coefficients of the order asked for."""
-        cutoff, order = self.params.cutoff, self.params.order
+    def design(self, high: bool) -> None:
+        """Write the coefficients of the order asked for, of a high-pass or a low-pass."""
+        cutoff, order, out = self.params.cutoff, self.params.order, self.constants.coefficients
         if order == 1:
-            first_order(cutoff, self.period, passes_fast, out)
+            first_order(cutoff, self.period, high, out)
         else:
-            second_order(cutoff, math.sqrt(0.5), self.period, passes_fast, out)
+            second_order(cutoff, math.sqrt(0.5), self.period, high, out)
 
 
 class LowPass(Butterworth):
@@ -113,9 +112,8 @@ class LowPass(Butterworth):
     the gain is 1 / sqrt(2). It begins settled at the first input.
     """
 
-    def coefficients(self, out: NDArray[np.float64]) -> None:
-        """Those that let slow changes pass."""
-        self.design(False, out)
+    def prepare(self) -> None:
+        self.design(high=False)
 
 
 class HighPass(Butterworth):
@@ -125,9 +123,8 @@ class HighPass(Butterworth):
     cutoff the gain is 1 / sqrt(2). It begins settled at the first input, so the first output is 0.
     """
 
-    def coefficients(self, out: NDArray[np.float64]) -> None:
-        """Those that let fast changes pass."""
-        self.design(True, out)
+    def prepare(self) -> None:
+        self.design(high=True)
 
 
 class BandStop(LinearFilter):
@@ -155,9 +152,9 @@ class BandStop(LinearFilter):
         """A centre far below the rate."""
         return {"centre": 50.0, "n": 2}
 
-    def coefficients(self, out: NDArray[np.float64]) -> None:
-        """Those of the notch."""
-        band_stop(self.params.centre, self.params.width, self.period, out)
+    def prepare(self) -> None:
+        p = self.params
+        band_stop(p.centre, p.width, self.period, self.constants.coefficients)
 
 
 class Window(Signal):
@@ -182,22 +179,18 @@ class MovingAverage(UnitOfInput, Block):
     y = Output(Vector, text="the mean")
     x = State(Window, text="the last inputs")
 
-    def setup(self) -> None:
-        """Make room for the count."""
-        self._number = np.zeros(())
-
-    def step(self) -> None:
-        """Take the input in and average."""
-        x, samples = self.x, self.params.samples
-        count = int(x.count)
-        np.copyto(x.values[count % samples], self.u.value)
-        x.count[...] = count + 1
-        self._number[...] = min(count + 1, samples)
-        np.add.reduce(x.values, axis=0, out=self.y.value)
-        np.divide(self.y.value, self._number, out=self.y.value)
+    @kernel
+    @staticmethod
+    def step(u: Vector, y: Vector, x: Window, params: Params) -> None:
+        x.values[x.count % params.samples, :] = u.value
+        x.count += 1
+        y.value[:] = 0.0
+        for k in range(params.samples):
+            y.value[:] += x.values[k, :]
+        y.value[:] /= min(x.count, params.samples)
 
 
-class DerivativeMemory(Signal):
+class DerivativeState(Signal):
     """What a filtered derivative remembers."""
 
     value = Field("n", text="the input before")
@@ -216,10 +209,16 @@ class FilteredDerivative(Block):
     class Params(VectorParameters):
         time_constant: float = live_parameter(0.01, unit="s", ge=0.0, text="tau, of the smoothing")
 
+    class Constants(Signal):
+        """The weights of the difference equation."""
+
+        decay = Field(text="tau / (tau + T)")
+        gain = Field(unit="1/s", text="1 / (tau + T)")
+
     params: Params
     u = Input(Vector, text="what is differentiated")
     y = Output(Vector, text="its rate per second")
-    x = State(DerivativeMemory, text="the input and the derivative before")
+    x = State(DerivativeState, text="the input and the derivative before")
 
     @classmethod
     def carried(cls, params: Parameters, given: Given) -> Carried:
@@ -227,26 +226,17 @@ class FilteredDerivative(Block):
         u = given["u"]
         return {"y": u and u.times(SECOND, -1)}
 
-    def setup(self) -> None:
-        """Compute the weights."""
-        self._difference = np.zeros(self.params.n)
-        self.on_parameters()
-
-    def on_parameters(self) -> None:
-        """As arrays, so that no tick makes them."""
+    def prepare(self) -> None:
         tau = self.params.time_constant
-        self._keep = np.array(tau / (tau + self.period))
-        self._gain = np.array(1.0 / (tau + self.period))
+        self.constants.decay = tau / (tau + self.period)
+        self.constants.gain = 1.0 / (tau + self.period)
 
-    def step(self) -> None:
-        """Differentiate."""
-        x = self.x
+    @kernel
+    @staticmethod
+    def step(u: Vector, y: Vector, x: DerivativeState, constants: Constants) -> None:
         if not x.started:
-            np.copyto(x.value, self.u.value)
-            x.started[...] = True
-        np.subtract(self.u.value, x.value, out=self._difference)
-        np.multiply(self._difference, self._gain, out=self._difference)
-        np.multiply(x.rate, self._keep, out=x.rate)
-        np.add(x.rate, self._difference, out=x.rate)
-        np.copyto(x.value, self.u.value)
-        np.copyto(self.y.value, x.rate)
+            x.value[:] = u.value
+            x.started = True
+        x.rate[:] = x.rate * constants.decay + (u.value - x.value) * constants.gain
+        x.value[:] = u.value
+        y.value[:] = x.rate

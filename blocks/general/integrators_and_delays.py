@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import numpy as np
-
+from ...mathematics.kernel import kernel
 from ...runtime.language.block import Block, Input, Output, State
 from ...runtime.language.parameters import Parameters, parameter
 from ...runtime.language.quantities import Carried, Given
@@ -12,13 +11,13 @@ from ...runtime.language.unit_algebra import SECOND
 from .vectors import (
     NEVER,
     Bounded,
+    Bounds,
     Flag,
     InitialValueParameters,
     ScalarOrVector,
     UnitOfInput,
     Vector,
     VectorParameters,
-    broadcast_bound,
 )
 
 
@@ -47,31 +46,26 @@ class Integrator(Bounded, Block):
         return {"y": u and u.times(SECOND)}
 
     def setup(self) -> None:
-        """Start from the initial value, and keep the bounds at hand."""
-        p = self.params
-        self._initial = p.start_value()
-        self._lower = broadcast_bound(p.lower, p.n, -np.inf)
-        self._upper = broadcast_bound(p.upper, p.n, np.inf)
-        self._step = np.zeros(p.n)
-        self._period = np.array(self.period)
-        np.copyto(self.x.value, self._initial)
+        self.x.value[...] = self.params.initial
 
-    def emit(self) -> None:
-        """Write the integral so far."""
-        np.copyto(self.y.value, self.x.value)
+    @kernel
+    @staticmethod
+    def emit(y: Vector, x: Vector) -> None:
+        y.value[:] = x.value
 
-    def update(self) -> None:
-        """Take one Euler step, or start anew."""
-        if self.reset.value:
-            np.copyto(self.x.value, self._initial)
-            return
-        np.multiply(self.u.value, self._period, out=self._step)
-        np.add(self.x.value, self._step, out=self.x.value)
-        np.maximum(self.x.value, self._lower, out=self.x.value)
-        np.minimum(self.x.value, self._upper, out=self.x.value)
+    @kernel
+    @staticmethod
+    def update(
+        u: Vector, reset: Flag, x: Vector, params: Params, constants: Bounds, period: float
+    ) -> None:
+        if reset.value:
+            x.value[:] = params.initial
+        else:
+            x.value[:] += u.value * period
+            x.value[:] = min(constants.upper, max(constants.lower, x.value))
 
 
-class Trapezoids(Signal):
+class TrapezoidalState(Signal):
     """What the trapezoidal integrator remembers."""
 
     integral = Field("n", text="the integral so far")
@@ -91,7 +85,7 @@ class TrapezoidalIntegrator(Block):
     u = Input(Vector, text="the rate")
     reset = Input(Flag, text="whether to start anew from the initial value", default=NEVER)
     y = Output(Vector, text="its integral")
-    x = State(Trapezoids, text="the integral and the rate before")
+    x = State(TrapezoidalState, text="the integral and the rate before")
 
     @classmethod
     def carried(cls, params: Parameters, given: Given) -> Carried:
@@ -99,24 +93,23 @@ class TrapezoidalIntegrator(Block):
         u = given["u"]
         return {"y": u and u.times(SECOND)}
 
-    def setup(self) -> None:
-        """Keep the initial value and half of the period at hand."""
-        self._initial = self.params.start_value()
-        self._sum = np.zeros(self.params.n)
-        self._half = np.array(0.5 * self.period)
-
-    def step(self) -> None:
-        """Add one trapezoid."""
-        x = self.x
-        if self.reset.value or not x.started:
-            np.copyto(x.integral, self._initial)
-            x.started[...] = True
+    @kernel
+    @staticmethod
+    def step(
+        u: Vector,
+        reset: Flag,
+        y: Vector,
+        x: TrapezoidalState,
+        params: InitialValueParameters,
+        period: float,
+    ) -> None:
+        if reset.value or not x.started:
+            x.integral[:] = params.initial
+            x.started = True
         else:
-            np.add(x.rate, self.u.value, out=self._sum)
-            np.multiply(self._sum, self._half, out=self._sum)
-            np.add(x.integral, self._sum, out=x.integral)
-        np.copyto(x.rate, self.u.value)
-        np.copyto(self.y.value, x.integral)
+            x.integral[:] += (x.rate + u.value) * (0.5 * period)
+        x.rate[:] = u.value
+        y.value[:] = x.integral
 
 
 class UnitDelay(UnitOfInput, Block):
@@ -132,19 +125,20 @@ class UnitDelay(UnitOfInput, Block):
     x = State(Vector, text="u of the last run")
 
     def setup(self) -> None:
-        """Start from the initial value."""
-        self.x.value[...] = self.params.start_value()
+        self.x.value[...] = self.params.initial
 
-    def emit(self) -> None:
-        """Write the input of the last run."""
-        np.copyto(self.y.value, self.x.value)
+    @kernel
+    @staticmethod
+    def emit(y: Vector, x: Vector) -> None:
+        y.value[:] = x.value
 
-    def update(self) -> None:
-        """Remember the input."""
-        np.copyto(self.x.value, self.u.value)
+    @kernel
+    @staticmethod
+    def update(u: Vector, x: Vector) -> None:
+        x.value[:] = u.value
 
 
-class Line(Signal):
+class DelayLine(Signal):
     """A delay line."""
 
     values = Field(("samples", "n"), text="the last inputs, each in the place of its turn")
@@ -163,21 +157,21 @@ class Delay(UnitOfInput, Block):
     params: Params
     u = Input(Vector, text="what is delayed")
     y = Output(Vector, text="u, k runs ago")
-    x = State(Line, text="the last k inputs")
+    x = State(DelayLine, text="the last k inputs")
 
     def setup(self) -> None:
-        """Fill the line with the initial value."""
-        self.x.values[...] = self.params.start_value()
+        self.x.values[...] = self.params.initial
 
-    def emit(self) -> None:
-        """Write the oldest."""
-        np.copyto(self.y.value, self.x.values[int(self.x.next)])
+    @kernel
+    @staticmethod
+    def emit(y: Vector, x: DelayLine) -> None:
+        y.value[:] = x.values[x.next, :]
 
-    def update(self) -> None:
-        """Replace the oldest by the input."""
-        place = int(self.x.next)
-        np.copyto(self.x.values[place], self.u.value)
-        self.x.next[...] = (place + 1) % self.params.samples
+    @kernel
+    @staticmethod
+    def update(u: Vector, x: DelayLine, params: Params) -> None:
+        x.values[x.next, :] = u.value
+        x.next = (x.next + 1) % params.samples
 
 
 class SampleHold(UnitOfInput, Block):
@@ -194,17 +188,17 @@ class SampleHold(UnitOfInput, Block):
     x = State(Vector, text="the last sample")
 
     def setup(self) -> None:
-        """Start from the initial value."""
-        self.x.value[...] = self.params.start_value()
+        self.x.value[...] = self.params.initial
 
-    def step(self) -> None:
-        """Take a sample if asked to."""
-        if self.trigger.value:
-            np.copyto(self.x.value, self.u.value)
-        np.copyto(self.y.value, self.x.value)
+    @kernel
+    @staticmethod
+    def step(u: Vector, trigger: Flag, y: Vector, x: Vector) -> None:
+        if trigger.value:
+            x.value[:] = u.value
+        y.value[:] = x.value
 
 
-class Held(Signal):
+class HeldSample(Signal):
     """A held sample."""
 
     value = Field("n", text="the last sample")
@@ -224,12 +218,12 @@ class ZeroOrderHold(UnitOfInput, Block):
     params: Params
     u = Input(Vector, text="what is sampled")
     y = Output(Vector, text="the last sample")
-    x = State(Held, text="the last sample")
+    x = State(HeldSample, text="the last sample")
 
-    def step(self) -> None:
-        """Take a sample if it is time to."""
-        age = int(self.x.age)
-        if age == 0:
-            np.copyto(self.x.value, self.u.value)
-        self.x.age[...] = (age + 1) % self.params.samples
-        np.copyto(self.y.value, self.x.value)
+    @kernel
+    @staticmethod
+    def step(u: Vector, y: Vector, x: HeldSample, params: Params) -> None:
+        if x.age == 0:
+            x.value[:] = u.value
+        x.age = (x.age + 1) % params.samples
+        y.value[:] = x.value

@@ -8,9 +8,8 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ...mathematics.discretisation import controllable_form, discretise
-from ...mathematics.linear import add_product, multiply_vector
-from ...mathematics.transfer_function import advance
+from ...mathematics.kernel import kernel
+from ...mathematics.linear_systems import advance_transfer_function, controllable_form, discretise
 from ...robots.description import RobotDescription
 from ...runtime.language.block import Block, Input, Misfit, Output, State
 from ...runtime.language.parameters import Parameters, parameter
@@ -79,10 +78,34 @@ class SystemParameters(SourceParameters):
         return discretise(self.a, self.b, period)
 
 
+class DiscreteSystem(Signal):
+    """The matrices of the next state."""
+
+    a = Field(("order", "order"), text="A of a period")
+    b = Field(("order", "n"), text="B of a period")
+
+
+class NextState(Signal):
+    """Room for the next state."""
+
+    next = Field("order", text="the next state")
+
+
+@kernel
+def advance_state(
+    u: SystemInput, x: SystemState, constants: DiscreteSystem, scratch: NextState
+) -> None:
+    """Go on to the next state."""
+    scratch.next[:] = constants.a @ x.value + constants.b @ u.value
+    x.value[:] = scratch.next
+
+
 class LinearSystem(UnitFromParameters, Block):
     """The base of the linear systems in state space."""
 
     Params = SystemParameters
+    Constants = DiscreteSystem
+    Scratch = NextState
     params: SystemParameters
     u = Input(SystemInput, text="the inputs")
     y = Output(SystemOutput, text="the outputs")
@@ -113,18 +136,13 @@ class LinearSystem(UnitFromParameters, Block):
         }
 
     def setup(self) -> None:
-        """Discretise, and start from the initial state."""
-        self._a, self._b = self.params.matrices(self.period)
-        self._c = np.array(self.params.c)
-        self._next = np.zeros(len(self._a))
         if self.params.initial is not None:
             self.x.value[...] = self.params.initial
 
-    def advance(self) -> None:
-        """Go on to the next state."""
-        multiply_vector(self._a, self.x.value, self._next)
-        add_product(self._b, self.u.value, self._next)
-        np.copyto(self.x.value, self._next)
+    def prepare(self) -> None:
+        a, b = self.params.matrices(self.period)
+        self.constants.a[...] = a
+        self.constants.b[...] = b
 
 
 def _misfit(name: str, what: str, found: int, order: int) -> Iterable[Misfit]:
@@ -145,13 +163,17 @@ class StateSpace(LinearSystem):
     breaks a loop; ``StateSpaceWithFeedthrough`` has a matrix D as well and does not.
     """
 
-    def emit(self) -> None:
-        """Write the outputs."""
-        multiply_vector(self._c, self.x.value, self.y.value)
+    @kernel
+    @staticmethod
+    def emit(y: SystemOutput, x: SystemState, params: SystemParameters) -> None:
+        y.value[:] = params.c @ x.value
 
-    def update(self) -> None:
-        """Go on to the next state."""
-        self.advance()
+    @kernel
+    @staticmethod
+    def update(
+        u: SystemInput, x: SystemState, constants: DiscreteSystem, scratch: NextState
+    ) -> None:
+        advance_state(u, x, constants, scratch)
 
 
 class StateSpaceWithFeedthrough(LinearSystem):
@@ -183,19 +205,21 @@ class StateSpaceWithFeedthrough(LinearSystem):
         """An oscillator with feedthrough."""
         return {**super().example_parameters(), "d": [[0.5, -1.0]]}
 
-    def setup(self) -> None:
-        """Discretise, and start from the initial state."""
-        super().setup()
-        self._d = np.array(self.params.d)
+    @kernel
+    @staticmethod
+    def step(
+        u: SystemInput,
+        y: SystemOutput,
+        x: SystemState,
+        params: Params,
+        constants: DiscreteSystem,
+        scratch: NextState,
+    ) -> None:
+        y.value[:] = params.c @ x.value + params.d @ u.value
+        advance_state(u, x, constants, scratch)
 
-    def step(self) -> None:
-        """Write the outputs and go on to the next state."""
-        multiply_vector(self._c, self.x.value, self.y.value)
-        add_product(self._d, self.u.value, self.y.value)
-        self.advance()
 
-
-class TransferMemory(Signal):
+class TransferState(Signal):
     """The states of one transfer function for each element."""
 
     value = Field(("n", "order"), text="states in the controllable canonical form")
@@ -218,10 +242,19 @@ class TransferFunction(UnitOfProduct, Block):
             "continuous", text="whether it is a function of s or of z"
         )
 
+    class Constants(Signal):
+        """The discrete system in controllable canonical form."""
+
+        a = Field(("order", "order"), text="A")
+        b = Field("order", text="B")
+        c = Field("order", text="C")
+        d = Field(text="D")
+
+    Scratch = NextState
     params: Params
     u = Input(Vector, text="what is filtered")
     y = Output(Vector, text="u, filtered")
-    x = State(TransferMemory, text="the states")
+    x = State(TransferState, text="the states")
 
     @classmethod
     def local_dimensions(
@@ -250,16 +283,26 @@ class TransferFunction(UnitOfProduct, Block):
         """A damped second-order system with feedthrough."""
         return {"n": 2, "numerator": [0.1, 1.0, 4.0], "denominator": [1.0, 2.0, 4.0]}
 
-    def setup(self) -> None:
-        """Discretise."""
-        a, b, c, self._d = controllable_form(self.params.numerator, self.params.denominator)
-        if self.params.time == "continuous":
+    def prepare(self) -> None:
+        p = self.params
+        a, b, c, d = controllable_form(p.numerator, p.denominator)
+        if p.time == "continuous":
             a, b = discretise(a.tolist(), b.tolist(), self.period)
-        self._a, self._b, self._c = a, b[:, 0].copy(), c[0].copy()
-        self._next = np.zeros(len(a))
+        self.constants.a[...], self.constants.b[...] = a, b[:, 0]
+        self.constants.c[...], self.constants.d = c[0], d
 
-    def step(self) -> None:
-        """Filter one sample."""
-        advance(
-            self._a, self._b, self._c, self._d, self.u.value, self.x.value, self._next, self.y.value
+    @kernel
+    @staticmethod
+    def step(
+        u: Vector, y: Vector, x: TransferState, constants: Constants, scratch: NextState
+    ) -> None:
+        advance_transfer_function(
+            constants.a,
+            constants.b,
+            constants.c,
+            constants.d,
+            u.value,
+            x.value,
+            scratch.next,
+            y.value,
         )

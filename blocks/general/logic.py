@@ -7,11 +7,12 @@ from typing import Any, Literal
 
 import numpy as np
 
+from ...mathematics.kernel import kernel
 from ...runtime.language.block import Block, Input, Output, State
 from ...runtime.language.parameters import Parameters, live_parameter, parameter
 from ...runtime.language.quantities import Carried, Given
 from ...runtime.language.signals import Field, Signal
-from .vectors import NEVER, Flag, Flags, Number, Seconds, Tally, Vector, VectorParameters
+from .vectors import NEVER, CountState, Flag, Flags, Number, Seconds, Vector, VectorParameters
 
 UFUNCS: Mapping[str, tuple[Any, bool]] = {
     "and": (np.logical_and, False),
@@ -36,15 +37,21 @@ class Logic(Block):
     b = Input(Flags, text="the second truth values")
     y = Output(Flags, text="the result")
 
-    def setup(self) -> None:
-        """Choose the operation."""
-        self._operation, self._negated = UFUNCS[self.params.operation]
-
-    def step(self) -> None:
-        """Combine."""
-        self._operation(self.a.value, self.b.value, out=self.y.value)
-        if self._negated:
-            np.logical_not(self.y.value, out=self.y.value)
+    @kernel
+    @staticmethod
+    def step(a: Flags, b: Flags, y: Flags, params: Params) -> None:
+        for i in range(a.value.shape[0]):
+            p, q = a.value[i], b.value[i]
+            if params.operation == "and":
+                y.value[i] = p and q
+            elif params.operation == "or":
+                y.value[i] = p or q
+            elif params.operation == "xor":
+                y.value[i] = p != q
+            elif params.operation == "nand":
+                y.value[i] = not (p and q)
+            else:
+                y.value[i] = not (p or q)
 
 
 COMPARISONS: Mapping[str, Any] = {
@@ -75,13 +82,23 @@ class Compare(Block):
         given.alike("a", "b")
         return {}
 
-    def setup(self) -> None:
-        """Choose the comparison."""
-        self._compare = COMPARISONS[self.params.operation]
-
-    def step(self) -> None:
-        """Compare."""
-        self._compare(self.a.value, self.b.value, out=self.y.value)
+    @kernel
+    @staticmethod
+    def step(a: Vector, b: Vector, y: Flags, params: Params) -> None:
+        for i in range(a.value.shape[0]):
+            p, q = a.value[i], b.value[i]
+            if params.operation == "<":
+                y.value[i] = p < q
+            elif params.operation == "<=":
+                y.value[i] = p <= q
+            elif params.operation == "==":
+                y.value[i] = p == q
+            elif params.operation == "!=":
+                y.value[i] = p != q
+            elif params.operation == ">=":
+                y.value[i] = p >= q
+            else:
+                y.value[i] = p > q
 
 
 class Not(Block):
@@ -92,9 +109,11 @@ class Not(Block):
     u = Input(Flags, text="the truth values")
     y = Output(Flags, text="their opposites")
 
-    def step(self) -> None:
-        """Negate."""
-        np.logical_not(self.u.value, out=self.y.value)
+    @kernel
+    @staticmethod
+    def step(u: Flags, y: Flags) -> None:
+        for i in range(u.value.shape[0]):
+            y.value[i] = not u.value[i]
 
 
 class FlagsBefore(Signal):
@@ -118,19 +137,24 @@ class EdgeDetector(Block):
     y = Output(Flags, text="which elements changed in this run")
     x = State(FlagsBefore, text="the truth values of the run before")
 
-    def step(self) -> None:
-        """Compare with the run before."""
-        u, before, y = self.u.value, self.x.value, self.y.value
-        if not self.x.started:
-            np.copyto(before, u)
-            self.x.started[...] = True
-        if self.params.edge == "rising":
-            np.greater(u, before, out=y)
-        elif self.params.edge == "falling":
-            np.less(u, before, out=y)
-        else:
-            np.not_equal(u, before, out=y)
-        np.copyto(before, u)
+    @kernel
+    @staticmethod
+    def step(u: Flags, y: Flags, x: FlagsBefore, params: Params) -> None:
+        for i in range(u.value.shape[0]):
+            now = u.value[i]
+            before = x.value[i] if x.started else now
+            if params.edge == "rising":
+                y.value[i] = now and not before
+            elif params.edge == "falling":
+                y.value[i] = before and not now
+            else:
+                y.value[i] = now != before
+            x.value[i] = now
+        x.started = True
+
+
+_ENDLESS = 2**62
+"""A count that no run reaches."""
 
 
 class Counter(Block):
@@ -145,19 +169,28 @@ class Counter(Block):
             None, ge=1, text="the greatest count, behind which it is 0 again"
         )
 
+    class Constants(Signal):
+        """What follows from the parameters."""
+
+        last = Field(dtype="int64", text="the greatest count")
+
     params: Params
     u = Input(Flag, text="what is counted")
     reset = Input(Flag, text="whether to begin at 0 again", default=NEVER)
     y = Output(Number, text="the count")
-    x = State(Tally, text="the count")
+    x = State(CountState, text="the count")
 
-    def step(self) -> None:
-        """Count."""
-        count = int(self.x.count) + bool(self.u.value)
-        if self.reset.value or (self.params.last is not None and count > self.params.last):
-            count = 0
-        self.x.count[...] = count
-        self.y.value.fill(count)
+    def prepare(self) -> None:
+        self.constants.last = _ENDLESS if self.params.last is None else self.params.last
+
+    @kernel
+    @staticmethod
+    def step(u: Flag, reset: Flag, y: Number, x: CountState, constants: Constants) -> None:
+        if u.value:
+            x.count += 1
+        if reset.value or x.count > constants.last:
+            x.count = 0
+        y.value[0] = x.count
 
 
 class Timer(Block):
@@ -176,15 +209,16 @@ class Timer(Block):
     u = Input(Flag, text="what must hold")
     elapsed = Output(Seconds, text="for how long it has held; 0 where it does not")
     done = Output(Flag, text="whether it has held long enough")
-    x = State(Tally, text="runs in which it has held")
+    x = State(CountState, text="runs in which it has held")
 
-    def step(self) -> None:
-        """Count the runs."""
-        count = int(self.x.count) + 1 if self.u.value else 0
-        self.x.count[...] = count
-        elapsed = max(count - 1, 0) * self.period
-        self.elapsed.value.fill(elapsed)
-        self.done.value[...] = count > 0 and elapsed >= self.params.duration - 1e-6 * self.period
+    @kernel
+    @staticmethod
+    def step(
+        u: Flag, elapsed: Seconds, done: Flag, x: CountState, params: Params, period: float
+    ) -> None:
+        x.count = x.count + 1 if u.value else 0
+        elapsed.value[0] = max(x.count - 1, 0) * period
+        done.value = x.count > 0 and elapsed.value[0] >= params.duration - 1e-6 * period
 
 
 class Switch(Block):
@@ -202,6 +236,10 @@ class Switch(Block):
         """Both vectors must be the same quantity, and so is the output."""
         return {"y": given.alike("a", "b")}
 
-    def step(self) -> None:
-        """Choose."""
-        np.copyto(self.y.value, self.a.value if self.condition.value else self.b.value)
+    @kernel
+    @staticmethod
+    def step(condition: Flag, a: Vector, b: Vector, y: Vector) -> None:
+        if condition.value:
+            y.value[:] = a.value
+        else:
+            y.value[:] = b.value

@@ -9,14 +9,13 @@ import numpy as np
 from ...runtime.language.block import Block, Output, State
 from ...runtime.language.parameters import live_parameter, parameter
 from ...runtime.language.random_stream import RandomStream, StreamState
-from ...runtime.language.signals import Field
+from ...runtime.language.signals import Field, Signal
 from .vectors import (
     ScalarOrVector,
     SourceParameters,
     UnitFromParameters,
     Vector,
     VectorParameters,
-    broadcast,
 )
 
 
@@ -37,25 +36,15 @@ class WhiteNoise(UnitFromParameters, Block):
         mean: ScalarOrVector = live_parameter(0.0, text="the mean")
         seed: int = parameter(0, ge=0, text="of the random stream")
 
+    class Constants(Signal):
+        """The parameters of each element."""
+
+        std = Field("n", text="standard deviation of one sample")
+        mean = Field("n", text="the mean")
+
     params: Params
     y = Output(Vector, text="the noise")
     stream = State(StreamState, text="the random stream")
-
-    def setup(self) -> None:
-        """Make the stream."""
-        self._random = RandomStream(self, self.params.seed)
-        self.on_parameters()
-
-    def on_parameters(self) -> None:
-        """Keep mean and deviation as arrays."""
-        self._std = broadcast(self.params.std, self.params.n)
-        self._mean = broadcast(self.params.mean, self.params.n)
-
-    def step(self) -> None:
-        """Draw."""
-        self._random.generator.standard_normal(out=self.y.value)
-        np.multiply(self.y.value, self._std, out=self.y.value)
-        np.add(self.y.value, self._mean, out=self.y.value)
 
     def freeze(self) -> None:
         """Keep where the stream is."""
@@ -64,6 +53,20 @@ class WhiteNoise(UnitFromParameters, Block):
     def thaw(self) -> None:
         """Take it back."""
         self._random.load(self.stream)
+
+    def setup(self) -> None:
+        self._random = RandomStream(self, self.params.seed)
+
+    def prepare(self) -> None:
+        self.constants.std[...] = self.params.std
+        self.constants.mean[...] = self.params.mean
+
+    def step(self) -> None:
+        """Draw from the stream; the numbers are NumPy's, so this stays Python."""
+        y = self.y.value
+        self._random.generator.standard_normal(out=y)
+        np.multiply(y, self.constants.std, out=y)
+        np.add(y, self.constants.mean, out=y)
 
 
 class NoiseState(StreamState):
@@ -91,33 +94,21 @@ class ColouredNoise(UnitFromParameters, Block):
         )
         seed: int = parameter(0, ge=0, text="of the random stream")
 
+    class Constants(Signal):
+        """What follows from the parameters."""
+
+        decay = Field(text="f")
+        share = Field(text="sqrt(1 - f^2)")
+        std = Field("n", text="standard deviation")
+
+    class Scratch(Signal):
+        """Room for a step."""
+
+        sample = Field("n", text="what was drawn")
+
     params: Params
     y = Output(Vector, text="the noise")
     x = State(NoiseState, text="the noise and its random stream")
-
-    def setup(self) -> None:
-        """Make the stream."""
-        self._random = RandomStream(self, self.params.seed)
-        factor = math.exp(-self.period / self.params.correlation_time)
-        self._keep = np.array(factor)
-        self._new = np.array(math.sqrt(1.0 - factor * factor))
-        self._drawn = np.zeros(self.params.n)
-        self.on_parameters()
-
-    def on_parameters(self) -> None:
-        """Keep the deviation as an array."""
-        self._std = broadcast(self.params.std, self.params.n)
-
-    def step(self) -> None:
-        """Forget a little, and add something new."""
-        value = self.x.value
-        self._random.generator.standard_normal(out=self._drawn)
-        if self.x.started:
-            np.multiply(value, self._keep, out=value)
-            np.multiply(self._drawn, self._new, out=self._drawn)
-        self.x.started[...] = True
-        np.add(value, self._drawn, out=value)
-        np.multiply(value, self._std, out=self.y.value)
 
     def freeze(self) -> None:
         """Keep where the stream is."""
@@ -126,3 +117,23 @@ class ColouredNoise(UnitFromParameters, Block):
     def thaw(self) -> None:
         """Take it back."""
         self._random.load(self.x)
+
+    def setup(self) -> None:
+        self._random = RandomStream(self, self.params.seed)
+
+    def prepare(self) -> None:
+        decay = math.exp(-self.period / self.params.correlation_time)
+        self.constants.decay = decay
+        self.constants.share = math.sqrt(1.0 - decay * decay)
+        self.constants.std[...] = self.params.std
+
+    def step(self) -> None:
+        """Decay, and add a new sample of NumPy's stream."""
+        value, sample, constants = self.x.value, self.scratch.sample, self.constants
+        self._random.generator.standard_normal(out=sample)
+        if self.x.started:
+            np.multiply(value, constants.decay, out=value)
+            np.multiply(sample, constants.share, out=sample)
+        self.x.started = True
+        np.add(value, sample, out=value)
+        np.multiply(value, constants.std, out=self.y.value)

@@ -6,12 +6,14 @@ from collections.abc import Iterable
 
 import numpy as np
 
+from ...mathematics.kernel import kernel
 from ...robots.description import RobotDescription
 from ...runtime.language.block import Block, Input, Misfit, Output, State
 from ...runtime.language.parameters import Parameters, live_parameter
 from ...runtime.language.signals import Field, Signal
 from .vectors import (
     Bounded,
+    Bounds,
     Flags,
     ScalarOrVector,
     SourceParameters,
@@ -19,8 +21,6 @@ from .vectors import (
     UnitOfInput,
     Vector,
     VectorParameters,
-    broadcast,
-    broadcast_bound,
 )
 
 
@@ -38,19 +38,10 @@ class Saturation(Bounded, UnitOfInput, Block):
     u = Input(Vector, text="what is bounded")
     y = Output(Vector, text="u within the bounds")
 
-    def setup(self) -> None:
-        """Keep the bounds at hand."""
-        self.on_parameters()
-
-    def on_parameters(self) -> None:
-        """Keep them as arrays, so that no tick makes them."""
-        self._lower = broadcast_bound(self.params.lower, self.params.n, -np.inf)
-        self._upper = broadcast_bound(self.params.upper, self.params.n, np.inf)
-
-    def step(self) -> None:
-        """Apply the bounds."""
-        np.maximum(self.u.value, self._lower, out=self.y.value)
-        np.minimum(self.y.value, self._upper, out=self.y.value)
+    @kernel
+    @staticmethod
+    def step(u: Vector, y: Vector, constants: Bounds) -> None:
+        y.value[:] = min(constants.upper, max(constants.lower, u.value))
 
 
 class DeadZone(Bounded, UnitOfInput, Block):
@@ -64,20 +55,10 @@ class DeadZone(Bounded, UnitOfInput, Block):
     u = Input(Vector, text="what is passed on outside the zone")
     y = Output(Vector, text="how far u is beyond the zone")
 
-    def setup(self) -> None:
-        """Keep the bounds at hand."""
-        self.on_parameters()
-
-    def on_parameters(self) -> None:
-        """Keep them as arrays, so that no tick makes them."""
-        self._lower = broadcast(self.params.lower, self.params.n)
-        self._upper = broadcast(self.params.upper, self.params.n)
-
-    def step(self) -> None:
-        """Take off what is within the zone."""
-        np.maximum(self.u.value, self._lower, out=self.y.value)
-        np.minimum(self.y.value, self._upper, out=self.y.value)
-        np.subtract(self.u.value, self.y.value, out=self.y.value)
+    @kernel
+    @staticmethod
+    def step(u: Vector, y: Vector, params: Params) -> None:
+        y.value[:] = u.value - min(params.upper, max(params.lower, u.value))
 
 
 class Backlash(UnitOfInput, Block):
@@ -91,22 +72,13 @@ class Backlash(UnitOfInput, Block):
     y = Output(Vector, text="position of the driven part")
     x = State(Vector, text="position of the driven part before")
 
-    def setup(self) -> None:
-        """Keep half of the play at hand."""
-        self._bound = np.zeros(self.params.n)
-        self.on_parameters()
-
-    def on_parameters(self) -> None:
-        """As an array, so that no tick makes one; a negative play counts as none."""
-        self._half = 0.5 * np.maximum(broadcast(self.params.width, self.params.n), 0.0)
-
-    def step(self) -> None:
-        """Push the driven part along, if it is reached."""
-        np.subtract(self.u.value, self._half, out=self._bound)
-        np.maximum(self.x.value, self._bound, out=self.x.value)
-        np.add(self.u.value, self._half, out=self._bound)
-        np.minimum(self.x.value, self._bound, out=self.x.value)
-        np.copyto(self.y.value, self.x.value)
+    @kernel
+    @staticmethod
+    def step(u: Vector, y: Vector, x: Vector, params: Params) -> None:
+        for i in range(u.value.shape[0]):
+            half = 0.5 * max(params.width[i], 0.0)  # a negative play counts as none
+            x.value[i] = min(u.value[i] + half, max(u.value[i] - half, x.value[i]))
+        y.value[:] = x.value
 
 
 class Quantiser(UnitOfInput, Block):
@@ -119,19 +91,12 @@ class Quantiser(UnitOfInput, Block):
     u = Input(Vector, text="what is rounded")
     y = Output(Vector, text="the rounded vector")
 
-    def setup(self) -> None:
-        """Keep the step at hand."""
-        self.on_parameters()
-
-    def on_parameters(self) -> None:
-        """As an array, so that no tick makes one."""
-        self._interval = np.array(self.params.interval)
-
-    def step(self) -> None:
-        """Round."""
-        np.divide(self.u.value, self._interval, out=self.y.value)
-        np.rint(self.y.value, out=self.y.value)
-        np.multiply(self.y.value, self._interval, out=self.y.value)
+    @kernel
+    @staticmethod
+    def step(u: Vector, y: Vector, params: Params) -> None:
+        y.value[:] = u.value / params.interval
+        np.rint(y.value, y.value)
+        y.value[:] *= params.interval
 
 
 class LastOutput(Signal):
@@ -157,29 +122,19 @@ class RateLimiter(UnitOfInput, Block):
     y = Output(Vector, text="what follows it")
     x = State(LastOutput, text="the output before")
 
-    def setup(self) -> None:
-        """Keep the greatest steps at hand."""
-        self._lower = np.zeros(self.params.n)
-        self._upper = np.zeros(self.params.n)
-        self.on_parameters()
-
-    def on_parameters(self) -> None:
-        """Compute the greatest steps of one period; a negative rate counts as zero."""
-        n = self.params.n
-        self._rise = self.period * np.maximum(broadcast(self.params.rising, n), 0.0)
-        self._fall = self.period * np.maximum(broadcast(self.params.falling, n), 0.0)
-
-    def step(self) -> None:
-        """Go towards the input."""
-        x = self.x
+    @kernel
+    @staticmethod
+    def step(u: Vector, y: Vector, x: LastOutput, params: Params, period: float) -> None:
         if not x.started:
-            np.copyto(x.value, self.u.value)
-            x.started[...] = True
-        np.subtract(x.value, self._fall, out=self._lower)
-        np.add(x.value, self._rise, out=self._upper)
-        np.maximum(self.u.value, self._lower, out=x.value)
-        np.minimum(x.value, self._upper, out=x.value)
-        np.copyto(self.y.value, x.value)
+            x.value[:] = u.value
+            x.started = True
+        for i in range(u.value.shape[0]):
+            lowest = x.value[i] - period * max(
+                params.falling[i], 0.0
+            )  # a negative rate counts as zero
+            highest = x.value[i] + period * max(params.rising[i], 0.0)
+            x.value[i] = min(highest, max(lowest, u.value[i]))
+        y.value[:] = x.value
 
 
 class Relay(UnitFromParameters, Block):
@@ -217,22 +172,11 @@ class Relay(UnitFromParameters, Block):
                 found=f"{params.switch_off:g}",
             )
 
-    def setup(self) -> None:
-        """Keep the thresholds at hand."""
-        self._above = np.zeros(self.params.n, bool)
-        self.on_parameters()
-
-    def on_parameters(self) -> None:
-        """As arrays, so that no tick makes them."""
-        self._on, self._off = np.array(self.params.switch_on), np.array(self.params.switch_off)
-        self._value = np.array(self.params.on_value)
-
-    def step(self) -> None:
-        """Switch what is beyond its threshold."""
-        np.greater(self.u.value, self._off, out=self._above)
-        np.logical_and(self.x.value, self._above, out=self.x.value)
-        np.greater_equal(self.u.value, self._on, out=self._above)
-        np.logical_or(self.x.value, self._above, out=self.x.value)
-        np.copyto(self.on.value, self.x.value)
-        self.y.value.fill(self.params.off_value)
-        np.copyto(self.y.value, self._value, where=self.x.value)
+    @kernel
+    @staticmethod
+    def step(u: Vector, y: Vector, on: Flags, x: Flags, params: Params) -> None:
+        for i in range(u.value.shape[0]):
+            stays = x.value[i] and u.value[i] > params.switch_off
+            x.value[i] = stays or u.value[i] >= params.switch_on
+            on.value[i] = x.value[i]
+            y.value[i] = params.on_value if x.value[i] else params.off_value

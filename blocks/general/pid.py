@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import numpy as np
-
-from ...mathematics.pid import PidGains, PidMemory, start_pid, step_pid
+from ...mathematics.kernel import kernel
 from ...runtime.language.block import Block, Input, Output, State
 from ...runtime.language.parameters import Parameters, live_parameter
 from ...runtime.language.quantities import Carried, Given
@@ -13,17 +11,16 @@ from ...runtime.language.unit_algebra import read_unit
 from .vectors import (
     NEVER,
     Bounded,
+    Bounds,
     Flag,
     InUnit,
     ScalarOrVector,
     Vector,
     VectorParameters,
-    broadcast,
-    broadcast_bound,
 )
 
 
-class Memory(Signal):
+class PidState(Signal):
     """What a PID controller remembers."""
 
     integral = Field("n", text="the integral part")
@@ -67,13 +64,20 @@ class PID(Bounded, Block):
         lower: ScalarOrVector | None = live_parameter(None, text="the least output")
         upper: ScalarOrVector | None = live_parameter(None, text="the greatest output")
 
+    class Constants(Bounds):
+        """The bounds, and what follows from the other parameters."""
+
+        tracking = Field(
+            text="the share of what a bound cut off that the integral takes back in a run"
+        )
+
     params: Params
     setpoint = Input(Vector, text="r, what is wanted")
     measured = Input(Vector, text="y, what is")
     feedforward = Input(Vector, text="f, added before the bounds", default={"value": 0.0})
     reset = Input(Flag, text="whether to forget what was", default=NEVER)
     u = Output(Vector, text="the control, within the bounds")
-    x = State(Memory, text="the integral and the derivative")
+    x = State(PidState, text="the integral and the derivative")
 
     @classmethod
     def carried(cls, params: Parameters, given: Given) -> Carried:
@@ -84,32 +88,42 @@ class PID(Bounded, Block):
         given.agree("feedforward", u, "it is added to the control")
         return {"u": u}
 
-    def setup(self) -> None:
-        """Keep gains and memory at hand."""
-        x = self.x
-        self._memory = PidMemory(x.integral, x.derivative, x.before)
-        self.on_parameters()
+    def prepare(self) -> None:
+        super().prepare()
+        self.constants.tracking = min(self.period / self.params.tracking_time, 1.0)
 
-    def on_parameters(self) -> None:
-        """Keep the gains as arrays."""
-        p = self.params
-        self._gains = PidGains(
-            broadcast(p.kp, p.n),
-            broadcast(p.ki, p.n),
-            broadcast(p.kd, p.n),
-            broadcast(p.b, p.n),
-            broadcast(p.c, p.n),
-            broadcast_bound(p.lower, p.n, -np.inf),
-            broadcast_bound(p.upper, p.n, np.inf),
-            p.derivative_time_constant,
-            min(self.period / p.tracking_time, 1.0),
-            self.period,
-        )
-
-    def step(self) -> None:
-        """Control."""
-        r, y = self.setpoint.value, self.measured.value
-        if self.reset.value or not self.x.started:
-            start_pid(self._gains, r, y, self._memory)
-            self.x.started[...] = True
-        step_pid(self._gains, r, y, self.feedforward.value, self._memory, self.u.value)
+    @kernel
+    @staticmethod
+    def step(
+        setpoint: Vector,
+        measured: Vector,
+        feedforward: Vector,
+        reset: Flag,
+        u: Vector,
+        x: PidState,
+        params: Params,
+        constants: Constants,
+        period: float,
+    ) -> None:
+        tau = params.derivative_time_constant
+        starts = reset.value or not x.started
+        x.started = True
+        for i in range(u.value.shape[0]):
+            r, y = setpoint.value[i], measured.value[i]
+            d = params.c[i] * r - y
+            if starts:
+                x.integral[i] = 0.0
+                x.derivative[i] = 0.0
+                x.before[i] = d
+            x.derivative[i] = (tau * x.derivative[i] + params.kd[i] * (d - x.before[i])) / (
+                tau + period
+            )
+            x.before[i] = d
+            p = params.kp[i] * (params.b[i] * r - y)
+            v = p + x.integral[i] + x.derivative[i] + feedforward.value[i]
+            u.value[i] = min(max(v, constants.lower[i]), constants.upper[i])
+            x.integral[i] = (
+                x.integral[i]
+                + period * params.ki[i] * (r - y)
+                + constants.tracking * (u.value[i] - v)
+            )

@@ -7,13 +7,15 @@ from typing import Any, Literal
 
 import numpy as np
 
-from ...mathematics.euler_angles import from_euler, to_euler
+from ...mathematics.kernel import kernel
 from ...mathematics.rotations import (
     conjugate,
+    from_euler,
     from_matrix,
     multiply,
     rotate,
     rotate_back,
+    to_euler,
     to_matrix,
 )
 from ...runtime.language.block import Block, Input, Output
@@ -94,13 +96,13 @@ class RotateVector(Block):
         given.agree("u", Quantity(u.unit, before), f"the block turns vectors from {before}")
         return {"y": Quantity(u.unit, after)}
 
-    def setup(self) -> None:
-        """Choose the direction."""
-        self._turn = rotate if self.params.direction == "body to world" else rotate_back
-
-    def step(self) -> None:
-        """Turn."""
-        self._turn(self.rotation.value, self.u.value, self.y.value)
+    @kernel
+    @staticmethod
+    def step(rotation: Quaternion, u: Vector3, y: Vector3, params: Params) -> None:
+        if params.direction == "body to world":
+            rotate(rotation.value, u.value, y.value)
+        else:
+            rotate_back(rotation.value, u.value, y.value)
 
 
 class QuaternionProduct(Block):
@@ -111,6 +113,11 @@ class QuaternionProduct(Block):
 
     class Params(Parameters):
         inverse: bool = parameter(False, text="whether a is inverted")
+
+    class Scratch(Signal):
+        """Room for a step."""
+
+        inverse = Field(4, text="a*")
 
     params: Params
     a = Input(Quaternion, text="the second rotation")
@@ -124,17 +131,14 @@ class QuaternionProduct(Block):
         """Unit quaternions."""
         return {"a": random_unit(rng), "b": random_unit(rng)}
 
-    def setup(self) -> None:
-        """Make room for the inverse."""
-        self._inverse = np.zeros(4)
-
-    def step(self) -> None:
-        """Multiply."""
-        a = self.a.value
-        if self.params.inverse:
-            conjugate(a, self._inverse)
-            a = self._inverse
-        multiply(a, self.b.value, self.y.value)
+    @kernel
+    @staticmethod
+    def step(a: Quaternion, b: Quaternion, y: Quaternion, params: Params, scratch: Scratch) -> None:
+        if params.inverse:
+            conjugate(a.value, scratch.inverse)
+            multiply(scratch.inverse, b.value, y.value)
+        else:
+            multiply(a.value, b.value, y.value)
 
 
 class QuaternionToMatrix(QuaternionInput, Block):
@@ -143,9 +147,10 @@ class QuaternionToMatrix(QuaternionInput, Block):
     u = Input(Quaternion, text="the unit quaternion")
     y = Output(RotationMatrix, text="the same rotation")
 
-    def step(self) -> None:
-        """Convert."""
-        to_matrix(self.u.value, self.y.value)
+    @kernel
+    @staticmethod
+    def step(u: Quaternion, y: RotationMatrix) -> None:
+        to_matrix(u.value, y.value)
 
 
 class MatrixToQuaternion(Block):
@@ -163,9 +168,10 @@ class MatrixToQuaternion(Block):
         to_matrix(random_unit(rng)["value"], matrix)
         return {"u": {"value": matrix}}
 
-    def step(self) -> None:
-        """Convert."""
-        from_matrix(self.u.value, self.y.value)
+    @kernel
+    @staticmethod
+    def step(u: RotationMatrix, y: Quaternion) -> None:
+        from_matrix(u.value, y.value)
 
 
 class QuaternionToEuler(QuaternionInput, Block):
@@ -178,9 +184,10 @@ class QuaternionToEuler(QuaternionInput, Block):
     u = Input(Quaternion, text="the unit quaternion")
     y = Output(EulerAngles, text="roll, pitch, yaw")
 
-    def step(self) -> None:
-        """Convert."""
-        to_euler(self.u.value, self.y.value)
+    @kernel
+    @staticmethod
+    def step(u: Quaternion, y: EulerAngles) -> None:
+        to_euler(u.value, y.value)
 
 
 class EulerToQuaternion(Block):
@@ -189,6 +196,7 @@ class EulerToQuaternion(Block):
     u = Input(EulerAngles, text="roll, pitch, yaw")
     y = Output(Quaternion, text="the same rotation")
 
-    def step(self) -> None:
-        """Convert."""
-        from_euler(self.u.value, self.y.value)
+    @kernel
+    @staticmethod
+    def step(u: EulerAngles, y: Quaternion) -> None:
+        from_euler(u.value, y.value)

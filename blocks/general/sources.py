@@ -6,19 +6,17 @@ import math
 from collections.abc import Mapping
 from typing import Any, Literal
 
-import numpy as np
-
 from ...mathematics.kernel import kernel
 from ...robots.description import RobotDescription
-from ...runtime.language.block import Block, Output
+from ...runtime.language.block import Block, Clock, Output
 from ...runtime.language.parameters import Parameters, live_parameter, parameter
+from ...runtime.language.signals import Field, Signal
 from .vectors import (
     ScalarOrVector,
     SourceParameters,
     UnitFromParameters,
     Vector,
     VectorParameters,
-    broadcast,
 )
 
 
@@ -52,17 +50,10 @@ class Constant(UnitFromParameters, Block):
         """Three numbers."""
         return {"value": [1.0, -2.0, 0.5]}
 
-    def setup(self) -> None:
-        """Make the vector."""
-        self.on_parameters()
-
-    def on_parameters(self) -> None:
-        """Make the vector again from the changed parameters."""
-        self._value = np.array(self.params.value)
-
-    def step(self) -> None:
-        """Write the vector."""
-        np.copyto(self.y.value, self._value)
+    @kernel
+    @staticmethod
+    def step(y: Vector, params: Params) -> None:
+        y.value[:] = params.value
 
 
 class Step(UnitFromParameters, Block):
@@ -84,19 +75,13 @@ class Step(UnitFromParameters, Block):
     params: Params
     y = Output(Vector, text="the step")
 
-    def setup(self) -> None:
-        """Find the tick of the step."""
-        self._tick = first_tick(self.params.at, self.context.clock.base_period)
-        self.on_parameters()
-
-    def on_parameters(self) -> None:
-        """Keep both values as arrays."""
-        self._before = broadcast(self.params.before, self.params.n)
-        self._after = broadcast(self.params.after, self.params.n)
-
-    def step(self) -> None:
-        """Write the value of the present tick."""
-        np.copyto(self.y.value, self._before if self.tick < self._tick else self._after)
+    @kernel
+    @staticmethod
+    def step(y: Vector, params: Params, clock: Clock) -> None:
+        if clock.tick < first_tick(params.at, clock.base_period):
+            y.value[:] = params.before
+        else:
+            y.value[:] = params.after
 
 
 class Ramp(UnitFromParameters, Block):
@@ -113,27 +98,24 @@ class Ramp(UnitFromParameters, Block):
         slope: ScalarOrVector = live_parameter(1.0, text="growth per second")
         offset: ScalarOrVector = live_parameter(0.0, text="the value before the start")
 
+    class Constants(Signal):
+        """What follows from the parameters."""
+
+        duration = Field(unit="s", text="how long it grows, maybe for ever")
+
     params: Params
     y = Output(Vector, text="the ramp")
 
-    def setup(self) -> None:
-        """Keep slope and offset at hand."""
-        self._elapsed = np.zeros(())
-        self.on_parameters()
+    def prepare(self) -> None:
+        duration = self.params.duration
+        self.constants.duration = math.inf if duration is None else duration
 
-    def on_parameters(self) -> None:
-        """Keep them as arrays, so that no tick makes them."""
-        self._slope = broadcast(self.params.slope, self.params.n)
-        self._offset = broadcast(self.params.offset, self.params.n)
-
-    def step(self) -> None:
-        """Evaluate at the present time."""
-        elapsed = max(self.time - self.params.start, 0.0)
-        if self.params.duration is not None:
-            elapsed = min(elapsed, self.params.duration)
-        self._elapsed[...] = elapsed
-        np.multiply(self._slope, self._elapsed, out=self.y.value)
-        np.add(self.y.value, self._offset, out=self.y.value)
+    @kernel
+    @staticmethod
+    def step(y: Vector, params: Params, constants: Constants, clock: Clock) -> None:
+        time = clock.base_period * clock.tick
+        elapsed = min(max(time - params.start, 0.0), constants.duration)
+        y.value[:] = params.slope * elapsed + params.offset
 
 
 class Pulse(UnitFromParameters, Block):
@@ -158,22 +140,14 @@ class Pulse(UnitFromParameters, Block):
     params: Params
     y = Output(Vector, text="the pulses")
 
-    def setup(self) -> None:
-        """Keep both levels at hand."""
-        self.on_parameters()
-
-    def on_parameters(self) -> None:
-        """Keep them as arrays, so that no tick makes them."""
-        self._low = broadcast(self.params.offset, self.params.n)
-        self._high = self._low + broadcast(self.params.amplitude, self.params.n)
-
-    def step(self) -> None:
-        """Write the level of the present time."""
-        p = self.params
-        periods = (self.time - p.start) / p.duration + 1e-9
-        share = periods - math.floor(periods)
-        high = periods >= 0.0 and share < p.width
-        np.copyto(self.y.value, self._high if high else self._low)
+    @kernel
+    @staticmethod
+    def step(y: Vector, params: Params, clock: Clock) -> None:
+        time = clock.base_period * clock.tick
+        periods = (time - params.start) / params.duration + 1e-9
+        y.value[:] = params.offset
+        if periods >= 0.0 and periods - math.floor(periods) < params.width:
+            y.value[:] += params.amplitude
 
 
 class SineWave(UnitFromParameters, Block):
@@ -194,11 +168,12 @@ class SineWave(UnitFromParameters, Block):
     params: Params
     y = Output(Vector, text="the sine")
 
-    def step(self) -> None:
-        """Evaluate at the present time."""
-        p = self.params
-        angle = 2.0 * math.pi * p.frequency * self.time + p.phase
-        self.y.value.fill(p.offset + p.amplitude * math.sin(angle))
+    @kernel
+    @staticmethod
+    def step(y: Vector, params: Params, clock: Clock) -> None:
+        time = clock.base_period * clock.tick
+        angle = 2.0 * math.pi * params.frequency * time + params.phase
+        y.value[:] = params.offset + params.amplitude * math.sin(angle)
 
 
 class Chirp(UnitFromParameters, Block):
@@ -230,19 +205,19 @@ class Chirp(UnitFromParameters, Block):
     params: Params
     y = Output(Vector, text="the sine, the same in every element")
 
-    def step(self) -> None:
-        """Evaluate at the present time."""
-        p = self.params
-        inside = min(self.time, p.duration)
-        cycles = p.end_frequency * (self.time - inside)
-        ratio = math.log(p.end_frequency / p.start_frequency)
-        if p.sweep == "linear":
-            growth = (p.end_frequency - p.start_frequency) / p.duration
-            cycles += p.start_frequency * inside + 0.5 * growth * inside * inside
+    @kernel
+    @staticmethod
+    def step(y: Vector, params: Params, clock: Clock) -> None:
+        time = clock.base_period * clock.tick
+        start, end, duration = params.start_frequency, params.end_frequency, params.duration
+        inside = min(time, duration)
+        cycles = end * (time - inside)
+        ratio = math.log(end / start)
+        if params.sweep == "linear":
+            growth = (end - start) / duration
+            cycles += start * inside + 0.5 * growth * inside * inside
         elif ratio == 0.0:
-            cycles += p.start_frequency * inside
+            cycles += start * inside
         else:
-            cycles += (
-                p.start_frequency * p.duration * math.expm1(ratio * inside / p.duration) / ratio
-            )
-        self.y.value.fill(p.offset + p.amplitude * math.sin(2.0 * math.pi * cycles))
+            cycles += start * duration * math.expm1(ratio * inside / duration) / ratio
+        y.value[:] = params.offset + params.amplitude * math.sin(2.0 * math.pi * cycles)

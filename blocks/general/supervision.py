@@ -3,24 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from pydantic import Field as Key
 
+from ...mathematics.arrays import Flags1D, Indices1D
+from ...mathematics.kernel import kernel
 from ...robots.description import RobotDescription
-from ...runtime.language.block import Block, Input, Metric, Misfit, Output, State
+from ...runtime.language.block import Block, Clock, Input, Metric, Misfit, Output, State
 from ...runtime.language.parameters import Parameters, parameter
 from ...runtime.language.signals import Field, Signal
 from .vectors import (
+    Bounded,
+    Bounds,
     Flag,
     Flags,
     ScalarOrVector,
     Seconds,
     Vector,
     VectorParameters,
-    broadcast_bound,
-    crossed_bounds,
 )
 
 
@@ -44,7 +46,22 @@ class StateName(Signal):
     value = Field("n_states", dtype="bool", text="one truth value for each state")
 
 
-class Present(Signal):
+class Transitions(NamedTuple):
+    """All transitions, those from the first state first."""
+
+    first: Indices1D
+    """For each state the place of its first transition; one more for the end."""
+    target: Indices1D
+    """The state that is entered."""
+    condition: Indices1D
+    """The place of the condition; -1 where there is none."""
+    expected: Flags1D
+    """What the condition must be."""
+    least_runs: Indices1D
+    """For how many runs the state must have lasted."""
+
+
+class MachineState(Signal):
     """What a state machine remembers."""
 
     index = Field((), dtype="int64", text="the present state")
@@ -76,7 +93,7 @@ class StateMachine(Block):
     u = Input(Flags, text="the conditions")
     state = Output(StateName, text="the present state")
     elapsed = Output(Seconds, text="how long it has lasted")
-    x = State(Present, text="the present state")
+    x = State(MachineState, text="the present state")
 
     @classmethod
     def local_dimensions(
@@ -115,31 +132,44 @@ class StateMachine(Block):
         }
 
     def setup(self) -> None:
-        """Turn names into places: for each state its transitions."""
         p = self.params
-        ways: list[list[tuple[int, int, bool, int]]] = [[] for _ in p.states]
-        for way in p.transitions:
-            when = way.when or ""
-            place = p.conditions.index(when.removeprefix("not ").strip()) if when else -1
-            runs = int(np.ceil(way.after / self.period - 1e-6))
-            ways[p.states.index(way.source)].append(
-                (p.states.index(way.to), place, not when.startswith("not "), runs)
-            )
-        self._ways = tuple(tuple(of_state) for of_state in ways)
+        ways = sorted(
+            p.transitions, key=lambda way: p.states.index(way.source)
+        )  # keeps their order
+        names = [(way.when or "").removeprefix("not ").strip() for way in ways]
+        self.transitions = Transitions(
+            np.searchsorted(
+                [p.states.index(way.source) for way in ways], np.arange(len(p.states) + 1)
+            ),
+            np.array([p.states.index(way.to) for way in ways], np.int64),
+            np.array([p.conditions.index(name) if name else -1 for name in names], np.int64),
+            np.array([not (way.when or "").startswith("not ") for way in ways], bool),
+            np.array([np.ceil(way.after / self.period - 1e-6) for way in ways], np.int64),
+        )
 
-    def step(self) -> None:
-        """Take a transition if there is one."""
-        index, runs = int(self.x.index), int(self.x.runs)
-        for target, place, wanted, least in self._ways[index]:
-            if runs >= least and (place < 0 or bool(self.u.value[place]) == wanted):
-                index, runs = target, 0
+    @kernel
+    @staticmethod
+    def step(
+        u: Flags,
+        state: StateName,
+        elapsed: Seconds,
+        x: MachineState,
+        transitions: Transitions,
+        period: float,
+    ) -> None:
+        before = x.index
+        for k in range(transitions.first[before], transitions.first[before + 1]):
+            condition = transitions.condition[k]
+            holds = condition < 0 or u.value[condition] == transitions.expected[k]
+            if holds and x.runs >= transitions.least_runs[k]:
+                x.index = transitions.target[k]
+                x.runs = 0
                 break
-        self.x.index[...] = index
-        self.x.runs[...] = runs + 1
-        self.state.index[...] = index
-        self.state.value.fill(False)
-        self.state.value[index] = True
-        self.elapsed.value.fill(runs * self.period)
+        for k in range(state.value.shape[0]):
+            state.value[k] = k == x.index
+        state.index = x.index
+        elapsed.value[0] = x.runs * period
+        x.runs += 1
 
 
 def _unknown(kind: str, name: str, known: list[str]) -> Misfit:
@@ -160,7 +190,7 @@ class Violations(Signal):
     element = Field((), dtype="int64", text="the element that broke it then")
 
 
-class Assertion(Block):
+class Assertion(Bounded, Block):
     """Bounds that every element must keep: lower <= u <= upper.
 
     A run in which one was broken is not successful, and its reason names the first: the element, its
@@ -181,7 +211,7 @@ class Assertion(Block):
     def requires(cls, params: Parameters, robot: RobotDescription | None) -> Iterable[Misfit]:
         """The bounds must not cross, and one must be there."""
         assert isinstance(params, cls.Params)
-        yield from crossed_bounds(params.lower, params.upper, params.n)
+        yield from super().requires(params, robot)
         if params.lower is None and params.upper is None:
             yield Misfit("it has no bound", fix="with: {upper: 1.0}")
 
@@ -190,37 +220,12 @@ class Assertion(Block):
         """A bound that is broken now and then."""
         return {"n": 2, "lower": -0.9, "upper": 0.9}
 
-    def setup(self) -> None:
-        """Keep the bounds at hand."""
-        p = self.params
-        self._lower = broadcast_bound(p.lower, p.n, -np.inf)
-        self._upper = broadcast_bound(p.upper, p.n, np.inf)
-        self._broken, self._above = np.zeros(p.n, bool), np.zeros(p.n, bool)
-
-    def step(self) -> None:
-        """Look at every element."""
-        np.less(self.u.value, self._lower, out=self._broken)
-        np.greater(self.u.value, self._upper, out=self._above)
-        np.logical_or(self._broken, self._above, out=self._broken)
-        broken = bool(self._broken.any())
-        self.ok.value[...] = not broken
-        if not broken:
-            return
-        x = self.x
-        if x.count == 0:
-            element = int(self._broken.argmax())
-            x.first[...], x.element[...] = self.time, element
-            x.value[...] = self.u.value[element]
-        x.count[...] = int(x.count) + 1
-        if self.params.action == "stop":
-            self.request_stop(self._reason())
-
     def _reason(self) -> str:
         element = int(self.x.element)
         return (
             f"{self.context.path}: element {element} was {float(self.x.value):.6g} at "
-            f"{float(self.x.first):.6g} s, outside [{self._lower[element]:g}, "
-            f"{self._upper[element]:g}]"
+            f"{float(self.x.first):.6g} s, outside [{self.constants.lower[element]:g}, "
+            f"{self.constants.upper[element]:g}]"
         )
 
     def metrics(self) -> Mapping[str, Metric]:
@@ -229,3 +234,26 @@ class Assertion(Block):
         if not count:
             return {"success": True, "violations": 0}
         return {"success": False, "reason": self._reason(), "violations": count}
+
+    @kernel
+    @staticmethod
+    def step(
+        u: Vector, ok: Flag, x: Violations, params: Params, constants: Bounds, clock: Clock
+    ) -> bool:
+        broken = -1
+        for i in range(u.value.shape[0]):
+            if u.value[i] < constants.lower[i] or u.value[i] > constants.upper[i]:
+                broken = i
+                break
+        ok.value = broken < 0
+        if broken < 0:
+            return False
+        if x.count == 0:
+            x.first = clock.base_period * clock.tick
+            x.element = broken
+            x.value = u.value[broken]
+        x.count += 1
+        return params.action == "stop"
+
+    def on_event(self) -> None:
+        self.request_stop(self._reason())

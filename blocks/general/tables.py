@@ -11,9 +11,11 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ...mathematics.lookup import interpolate, interpolate_grid
+from ...mathematics.arrays import Array1D, Array2D, Indices1D
+from ...mathematics.interpolation import interpolate, interpolate_grid, interval
+from ...mathematics.kernel import kernel
 from ...robots.description import RobotDescription
-from ...runtime.language.block import Block, Context, Input, Misfit, Output
+from ...runtime.language.block import Block, Clock, Context, Input, Misfit, Output
 from ...runtime.language.parameters import Parameters, parameter
 from ...runtime.language.signals import Field, Signal
 from .vectors import SourceParameters, UnitFromParameters, Vector, VectorParameters
@@ -70,16 +72,13 @@ class LookupTable(UnitFromParameters, Block):
         """Three points."""
         return {"n": 2, "points": [-1.0, 0.0, 2.0], "values": [1.0, 0.0, 4.0]}
 
-    def setup(self) -> None:
-        """Keep the table at hand."""
-        self._points, self._values = np.array(self.params.points), np.array(self.params.values)
-        self._clamp = self.params.beyond == "clamp"
-
-    def step(self) -> None:
-        """Read the table for every element."""
-        u, y = self.u.value, self.y.value
-        for i in range(self.params.n):
-            y[i] = interpolate(self._points, self._values, float(u[i]), self._clamp)
+    @kernel
+    @staticmethod
+    def step(u: Vector, y: Vector, params: Params) -> None:
+        for i in range(y.value.shape[0]):
+            y.value[i] = interpolate(
+                params.points, params.values, u.value[i], params.beyond == "clamp"
+            )
 
 
 class TableValue(Signal):
@@ -106,6 +105,12 @@ class LookupGrid(UnitFromParameters, Block):
         beyond: Literal["clamp", "extrapolate"] = parameter(
             "clamp", text="what holds beyond the first and last points"
         )
+
+    class Scratch(Signal):
+        """Room for a step."""
+
+        places = Field("n", dtype="int64", text="the cell that the input is in, by axis")
+        shares = Field("n", text="how far the input is through the cell, by axis")
 
     params: Params
     u = Input(Vector, text="where the table is read, one element a variable")
@@ -147,24 +152,23 @@ class LookupGrid(UnitFromParameters, Block):
         return {"axes": [[-1.0, 0.5], [-1.0, 0.0, 1.0]], "values": [0.0, 1.0, 2.0, 3.0, 5.0, 8.0]}
 
     def setup(self) -> None:
-        """Keep the table at hand, and scratch memory."""
-        p = self.params
-        self._points = np.array([point for axis in p.axes for point in axis])
-        self._counts = np.array([len(axis) for axis in p.axes])
-        self._values = np.array(p.values)
-        self._places, self._shares = np.zeros(len(p.axes), np.int64), np.zeros(len(p.axes))
-        self._clamp = p.beyond == "clamp"
+        axes = self.params.axes
+        self.points = np.array([point for axis in axes for point in axis])
+        self.counts = np.array([len(axis) for axis in axes])
 
-    def step(self) -> None:
-        """Read the table."""
-        self.y.value[0] = interpolate_grid(
-            self._points,
-            self._counts,
-            self._values,
-            self.u.value,
-            self._clamp,
-            self._places,
-            self._shares,
+    @kernel
+    @staticmethod
+    def step(
+        u: Vector,
+        y: TableValue,
+        params: Params,
+        points: Array1D,
+        counts: Indices1D,
+        scratch: Scratch,
+    ) -> None:
+        clamp = params.beyond == "clamp"
+        y.value[0] = interpolate_grid(
+            points, counts, params.values, u.value, clamp, scratch.places, scratch.shares
         )
 
 
@@ -216,25 +220,27 @@ class TablePlayback(UnitFromParameters, Block):
         return {"columns": ["x", "y"], "rows": rows}
 
     def setup(self) -> None:
-        """Read the table."""
         p = self.params
-        self._times, self._columns = read_table(
+        self.times, self.columns = read_table(
             p.file, p.rows, p.time, p.columns, self.context.folder
         )
 
-    def step(self) -> None:
-        """Write the values of the present time."""
-        times, y = self._times, self.y.value
-        start, end = float(times[0]), float(times[-1])
-        now = self.time
-        if self.params.repeat:
+    @kernel
+    @staticmethod
+    def step(y: Vector, params: Params, times: Array1D, columns: Array2D, clock: Clock) -> None:
+        rows = times.shape[0]
+        start, end = times[0], times[rows - 1]
+        now = clock.base_period * clock.tick
+        if params.repeat:
             now = start + (now - start) % (end - start)
-        if self.params.between == "linear":
-            for k in range(len(y)):
-                y[k] = interpolate(times, self._columns[k], now, True)
+        if params.between == "linear":
+            for k in range(y.value.shape[0]):
+                y.value[k] = interpolate(times, columns[k], now, True)
         else:
-            last = int(np.searchsorted(times, now + 1e-9, side="right")) - 1
-            np.copyto(y, self._columns[:, max(last, 0)])
+            last = interval(times, 0, rows, now + 1e-9)
+            if now + 1e-9 >= times[last + 1]:
+                last += 1
+            y.value[:] = columns[:, last]
 
 
 def read_table(

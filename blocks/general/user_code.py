@@ -326,7 +326,7 @@ class External(UnitFromParameters, Block):
 
     def setup(self) -> None:
         """Begin with the initial value."""
-        np.copyto(self.x.value, self.params.start_value())
+        self.x.value[...] = self.params.initial
 
     def emit(self) -> None:
         """Write the vector."""

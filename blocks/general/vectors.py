@@ -6,12 +6,11 @@ from collections.abc import Iterable, Sequence
 from typing import Annotated, Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import AfterValidator, ValidationInfo, field_validator, model_validator
 
 from ...robots.description import RobotDescription
 from ...runtime.language.block import Misfit
-from ...runtime.language.parameters import Parameters, parameter
+from ...runtime.language.parameters import Parameters, ScalarOrVector, parameter
 from ...runtime.language.quantities import Carried, Given, Quantity
 from ...runtime.language.signals import Field, Signal
 from ...runtime.language.unit_algebra import read_unit
@@ -36,14 +35,12 @@ class Seconds(Signal):
     value = Field(1, unit="s", text="the duration")
 
 
-class Tally(Signal):
-    """A whole number that is remembered."""
+class CountState(Signal):
+    """A whole number that a block counts."""
 
     count = Field((), dtype="int64", text="the number")
 
 
-ScalarOrVector = float | list[float]
-"""One number for all elements of a vector, or a list with one number for each."""
 _CHECKED = (ScalarOrVector, ScalarOrVector | None)
 
 
@@ -65,18 +62,6 @@ class VectorParameters(Parameters):
         if cls.model_fields[name].annotation in _CHECKED and len(value) != n:
             raise ValueError(f"{name} has {len(value)} elements, expected n = {n}")
         return value
-
-
-def broadcast(value: ScalarOrVector, n: int) -> NDArray[np.float64]:
-    """The value as an array of its own with n elements."""
-    result = np.empty(n)
-    result[...] = value
-    return result
-
-
-def broadcast_bound(value: ScalarOrVector | None, n: int, absent: float) -> NDArray[np.float64]:
-    """The same for a bound that may be missing and is then ``absent``, such as minus infinity."""
-    return broadcast(absent if value is None else value, n)
 
 
 class Flags(Signal):
@@ -102,16 +87,13 @@ class InitialValueParameters(VectorParameters):
         0.0, text="the first output: n numbers, or one for all elements"
     )
 
-    def start_value(self) -> NDArray[np.float64]:
-        """``initial`` as an array of n elements."""
-        return broadcast(self.initial, self.n)
-
 
 def crossed_bounds(
     lower: ScalarOrVector | None, upper: ScalarOrVector | None, n: int
 ) -> Iterable[Misfit]:
     """A misfit where a lower bound is above its upper one."""
-    low, high = broadcast_bound(lower, n, -np.inf), broadcast_bound(upper, n, np.inf)
+    low = np.full(n, -np.inf if lower is None else lower)
+    high = np.full(n, np.inf if upper is None else upper)
     for i in np.flatnonzero(low > high)[:1]:
         yield Misfit(
             f"the lower bound of element {i} is above the upper one",
@@ -121,13 +103,28 @@ def crossed_bounds(
         )
 
 
+class Bounds(Signal):
+    """The bounds of each element; infinite where there is none."""
+
+    lower = Field("n", text="the lower bounds")
+    upper = Field("n", text="the upper bounds")
+
+
 class Bounded:
     """The base of blocks whose parameters ``lower`` and ``upper`` bound ``n`` elements."""
+
+    Constants = Bounds
 
     @classmethod
     def requires(cls, params: Any, robot: RobotDescription | None) -> Iterable[Misfit]:
         """The bounds must not cross."""
         return crossed_bounds(params.lower, params.upper, params.n)
+
+    def prepare(self: Any) -> None:
+        """Take the bounds."""
+        p = self.params
+        self.constants.lower[...] = -np.inf if p.lower is None else p.lower
+        self.constants.upper[...] = np.inf if p.upper is None else p.upper
 
 
 def _readable(text: str) -> str:

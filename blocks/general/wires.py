@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-import numpy as np
-
+from ...mathematics.kernel import kernel
 from ...robots.description import RobotDescription
 from ...runtime.language.block import Block, Input, Misfit, Output
 from ...runtime.language.parameters import Parameters, parameter
@@ -69,10 +68,11 @@ class Mux(Pairs, Block):
             return {}
         return {"y": a if a == b else UNCHECKED}
 
-    def step(self) -> None:
-        """Join."""
-        np.copyto(self.y.value[: self.params.n_a], self.a.value)
-        np.copyto(self.y.value[self.params.n_a :], self.b.value)
+    @kernel
+    @staticmethod
+    def step(a: First, b: Second, y: Joined, params: PairSizes) -> None:
+        y.value[: params.n_a] = a.value
+        y.value[params.n_a :] = b.value
 
 
 class Demux(Pairs, Block):
@@ -89,10 +89,11 @@ class Demux(Pairs, Block):
         """Both are what u is."""
         return {"a": given["u"], "b": given["u"]}
 
-    def step(self) -> None:
-        """Split."""
-        np.copyto(self.a.value, self.u.value[: self.params.n_a])
-        np.copyto(self.b.value, self.u.value[self.params.n_a :])
+    @kernel
+    @staticmethod
+    def step(u: Joined, a: First, b: Second, params: PairSizes) -> None:
+        a.value[:] = u.value[: params.n_a]
+        b.value[:] = u.value[params.n_a :]
 
 
 class Selected(Signal):
@@ -138,10 +139,8 @@ class Selector(UnitOfInput, Block):
         """Two of three."""
         return {"n": 3, "elements": [2, 0]}
 
-    def setup(self) -> None:
-        """Keep the places at hand."""
-        self._places = np.array(self.params.elements)
-
-    def step(self) -> None:
-        """Select."""
-        np.take(self.u.value, self._places, out=self.y.value, mode="clip")
+    @kernel
+    @staticmethod
+    def step(u: Vector, y: Selected, params: Params) -> None:
+        for i in range(y.value.shape[0]):
+            y.value[i] = u.value[params.elements[i]]
