@@ -1,4 +1,4 @@
-"""Chooses the values of a signal that must be written so that every tick can be read back and drawn.
+"""Chooses the values of a signal that must be written so that the same curve is drawn.
 
 A value is left out if it has the same bits as the values of the tick before and of the tick after.
 A reader takes the last value at or before a tick, and the line that a viewer draws is the same. A
@@ -55,15 +55,3 @@ class ChangedRows:
         if self._value is not None:
             changed[0] = bool((bits[0] != self._value.view(whole)[0]).any())
         return changed
-
-
-def filled(
-    ticks: NDArray[np.int64], written: NDArray[np.int64], values: NDArray[Any]
-) -> NDArray[Any]:
-    """The value at each of ``ticks`` (n,): of ``values`` (m, ...), which were written at ``written``
-    (m,) in any order, the last at or before it. Something must be written at or before every tick.
-    """
-    order = np.argsort(written, kind="stable")
-    last = np.searchsorted(written[order], ticks, side="right") - 1
-    result: NDArray[Any] = values[order[last]]
-    return result

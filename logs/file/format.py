@@ -30,13 +30,6 @@ output and a field. All but the static ones are on the timelines ``t`` (exact na
 Row k is the bus after all outputs of tick k were written. Every message of the file has a checksum:
 see ``messages``. ``viewing.detail`` says how much is drawn into a recording. The other curves, and
 the rest of the scene, are drawn from the rows when ``aloft view`` shows it.
-
-Format 3 had the curves of all fields, and packed its rows in another way.
-
-Recordings of versions before 0.2 have format 2. They have no ``rows`` and no checksums. Their
-``signals`` hold every field exactly (int64 fields as component ``aloft:exact``), and ``recorded``
-(``aloft:span``) holds first and last of ticks without a gap whose signals are all there. Unwired
-inputs are in ``Header.bus_start``, over which the signals of a tick are laid.
 """
 
 from __future__ import annotations
@@ -57,14 +50,12 @@ from ...runtime.language.signals import Slot
 from ...runtime.language.terrain import Ground, Terrain
 
 FORMAT = 4
-"""The number of this format."""
-READABLE = (2, 3, 4)
-"""The formats that can be read."""
+"""The number of this format, the only one that is read."""
 SIGNALS, STATES, KEYFRAMES, NOTES, EVENTS = "signals", "states", "keyframes", "notes", "events"
 LIMITS, TIMES, WORLD, GRAPH, DIAGRAM = "limits", "times", "world", "graph", "diagram"
 PLOTS = "plots"
-RECORDED, ROWS = "recorded", "rows"
-EXACT, BUS, STATE, NOTE, SPAN, PACKED = "exact", "bus", "state", "note", "span", "packed"
+ROWS = "rows"
+BUS, STATE, NOTE, PACKED = "bus", "state", "note", "packed"
 
 
 @dataclass(frozen=True)
@@ -80,8 +71,7 @@ class RecordedField:
         unit, frame, text: as declared.
         values: the names of the numbers of an int64 field.
         constant: whether it belongs to an unwired input.
-        signals: the name of the signal's class, and those of the signals that it derives from;
-            empty in recordings of versions before 0.2.
+        signals: the name of the signal's class, and those of the signals that it derives from.
     """
 
     name: str
@@ -105,8 +95,7 @@ class RecordedField:
     def from_json(cls, data: Mapping[str, Any]) -> Self:
         """The field from the plain data that ``dataclasses.asdict`` made."""
         values = {int(number): name for number, name in data["values"].items()}
-        lists = ("shape", "dimensions", "signals")
-        tuples = {name: tuple(data[name]) for name in lists if name in data}
+        tuples = {name: tuple(data[name]) for name in ("shape", "dimensions", "signals")}
         return cls(**{**data, "values": values, **tuples})
 
 
@@ -231,12 +220,12 @@ class Header:
         data["bus_start"] = b64decode(data["bus_start"])
         data["blocks"] = tuple(RecordedBlock(**block) for block in data["blocks"])
         data["order"] = tuple(data["order"])
-        data["terrain"] = _terrain(data.get("terrain"))
+        data["terrain"] = _terrain(data["terrain"])
         return cls(**data)
 
 
 def _terrain(data: Mapping[str, Any] | None) -> Terrain | None:
-    """Back from plain data; recordings before version 0.2 have none."""
+    """The terrain from plain data; a run without a simulated world has none."""
     if data is None:
         return None
     blocks = tuple(Ground(tuple(b["least"]), tuple(b["most"])) for b in data["blocks"])

@@ -10,7 +10,8 @@ speaks of, and the CRC-32 of the whole message. The seal of the first message co
 too. So every byte before the closing message is under a checksum, and nothing is given to Rerun or
 Arrow unless its checksum is right: neither of them survives every damaged message.
 
-Recordings of versions before 0.2 have no seals; of these only the framing can be checked.
+A file that another program has written again, such as ``rerun rrd filter``, has no seals; of it
+only the framing can be checked.
 """
 
 from __future__ import annotations

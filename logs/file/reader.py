@@ -28,17 +28,17 @@ from ...runtime.running.notes import Note
 from .contents import NoRunError, RecordingError, expect_intact, scanned, tables, tables_at
 from .format import (
     BUS,
+    FORMAT,
     KEYFRAMES,
     NOTE,
     NOTES,
-    READABLE,
     STATE,
     Header,
     RecordedField,
     RecordedRows,
 )
 from .messages import Content, Damage, Scan
-from .row_sources import PackedRows, Piece, RowSource, SeriesRows
+from .row_sources import PackedRows, Piece
 
 __all__ = ["RecordedRun", "RecordingError", "read"]
 
@@ -80,9 +80,7 @@ class RecordedRun:
         return self.outcome is not None and self.scan.closed and not self.scan.damage
 
     @cached_property
-    def _source(self) -> RowSource:
-        if self.header.format == 2:
-            return SeriesRows(self.scan, self.header, whole=self.outcome is not None)
+    def _source(self) -> PackedRows:
         return PackedRows(self.scan, self.header)
 
     def signals(self) -> Mapping[str, RecordedField]:
@@ -257,11 +255,10 @@ def read(path: str | PathLike[str], *, damaged: bool = False) -> RecordedRun:
             raise RecordingError(f"{path} was cut off before its beginning was written")
         raise NoRunError(f"{path} is a Rerun file, but not a recording of a run by aloft")
     number = json.loads(texts["header"]).get("format", 0)
-    if number not in READABLE:
-        newer = "update aloft" if number > max(READABLE) else "read it with an older one"
+    if number != FORMAT:
+        fix = "update aloft" if number > FORMAT else "read it with an older one"
         raise RecordingError(
-            f"{path} has format {number}, this version of aloft reads "
-            f"{', '.join(map(str, READABLE))}; {newer}"
+            f"{path} has format {number}, this version of aloft reads {FORMAT}; {fix}"
         )
     notes = [
         (row, Note(**json.loads(text)))

@@ -19,7 +19,7 @@ from .row_prediction import MOST_ORDER, Prediction, Words, ordered, predict
 
 _HEAD = Struct("<4sIIqI")
 """A mark, the number of ticks, the bytes of a row, the first tick, and the CRC-32 of the rows."""
-_MARK, _EARLIER = b"rowp", b"rows"
+_MARK = b"rowp"
 _SIZES = Struct("<II")
 """Behind the head: the number of columns that change, and the bytes before compression."""
 _NEGATIVE = 16
@@ -74,8 +74,8 @@ def unpack(data: bytes) -> tuple[int, NDArray[np.uint8]]:
     Raises:
         ValueError: the bytes are not packed rows, or give other rows than were packed.
     """
-    mark, _, size, first, crc = _head(data)
-    rows = _earlier(data) if mark == _EARLIER else _words(data, 0, size)
+    _, _, size, first, crc = _head(data)
+    rows = _words(data, 0, size)
     rows = np.ascontiguousarray(rows[:, :size])
     if crc32(rows.data) != crc:
         raise ValueError("unpacked rows are not those that were packed")
@@ -88,9 +88,6 @@ def unpack_bytes(data: bytes, begin: int, end: int) -> tuple[int, NDArray[np.uin
     Raises:
         ValueError: the bytes are not packed rows.
     """
-    if _head(data)[0] == _EARLIER:
-        first, rows = unpack(data)
-        return first, np.ascontiguousarray(rows[:, begin:end])
     low = begin // 8
     words = _words(data, begin, end)
     return _head(data)[3], np.ascontiguousarray(words[:, begin - 8 * low : end - 8 * low])
@@ -98,7 +95,7 @@ def unpack_bytes(data: bytes, begin: int, end: int) -> tuple[int, NDArray[np.uin
 
 def _head(data: bytes) -> tuple[bytes, int, int, int, int]:
     """Mark, number of ticks, bytes of a row, first tick, CRC-32. Raises ``ValueError``."""
-    if len(data) < _HEAD.size + _SIZES.size or data[:4] not in (_MARK, _EARLIER):
+    if len(data) < _HEAD.size + _SIZES.size or data[:4] != _MARK:
         raise ValueError("these bytes are no packed rows")
     mark, count, size, first, crc = _HEAD.unpack_from(data)
     return mark, count, size, first, crc
@@ -192,15 +189,3 @@ def _columns(planes: NDArray[np.uint8], how: Prediction, wanted: NDArray[np.bool
         waiting = waiting[~ready]
     result: Words = columns[here[np.flatnonzero(wanted)]]
     return result
-
-
-def _earlier(data: bytes) -> NDArray[np.uint8]:
-    """The rows of recordings of format 3: each word combined with that of the tick before by
-    exclusive or, ordered by word, by byte, then by tick."""
-    _, count, size, _, _ = _head(data)
-    width = -(-size // 8)
-    flat = _decompressed(data[_HEAD.size :], count * width * 8)
-    words = np.frombuffer(flat, np.uint8).reshape(width, 8, count).transpose(2, 0, 1).copy()
-    whole = words.reshape(count, width * 8).view(np.uint64)
-    np.bitwise_xor.accumulate(whole, axis=0, out=whole)
-    return whole.view(np.uint8)

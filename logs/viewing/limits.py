@@ -6,7 +6,6 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from ...robots.description import RobotDescription
 from ..file.format import Header, RecordedField
 
 
@@ -26,7 +25,7 @@ def limits_of(field: RecordedField, header: Header) -> list[tuple[str, float]]:
             for joint in robot.joints
             for side, value in zip(("least", "most"), joint.limits or (), strict=False)
         )
-    motors, of_motor = _robot_in_use(header, robot).motors, "motor" in field.field_name
+    motors, of_motor = robot.motors, "motor" in field.field_name
     if field.unit == "N m" and of_motor:
         return _both("peak torque", motors.peak_torque.tolist())
     if field.unit == "N m":
@@ -35,16 +34,6 @@ def limits_of(field: RecordedField, header: Header) -> list[tuple[str, float]]:
     if field.unit == "rad/s" and of_motor:
         return _both("no-load speed", motors.no_load_speed.tolist())
     return []
-
-
-def _robot_in_use(header: Header, robot: RobotDescription) -> RobotDescription:
-    """The robot with the actuator profile of the run.
-
-    In recordings of versions before 0.2 a parameter of some block names the profile.
-    """
-    texts = {str(value) for value in header.parameters.values()}
-    earlier = [name for name in robot.profiles if name in texts]
-    return robot.with_profile(earlier[0]) if earlier and not robot.profile else robot
 
 
 def _both(name: str, values: list[float]) -> list[tuple[str, float]]:

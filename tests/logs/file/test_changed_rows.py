@@ -6,8 +6,14 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from aloft.logs.file.changed_rows import ChangedRows, filled
+from aloft.logs.file.changed_rows import ChangedRows
 from aloft.logs.file.format import spans
+
+
+def filled(ticks: np.ndarray, written: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """The value at each of ``ticks``: the last that was written at or before it."""
+    return values[np.searchsorted(written, ticks, side="right") - 1]
+
 
 ODD = np.array([0.0, -0.0, np.nan, -np.nan, 1.0, np.nextafter(1.0, 2.0)])
 

@@ -77,26 +77,6 @@ def test_the_dearer_of_two_like_columns_is_predicted() -> None:
     assert not how.negative.any()
 
 
-def test_rows_of_format_3_are_read() -> None:
-    """As they were packed: each word combined with the one before by exclusive or, by bytes."""
-    from struct import pack as packed
-    from zlib import crc32
-
-    import pyarrow as pa
-
-    rows = rows_of(smooth(40), np.full(40, 1.5))[:, :13]
-    words = np.zeros((40, 16), np.uint8)
-    words[:, :13] = rows
-    changes = words.view(np.uint64).copy()
-    changes[1:] ^= words.view(np.uint64)[:-1]
-    planes = changes.view(np.uint8).reshape(40, -1, 8).transpose(1, 2, 0).tobytes()
-    head = packed("<4sIIqI", b"rows", 40, 13, 9, crc32(rows.tobytes()))
-    data = head + pa.Codec("zstd").compress(planes, asbytes=True)
-    assert unpack(data)[0] == unpack_bytes(data, 2, 4)[0] == 9
-    np.testing.assert_array_equal(unpack(data)[1], rows)
-    np.testing.assert_array_equal(unpack_bytes(data, 2, 12)[1], rows[:, 2:12])
-
-
 def test_damage_is_a_clear_error() -> None:
     """Whatever byte has changed: it is told as an error, or the rows are right all the same."""
     rng = np.random.default_rng(9)

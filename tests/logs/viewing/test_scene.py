@@ -107,12 +107,7 @@ def test_a_ports_type_comes_before_its_fields() -> None:
     assert found(*old) == "a.push", "old recordings keep no types"
 
 
-def test_a_recording_made_before_signals_had_names_is_read() -> None:
-    data = {
-        "name": "a.b.c", "dtype": "float64", "start": 0, "shape": [3], "dimensions": ["n_feet"],
-        "unit": "m", "frame": None, "text": "", "values": {}, "constant": False,
-    }  # fmt: skip
-    assert RecordedField.from_json(data).signals == ()
+def test_a_recording_keeps_the_names_of_signals() -> None:
     header = header_of(BoundGraph(load(GRAPH).checked))
     again = Header.from_json(header.to_json())
     assert again.bus == header.bus

@@ -56,13 +56,6 @@ def test_level_ground_is_the_viewers_grid(tmp_path: Path) -> None:
     assert boxes_of(written(tmp_path, header)) == []
 
 
-def test_a_recording_of_an_earlier_version_has_none() -> None:
-    header = header_of(BoundGraph(load(GRAPHS / "jump.yaml").checked))
-    text = replace(header, terrain=None).to_json().replace('"terrain": null, ', "")
-    assert "terrain" not in text
-    assert Header.from_json(text).terrain is None
-
-
 def test_plots_show_every_value(tmp_path: Path) -> None:
     # a mean over neighbouring values halves the peak of a touchdown and draws force into the flight
     from rerun.chunk import RrdReader
