@@ -26,13 +26,12 @@ from ..blocks.signals import CommandMode, DrivePhase, JointCommand
 from ..hal.bear.bulk import BulkExchange
 from ..hal.bear.bus import open_port
 from ..hal.bear.configuration import Hardware
-from ..hal.bear.drive_law import DriveLaw
-from ..hal.bear.driver import Driver
+from ..hal.bear.driver import DriveLaw, Driver
 from ..hal.bear.measurement import READ
 from ..hal.bear.motor_loop import WRITE
-from ..hal.simulated.parameters import SimulatorParameters
-from ..hal.twin.standing_twin import standing_twin
-from ..hal.twin.virtual_port import VirtualBoardPort, VirtualBusPort
+from ..hal.simulated.simulated_robot import SimulatorParameters
+from ..hal.twin.twin import standing_twin
+from ..hal.twin.twin_robot import VirtualBoardPort, VirtualBusPort
 from ..mathematics.compiling.compile_calls import compile_calls
 from ..mathematics.compiling.kernel_call import collect_calls
 from ..robots.description import find_robot

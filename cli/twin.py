@@ -43,10 +43,10 @@ def twin(
     import yaml
 
     from ..hal.bear.configuration import Hardware
-    from ..hal.simulated.parameters import SimulatorParameters
+    from ..hal.simulated.simulated_robot import SimulatorParameters
+    from ..hal.twin.faults import read_fault
     from ..hal.twin.server import TwinServer
-    from ..hal.twin.standing_twin import standing_twin
-    from ..hal.twin.written_faults import read_fault
+    from ..hal.twin.twin import standing_twin
     from ..robots.description import find_robot
 
     with errors_reported(as_json):
@@ -104,7 +104,7 @@ def _settings(texts: list[str]) -> dict[str, object]:
     """``name=value`` texts as parameters. Raises ``AloftError``."""
     import yaml
 
-    from ..hal.simulated.parameters import SimulatorParameters
+    from ..hal.simulated.simulated_robot import SimulatorParameters
     from ..robots.validation.faults import nearest
 
     found: dict[str, object] = {}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from ..hal.simulated.parameters import SimulatorParameters
+from ..hal.simulated.simulated_robot import SimulatorParameters
 from ..planner.library.shipped import shipped_folder
 from ..runtime.language.errors import AloftError
 from ..runtime.loading.reading.file_settings import settings_of

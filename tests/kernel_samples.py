@@ -5,7 +5,7 @@ import numpy as np
 from aloft.blocks.control import balance_law, followed_plan
 from aloft.blocks.jumping import capture_law, plan_progress, turn_timing
 from aloft.blocks.scoring import footing, jump_following, jump_series, stand_following, stand_score
-from aloft.hal.simulated import base, external_force
+from aloft.hal.simulated import base, plant
 from aloft.mathematics.body_tree import BodyMotion
 from aloft.mathematics.flight_prediction import LandingCost, flight_map
 from aloft.mathematics.joint_feedback import Feedback, Motion, SoftStops
@@ -236,9 +236,9 @@ UNUSED = {
     "aloft.hal.simulated.base.report_fixed": (BASE,),
     "aloft.hal.simulated.base.report_planar": (POSE[0], POSE[3], BASE),
     "aloft.hal.simulated.base.read_pitch_rate": (POSE[0], np.zeros(3)),
-    "aloft.hal.simulated.external_force.push_point": (
+    "aloft.hal.simulated.plant.push_point": (
         np.array([3.0, -2.0, 1.0]), np.array(1),
-        external_force.Points(
+        plant.Points(
             np.array([2, 0]), np.array([1, 1]), DRAW((3, 3)), DRAW((2, 3)), np.zeros((2, 6)),
             np.zeros(1, np.bool_),
         ),

@@ -30,10 +30,10 @@ NOT_HOT = {
     "blocks.signals.drive_conditions.conditions": "of an error byte, for people",
     "blocks.signals.drive_conditions.describe": "of an error byte, for people",
     "blocks.signals.drive_conditions.is_critical": "of an error byte, by integer arithmetic",
-    "hal.simulated.start_check._millimetres": "for the text of an error, before a run",
+    "hal.simulated.stance._millimetres": "for the text of an error, before a run",
     "hal.simulated.mujoco_robot._is_whole": "when a graph is loaded",
     "hal.simulated.mujoco_robot._nearest_step": "for the text of an error, when a graph is loaded",
-    "hal.bear.supervision._first_lasting": "of plain numbers, in the driver's own Python",
+    "hal.bear.measurement._first_lasting": "of plain numbers, in the driver's own Python",
     "blocks.estimation.mass_estimator._scratch": "memory, when a block is set up",
     "mathematics.reproducible.inverse": "before a run, when tables are made",
     "mathematics.reproducible.product": "before a run, when tables are made",
@@ -52,7 +52,7 @@ NOT_HOT = {
     "hal.simulated.scenes.step": "makes a scene, when a run is loaded",
     "hal.simulated.scenes.platform": "makes a scene, when a run is loaded",
     "hal.simulated.stance._solve_positive": "before a run, by MuJoCo's linear algebra",
-    "hal.simulated.holding._two_digits": "before a run, of the holding gains",
+    "hal.simulated.stance._two_digits": "before a run, of the holding gains",
     "hal.simulated.stance._solve_normal": "before a run, by MuJoCo's linear algebra",
 }
 """Functions of numbers and arrays only that need not compile, and why."""

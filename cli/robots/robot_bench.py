@@ -144,7 +144,7 @@ def jog(
 ) -> None:
     """Move one motor there and back with little current. Without --arm nothing moves."""
     from ...hal.bear import bench
-    from ...hal.bear.dead_man import open_switch, wait_until_held
+    from ...hal.bear.watchdog import open_switch, wait_until_held
 
     with errors_reported(as_json):
         if not arm:

@@ -10,16 +10,13 @@ from typing import Literal
 from ...blocks.signals import DrivePhase
 from ...runtime.language.block import Context, Misfit
 from ...runtime.language.parameters import Parameters, parameter
-from ..drive_gains import joint_gains
+from ..drive_control import joint_gains
 from .bus import BusError, open_port
-from .command_queue import CommandQueue
 from .configuration import Hardware, HardwareError
-from .dead_man import AlwaysHeld, DeadMansSwitch, open_switch, wait_until_held
-from .drive_law import DriveLaw
 from .driven_robot import DrivenRobot, DriveParameters, read_hardware
-from .driver import Driver
-from .motor_thread import MotorThread
-from .watchdog import Watchdog
+from .driver import DriveLaw, Driver
+from .motor_loop import CommandQueue, MotorThread
+from .watchdog import AlwaysHeld, DeadMansSwitch, Watchdog, open_switch, wait_until_held
 
 _HOLDING_TIME = 30.0
 """How long somebody has to take the dead man's switch [s]."""

@@ -13,12 +13,12 @@ from ...blocks.signals.drive_conditions import describe, is_critical
 from ...mathematics.arrays import Array
 from ...robots.robot_description import RobotDescription
 from ...robots.transmission import Transmission
-from .arming import LISTENING
 from .bulk import BulkExchange
 from .bus import BearBus, BusError
 from .configuration import Hardware, MotorSettings
+from .driver import LISTENING
 from .motor_loop import WRITE
-from .registers import Mode, Torque
+from .protocol import Mode, Torque
 from .watchdog import damping_frame
 
 STATUS = (

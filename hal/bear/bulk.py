@@ -8,8 +8,7 @@ import numpy as np
 
 from ...blocks.signals.drive_conditions import HEALTHY
 from .bus import BearBus, BusError, register_of
-from .frames import BROADCAST, HEADER, LONGEST, Instruction, checksum
-from .registers import Register
+from .protocol import BROADCAST, HEADER, LONGEST, Instruction, Register, checksum
 
 _LONGEST_LIST = 15
 """Four bits hold the number of registers that are read, four those that are written."""

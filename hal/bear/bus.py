@@ -9,8 +9,16 @@ from typing import Protocol
 
 from ...blocks.signals.drive_conditions import describe, is_critical
 from ...runtime.language.errors import AloftError
-from .frames import BROADCAST, Frame, FrameReader, Instruction, frame_bytes
-from .registers import CONFIG, STATUS, Register
+from .protocol import (
+    BROADCAST,
+    CONFIG,
+    STATUS,
+    Frame,
+    FrameReader,
+    Instruction,
+    Register,
+    frame_bytes,
+)
 
 BAUDRATE = 8_000_000
 """The rate of a new actuator [bit/s]."""

@@ -17,7 +17,7 @@ from ...robots.validation.faults import RobotError, nearest
 from ...runtime.language.errors import AloftError
 from ...runtime.language.parameters import Parameters, parameter
 from .bus import BAUDRATE
-from .frames import LAST_DEVICE
+from .protocol import LAST_DEVICE
 from .sense_board import SWITCHES
 
 Misfit = tuple[tuple[str | int, ...], str]

@@ -9,7 +9,7 @@ from pathlib import Path
 from ...robots.description import RobotDescription
 from ...runtime.language.block import Context, Metric, Misfit
 from ...runtime.language.parameters import Parameters, parameter
-from ..drive_gains import DriveGains, gain_misfits, lost_gains
+from ..drive_control import DriveGains, gain_misfits, lost_gains
 from ..robot import Robot
 from .configuration import Hardware, HardwareError
 from .driver import Driver

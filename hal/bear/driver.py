@@ -1,4 +1,5 @@
-"""A real robot's drives and sensor board, from finding them to letting go, without a graph.
+"""A real robot's drives and sensor board without a graph: found, set up, enabled and led to the
+standing pose one safe step after another, and damped at the end.
 
 ``BearRobot`` puts a graph's ports around it. Time is given by whoever calls ``cycle``: a thread at
 the rate of the bus, or the graph itself where the robot is a twin in virtual time.
@@ -6,19 +7,215 @@ the rate of the bus, or the graph itself where the robot is a twin in virtual ti
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
 from ...blocks.signals import DrivePhase
+from ...blocks.signals.drive_conditions import describe, is_critical
+from ...mathematics.arrays import Array
 from ...robots.robot_description import RobotDescription
-from ...robots.transmission import Transmission
-from . import arming
-from .bus import BearBus, SerialPort
+from ...robots.transmission import Transmission, motor_gains
+from ..drive_control import DriveGoals
+from .bus import BearBus, BusError, Reply, SerialPort
 from .configuration import Hardware
-from .drive_law import DriveLaw
 from .motor_loop import MotorLoop
+from .protocol import Mode, Torque
 from .sense_board import BoardMode, SenseBoard
+
+
+class DriveLaw:
+    """What the drives are set to, and the goals that follow from it.
+
+    A block makes it in ``setup``, before any port is open, so that the kernel of the goals is
+    compiled with those of the graph.
+
+    Args:
+        robot: the description.
+        stiffness, damping: the joints' gains that run in the drives [N m/rad, N m s/rad],
+            (n_joints,); where no motor gains give them, the nearest do.
+        lead: the time from a measurement to when the goals made from it act [s].
+
+    Attributes:
+        motor_stiffness, motor_damping: the gains of every drive at its output [N m/rad, N m s/rad],
+            (n_joints,).
+        goals: how commands become goals.
+    """
+
+    def __init__(
+        self, robot: RobotDescription, stiffness: Array, damping: Array, lead: float
+    ) -> None:
+        self.motor_stiffness = motor_gains(robot, stiffness, "N m/rad").motor
+        self.motor_damping = motor_gains(robot, damping, "N m s/rad").motor
+        self.goals = DriveGoals(
+            robot, stiffness, damping, self.motor_stiffness, self.motor_damping, lead
+        )
+
+
+LISTENING = 0.05
+"""How long the bus must be silent before anything is sent on it [s]."""
+_CLEARINGS = 6
+"""How often the torque is switched off to clear errors, as the maker's own program does."""
+_RAMP = 0.2
+"""The share of the soft start in which the current's limit rises to its full value."""
+
+
+def find_drives(bus: BearBus, hardware: Hardware) -> dict[str, Reply]:
+    """Ping every drive of the file; the answers by motor.
+
+    Raises:
+        BusError: somebody else sends on the bus, or drives do not answer: all of them are named.
+    """
+    if bus.listen(LISTENING):
+        raise BusError(
+            "another program or adapter sends instructions on the bus of the drives; nothing was "
+            "sent: stop it first"
+        )
+    found: dict[str, Reply] = {}
+    missing = []
+    for name, motor in hardware.motors.items():
+        try:
+            found[name] = bus.ping(motor.id)
+        except BusError:
+            missing.append(f"{name} (address {motor.id})")
+    if missing:
+        raise BusError(
+            f"{len(missing)} of {len(hardware.motors)} drives do not answer: {', '.join(missing)}; "
+            "check their supply, cables and addresses with `aloft robot scan`"
+        )
+    return found
+
+
+def clear_errors(bus: BearBus, hardware: Hardware) -> None:
+    """Switch every drive's torque off until it reports no error.
+
+    Raises:
+        BusError: a drive keeps an error: it is named with what it reports.
+    """
+    for name, motor in hardware.motors.items():
+        for _ in range(_CLEARINGS):
+            bus.write(motor.id, {"torque_enable": Torque.OFF})
+            condition = bus.ping(motor.id).error_byte
+            if not is_critical(condition):
+                break
+        else:
+            raise BusError(f"drive {name} (address {motor.id}): {describe(condition)}")
+
+
+def configure(
+    bus: BearBus, hardware: Hardware, stiffness: Mapping[str, float], damping: Mapping[str, float]
+) -> None:
+    """Write and read back the configuration that a run needs; nothing of it goes to flash memory.
+
+    Args:
+        bus: the bus, with the torque of all drives off.
+        hardware: limits and gains of the current loops.
+        stiffness, damping: the gains of every motor at its output [N m/rad, N m s/rad].
+
+    Raises:
+        BusError: a drive does not take a value.
+    """
+    drives = hardware.drives
+    current = dict(zip("pid", drives.iq_gains, strict=True))
+    for name, motor in hardware.motors.items():
+        bus.verify(
+            motor.id,
+            {
+                "mode": Mode.DIRECT_FORCE,
+                "limit_i_max": drives.current_limit,
+                "watchdog_timeout": round(1e6 * drives.watchdog),
+                "p_gain_direct_force": stiffness[name] / drives.torque_constant,
+                "i_gain_direct_force": 0.0,
+                "d_gain_direct_force": damping[name] / drives.torque_constant,
+                **{f"{letter}_gain_iq": gain for letter, gain in current.items()},
+                **{f"{letter}_gain_id": gain for letter, gain in current.items()},
+            },
+        )
+
+
+def check_ready(loop: MotorLoop, standing: Array, names: tuple[str, ...]) -> None:
+    """See to it that every drive is healthy and near enough to the standing pose.
+
+    Args:
+        loop: after a cycle, with the drives off.
+        standing: the motors' angles in the standing pose [rad], (n_joints,).
+        names: the motors.
+
+    Raises:
+        BusError: all that is wrong, by drive.
+    """
+    hardware, measured = loop.hardware, loop.measured
+    drives, farthest = hardware.drives, hardware.soft_start.farthest
+    wrong = []
+    for k, name in enumerate(names):
+        voltage, angle = measured.voltage.item(k), measured.position.item(k)
+        if not drives.lowest_voltage <= voltage <= drives.highest_voltage:
+            wrong.append(
+                f"{name} has {voltage:.1f} V instead of {drives.lowest_voltage:g} to "
+                f"{drives.highest_voltage:g} V"
+            )
+        if measured.temperature.item(k) > drives.highest_temperature:
+            wrong.append(f"{name} has {measured.temperature.item(k):.0f} deg C")
+        if not abs(angle - standing.item(k)) <= farthest:
+            wrong.append(
+                f"{name} is at {angle:.2f} rad and stands at {standing.item(k):.2f}: more than "
+                f"{farthest:g} rad away"
+            )
+    if wrong:
+        raise BusError(f"the drives are not enabled: {'; '.join(wrong)}")
+
+
+def enable(loop: MotorLoop, names: tuple[str, ...]) -> None:
+    """Switch the torque on, with the present positions as goals, and see that it is on.
+
+    Raises:
+        BusError: a drive stays off; then all are off again.
+    """
+    bus, hardware = loop.bus, loop.hardware
+    loop.load_goals()
+    off = []
+    for name in names:
+        bus.write(hardware.motors[name].id, {"torque_enable": Torque.ON})
+    for name in names:
+        device = hardware.motors[name].id
+        if bus.read(device, "torque_enable")["torque_enable"] != Torque.ON:
+            off.append(f"{name}: {bus.ping(device).trouble or 'it does not say why'}")
+    if off:
+        for motor in hardware.motors.values():
+            bus.write(motor.id, {"torque_enable": Torque.OFF})
+        raise BusError(f"drives cannot be enabled: {'; '.join(off)}")
+
+
+def soft_start(loop: MotorLoop, standing: Array, next_cycle: Callable[[], bool]) -> None:
+    """Lead the motors from where they are to the standing pose, slowly and with little current.
+
+    Args:
+        loop: with the drives enabled, and the present angles as ``target``.
+        standing: the motors' angles in the standing pose [rad].
+        next_cycle: waits for the next cycle, and says whether to go on.
+
+    Raises:
+        BusError: a fault came up, or somebody let go of the dead man's switch.
+    """
+    settings, period = loop.hardware.soft_start, loop.hardware.bus.period
+    start, count = loop.target.copy(), max(1, math.ceil(settings.duration / period))
+    loop.phase = DrivePhase.STARTING
+    for k in range(1, count + 1):
+        share = k / count
+        loop.current_limit = settings.current * min(1.0, share / _RAMP)
+        blend = 0.5 - 0.5 * math.cos(math.pi * share)
+        np.multiply(standing - start, blend, out=loop.target)
+        np.add(loop.target, start, out=loop.target)
+        loop.cycle()
+        if loop.fault:
+            raise BusError(loop.fault)
+        if not next_cycle():
+            loop.fail("the dead man's switch was let go during the soft start")
+            raise BusError(loop.fault)
+    loop.target[:] = standing
+    loop.phase = DrivePhase.HOLDING
+
 
 STOP_CYCLES = 5
 """How often damping is commanded at least, since an instruction may be lost."""
@@ -58,7 +255,7 @@ class Driver:
         Raises:
             BusError: something does not answer, or somebody else sends on the bus.
         """
-        arming.find_drives(self.bus, self.hardware)
+        find_drives(self.bus, self.hardware)
         self.board.send(BoardMode.NOMINAL)
         for _ in range(_BOARD_CYCLES):
             self.loop.cycle()
@@ -78,12 +275,12 @@ class Driver:
         """
         try:
             # From here on a drive may be on, so whatever goes wrong ends in damping.
-            arming.clear_errors(self.bus, self.hardware)
-            arming.configure(self.bus, self.hardware, *self._gains)
+            clear_errors(self.bus, self.hardware)
+            configure(self.bus, self.hardware, *self._gains)
             self.loop.cycle()
-            arming.check_ready(self.loop, self._standing, self._names)
-            arming.enable(self.loop, self._names)
-            arming.soft_start(self.loop, self._standing, next_cycle)
+            check_ready(self.loop, self._standing, self._names)
+            enable(self.loop, self._names)
+            soft_start(self.loop, self._standing, next_cycle)
             self.loop.measured.forget_torques()  # those of the way to the standing pose
         except BaseException:
             self.loop.phase = DrivePhase.DAMPED

@@ -1,7 +1,11 @@
-"""One cycle of a real robot: goals to all drives, measurements back, and the verdict on them."""
+"""One cycle of a real robot: goals to all drives, measurements back, the verdict on them; and who makes the cycles."""
 
 from __future__ import annotations
 
+import math
+import sys
+import threading
+import time
 from collections.abc import Callable
 from threading import Lock
 
@@ -10,14 +14,13 @@ import numpy as np
 from ...blocks.signals import CommandMode, DrivePhase, JointCommand, RobotHealth
 from ...mathematics.arrays import Array
 from ...robots.robot_description import RobotDescription
-from ..drive_goals import DriveGoals
+from ..drive_control import DriveGoals
 from .bulk import BulkExchange
 from .bus import BearBus, BusError
 from .configuration import Hardware
-from .measurement import FASTEST, LARGEST_STEP, PLAUSIBLE, READ, Measurement
-from .registers import Torque
+from .measurement import FASTEST, LARGEST_STEP, PLAUSIBLE, READ, Measurement, Supervision
+from .protocol import Torque
 from .sense_board import SenseBoard
-from .supervision import Supervision
 
 WRITE = ("goal_iq", "goal_position", "goal_velocity")
 
@@ -263,3 +266,138 @@ class MotorLoop:
         np.add(self._scratch, measured.offset, out=self._scratch)
         np.multiply(self._scratch, measured.sign, out=out[:, 1])
         np.multiply(goals.velocity, measured.sign, out=out[:, 2])
+
+
+_SWITCHING = 2e-4
+"""How soon Python lets another thread run [s]; its default is five periods of the bus."""
+
+
+class MotorThread:
+    """Makes a cycle every period, whatever the graph does.
+
+    While the drives are on it damps them when the last command is older than ``command_age``, or
+    when ``objection`` gives a reason.
+
+    Args:
+        loop: the motor loop.
+        command_age: how old a command may be [s].
+        objection: called before every cycle; a text that is not empty ends the driving.
+    """
+
+    def __init__(self, loop: MotorLoop, command_age: float, objection: Callable[[], str]) -> None:
+        self._loop, self._command_age, self._objection = loop, command_age, objection
+        self._stop = threading.Event()
+        self._cycle = threading.Condition()
+        self._done = 0
+        self._commanded = time.monotonic()
+        self._thread = threading.Thread(target=self._run, name="aloft motors", daemon=True)
+        self._switching = sys.getswitchinterval()
+
+    @property
+    def done(self) -> int:
+        """The cycles so far."""
+        return self._done
+
+    def start(self) -> None:
+        """Begin."""
+        sys.setswitchinterval(_SWITCHING)
+        self._commanded = time.monotonic()
+        self._thread.start()
+
+    def follow(self, command: JointCommand, heard: int = 0) -> None:
+        """Follow this command from the next cycle on.
+
+        ``heard`` says when what it was made from last came from another machine, by the monotonic
+        clock [ns]; zero where it was made here.
+        """
+        self._commanded = heard * 1e-9 if heard else time.monotonic()
+        self._loop.follow(command)
+
+    def wait_for(self, cycle: int, seconds: float) -> bool:
+        """Wait until so many cycles are done; says whether they are."""
+        with self._cycle:
+            return self._cycle.wait_for(lambda: self._done >= cycle, seconds)
+
+    def stop(self) -> None:
+        """End after the present cycle."""
+        self._stop.set()
+        if self._thread.is_alive():
+            self._thread.join(2.0)
+        sys.setswitchinterval(self._switching)
+
+    def _run(self) -> None:
+        loop, period = self._loop, self._loop.hardware.bus.period
+        following = time.monotonic()
+        while not self._stop.is_set():
+            if loop.phase in (DrivePhase.HOLDING, DrivePhase.DRIVING):
+                self._look()
+            loop.cycle()
+            with self._cycle:
+                self._done += 1
+                self._cycle.notify_all()
+            following += period
+            rest = following - time.monotonic()
+            if rest > 0.0:
+                time.sleep(rest)
+            else:
+                loop.late_cycles += 1
+                following -= rest
+
+    def _look(self) -> None:
+        age = time.monotonic() - self._commanded
+        reason = self._objection()
+        if reason:
+            self._loop.fail(reason)
+        elif age > self._command_age and self._loop.phase is DrivePhase.DRIVING:
+            self._loop.fail(f"no new command has come for {1e3 * age:.0f} ms")
+
+
+class CommandQueue:
+    """Gives each command to the motor loop when its latency is over, and makes a tick's cycles.
+
+    In cycle ``j`` (from 1) behind tick ``n`` acts the newest command that is ``latency`` old, in
+    whole periods of the bus, of which at least one has passed: the command of the tick itself can
+    only be in the next exchange.
+
+    Args:
+        loop: the motor loop.
+        robot: the description.
+        latency: from the measurement to the exchange that carries the command [s].
+        tick: the graph's period [s]; it is a whole number of the bus's.
+
+    Attributes:
+        commands: room for the commands on their way.
+        sent: how many commands there were.
+    """
+
+    def __init__(
+        self, loop: MotorLoop, robot: RobotDescription, latency: float, tick: float
+    ) -> None:
+        period = loop.hardware.bus.period
+        self._loop = loop
+        self.cycles = round(tick / period)
+        self._wait = max(1, math.ceil(latency / period - 1e-9))
+        slots = math.ceil(latency / period) + 2  # enough for any tick
+        self.commands = [JointCommand.allocate(robot.dimensions) for _ in range(slots)]
+        self.sent = 0
+
+    def give(self, command: JointCommand) -> None:
+        """Take over the command of this tick."""
+        slot = self.commands[self.sent % len(self.commands)]
+        for name, values in command:
+            getattr(slot, name)[...] = values
+        self.sent += 1
+
+    def advance(self) -> None:
+        """Make the cycles up to the next tick."""
+        for j in range(1, self.cycles + 1):
+            age = max(0, (self._wait - j + self.cycles - 1) // self.cycles)
+            index = self.sent - 1 - age
+            if index >= 0:
+                self._loop.follow(self.commands[index % len(self.commands)])
+            self._loop.cycle()
+
+    def parts(self) -> list[tuple[object, tuple[str, ...]]]:
+        """What changes in a run: objects, and the names of their attributes."""
+        found: list[tuple[object, tuple[str, ...]]] = [(self, ("sent",))]
+        return found + [(command, tuple(command.views())) for command in self.commands]

@@ -12,7 +12,7 @@ from enum import IntEnum
 import numpy as np
 
 from .bus import BusError, SerialPort
-from .frames import checksum
+from .protocol import checksum
 
 START, END = 0xFF, 0xFE
 LENGTH = 0x1B

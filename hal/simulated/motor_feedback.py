@@ -17,8 +17,8 @@ from ...mathematics.linear import multiply_vector
 from ...robots.robot_description import RobotDescription
 from ...robots.transmission import motor_gains
 from ...runtime.language.signals import Field, Signal
-from ..drive_gains import DriveGains, joint_gains
-from ..drive_goals import (
+from ..drive_control import (
+    DriveGains,
     Errors,
     Gears,
     Goals,
@@ -26,6 +26,7 @@ from ..drive_goals import (
     Measured,
     Targets,
     gears_of,
+    joint_gains,
     make_goals,
 )
 

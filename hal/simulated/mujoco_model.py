@@ -3,7 +3,7 @@
 Every joint of the description has one body and one joint, so this rigid-body model and the
 controller's have the same links. Rotor inertia is exact: a rotor that is geared to one joint is
 that joint's armature, and a rotor that is geared to several is a fixed tendon with armature
-(``rotors.py``).
+(``add_rotors``).
 
 Contact: spheres at the contact points and capsules for the rest of the robot. The capsules collide
 with the ground and with other limbs, but not with their own limb or the base; a limb consists of
@@ -24,21 +24,26 @@ sites ``point/<name>``, and the sensors are ``com``, ``com_velocity``,
 
 from __future__ import annotations
 
+from collections import deque
+from copy import copy
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from ...mathematics.arrays import Array
 from ...mathematics.constants import GRAVITY
 from ...robots.ball_feet import ball_feet
 from ...robots.description import RobotDescription
-from ...robots.link_poses import contact_centres
+from ...robots.link_poses import contact_centres, joints_above
 from .base import BASES
-from .rotors import add_rotors, joint_armature
+from .random_streams import Purpose, stream
 from .scenes import Scene
+from .simulated_robot import SimulatorParameters
 
 if TYPE_CHECKING:
     from mujoco import MjModel, MjSpec
+
 
 GROUND_BIT = 1
 MOST_LIMBS = 30
@@ -280,3 +285,131 @@ def _add_sensors(spec: MjSpec, robot: RobotDescription) -> None:
             reftype=thing.mjOBJ_BODY, refname="world",
             intprm=[found | 1 << int(field.mjCONDATA_FORCE), net_force, 1],
         )  # fmt: skip
+
+
+def draw_variation(params: SimulatorParameters) -> Variation:
+    """Draw the variation of the world from the seed in these parameters."""
+
+    def uniform(purpose: Purpose) -> float:
+        return float(stream(params.seed, purpose).uniform(-1.0, 1.0))
+
+    friction = params.friction
+    if params.friction_range is not None:
+        low, high = params.friction_range
+        friction = low + (high - low) * 0.5 * (1.0 + uniform(Purpose.FRICTION))
+    stiffness = params.contact_stiffness * params.contact_stiffness_spread ** uniform(
+        Purpose.CONTACT_STIFFNESS
+    )
+    offsets = stream(params.seed, Purpose.BASE_COM).uniform(-1.0, 1.0, 3)
+    x, y, z = (
+        nominal + params.base_com_spread * float(draw)
+        for nominal, draw in zip(params.base_com_offset, offsets, strict=True)
+    )
+    mass = params.mass_scale * (1.0 + params.mass_spread * uniform(Purpose.MASS))
+    return Variation(friction, stiffness, mass, (x, y, z), params.joint_friction)
+
+
+def build_world(
+    params: SimulatorParameters, robot: RobotDescription, variation: Variation
+) -> MjModel:
+    """The simulator's model of the robot in the scene these parameters describe.
+
+    Raises:
+        ValueError: the simulator cannot express the robot; see ``build_mujoco_model``.
+    """
+    scene = params.build_scene()
+    for kept in _kept:
+        if kept.robot is robot and kept[1:4] == (scene, params.timestep, variation):
+            return copy(kept.model)
+    import mujoco
+
+    model = build_mujoco_model(robot, scene=scene, timestep=params.timestep, variation=variation)
+    # A state that has become NaN must be noticed, and not be replaced by the initial state.
+    model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
+    _kept.append(_Kept(robot, scene, params.timestep, variation, copy(model)))
+    return model
+
+
+class _Kept(NamedTuple):
+    """A model that has been built, and what it was built from."""
+
+    robot: RobotDescription
+    scene: Scene
+    timestep: float
+    variation: Variation
+    model: MjModel
+
+
+_kept: deque[_Kept] = deque(maxlen=4)
+"""The models built last. The runs of a study mostly differ by what is not in the model, and building
+it takes longer than anything else before a run. Nobody is given the kept model itself."""
+
+
+def joint_armature(robot: RobotDescription) -> Array:
+    """The armature [kg m^2] (n_joints,) of the joints, from all motors without a tendon."""
+    armature, shared = np.zeros(len(robot.joints)), _shared_motors(robot)
+    for motor, inertia in enumerate(robot.motors.rotor_inertia.tolist()):
+        if motor not in shared:
+            armature += inertia * robot.joint_to_motor[motor] ** 2
+    return armature
+
+
+def add_rotors(spec: MjSpec, robot: RobotDescription) -> None:
+    """Add a fixed tendon for every motor whose rotor couples joints.
+
+    With ``A`` the transmission's ``joint_to_motor`` and ``I_m`` the motors' rotor inertias at the
+    gearbox output, the rotors add ``A^T diag(I_m) A`` to the joint-space inertia. MuJoCo can express
+    that in two ways: by the armature of a joint, which is a term on the diagonal, and by the armature
+    of a fixed tendon whose length is a weighted sum of joint positions, which is a term of rank one. A
+    motor's row of ``A`` is such a weighted sum, so one tendon for each motor that is geared to several
+    joints is exact for any transmission, as long as each of these joints carries the next: the
+    simulator's inertia matrix has no entries for other pairs of joints.
+
+    Raises:
+        ValueError: a motor couples two joints neither of which carries the other.
+    """
+    complaint = unfit_motor(robot)
+    if complaint:
+        raise ValueError(f"{robot.name}: {complaint}")
+    for motor in _shared_motors(robot):
+        tendon = spec.add_tendon(
+            name=f"rotor/{robot.transmission.motors[motor]}",
+            armature=float(robot.motors.rotor_inertia[motor]),
+        )
+        for joint, weight in zip(robot.joints, robot.joint_to_motor[motor].tolist(), strict=True):
+            if weight:
+                tendon.wrap_joint(joint.name, weight)
+
+
+def unfit_motor(robot: RobotDescription) -> str:
+    """A text that says which motor's rotor cannot be simulated, and why; empty if all can."""
+    names = [joint.name for joint in robot.joints]
+    above = [joints_above(robot, joint.child) for joint in robot.joints]
+    for motor in _shared_motors(robot):
+        geared = np.flatnonzero(robot.joint_to_motor[motor]).tolist()
+        for first in geared:
+            for second in geared:
+                if first < second and not (above[second][first] or above[first][second]):
+                    return (
+                        f"motor {robot.transmission.motors[motor]} is geared to {names[first]} and "
+                        f"{names[second]}, and neither joint carries the other; the simulator "
+                        "cannot express the inertia of such a rotor"
+                    )
+    return ""
+
+
+def _shared_motors(robot: RobotDescription) -> list[int]:
+    """The motors that need a tendon: those geared to several joints, unless the couplings of all
+    motors that have joints in common cancel, as in a differential of two equal motors."""
+    geared, inertia = robot.joint_to_motor != 0.0, robot.motors.rotor_inertia
+    coupling = np.abs(robot.rotor_matrix - np.diag(np.diag(robot.rotor_matrix)))
+    small = 1e-12 * float(np.abs(robot.rotor_matrix).max(initial=0.0))
+    found = []
+    for motor in range(len(inertia)):
+        joints = geared[motor]
+        for _ in range(len(inertia)):  # all joints that are geared to these over any motor
+            joints = geared[(geared & joints).any(axis=1)].any(axis=0)
+        joined = coupling[np.ix_(joints, joints)].max(initial=0.0) > small
+        if inertia[motor] and geared[motor].sum() > 1 and joined:
+            found.append(motor)
+    return found

@@ -12,11 +12,10 @@ from ...mathematics.compiling.call_sequence import CallSequence
 from ...robots.description import RobotDescription
 from ...runtime.language.block import Context, Metric, Misfit, State
 from ...runtime.language.parameters import Parameters
-from ..drive_gains import gain_misfits, lost_gains
+from ..drive_control import gain_misfits, lost_gains
 from .motor_feedback import FeedbackState, MotorFeedback
-from .parameters import SimulatorParameters
-from .rotors import unfit_motor
-from .simulated_robot import SimulatedRobot
+from .mujoco_model import unfit_motor
+from .simulated_robot import SimulatedRobot, SimulatorParameters
 from .stance import uneven_contacts
 from .state import DriveState, TickRecord
 
@@ -37,7 +36,7 @@ class MujocoRobot(SimulatedRobot):
     gains that are fixed for the run (``stiffness`` and ``damping`` of the joints, through the
     transmission), around goals that a driver renews when a command arrives and once a period, from the
     measurement of the exchange before. The command's gains are met at the instant of each measurement
-    (``hal/drive_goals.py``). Without it the driver is taken as infinitely fast: every joint gets its
+    (``hal/drive_control.py``). Without it the driver is taken as infinitely fast: every joint gets its
     command's own gains in every physics step, as no real drives could give them.
 
     Command modes: ``OFF`` gives no torque, ``ACTIVE`` feedforward plus joint feedback, ``DAMPING``
@@ -45,7 +44,7 @@ class MujocoRobot(SimulatedRobot):
 
     Start: the robot stands in its description's pose (torso turned by a drawn
     ``initial_attitude_error``, soles flat), held by its drives around the static torques with gains
-    that follow from its weight and inertia (``holding.py``), settles for 0.3 s, and is centred: the
+    that follow from its weight and inertia (``stance.py``), settles for 0.3 s, and is centred: the
     middle between the soles is the world's origin. It is held so until the first command arrives.
     Joints without a working motor are kept in the standing pose until the run begins. A fixed base
     is at the world's origin from the start, and a robot without feet lies on its lowest shape.
@@ -157,9 +156,9 @@ class MujocoRobot(SimulatedRobot):
     def setup(self) -> None:
         """Draw the world from the seed and build it."""
         from .drives import Drives, Way
-        from .holding import RELEASED
         from .plant import Plant
         from .random_streams import Purpose, uniform_call
+        from .stance import RELEASED
 
         robot, params = self.robot, self.params
         plant = self.plant = Plant(robot, params, self.period, self.physics, self.record)

@@ -6,43 +6,159 @@ owns a plant says which torques its drives give, and lets it simulate so many ph
 
 from __future__ import annotations
 
+import ctypes
 import math
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Protocol
+from functools import cache, partial
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
 
 from ...blocks.signals import ExternalForce, ImuReading, JointState
-from ...mathematics.arrays import Array, Indices
+from ...mathematics.arrays import Array, Flags, Indices
 from ...mathematics.compiling.call_sequence import Call, CallSequence
 from ...mathematics.compiling.kernel_call import KernelCall
+from ...mathematics.compiling.library_call import LibraryCall, address_of
+from ...mathematics.kernel import kernel
 from ...robots.description import RobotDescription
 from ...runtime.language.block import Metric
 from .base import BASES
-from .external_force import ExternalForces
-from .holding import holding_gains, passive_joints
-from .mujoco_model import Variation, body_name
-from .parameters import SimulatorParameters
+from .mujoco_model import Variation, body_name, build_world, draw_variation
 from .random_streams import WORDS, Purpose, RandomStreams, stream
 from .sensors import Sensors
-from .simulator_calls import step_calls
-from .stance import centre_on_origin, holding_torque, place_standing
-from .start_check import StartCheck
-from .state import PhysicsState, TickRecord
-from .step_record import (
+from .simulated_robot import SimulatorParameters
+from .stance import (
+    StartCheck,
+    centre_on_origin,
+    holding_gains,
+    holding_torque,
+    passive_joints,
+    place_standing,
+)
+from .state import (
     Cleared,
+    PhysicsState,
     StepRecord,
     StepSensors,
+    TickRecord,
     clear,
     mean_over_steps,
     note_step,
     read_encoders,
 )
 from .truth import TruthReport
-from .world import build_world, draw_variation
 
 if TYPE_CHECKING:
-    from mujoco import MjData
+    from mujoco import MjData, MjModel
+
+
+class Points(NamedTuple):
+    """The points that a force may act at, in the simulator's memory.
+
+    ``sites`` and ``bodies`` (n_points,) are the numbers of the points and of their bodies, ``places``
+    and ``centres`` (n, 3) [m, world] where all points and all bodies' centres of mass are, ``wrenches``
+    (n, 6) [N, N m, world] what acts on all bodies. ``missing`` (1,) becomes true where a force acts at
+    a point that there is not.
+    """
+
+    sites: Indices
+    bodies: Indices
+    places: Array
+    centres: Array
+    wrenches: Array
+    missing: Flags
+
+
+@kernel
+def release(wrenches: Array) -> None:
+    """Nothing acts on any body."""
+    for body in range(wrenches.shape[0]):
+        for axis in range(6):
+            wrenches[body, axis] = 0.0
+
+
+@kernel
+def push_point(force: Array, point: Indices, points: Points) -> None:
+    """Let the ``force`` (3,) [N, world] act at the ``point``, without a dimension, of its body, which
+    moves with the body."""
+    fx, fy, fz = float(force[0]), float(force[1]), float(force[2])
+    if fx == 0.0 and fy == 0.0 and fz == 0.0:
+        return
+    number = int(point[()])
+    if number < 0 or number >= points.sites.shape[0]:
+        points.missing[0] = True
+        return
+    site, body = int(points.sites[number]), int(points.bodies[number])
+    x = float(points.places[site, 0]) - float(points.centres[body, 0])
+    y = float(points.places[site, 1]) - float(points.centres[body, 1])
+    z = float(points.places[site, 2]) - float(points.centres[body, 2])
+    wrench = points.wrenches
+    wrench[body, 0], wrench[body, 1], wrench[body, 2] = fx, fy, fz
+    wrench[body, 3], wrench[body, 4] = y * fz - z * fy, z * fx - x * fz
+    wrench[body, 5] = x * fy - y * fx
+
+
+class ExternalForces:
+    """Lets forces act on the robot's named points."""
+
+    def __init__(self, model: MjModel, data: MjData, robot: RobotDescription) -> None:
+        self._robot = robot
+        sites = [int(model.site(f"point/{name}").id) for name in robot.points]
+        bodies = [int(model.body(body_name(link)).id) for link, _ in robot.points.values()]
+        self._points = Points(
+            np.array(sites, np.int64), np.array(bodies, np.int64), data.site_xpos, data.xipos,
+            data.xfrc_applied, np.zeros(1, np.bool_),
+        )  # fmt: skip
+
+    def releasing(self) -> KernelCall:
+        """Nothing acts any more."""
+        return KernelCall(release, self._points.wrenches)
+
+    def pushing(self, push: ExternalForce) -> KernelCall:
+        """The push acts in the next physics step; ``check`` says whether it has a point."""
+        return KernelCall(push_point, push.force, push.point, self._points)
+
+    def check(self, push: ExternalForce) -> None:
+        """Raise ``IndexError`` if the push has acted at a point that the robot does not have."""
+        if self._points.missing[0]:
+            self._points.missing[0] = False
+            raise IndexError(
+                f"push at point {int(push.point)}; {self._robot.name} has "
+                f"{len(self._points.sites)}: " + ", ".join(self._robot.points)
+            )
+
+
+def step_calls(model: MjModel, data: MjData) -> tuple[LibraryCall, LibraryCall]:
+    """The two parts of a physics step: what follows from the state, and the step with the present
+    controls. Keep ``model`` and ``data`` alive.
+
+    Machine code and Python call the same two functions, so the bytes are the same. An error that is
+    fatal to the simulator, such as no memory left for contacts, ends the process in machine code, and
+    is an exception in Python. Of the simulator's memory a jump uses less than a hundredth.
+    """
+    import mujoco
+
+    first, second = _addresses()
+    memory = model._address, data._address
+    return (
+        LibraryCall(partial(mujoco.mj_step1, model, data), first, *memory),
+        LibraryCall(partial(mujoco.mj_step2, model, data), second, *memory),
+    )
+
+
+@cache
+def _addresses() -> tuple[int, int]:
+    """The addresses of ``mj_step1`` and ``mj_step2`` in the library that Python has loaded; zeros
+    where it is not found, and then Python calls them."""
+    import mujoco
+
+    folder, version = Path(mujoco.__file__).parent, mujoco.mj_versionString()
+    for name in (f"libmujoco.so.{version}", f"libmujoco.{version}.dylib"):
+        if (folder / name).is_file():
+            library = ctypes.CDLL(str(folder / name))
+            return address_of(library.mj_step1), address_of(library.mj_step2)
+    return 0, 0
 
 
 SETTLING_TIME = 0.3

@@ -13,34 +13,9 @@ from ...mathematics.compiling.call_sequence import Call
 from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.kernel import kernel
 from ...robots.description import RobotDescription
-from .parameters import SimulatorParameters
 from .random_streams import Purpose, RandomStreams, normal_call, stream, uniform_call
+from .simulated_robot import SimulatorParameters
 from .state import TickRecord
-
-
-@kernel
-def watch_switches(
-    step: int,
-    load: Array,
-    ground_force: Array,
-    bounce_steps: int,
-    closed: Flags,
-    bounce_end: Counts,
-) -> None:
-    """Update the switches in one physics step.
-
-    Args:
-        load: the contact points' contact counts and forces on the ground [N], (n_contacts, 4); the
-            vertical force is negative where the robot presses.
-        ground_force: up to which force every switch is closed [N], (n_contacts,).
-        bounce_steps: how long a switch that has changed chatters.
-        closed, bounce_end: as in ``TickRecord``.
-    """
-    for point in range(closed.shape[0]):
-        now = float(load[point, 3]) <= float(ground_force[point])
-        if bounce_steps > 0 and now != closed[point]:
-            bounce_end[point] = step + 1 + bounce_steps
-        closed[point] = now
 
 
 class ImuErrors(NamedTuple):

@@ -1,18 +1,152 @@
-"""What every robot that MuJoCo simulates has beside a real one's ports: truth, a push, a floor."""
+"""What all simulated robots have: their parameters (world, actuators, disturbances) and their ports."""
 
 from __future__ import annotations
 
 from abc import ABC
 from collections.abc import Mapping
+from typing import Literal, Self
+
+from pydantic import model_validator
 
 from ...blocks.signals import ExternalForce, RobotTruth
 from ...robots.description import RobotDescription
 from ...runtime.language.block import Input, Output, State
-from ...runtime.language.parameters import Parameters
+from ...runtime.language.parameters import Parameters, parameter
 from ...runtime.language.terrain import Terrain
+from ..drive_control import DriveGains
 from ..robot import Robot
-from .parameters import SimulatorParameters
+from . import scenes
 from .state import PhysicsState
+
+
+class SimulatorParameters(DriveGains):
+    """The parameters of ``MujocoRobot``; by default there are no disturbances.
+
+    A *spread* is half the width of a uniform distribution around the nominal value, from which one
+    value is drawn by the seed. A *noise* is the standard deviation of a normal distribution, from
+    which a value is drawn for every sample.
+    """
+
+    seed: int = parameter(0, ge=0, text="the seed of all random numbers")
+    timestep: float = parameter(
+        0.0005, unit="s", gt=0, le=0.002, text="physics step; it must divide the control period"
+    )
+
+    scene: Literal["flat", "step", "platform", "none"] | scenes.SceneParameters = parameter(
+        "flat",
+        text="the kind of ground; none: there is no ground; or a floor and boxes; or "
+        "{from: plan.scene}, the ground that a jump's task asks for",
+    )
+    step_height: float = parameter(0.05, unit="m", gt=0, text="scene step: its height")
+    step_distance: float = parameter(
+        0.1, unit="m", text="scene step: from the start to its front edge"
+    )
+    step_depth: float = parameter(
+        1.5, unit="m", gt=0, text="scene step: its depth, from its front edge to its back edge"
+    )
+    platform_height: float = parameter(
+        0.35, unit="m", gt=0, text="scene platform: its height above the floor"
+    )
+    platform_edge: float = parameter(
+        0.15, unit="m",
+        text="scene platform: from the start to the edge that is jumped off; negative: behind it",
+    )  # fmt: skip
+
+    friction: float = parameter(0.7, gt=0, text="friction coefficient of the ground")
+    friction_range: list[float] | None = parameter(
+        None, min_length=2, max_length=2,
+        text="lowest and highest friction, drawn uniformly in place of `friction`",
+    )  # fmt: skip
+    contact_stiffness: float = parameter(
+        1.0, ge=0.05, le=16.0, text="factor on the stiffness of all contacts"
+    )
+    contact_stiffness_spread: float = parameter(
+        1.0, ge=1.0, le=16.0, text="further factor, log-uniform between its inverse and this"
+    )
+    mass_scale: float = parameter(1.0, gt=0, text="factor on all masses and inertias")
+    mass_spread: float = parameter(0.0, ge=0, lt=1, text="spread of the factor mass_scale")
+    joint_friction: float = parameter(1.0, ge=0, text="factor on the motors' friction and damping")
+    base_com_offset: list[float] = parameter(
+        [0.0, 0.0, 0.0], unit="m", min_length=3, max_length=3, text="offset of the torso's CoM"
+    )
+    base_com_spread: float = parameter(0.0, unit="m", ge=0, text="spread of the offset, per axis")
+
+    initial_attitude_error: float = parameter(
+        0.0, unit="rad", ge=0, le=0.1,
+        text="standard deviation per axis of the torso's attitude at the start, soles flat",
+    )  # fmt: skip
+    random_start_phase: bool = parameter(
+        False, text="start physics at a drawn phase of the control clock"
+    )
+    bus_period: float | None = parameter(
+        None, unit="s", gt=0, le=0.02,
+        text="how often the driver renews the goals of the drives, which close their loops per motor with "
+        "`stiffness` and `damping`; none: in every physics step, so that the joints get exactly the "
+        "commanded feedback",
+    )  # fmt: skip
+    latency: float = parameter(0.0, unit="s", ge=0, le=0.1, text="delay from sensing to torque")
+    jitter: float = parameter(
+        0.0,
+        unit="s",
+        ge=0,
+        le=0.1,
+        text="additional latency of a command, uniform from zero to this",
+    )
+
+    gyro_noise: float = parameter(0.0, unit="rad/s", ge=0, text="gyroscope noise")
+    gyro_bias: float = parameter(
+        0.0, unit="rad/s", ge=0, text="spread of the gyroscope's bias, per axis"
+    )
+    gyro_range: float | None = parameter(
+        None, unit="rad/s", gt=0, text="the gyroscope saturates at this rate; none: never"
+    )
+    accelerometer_noise: float = parameter(0.0, unit="m/s^2", ge=0, text="accelerometer noise")
+    accelerometer_bias: float = parameter(
+        0.0, unit="m/s^2", ge=0, text="spread of the accelerometer's bias, per axis"
+    )
+    accelerometer_range: float | None = parameter(
+        None, unit="m/s^2", gt=0, text="the accelerometer saturates at this value; none: never"
+    )
+    encoder_offset: float = parameter(
+        0.0, unit="rad", ge=0, text="spread of the joint encoders' offsets"
+    )
+    encoder_resolution: float = parameter(
+        0.0, unit="rad", ge=0, text="joint angles are rounded to multiples of this; 0: not rounded"
+    )
+    joint_velocity_noise: float = parameter(0.0, unit="rad/s", ge=0, text="joint velocity noise")
+    switch_threshold: list[float] = parameter(
+        [1.0, 1.0], unit="N", min_length=2, max_length=2,
+        text="lowest and highest force that closes a switch, drawn per switch",
+    )  # fmt: skip
+    switch_bounce: float = parameter(
+        0.0, unit="s", ge=0, le=0.1, text="for how long a switch chatters after each change"
+    )
+
+    drive_damping: float | None = parameter(
+        None, unit="N m s/rad", ge=0,
+        text="joint damping of a drive in its damping mode; none: a third of the damping that "
+        "holds the robot before the first command",
+    )  # fmt: skip
+
+    @model_validator(mode="after")
+    def _check_ranges(self) -> Self:
+        for name in ("friction_range", "switch_threshold"):
+            value = getattr(self, name)
+            if value is not None and not 0.0 < value[0] <= value[1]:
+                raise ValueError(f"{name} must be two positive numbers in rising order: {value}")
+        return self
+
+    def build_scene(self) -> scenes.Scene:
+        """The ground these parameters describe."""
+        if isinstance(self.scene, scenes.SceneParameters):
+            return self.scene.build()
+        if self.scene == "step":
+            return scenes.step(self.step_height, self.step_distance, self.step_depth)
+        if self.scene == "platform":
+            return scenes.platform(self.platform_height, self.platform_edge)
+        if self.scene == "none":
+            return scenes.nowhere()
+        return scenes.flat()
 
 
 class SimulatedRobot(Robot, ABC):

@@ -1,4 +1,5 @@
-"""How a simulated robot is made to stand before a run: its pose and the torques that hold it.
+"""How a simulated robot is made to stand before a run: its pose, the torques and gains that hold it,
+and the check that it does stand as its description says.
 
 The linear algebra here is MuJoCo's own, because NumPy's rounds differently from one CPU to the
 next, and then runs of the same seed would differ from their first tick on.
@@ -6,17 +7,21 @@ next, and then runs of the same seed would differ from their first tick on.
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...mathematics.arrays import Array
+from ...mathematics.constants import GRAVITY
+from ...mathematics.reproducible import product
+from ...mathematics.support_margin import support_margin
 from ...robots.ball_feet import ball_feet
 from ...robots.description import RobotDescription
-from ...robots.link_poses import joints_above, standing_heights
+from ...robots.link_poses import joints_above, standing_com, standing_heights
 from ...runtime.language.errors import BlockError
-from .base import FixedBase
+from .base import BASES, FixedBase
 from .mujoco_model import body_name
 
 if TYPE_CHECKING:
@@ -219,3 +224,244 @@ def _sole_middle(data: MjData, robot: RobotDescription) -> Array:
         mujoco.mju_mulMatVec(offset, body.xmat.reshape(3, 3), sole)
         middle += (body.xpos + offset) / len(robot.feet)
     return middle
+
+
+LOAD_ERROR = 0.05
+"""The largest difference of the feet's mean load from the robot's weight, as a share of it."""
+MOST_JOINT_SPEED = 0.2
+"""The largest speed of a joint that counts as still [rad/s, or m/s for a slide]."""
+MOST_BASE_SPEED = 0.03
+"""The largest speed of a base that counts as still [m/s]."""
+MOST_BASE_RATE = 0.1
+"""The largest angular speed of a base that counts as still [rad/s]."""
+MOST_TILT_ERROR = 0.03
+"""The largest angle between the base's orientation and the one asked for [rad]."""
+MOST_SAG = 0.02
+"""The largest error of a held joint's position [rad, or m for a slide]."""
+NEAR = 0.001
+"""A contact point higher above the ground than this is in the air [m]."""
+
+
+MOST_NAMED = 3
+"""How many joints, links or contact points of a kind an error names."""
+
+
+class StartCheck:
+    """Checks that a settled robot stands: its feet carry its weight, nothing else touches anything,
+    nothing moves, and the base has the orientation asked for.
+
+    A robot on a fixed base, or without contact points, must only be still while it is held.
+
+    Args:
+        model, data: the simulator's model and data, after settling.
+        base: how the robot's base is held.
+        robot: its description.
+    """
+
+    def __init__(
+        self, model: MjModel, data: MjData, base: FixedBase, robot: RobotDescription
+    ) -> None:
+        self._model, self._data, self._base, self._robot = model, data, base, robot
+        self._standing = bool(robot.contacts) and base.velocities > 0
+
+    def check(self, load: Array, wanted: Array, torque: Array, rotation: Array) -> None:
+        """Raise ``StartError`` if the robot does not stand.
+
+        The message gives the causes, or the symptoms if no cause is found.
+
+        Args:
+            load: the mean vertical force on every contact point [N], (n_contacts,).
+            wanted: the joint positions in which the drives hold the robot [rad], (n_joints,).
+            torque: the joint torques that hold it there without moving [N m], (n_joints,).
+            rotation: the matrix (3, 3) from base to world that the robot was placed with.
+        """
+        symptoms = [*self._sagging(wanted), *self._moving()]
+        if self._standing:
+            symptoms = [*self._unloaded(load), *symptoms, *self._tilted(rotation)]
+        causes = [*self._unbalanced(), *self._touching()] if self._standing else []
+        if symptoms:
+            causes += self._too_weak(torque)
+        found = causes or symptoms
+        if not found:
+            return
+        verb = "stand" if self._standing else "stay"
+        raise StartError(
+            f"{self._robot.name} does not {verb} as its description says when it is held in its "
+            f"standing pose for 0.3 s: {'; '.join(found)}"
+        )
+
+    def _unbalanced(self) -> list[str]:
+        """Report a centre of mass outside of the support polygon."""
+        places = np.array([self._data.site(c.name).xpos for c in self._robot.contacts])
+        com = self._data.sensor("com").data
+        loaded = np.ones(len(places), dtype=np.bool_)
+        margin = support_margin(places, loaded, float(com[0]), float(com[1]))
+        if self._base.velocities == 3:  # a robot with a planar base cannot fall sideways
+            x, ahead = float(com[0]), places[:, 0]
+            margin = min(x - float(ahead.min()), float(ahead.max()) - x)
+        if margin > 0.0:
+            return []
+        way = _millimetres(-margin)
+        return [f"its centre of mass is {way} outside its contact points, so it tips over"]
+
+    def _touching(self) -> list[str]:
+        """Report links that touch anything, and contact points that touch more than the ground."""
+        model, contacts = self._model, [contact.name for contact in self._robot.contacts]
+        found: dict[str, None] = {}
+        for first, second in self._data.contact.geom.tolist():
+            names = [model.geom(geom).name for geom in (first, second)]
+            bodies = [int(model.geom_bodyid[geom]) for geom in (first, second)]
+            grounded = 0 in bodies
+            owner = names[1] if bodies[0] == 0 else names[0]
+            if grounded and owner in contacts:
+                continue
+            links = [model.body(body).name for body in bodies if body]
+            if grounded:
+                found[f"link {links[0]} touches the ground"] = None
+            else:
+                found[f"links {links[0]} and {links[1]} touch each other"] = None
+        return _some(list(found))
+
+    def _too_weak(self, torque: Array) -> list[str]:
+        """Report motors that are too weak to hold the robot; joints without motors do not count."""
+        robot = self._robot
+        needed = np.abs(product(robot.torque_to_motor, torque))
+        found = []
+        for k, peak in enumerate(robot.motors.peak_torque.tolist()):
+            if peak > 0.0 and float(needed[k]) > peak:
+                name, wanted = robot.transmission.motors[k], float(needed[k])
+                found.append(f"motor {name} has {peak:.3g} N m and would need {wanted:.3g} N m")
+        return _some(found)
+
+    def _unloaded(self, load: Array) -> list[str]:
+        """Report feet in the air, and a load on the feet that is not the robot's weight."""
+        total = float(load.sum())
+        weight = float(self._model.body_subtreemass[0]) * GRAVITY
+        if abs(total - weight) <= LOAD_ERROR * weight:
+            return []
+        carried = f"its contact points carry {total:.3g} N of its weight of {weight:.3g} N"
+        found = []
+        for contact in self._robot.contacts:
+            ball = self._data.geom(contact.name)
+            height = ball.xpos.item(2) - contact.radius
+            if height > NEAR:
+                found.append(f"{contact.name} is {_millimetres(height)} above the ground")
+        return [carried, *_some(found)]
+
+    def _sagging(self, wanted: Array) -> list[str]:
+        """Report joints that are not where they are held, the worst first."""
+        away = self._data.qpos[self._base.positions :] - wanted
+        text = "joint {name} is {value:+.2g} {unit} from where it is held"
+        return self._joints(away, MOST_SAG, text, "rad", "m")
+
+    def _moving(self) -> list[str]:
+        """Report joints that still move, the worst first, and a base that does."""
+        speeds = self._data.qvel[self._base.velocities :]
+        text = "joint {name} moves at {value:.2g} {unit}"
+        found = self._joints(speeds, MOST_JOINT_SPEED, text, "rad/s", "m/s")
+        size = self._base.velocities
+        linear = math.hypot(*self._data.qvel[: min(size, 2) if size == 3 else min(size, 3)])
+        self._base.refresh()
+        turning = math.hypot(*self._base.angular_velocity)
+        if not linear <= MOST_BASE_SPEED:
+            found.append(f"its base moves at {linear:.2g} m/s")
+        if not turning <= MOST_BASE_RATE:
+            found.append(f"its base turns at {turning:.2g} rad/s")
+        return found
+
+    def _joints(self, values: Array, most: float, text: str, hinge: str, slide: str) -> list[str]:
+        """``text`` for every joint whose value is more than ``most``, the worst first."""
+        worst = sorted(range(len(values)), key=lambda k: -abs(values.item(k)))
+        found = []
+        for k in worst:
+            joint, value = self._robot.joints[k], values.item(k)
+            unit = slide if joint.kind == "slide" else hinge
+            if not abs(value) <= most:
+                found.append(text.format(name=joint.name, value=value, unit=unit))
+        return _some(found)
+
+    def _tilted(self, rotation: Array) -> list[str]:
+        """Report a base that has rotated since the robot was placed."""
+        import mujoco
+
+        turned = self._data.body(1).xmat.reshape(3, 3)
+        cosine = 0.0
+        for k in range(3):
+            cosine += mujoco.mju_dot3(turned[k], rotation[k])
+        angle = math.acos(min(1.0, max(-1.0, 0.5 * (cosine - 1.0))))
+        if angle <= MOST_TILT_ERROR:
+            return []
+        return [f"its base has turned by {math.degrees(angle):.2g} deg from its standing pose"]
+
+
+def _some(found: list[str]) -> list[str]:
+    """The first few texts, and the number of the others."""
+    more = len(found) - MOST_NAMED
+    return found if more <= 0 else [*found[:MOST_NAMED], f"the same of {more} more"]
+
+
+def _millimetres(length: float) -> str:
+    return f"{1e3 * length:.2g} mm" if length < 0.01 else f"{1e3 * length:.0f} mm"
+
+
+GRAVITY_SHARE = 18.0
+DAMPING_TIME = 0.005
+NATURAL_FREQUENCY = 60.0
+RELEASED = 1.0 / 3.0
+"""The damping of a drive in its damping mode, as a share of its damping while it holds the pose."""
+
+
+def holding_gains(model: MjModel, robot: RobotDescription) -> tuple[Array, Array]:
+    """The stiffness [N m/rad] and damping [N m s/rad] that hold every joint before the first command,
+    each (n_joints,).
+
+    They follow from the robot, so that a robot of 2 kg and one of 100 kg are held alike:
+
+    * A joint of a leg carries the robot, which would topple about it like an inverted pendulum of
+      gravity stiffness ``m g h``, with the mass ``m`` and the height ``h`` of the centre of mass above
+      the ground. It is held 18 times as stiffly, with 5 ms of that stiffness as damping.
+    * Any other joint is held at a natural frequency of 60 rad/s, critically damped, for the inertia
+      that the mass matrix says it has in the standing pose.
+
+    Both gains are bounded so that the drive's loop is stable. It is closed once in every physics step
+    of ``dt`` on the inertia ``I`` of the joint with all others free, so the stiffness is at most
+    ``I / (4 dt^2)`` and the damping at most ``I / dt``. Apart from that bound, the gains do not depend
+    on what is drawn from the seed.
+    """
+    import mujoco
+
+    data = mujoco.MjData(model)
+    base = BASES[robot.base_joint](data)
+    base.place()
+    data.qpos[base.positions :] = robot.standing_position
+    mujoco.mj_forward(model, data)
+    mass = np.zeros((model.nv, model.nv))
+    mujoco.mj_fullM(model, data, mass)
+    answers = np.zeros((model.nv, model.nv))
+    mujoco.mj_solveM(
+        model, data, answers, np.eye(model.nv)
+    )  # NumPy's solver rounds differently by machine
+    free = 1.0 / np.diag(answers)[base.velocities :]
+    carried = np.diag(mass)[base.velocities :]
+    stiffness = carried * NATURAL_FREQUENCY**2
+    damping = 2.0 * carried * NATURAL_FREQUENCY
+    if robot.contacts and base.velocities:
+        legs = np.zeros(len(robot.joints), dtype=np.bool_)
+        for foot in robot.feet:
+            legs |= joints_above(robot, foot.link)
+        height = float(standing_com(robot)[2] - standing_heights(robot).min())
+        needed = _two_digits(GRAVITY_SHARE * robot.total_mass * GRAVITY * max(height, 0.01))
+        stiffness[legs], damping[legs] = needed, DAMPING_TIME * needed
+    step = float(model.opt.timestep)
+    return np.minimum(stiffness, 0.25 * free / step**2), np.minimum(damping, free / step)
+
+
+def passive_joints(robot: RobotDescription) -> NDArray[np.int64]:
+    """The joints that no motor can move: all motors geared to them have a peak torque of zero."""
+    driven = (robot.joint_to_motor[robot.motors.peak_torque > 0.0] != 0.0).any(axis=0)
+    return np.flatnonzero(~driven)
+
+
+def _two_digits(value: float) -> float:
+    """The value rounded to two significant digits, so that it is the same on every machine."""
+    return float(f"{value:.1e}") if math.isfinite(value) else value

@@ -12,13 +12,12 @@ from ...mathematics.compiling.kernel_call import KernelCall
 from ...robots.robot_description import RobotDescription
 from ...robots.transmission import Transmission
 from ..bear.configuration import Hardware
-from ..bear.registers import Mode
-from ..simulated.actuator import drive_motors
-from ..simulated.drives import MotorLimits
+from ..bear.protocol import Mode
+from ..simulated.drives import MotorLimits, drive_motors
 from ..simulated.motor_feedback import motor_feedback
 from ..simulated.state import TickRecord
-from .actuator import EmulatedActuator
-from .frozen import Part
+from .devices import EmulatedActuator
+from .snapshot import Part
 
 _SLOTS = 8
 """How many sets of goals may be on their way."""

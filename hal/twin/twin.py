@@ -12,18 +12,16 @@ from ...mathematics.compiling.call_sequence import CallSequence
 from ...mathematics.compiling.library_call import LibraryCall
 from ...robots.robot_description import RobotDescription
 from ..bear.configuration import Hardware
-from ..bear.frames import BROADCAST, Instruction, frame_bytes
+from ..bear.protocol import BROADCAST, Instruction, frame_bytes
 from ..simulated.drives import Drives
-from ..simulated.parameters import SimulatorParameters
 from ..simulated.plant import Plant
 from ..simulated.random_streams import Purpose
+from ..simulated.simulated_robot import SimulatorParameters
 from ..simulated.state import DriveState, PhysicsState, TickRecord
-from .actuator import EmulatedActuator
-from .bus import EmulatedBus
+from .devices import EmulatedActuator, EmulatedBoard, EmulatedBus
 from .drives import EmulatedDrives
 from .faults import ANSWERS, Fault, Faults, flip, spoil
-from .frozen import Part
-from .sense_board import EmulatedBoard
+from .snapshot import Part
 
 BRAKING = 0.5
 """Of an actuator with shorted windings [N m s/rad]: an estimate."""
@@ -307,3 +305,28 @@ class Twin:
             if not answer:
                 break
         return answer
+
+
+def standing_twin(
+    robot: RobotDescription, params: SimulatorParameters, hardware: Hardware,
+    tick: float = 0.002, faults: tuple[Fault, ...] = (),
+) -> Twin:  # fmt: skip
+    """A twin that stands in its gantry.
+
+    Args:
+        robot: the description.
+        params: world, disturbances and sensors' errors.
+        hardware: addresses, directions, offsets and the bus's period.
+        tick: the control period [s], to which noise and start phase refer.
+        faults: what goes wrong.
+
+    Raises:
+        StartError: the robot does not stand as its description says.
+    """
+    sizes = {**robot.dimensions, **Plant.state_dimensions(params, robot), "n_queue": 2}
+    twin = Twin(
+        robot, params, hardware, tick, PhysicsState.allocate(sizes), TickRecord.allocate(sizes),
+        DriveState.allocate(sizes), faults,
+    )  # fmt: skip
+    twin.stand()
+    return twin

@@ -9,22 +9,78 @@ from ...robots.description import RobotDescription
 from ...runtime.language.block import Context, Metric, Misfit, State
 from ...runtime.language.parameters import Parameters, parameter
 from ...runtime.language.signals import Field, Signal
-from ..bear.command_queue import CommandQueue
 from ..bear.configuration import Hardware
-from ..bear.drive_law import DriveLaw
 from ..bear.driven_robot import DrivenRobot, DriveParameters, read_hardware
-from ..bear.driver import Driver
-from ..drive_gains import joint_gains
-from ..simulated.parameters import SimulatorParameters
+from ..bear.driver import DriveLaw, Driver
+from ..bear.motor_loop import CommandQueue
+from ..drive_control import joint_gains
+from ..simulated.mujoco_model import unfit_motor
 from ..simulated.plant import Plant
-from ..simulated.rotors import unfit_motor
-from ..simulated.simulated_robot import SimulatedRobot
+from ..simulated.simulated_robot import SimulatedRobot, SimulatorParameters
 from ..simulated.stance import uneven_contacts
 from ..simulated.state import DriveState, PhysicsState, TickRecord
 from .faults import Fault
-from .frozen import Frozen, Part
+from .snapshot import Frozen, Part
 from .twin import Twin
-from .virtual_port import VirtualBoardPort, VirtualBusPort
+
+
+class VirtualBusPort:
+    """The master's end of the bus of a twin's drives.
+
+    Waiting takes no real time: where nothing has come, ``read`` lets ``timeout`` seconds of virtual
+    time pass. So a driver with time limits runs the same way on any machine.
+    """
+
+    def __init__(self, twin: Twin) -> None:
+        self.timeout: float | None = None
+        self._twin = twin
+        self._received = bytearray()
+        self._now = 0.0
+
+    def now(self) -> float:
+        """The virtual time [s]."""
+        return self._now
+
+    @property
+    def in_waiting(self) -> int:
+        """How many bytes were received and not read, with those that came late."""
+        self._received += self._twin.read_late()
+        return len(self._received)
+
+    def write(self, data: bytes | bytearray) -> int:
+        """Send bytes to the twin; its answers are there at once."""
+        self._received += self._twin.write_bus(bytes(data))
+        return len(data)
+
+    def read(self, size: int = 1) -> bytes:
+        """Up to ``size`` bytes; none after ``timeout`` of virtual time without any."""
+        if not self._received:
+            self._now += self.timeout or 0.0
+            return b""
+        part = bytes(self._received[:size])
+        del self._received[:size]
+        return part
+
+    def reset_input_buffer(self) -> None:
+        """Discard what was received and not read."""
+        self._received.clear()
+
+    def close(self) -> None:
+        """Nothing to give back."""
+
+
+class VirtualBoardPort(VirtualBusPort):
+    """The host's end of a twin's sensor board."""
+
+    def write(self, data: bytes | bytearray) -> int:
+        """Send a command to the board."""
+        self._twin.write_board(bytes(data))
+        return len(data)
+
+    def read(self, size: int = 1) -> bytes:
+        """Up to ``size`` bytes of what the board has sent."""
+        self._received += self._twin.read_board()
+        return super().read(size)
 
 
 class TwinParameters(SimulatorParameters, DriveParameters):

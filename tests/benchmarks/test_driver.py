@@ -2,7 +2,7 @@
 
 from aloft.benchmarks.driver import BARE, RECORDED, driver, recorded
 from aloft.blocks.signals import DrivePhase
-from aloft.hal.bear.frames import BROADCAST, FrameReader, Instruction
+from aloft.hal.bear.protocol import BROADCAST, FrameReader, Instruction
 
 
 def test_what_is_said_and_heard_is_the_protocol_of_ten_drives() -> None:

@@ -27,7 +27,7 @@ NOT_FOR_A_CHECK = (
     "numpy.polynomial", "numpy.fft", "numpy.testing", "aloft.logs", "aloft.studies", "aloft.cli.run",
     "aloft.planner.solving", "aloft.planner.problem", "aloft.runtime.running", "aloft.runtime.links",
     "aloft.hal.simulated.plant", "aloft.hal.simulated.drives",
-    "aloft.hal.simulated.sensors", "aloft.hal.simulated.world",
+    "aloft.hal.simulated.sensors", "aloft.hal.simulated.mujoco_model",
 )  # fmt: skip
 """Modules, with all that lies in them, which only a run needs, or a picture, or a report."""
 

@@ -24,11 +24,11 @@ import yaml
 import aloft
 from aloft.hal.bear.bus import open_port
 from aloft.hal.bear.configuration import Hardware
-from aloft.hal.bear.frames import Instruction, frame_bytes
-from aloft.hal.simulated.parameters import SimulatorParameters
+from aloft.hal.bear.protocol import Instruction, frame_bytes
+from aloft.hal.simulated.simulated_robot import SimulatorParameters
 from aloft.hal.twin.faults import Fault
 from aloft.hal.twin.server import TwinServer
-from aloft.hal.twin.standing_twin import standing_twin
+from aloft.hal.twin.twin import standing_twin
 from aloft.robots.description import find_robot
 from aloft.runtime.running.memory import BoundGraph
 
@@ -221,4 +221,4 @@ def test_the_kernel_of_the_goals_is_compiled_with_the_graph() -> None:
     """The driver opens later; goals by plain Python would take longer than all else in a cycle."""
     graph = aloft.load(Path(aloft.__file__).parent / "graphs" / "jump_robot.yaml")
     calls = BoundGraph(graph.checked).kernel_calls
-    assert "aloft.hal.drive_goals.make_goals" in [call.name for call in calls]
+    assert "aloft.hal.drive_control.make_goals" in [call.name for call in calls]

@@ -8,10 +8,8 @@ import pytest
 from aloft.hal.bear import bench
 from aloft.hal.bear.bus import BearBus, BusError
 from aloft.hal.bear.configuration import Hardware
-from aloft.hal.bear.frames import FrameReader, Instruction
-from aloft.hal.bear.registers import Torque
-from aloft.hal.twin.actuator import EmulatedActuator
-from aloft.hal.twin.bus import EmulatedBus
+from aloft.hal.bear.protocol import FrameReader, Instruction, Torque
+from aloft.hal.twin.devices import EmulatedActuator, EmulatedBus
 from aloft.robots.description import find_robot
 
 from .virtual_wire import VirtualWire

@@ -5,9 +5,8 @@ import pytest
 
 from aloft.hal.bear.bulk import BulkExchange
 from aloft.hal.bear.bus import BearBus, BusError
-from aloft.hal.bear.frames import FrameReader, Instruction
-from aloft.hal.twin.actuator import EmulatedActuator
-from aloft.hal.twin.bus import EmulatedBus
+from aloft.hal.bear.protocol import FrameReader, Instruction
+from aloft.hal.twin.devices import EmulatedActuator, EmulatedBus
 from aloft.runtime.testing.allocations import count_array_allocations
 
 from .virtual_wire import VirtualWire

@@ -5,10 +5,9 @@ from collections.abc import Iterator
 import pytest
 
 from aloft.hal.bear.bus import BearBus, BusError, NoReplyError, open_port
-from aloft.hal.bear.registers import Torque
-from aloft.hal.twin.actuator import EmulatedActuator
-from aloft.hal.twin.bus import EmulatedBus
-from aloft.hal.twin.pseudo_terminal import PseudoTerminal
+from aloft.hal.bear.protocol import Torque
+from aloft.hal.twin.devices import EmulatedActuator, EmulatedBus
+from aloft.hal.twin.server import PseudoTerminal
 
 
 @pytest.fixture

@@ -11,13 +11,11 @@ import pytest
 from aloft.blocks.signals import CommandMode, DrivePhase, JointCommand
 from aloft.hal.bear.bus import BusError
 from aloft.hal.bear.configuration import Hardware
-from aloft.hal.bear.drive_law import DriveLaw
-from aloft.hal.bear.driver import Driver
-from aloft.hal.bear.motor_thread import MotorThread
-from aloft.hal.simulated.parameters import SimulatorParameters
-from aloft.hal.twin.standing_twin import standing_twin
-from aloft.hal.twin.twin import Twin
-from aloft.hal.twin.virtual_port import VirtualBoardPort, VirtualBusPort
+from aloft.hal.bear.driver import DriveLaw, Driver
+from aloft.hal.bear.motor_loop import MotorThread
+from aloft.hal.simulated.simulated_robot import SimulatorParameters
+from aloft.hal.twin.twin import Twin, standing_twin
+from aloft.hal.twin.twin_robot import VirtualBoardPort, VirtualBusPort
 from aloft.robots.description import find_robot
 
 ROBOT = find_robot("bruce")

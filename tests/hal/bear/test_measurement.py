@@ -8,7 +8,7 @@ from aloft.hal.bear.bulk import BulkExchange
 from aloft.hal.bear.bus import BearBus
 from aloft.hal.bear.configuration import Hardware
 from aloft.hal.bear.measurement import READ, Measurement
-from aloft.hal.twin.virtual_port import VirtualBusPort
+from aloft.hal.twin.twin_robot import VirtualBusPort
 from aloft.robots.description import find_robot
 
 ROBOT = find_robot("bruce")

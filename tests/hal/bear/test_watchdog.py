@@ -1,13 +1,30 @@
-"""The watchdog's process damps by itself: when beats end, when links are silent, when the graph dies."""
+"""The watchdog's process damps by itself: when beats end, when links are silent, when the graph dies.
 
+The dead man's switch is held only while somebody holds it.
+"""
+
+import io
 import os
 import select
+import struct
+import sys
+import termios
 import time
 from collections.abc import Callable, Iterator
+from pathlib import Path
 
 import pytest
 
-from aloft.hal.bear.watchdog import Watchdog, damping_frame
+from aloft.hal.bear.bus import BusError
+from aloft.hal.bear.configuration import DeadMan
+from aloft.hal.bear.watchdog import (
+    AlwaysHeld,
+    GamepadButton,
+    Watchdog,
+    damping_frame,
+    open_switch,
+    wait_until_held,
+)
 
 DEVICES = [1, 2, 3]
 FRAME = damping_frame(DEVICES)
@@ -89,3 +106,63 @@ def test_it_ends_without_damping_when_told_that_the_graph_closes(
     assert first_frame(port, 0.05) == b""
     with pytest.raises(ProcessLookupError):
         os.kill(watchdog.pid, 0)
+
+
+def test_a_gamepads_button(tmp_path: Path) -> None:
+    device = tmp_path / "js0"
+    os.mkfifo(device)
+    keep = os.open(device, os.O_RDWR)
+
+    def event(value: int, kind: int, number: int) -> None:
+        os.write(keep, struct.pack("<IhBB", 0, value, kind, number))
+
+    switch = open_switch(DeadMan(device=str(device), button=4))
+    assert isinstance(switch, GamepadButton) and not switch.held()
+    event(1, 0x01, 3)
+    event(900, 0x02, 4)  # an axis of the same number
+    assert not switch.held()
+    event(1, 0x81, 4)  # what the system tells at first
+    assert switch.held() and switch.held()
+    event(0, 0x01, 4)
+    assert not switch.held()
+    switch.close()
+    os.close(keep)
+
+
+def test_what_is_not_there_or_not_held(tmp_path: Path) -> None:
+    with pytest.raises(BusError, match=r"the dead man's switch .*js9 cannot be opened: No such"):
+        open_switch(DeadMan(device=str(tmp_path / "js9")))
+    wait_until_held(AlwaysHeld(), 0.0)
+
+    class Never(AlwaysHeld):
+        def held(self) -> bool:
+            return False
+
+    with pytest.raises(BusError, match=r"within 0\.05 s: nothing was enabled"):
+        wait_until_held(Never(), 0.05)
+
+
+def test_the_space_bar(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It counts as held while it repeats itself; the terminal is given back as it was."""
+    ours, theirs = os.openpty()
+    with os.fdopen(theirs) as terminal:
+        monkeypatch.setattr(sys, "stdin", terminal)
+        before = termios.tcgetattr(theirs)
+        switch = open_switch(DeadMan(kind="key"))
+        now = [100.0]
+        monkeypatch.setattr("aloft.hal.bear.watchdog.time.monotonic", lambda: now[0])
+        assert not switch.held()
+        for key, held in ((b"x", False), (b" ", True)):
+            os.write(ours, key)
+            assert select.select([theirs], [], [], 60.0)[0]
+            assert switch.held() is held
+        now[0] += 0.6
+        assert switch.held()
+        now[0] += 0.2
+        assert not switch.held(), "it no longer repeats itself"
+        switch.close()
+        assert termios.tcgetattr(theirs) == before and os.get_blocking(theirs)
+    os.close(ours)
+    monkeypatch.setattr(sys, "stdin", io.StringIO())
+    with pytest.raises(BusError, match="needs a terminal as standard input"):
+        open_switch(DeadMan(kind="key"))

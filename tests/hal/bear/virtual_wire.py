@@ -1,6 +1,6 @@
 """A serial port whose other end are emulated actuators: they answer at once, in virtual time."""
 
-from aloft.hal.twin.bus import EmulatedBus
+from aloft.hal.twin.devices import EmulatedBus
 
 
 class VirtualWire:

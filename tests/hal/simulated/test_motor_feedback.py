@@ -9,13 +9,12 @@ import pytest
 
 from aloft.blocks.signals import CommandMode, JointCommand
 from aloft.hal.bear.configuration import Hardware
-from aloft.hal.bear.registers import Mode
-from aloft.hal.drive_gains import DriveGains, joint_gains
-from aloft.hal.drive_goals import DriveGoals
+from aloft.hal.bear.protocol import Mode
+from aloft.hal.drive_control import DriveGains, DriveGoals, joint_gains
 from aloft.hal.simulated.motor_feedback import FeedbackState, MotorFeedback
 from aloft.hal.simulated.mujoco_robot import MujocoRobot
 from aloft.hal.simulated.state import TickRecord
-from aloft.hal.twin.actuator import EmulatedActuator
+from aloft.hal.twin.devices import EmulatedActuator
 from aloft.hal.twin.drives import EmulatedDrives
 from aloft.mathematics.arrays import Array
 from aloft.robots.description import find_robot

@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 
 from aloft.blocks.signals import CommandMode, DrivePhase
-from aloft.hal.bear.frames import FrameReader, frame_bytes
-from aloft.hal.twin.faults import Fault, Faults, flip
+from aloft.hal.bear.protocol import FrameReader, frame_bytes
+from aloft.hal.twin.faults import Fault, Faults, flip, read_fault
 from aloft.hal.twin.twin_robot import TwinRobot
-from aloft.hal.twin.written_faults import read_fault
 from aloft.robots.description import find_robot
 from aloft.runtime.language.errors import AloftError
 from aloft.runtime.testing.bench import BlockBench

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import threading
+import time
 from collections.abc import Iterator
 
 import numpy as np
@@ -11,12 +13,12 @@ import pytest
 from aloft.hal.bear.bulk import BulkExchange
 from aloft.hal.bear.bus import BearBus, open_port
 from aloft.hal.bear.configuration import Hardware
-from aloft.hal.bear.frames import FrameReader, Instruction, frame_bytes
 from aloft.hal.bear.measurement import READ
+from aloft.hal.bear.protocol import FrameReader, Instruction, frame_bytes
 from aloft.hal.bear.sense_board import SenseBoard
-from aloft.hal.simulated.parameters import SimulatorParameters
-from aloft.hal.twin.server import TwinServer
-from aloft.hal.twin.standing_twin import standing_twin
+from aloft.hal.simulated.simulated_robot import SimulatorParameters
+from aloft.hal.twin.server import PseudoTerminal, TwinServer
+from aloft.hal.twin.twin import standing_twin
 from aloft.robots.description import find_robot
 
 ROBOT = find_robot("bruce")
@@ -56,3 +58,36 @@ def test_the_packet_of_an_exchange_is_there_before_its_answers(server: TwinServe
     np.testing.assert_allclose(board.specific_force[2], 9.81, atol=0.3)
     port.close()
     board.port.close()
+
+
+def test_the_device_answers_and_a_pulled_cable_fails():
+    with PseudoTerminal(lambda sent: sent.upper()) as cable:
+        port = os.open(cable.path, os.O_RDWR | os.O_NOCTTY)
+        os.write(port, b"hello")
+        assert os.read(port, 16) == b"HELLO"
+    with pytest.raises(OSError):
+        os.write(port, b"hello")
+    os.close(port)
+
+
+def test_many_threads_may_close_it_at_once():
+    """The twin's clock and a fault of a device both pull the cable."""
+    cable = PseudoTerminal(lambda sent: time.sleep(0.1) or b"")
+    port = os.open(cable.path, os.O_RDWR | os.O_NOCTTY)
+    os.write(port, b"hello")  # keeps the serving thread alive until all others are there
+    gate, errors = threading.Barrier(8), []
+
+    def pull():
+        gate.wait()
+        try:
+            cable.close()
+        except OSError as error:
+            errors.append(error)
+
+    threads = [threading.Thread(target=pull) for _ in range(8)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    os.close(port)
+    assert errors == []

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from aloft.blocks.signals import JointCommand
-from aloft.hal.drive_goals import DriveGoals
+from aloft.hal.drive_control import DriveGoals
 from aloft.mathematics.arrays import Array
 from aloft.robots.description import find_robot
 from aloft.robots.transmission import Transmission, motor_gains

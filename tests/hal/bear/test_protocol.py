@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from aloft.hal.bear.frames import (
+from aloft.hal.bear.protocol import (
     BROADCAST,
     Frame,
     FrameReader,

@@ -3,9 +3,8 @@
 import pytest
 
 from aloft.blocks.signals.drive_conditions import describe
-from aloft.hal.bear.frames import Frame, Instruction
-from aloft.hal.bear.registers import CONFIG, STATUS, Mode, Torque
-from aloft.hal.twin.actuator import EmulatedActuator
+from aloft.hal.bear.protocol import CONFIG, STATUS, Frame, Instruction, Mode, Torque
+from aloft.hal.twin.devices import EmulatedActuator
 
 
 def write(actuator: EmulatedActuator, **values: float) -> None:

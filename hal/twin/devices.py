@@ -1,14 +1,30 @@
-"""A BEAR actuator as its bus sees it: registers, limits, errors, and what it ignores."""
+"""The emulated devices as their ports see them: BEAR actuators, their bus, and the sensor board."""
 
 from __future__ import annotations
 
 import struct
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from functools import lru_cache
 
+import numpy as np
+
+from ...blocks.signals import ImuReading
 from ...blocks.signals.drive_conditions import HEALTHY
-from ..bear.frames import Frame, Instruction
-from ..bear.registers import CONFIG, STATUS, Mode, Register, Torque
+from ..bear.protocol import (
+    BROADCAST,
+    CONFIG,
+    STATUS,
+    Frame,
+    FrameReader,
+    Instruction,
+    Mode,
+    Register,
+    Torque,
+    checksum,
+    frame_bytes,
+)
+from ..bear.sense_board import END, LENGTH, START, BoardMode
 
 CORRUPT, HOT, ENCODER, WATCHDOG, LIMIT, HARDWARE, FLASH = range(7)
 """The bits of the error byte."""
@@ -203,3 +219,120 @@ class EmulatedActuator:
             self.errors |= 1 << WATCHDOG
         if wanted != Torque.ERROR:
             self.status["torque_enable"] = wanted
+
+
+Fault = Callable[[int, bytes], bytes]
+"""Takes an answer's device and bytes, and returns the bytes that really travel."""
+
+
+def faithful(device: int, answer: bytes) -> bytes:
+    """The answer as it is."""
+    return answer
+
+
+class EmulatedBus:
+    """All actuators of a bus.
+
+    A frame with a wrong checksum is answered by nobody, and the actuator that it was for reports it
+    in its next answer. A bulk exchange is answered by each actuator in the order of its list; those
+    that are not on the bus are silent.
+
+    Attributes:
+        fault: what happens to every answer on its way.
+    """
+
+    def __init__(self, actuators: Iterable[EmulatedActuator], fault: Fault = faithful) -> None:
+        self.actuators = {actuator.device: actuator for actuator in actuators}
+        self.fault = fault
+        self._reader = FrameReader()
+
+    def receive(self, data: bytes) -> bytes:
+        """Take the bytes that the master sends; returns the bytes that it receives."""
+        damaged = self._reader.damaged
+        frames = self._reader.feed(data)
+        if self._reader.damaged > damaged:
+            for actuator in self.actuators.values():
+                actuator.garble()
+        return b"".join(self._answer(frame) for frame in frames)
+
+    def _answer(self, frame: Frame) -> bytes:
+        if frame.device == BROADCAST:
+            return self._bulk(frame.data) if frame.code == Instruction.BULK else b""
+        actuator = self.actuators.get(frame.device)
+        if actuator is None:
+            return b""
+        data = actuator.answer(frame)
+        return b"" if data is None else self._send(actuator, data)
+
+    def _send(self, actuator: EmulatedActuator, data: bytes) -> bytes:
+        answer = frame_bytes(actuator.device, actuator.error_byte, data)
+        actuator.answered()
+        return self.fault(actuator.device, answer)
+
+    def _bulk(self, data: bytes) -> bytes:
+        if len(data) < 2:
+            return b""
+        count, reads, writes = data[0], data[1] >> 4, data[1] & 0x0F
+        start = 2 + reads + writes
+        read, write = data[2 : 2 + reads], data[2 + reads : start]
+        size = 1 + 4 * writes
+        if len(data) != start + count * size:
+            return b""
+        answers = []
+        for k in range(count):
+            part = data[start + k * size : start + (k + 1) * size]
+            actuator = self.actuators.get(part[0])
+            if actuator is None:
+                continue
+            actuator.bulk_write(write, part[1:])
+            if reads:
+                answers.append(self._send(actuator, actuator.bulk_read(read)))
+        return b"".join(answers)
+
+
+_COMMAND = 5
+
+
+class EmulatedBoard:
+    """BRUCE's sensor board: it sends a packet whenever ``packet`` is called while it streams.
+
+    It streams from the start, as the real one does after it was told to once. A command is taken
+    when its checksum is right. Calibration is acknowledged by one packet whose switches' byte is
+    0xFF; the bias that the real board would store is not simulated.
+
+    Attributes:
+        mode: the mode it was told.
+        cooling: the cooling's strength it was told, 0 to 10.
+    """
+
+    def __init__(self) -> None:
+        self.mode = BoardMode.NOMINAL
+        self.cooling = 0
+        self._pending = bytearray()
+        self._calibrating = False
+
+    def receive(self, data: bytes) -> None:
+        """Take bytes that the host sends."""
+        pending = self._pending
+        pending += data
+        while len(pending) >= _COMMAND:
+            command = bytes(pending[:_COMMAND])
+            whole = command[0] == START and command[1] == 3 and command[4] == END
+            if whole and checksum(command[1:3]) == command[3]:
+                self.mode, self.cooling = BoardMode(command[2] & 3), command[2] >> 2
+                self._calibrating = self.mode is BoardMode.CALIBRATE
+                del pending[:_COMMAND]
+            else:
+                del pending[:1]
+
+    def packet(self, imu: ImuReading, closed: np.ndarray) -> bytes:
+        """The next packet; empty while the board does not stream."""
+        if self._calibrating:
+            self._calibrating, self.mode, contacts = False, BoardMode.NOMINAL, 0xFF
+        elif self.mode is not BoardMode.NOMINAL:
+            return b""
+        else:
+            contacts = 0x80 | sum(1 << bit for bit, each in enumerate(closed.tolist()) if each)
+        numbers = struct.pack("<6f", *imu.specific_force.tolist(), *imu.angular_velocity.tolist())
+        body = bytes((LENGTH,)) + numbers + bytes((contacts,))
+        return bytes((START,)) + body + bytes((checksum(body), END))

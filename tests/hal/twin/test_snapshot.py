@@ -4,7 +4,7 @@ from enum import IntEnum
 
 import numpy as np
 
-from aloft.hal.twin.frozen import Frozen
+from aloft.hal.twin.snapshot import Frozen
 
 
 class Colour(IntEnum):

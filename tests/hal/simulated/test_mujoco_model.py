@@ -6,10 +6,9 @@ import mujoco
 import numpy as np
 import pytest
 
-from aloft.hal.simulated import world
-from aloft.hal.simulated.mujoco_model import Variation
-from aloft.hal.simulated.parameters import SimulatorParameters
-from aloft.hal.simulated.world import build_world
+from aloft.hal.simulated import mujoco_model
+from aloft.hal.simulated.mujoco_model import Variation, build_world
+from aloft.hal.simulated.simulated_robot import SimulatorParameters
 from aloft.robots.description import find_robot
 
 ROBOT = find_robot("bruce")
@@ -26,14 +25,14 @@ def bytes_of(model: mujoco.MjModel) -> bytes:
 def built(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """The robots that a model has been built of."""
     names: list[str] = []
-    original = world.build_mujoco_model
+    original = mujoco_model.build_mujoco_model
 
     def build(robot, **options):  # type: ignore[no-untyped-def]
         names.append(robot.name)
         return original(robot, **options)
 
-    monkeypatch.setattr(world, "build_mujoco_model", build)
-    world._kept.clear()
+    monkeypatch.setattr(mujoco_model, "build_mujoco_model", build)
+    mujoco_model._kept.clear()
     return names
 
 
@@ -60,4 +59,4 @@ def test_what_is_in_the_model_makes_another_world(built: list[str]) -> None:
     assert usual not in [bytes_of(model) for model in others]
     for k in range(9):
         build_world(FLAT, ROBOT, Variation(friction=0.5 + 0.01 * k))
-    assert len(world._kept) == 4, "older ones are forgotten"
+    assert len(mujoco_model._kept) == 4, "older ones are forgotten"

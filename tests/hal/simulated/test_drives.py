@@ -5,7 +5,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from aloft.hal.simulated.actuator import (
+from aloft.hal.simulated.drives import (
     MotorRecord,
     Motors,
     MotorScratch,
