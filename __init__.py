@@ -9,7 +9,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from .logs.recording.finished_run import write_recording
+    from .logs.recording.writer import write_recording
     from .runtime.building import GraphBuilder
     from .runtime.graph import Graph, load
     from .runtime.language.block import Block, Input, Output, State

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from aloft.logs.file.row_codec import pack, unpack, unpack_bytes
-from aloft.logs.file.row_prediction import ordered, predict
+from aloft.logs.file.row_codec import ordered, pack, predict, unpack, unpack_bytes
 
 ODD = np.array([0.0, -0.0, np.nan, -np.nan, np.inf, -np.inf, 5e-324, -1.7e308, 1.0])
 

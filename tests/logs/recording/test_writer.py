@@ -11,9 +11,9 @@ import pytest
 from aloft.logs.file.format import RecordedField
 from aloft.logs.file.header import make_header
 from aloft.logs.file.reader import read
-from aloft.logs.recording.finished_run import write_recording
-from aloft.logs.recording.whole_view import write_view
-from aloft.logs.viewing.flights import Flights
+from aloft.logs.recording.drawn_run import write_view
+from aloft.logs.recording.writer import write_recording
+from aloft.logs.viewing.contacts import Flights
 from aloft.logs.viewing.robot_shapes import quaternion_from_z
 from aloft.logs.viewing.scene_ports import scene_ports
 from aloft.logs.viewing.signal_names import element_names
