@@ -11,8 +11,7 @@ def doctor(
 ) -> None:
     """Say whether all libraries load, what this machine allows a control loop in real time, and what
     to change; nothing is changed."""
-    from ..runtime.running.library_check import examine_libraries
-    from ..runtime.running.machine_check import examine_machine
+    from ..runtime.running.machine_check import examine_libraries, examine_machine
 
     findings = [examine_libraries(), *examine_machine()]
     if as_json:

@@ -29,10 +29,10 @@ def keys(
     as_json: AsJson = False,
 ) -> None:
     """Make the certificates and sessions of all machines of a graph: mutual TLS, least access."""
-    from ..runtime.links.access import keys_from
-    from ..runtime.links.key_folder import make_keys
     from ..runtime.loading import load
     from ..runtime.placement.place import place
+    from ..runtime.transports.access import keys_from
+    from ..runtime.transports.keys import make_keys
 
     with errors_reported(as_json):
         placed = place(load(graph, overrides or []))

@@ -150,7 +150,7 @@ class Goals(NamedTuple):
     velocity: Array
 
 
-class Measured(NamedTuple):
+class MeasuredMotion(NamedTuple):
     """The measured motion of motors and joints [rad, rad/s], each (n,)."""
 
     position: Array
@@ -159,7 +159,7 @@ class Measured(NamedTuple):
     joint_velocity: Array
 
 
-class Errors(NamedTuple):
+class TrackingErrors(NamedTuple):
     """Scratch, each (n,): the joints' errors, and the torque that is asked of them."""
 
     position: Array
@@ -168,7 +168,7 @@ class Errors(NamedTuple):
 
 
 @kernel
-def least_share(gears: Gears, motor: int, commanded: Array, drives: Array) -> float:
+def smallest_share(gears: Gears, motor: int, commanded: Array, drives: Array) -> float:
     """Of a motor, the least share of the drives' gains among the joints it moves."""
     share = 1.0
     for joint in range(commanded.shape[0]):
@@ -180,7 +180,12 @@ def least_share(gears: Gears, motor: int, commanded: Array, drives: Array) -> fl
 
 @kernel
 def make_goals(
-    gears: Gears, targets: Targets, row: int, measured: Measured, goals: Goals, errors: Errors
+    gears: Gears,
+    targets: Targets,
+    row: int,
+    measured: MeasuredMotion,
+    goals: Goals,
+    errors: TrackingErrors,
 ) -> None:
     """The goals of all drives for the command in a row of ``targets``: see the module."""
     stiffness, damping = targets.stiffness[row], targets.damping[row]
@@ -188,19 +193,19 @@ def make_goals(
         position = float(targets.position[row, k]) - float(measured.joint_position[k])
         velocity = float(targets.velocity[row, k]) - float(measured.joint_velocity[k])
         errors.position[k], errors.velocity[k] = position, velocity
-        wanted = position * float(stiffness[k]) + float(targets.torque[row, k])
-        errors.torque[k] = wanted + velocity * float(damping[k])
+        requested = position * float(stiffness[k]) + float(targets.torque[row, k])
+        errors.torque[k] = requested + velocity * float(damping[k])
     multiply_vector(gears.torque_to_motor, errors.torque, goals.torque)
     multiply_vector(gears.to_motor, errors.position, goals.position)
     multiply_vector(gears.to_motor, errors.velocity, goals.velocity)
     for k in range(errors.torque.shape[0]):
         angle, speed = float(measured.position[k]), float(measured.velocity[k])
-        share = least_share(gears, k, stiffness, gears.stiffness)
+        share = smallest_share(gears, k, stiffness, gears.stiffness)
         error = float(goals.position[k]) * share
         # Where the drive follows the target by itself, its goal needs no lead.
         goals.position[k] = error + angle + (1.0 - share) * speed * gears.lead
         torque = float(goals.torque[k]) - error * float(gears.motor_stiffness[k])
-        error = float(goals.velocity[k]) * least_share(gears, k, damping, gears.damping)
+        error = float(goals.velocity[k]) * smallest_share(gears, k, damping, gears.damping)
         goals.torque[k] = torque - error * float(gears.motor_damping[k])
         goals.velocity[k] = error + speed
 
@@ -241,11 +246,11 @@ class DriveGoals:
         self.gears = gears_of(robot, stiffness, damping, motor_stiffness, motor_damping, lead)
         self.torque, self.position, self.velocity = (np.zeros(n) for _ in range(3))
         self._targets = Targets(*(np.zeros((1, n)) for _ in Targets._fields))
-        self._measured = Measured(*(np.zeros(n) for _ in Measured._fields))
+        self._measured = MeasuredMotion(*(np.zeros(n) for _ in MeasuredMotion._fields))
         self._make = KernelCall(
             make_goals, self.gears, self._targets, 0, self._measured,
             Goals(self.torque, self.position, self.velocity),
-            Errors(*(np.zeros(n) for _ in Errors._fields)),
+            TrackingErrors(*(np.zeros(n) for _ in TrackingErrors._fields)),
         )  # fmt: skip
 
     def follow(

@@ -26,8 +26,8 @@ from ..runtime.language.parameters import Parameters
 _DRIVING = int(DrivePhase.DRIVING)
 
 
-class Health(NamedTuple):
-    """The fields of ``RobotHealth``."""
+class HealthFields(NamedTuple):
+    """The fields of ``RobotHealth``, for kernels."""
 
     state: Counts
     voltage: Array
@@ -45,8 +45,8 @@ class Health(NamedTuple):
 
 
 @kernel
-def report_well(tick: Counts, base_period: float, health: Health) -> None:
-    """Drives and sensors are well in a ``tick``, (1,), of ``base_period`` [s]; nothing is measured."""
+def report_healthy(tick: Counts, base_period: float, health: HealthFields) -> None:
+    """Report healthy drives and sensors in a ``tick``, (1,), of ``base_period`` [s]; nothing is measured."""
     health.state[()] = _DRIVING
     for k in range(health.condition.shape[0]):
         health.condition[k] = HEALTHY
@@ -122,10 +122,10 @@ class Robot(Block, ABC):
     @classmethod
     def tells(cls, params: Parameters, context: Context) -> Mapping[str, Any]:
         """``delay``: the delay from sensing to torque [s], for the graph to compensate."""
-        return {"delay": cls.usual_delay(params)}
+        return {"delay": cls.nominal_delay(params)}
 
     @classmethod
-    def usual_delay(cls, params: Parameters) -> float:
+    def nominal_delay(cls, params: Parameters) -> float:
         """The delay [s] from an instant of the control clock, at which the sensors are read, to
         the torques that are computed from them. A driver that knows its own says so here."""
         return 0.002
@@ -171,8 +171,8 @@ class Robot(Block, ABC):
     def reporting(self) -> KernelCall:
         """Writes to ``health`` that all is well, at the tick's own time."""
         clock = self.context.clock
-        health = Health(*(getattr(self.health, name) for name in Health._fields))
-        return KernelCall(report_well, clock.present, clock.base_period, health)
+        health = HealthFields(*(getattr(self.health, name) for name in HealthFields._fields))
+        return KernelCall(report_healthy, clock.present, clock.base_period, health)
 
     @abstractmethod
     def write(self) -> None:

@@ -22,23 +22,27 @@ PACKAGES = (
 ALLOWED: dict[str, tuple[str, ...]] = {
     "mathematics": (),
     "robots": ("mathematics",),
-    "runtime/language": ("robots", "mathematics/compiling"),
+    "runtime/language": ("robots", "mathematics/compiling", "mathematics/kernel"),
     "runtime/running": (
         "runtime/language", "runtime/loading/reading/selection", "robots", "mathematics/compiling",
     ),
-    "runtime/loading": ("runtime/language", "runtime/placement", "robots"),
+    "runtime/loading": (
+        "runtime/language", "runtime/placement", "runtime/transports/registry", "robots",
+    ),
     "runtime/placement": ("runtime/language", "robots"),
+    "runtime/transports": ("runtime/language", "runtime/placement", "robots"),
     "runtime/links": (
-        "runtime/language", "runtime/loading", "runtime/running", "runtime/placement", "robots",
+        "runtime/language", "runtime/loading", "runtime/running", "runtime/placement",
+        "runtime/transports", "robots",
     ),
     "runtime/drawing": ("runtime/language", "runtime/loading", "robots"),
     "runtime/live": (
         "runtime/language", "runtime/loading", "runtime/running", "runtime/drawing",
-        "runtime/placement", "runtime/links", "robots",
+        "runtime/placement", "runtime/links", "runtime/transports", "robots",
     ),
     "runtime/testing": (
         "runtime/language", "runtime/loading", "runtime/running", "runtime/placement",
-        "runtime/links", "robots", "mathematics/compiling",
+        "runtime/links", "runtime/transports", "robots", "mathematics/compiling",
     ),
     "runtime": (
         "runtime/language", "runtime/loading", "runtime/running", "runtime/placement",

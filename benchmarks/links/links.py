@@ -23,16 +23,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...runtime.language.stages import LinkPolicy
-from ...runtime.links.clock_offset import ClockOffset
-from ...runtime.links.inbox import Inbox
-from ...runtime.links.latest import LatestInbox, LinkHealth
+from ...runtime.links.free_link import LatestInbox, LinkHealth
+from ...runtime.links.lockstep_link import Inbox
 from ...runtime.links.message import HEADER, MessageReader, MessageWriter
-from ...runtime.links.transport import Transport, data_key
-from ...runtime.links.zenoh_transport import ZenohTransport
+from ...runtime.links.peers import ClockOffset
 from ...runtime.loading import load_text
 from ...runtime.placement.place import place
 from ...runtime.placement.placed import Link, PlacedGraph
 from ...runtime.running.memory import Memory
+from ...runtime.transports.transport import Transport, data_key
+from ...runtime.transports.zenoh_transport import ZenohTransport
 from ..other_process import other_process
 from ..rows import Row, compare, take_turns
 from .damping import damping

@@ -45,7 +45,7 @@ def scan(
     if as_json:
         print_json({"drives": [vars(each) for each in found], "missing": missing})
         return
-    rows = [(str(f.device), f.motor or "-", f.version, f.trouble or "healthy") for f in found]
+    rows = [(str(f.device), f.motor or "-", f.version, f.problem or "healthy") for f in found]
     console().print(table("", (">address", "motor", "version", "condition"), rows))
     if missing:
         say(console(), f"no answer from {', '.join(missing)}")

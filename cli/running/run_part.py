@@ -8,15 +8,15 @@ from typing import Any
 
 from ...runtime.language.errors import AloftError
 from ...runtime.language.stages import CheckedGraph
-from ...runtime.links.key_folder import check_endpoints, secured
+from ...runtime.links.observer import Showing
 from ...runtime.links.part import BoundPart, run_part
-from ...runtime.links.showing import Showing
-from ...runtime.links.zenoh_transport import ZenohTransport
 from ...runtime.live.part_feed import PartFeed
 from ...runtime.placement.place import place
 from ...runtime.running.real_time import NO_WISHES, RealTime
 from ...runtime.running.run_result import RunResult
 from ...runtime.running.sinks import Sink
+from ...runtime.transports.keys import check_endpoints, secured
+from ...runtime.transports.zenoh_transport import ZenohTransport
 
 
 class Part:

@@ -13,9 +13,8 @@ import typer
 from ...runtime.language.errors import AloftError
 
 if TYPE_CHECKING:
-    from ...runtime.live.live_page import Opened
     from ...runtime.live.live_run import LiveRun
-    from ...runtime.live.live_server import Watched
+    from ...runtime.live.live_server import Opened, Watched
     from ...runtime.live.spread_run import SpreadRun
     from ...runtime.placement.placed import PlacedGraph
 
@@ -62,9 +61,9 @@ def open_live_run(name: str, elsewhere: Elsewhere | None = None) -> Watched:
 
 def _whole(run: LiveRun, path: Path, elsewhere: Elsewhere | None) -> Watched:
     """The whole of the graph of which ``run`` is the part that answers at ``path``."""
-    from ...runtime.links.key_folder import secured
     from ...runtime.live.spread_run import SpreadRun
     from ...runtime.placement.place import place
+    from ...runtime.transports.keys import secured
 
     placed = place(run.graph)
     keys = elsewhere.keys if elsewhere is not None else None
@@ -93,10 +92,10 @@ def _spread_elsewhere(elsewhere: Elsewhere) -> SpreadRun | None:
     Raises:
         AloftError: the graph is wrong, or none of its parts was heard.
     """
-    from ...runtime.links.key_folder import secured
     from ...runtime.live.spread_run import SpreadRun
     from ...runtime.loading import load
     from ...runtime.placement.place import place
+    from ...runtime.transports.keys import secured
     from .local_runs import settings_of
 
     def settings() -> tuple[str, ...]:

@@ -34,10 +34,10 @@ def observer_of(
         AloftError: the graph is wrong, names no machines, or does not fit the keys; or it is not
             clear which run is meant.
     """
-    from ...runtime.links.key_folder import secured
     from ...runtime.links.observer import Observer
     from ...runtime.loading import load
     from ...runtime.placement.place import place
+    from ...runtime.transports.keys import secured
     from .local_runs import settings_of
 
     placed = place(load(graph, [*settings_of(graph, process), *overrides]))

@@ -133,7 +133,7 @@ class BearRobot(DrivenRobot):
             driver.arm(self._next_cycle)
         if params.time == "real":
             age = min(params.command_age, self.context.clock.command_limit or params.command_age)
-            self._thread = MotorThread(driver.loop, age, self._objection)
+            self._thread = MotorThread(driver.loop, age, self._stop_reason)
             self._thread.start()
         else:
             self._queue = CommandQueue(driver.loop, self.robot, params.latency, self.period)
@@ -146,11 +146,11 @@ class BearRobot(DrivenRobot):
 
     def write(self) -> None:
         """Give the command to the motor thread, or to the next exchanges."""
-        heard = self.context.clock.commands_heard()
+        last_command = self.context.clock.commands_heard()
         if self._watchdog is not None:
-            self._watchdog.beat(heard)
+            self._watchdog.beat(last_command)
         if self._thread is not None:
-            self._thread.follow(self.command, heard)
+            self._thread.follow(self.command, last_command)
         elif self._queue is not None:
             self._queue.give(self.command)
         self.stop_after_fault()
@@ -196,7 +196,7 @@ class BearRobot(DrivenRobot):
         if self.driver is not None:
             self.driver.close()
 
-    def _objection(self) -> str:
+    def _stop_reason(self) -> str:
         """Why the motor thread must not go on; empty if it may."""
         if self._watchdog is not None and self._watchdog.tripped:
             limit, silence = 1e3 * self.params.graph_timeout, 1e3 * self.context.clock.command_limit

@@ -28,23 +28,23 @@ STATUS = (
 """What ``status`` reads of every drive."""
 STILL = 0.005
 """A drive that moves further while it is calibrated is not still [rad]."""
-FARTHEST_JOG = 0.5
+MAX_JOG = 0.5
 """How far ``jog`` moves a motor at most [rad]."""
 _READINGS = 100
 _STOPS = 5
 
 
 @dataclass(frozen=True)
-class Found:
-    """A drive that answers: its address, its motor's name in the file, its versions, its trouble."""
+class FoundDrive:
+    """A drive that answers: its address, its motor's name in the file, its versions, and the error it reports."""
 
     device: int
     motor: str
     version: str
-    trouble: str
+    problem: str
 
 
-def scan(bus: BearBus, hardware: Hardware, devices: Sequence[int]) -> list[Found]:
+def scan(bus: BearBus, hardware: Hardware, devices: Sequence[int]) -> list[FoundDrive]:
     """Ping those addresses, once each; nothing else is sent.
 
     Raises:
@@ -54,7 +54,7 @@ def scan(bus: BearBus, hardware: Hardware, devices: Sequence[int]) -> list[Found
         raise BusError("another program or adapter sends instructions on the bus: stop it first")
     names = {motor.id: name for name, motor in hardware.motors.items()}
     return [
-        Found(device, names.get(device, ""), reply.data.hex(" "), reply.trouble)
+        FoundDrive(device, names.get(device, ""), reply.data.hex(" "), reply.problem)
         for device, reply in bus.scan(devices).items()
     ]
 
@@ -69,7 +69,7 @@ def status(bus: BearBus, hardware: Hardware) -> list[dict[str, Any]]:
         row: dict[str, Any] = {"motor": name, "id": motor.id}
         try:
             row |= bus.read(motor.id, *STATUS)
-            row["trouble"] = bus.ping(motor.id).trouble
+            row["trouble"] = bus.ping(motor.id).problem
         except BusError as error:
             row["error"] = str(error)
         rows.append(row)
@@ -136,7 +136,7 @@ def jog(
         bus: the bus.
         hardware: limits.
         name: the motor.
-        angle: at most ``FARTHEST_JOG``, within the motor's ``low`` and ``high``.
+        angle: at most ``MAX_JOG``, within the motor's ``low`` and ``high``.
         seconds: there and back.
         next_cycle: waits for the next cycle, and says whether to go on.
 
@@ -148,8 +148,8 @@ def jog(
             somebody let go of the dead man's switch.
     """
     motor = _motor(hardware, name)
-    if not 0.0 < abs(angle) <= FARTHEST_JOG:
-        raise BusError(f"jog by 0 to {FARTHEST_JOG:g} rad, not by {angle:g}")
+    if not 0.0 < abs(angle) <= MAX_JOG:
+        raise BusError(f"jog by 0 to {MAX_JOG:g} rad, not by {angle:g}")
     drives, current = hardware.drives, hardware.soft_start.current
     if bus.listen(LISTENING):
         raise BusError("another program or adapter sends instructions on the bus: stop it first")

@@ -67,7 +67,7 @@ class Reply:
     data: bytes
 
     @property
-    def trouble(self) -> str:
+    def problem(self) -> str:
         """What the error byte reports, in words."""
         return describe(self.error_byte)
 

@@ -20,7 +20,7 @@ from .bus import BAUDRATE
 from .protocol import LAST_DEVICE
 from .sense_board import SWITCHES
 
-Misfit = tuple[tuple[str | int, ...], str]
+HardwareFault = tuple[tuple[str | int, ...], str]
 """A place in the file and what is wrong there."""
 
 
@@ -178,16 +178,16 @@ class Hardware(Parameters):
             for each in error.errors(include_url=False):
                 faults.append(_fault(file, placed, each))
         if found is not None:
-            for path, message in found.misfits(robot):
+            for path, message in found.find_faults(robot):
                 faults.append(_text(file, placed, path, message))
         if faults or found is None:
             count = f"{len(faults)} fault{'s' if len(faults) != 1 else ''}"
             raise HardwareError("\n".join([*faults, f"{file}: {count} in the hardware's file"]))
         return found
 
-    def misfits(self, robot: RobotDescription | None) -> list[Misfit]:
+    def find_faults(self, robot: RobotDescription | None) -> list[HardwareFault]:
         """What contradicts itself, or the robot's description: places and texts."""
-        found: list[Misfit] = []
+        found: list[HardwareFault] = []
         owners: dict[int, str] = {}
         for name, motor in self.motors.items():
             first = owners.setdefault(motor.id, name)
@@ -205,11 +205,11 @@ class Hardware(Parameters):
         if self.drives.lowest_voltage >= self.drives.highest_voltage:
             found.append((("drives", "lowest_voltage"), "lowest_voltage is above highest_voltage"))
         if robot is not None:
-            found += self._misfits_with(robot)
+            found += self._faults_with(robot)
         return found
 
-    def _misfits_with(self, robot: RobotDescription) -> list[Misfit]:
-        found: list[Misfit] = []
+    def _faults_with(self, robot: RobotDescription) -> list[HardwareFault]:
+        found: list[HardwareFault] = []
         if self.robot != robot.name:
             found.append((("robot",), f"this is the hardware of {self.robot}, not of {robot.name}"))
             return found

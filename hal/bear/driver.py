@@ -180,7 +180,7 @@ def enable(loop: MotorLoop, names: tuple[str, ...]) -> None:
     for name in names:
         device = hardware.motors[name].id
         if bus.read(device, "torque_enable")["torque_enable"] != Torque.ON:
-            off.append(f"{name}: {bus.ping(device).trouble or 'it does not say why'}")
+            off.append(f"{name}: {bus.ping(device).problem or 'it does not say why'}")
     if off:
         for motor in hardware.motors.values():
             bus.write(motor.id, {"torque_enable": Torque.OFF})

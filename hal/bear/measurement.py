@@ -167,7 +167,7 @@ class Supervision:
         self.imu_silent = 0
         self.imu_valid = False
 
-    def judge_drives(self, measured: Measurement, bulk: BulkExchange, driving: bool) -> str:
+    def check_drives(self, measured: Measurement, bulk: BulkExchange, driving: bool) -> str:
         """The first fault of the drives after an exchange; empty where there is none.
 
         ``driving`` says whether the drives are on: errors, voltages and stuck encoders of drives
@@ -222,7 +222,7 @@ class Supervision:
                 )
         return ""
 
-    def judge_board(self, board: SenseBoard, fresh: int) -> str:
+    def check_board(self, board: SenseBoard, fresh: int) -> str:
         """The first fault of the board, of which ``fresh`` packets came with this exchange."""
         settings = self._hardware.board
         self.imu_silent = 0 if fresh else self.imu_silent + 1

@@ -135,8 +135,8 @@ class MotorLoop:
             if fresh:
                 self.measured.take_board(self.board)
         driving = self.phase in (DrivePhase.STARTING, DrivePhase.HOLDING, DrivePhase.DRIVING)
-        fault = self.supervision.judge_drives(self.measured, bulk, driving)
-        fault = self.supervision.judge_board(self.board, fresh) or fault
+        fault = self.supervision.check_drives(self.measured, bulk, driving)
+        fault = self.supervision.check_board(self.board, fresh) or fault
         if fault and driving:
             self.fail(fault)
         return answered
@@ -276,7 +276,7 @@ class MotorThread:
     """Makes a cycle every period, whatever the graph does.
 
     While the drives are on it damps them when the last command is older than ``command_age``, or
-    when ``objection`` gives a reason.
+    when ``stop_reason`` gives a reason.
 
     Args:
         loop: the motor loop.
@@ -284,8 +284,8 @@ class MotorThread:
         objection: called before every cycle; a text that is not empty ends the driving.
     """
 
-    def __init__(self, loop: MotorLoop, command_age: float, objection: Callable[[], str]) -> None:
-        self._loop, self._command_age, self._objection = loop, command_age, objection
+    def __init__(self, loop: MotorLoop, command_age: float, stop_reason: Callable[[], str]) -> None:
+        self._loop, self._command_age, self._stop_reason = loop, command_age, stop_reason
         self._stop = threading.Event()
         self._cycle = threading.Condition()
         self._done = 0
@@ -304,13 +304,13 @@ class MotorThread:
         self._commanded = time.monotonic()
         self._thread.start()
 
-    def follow(self, command: JointCommand, heard: int = 0) -> None:
+    def follow(self, command: JointCommand, last_command: int = 0) -> None:
         """Follow this command from the next cycle on.
 
-        ``heard`` says when what it was made from last came from another machine, by the monotonic
+        ``last_command`` says when what it was made from last came from another machine, by the monotonic
         clock [ns]; zero where it was made here.
         """
-        self._commanded = heard * 1e-9 if heard else time.monotonic()
+        self._commanded = last_command * 1e-9 if last_command else time.monotonic()
         self._loop.follow(command)
 
     def wait_for(self, cycle: int, seconds: float) -> bool:
@@ -345,7 +345,7 @@ class MotorThread:
 
     def _look(self) -> None:
         age = time.monotonic() - self._commanded
-        reason = self._objection()
+        reason = self._stop_reason()
         if reason:
             self._loop.fail(reason)
         elif age > self._command_age and self._loop.phase is DrivePhase.DRIVING:

@@ -22,7 +22,7 @@ CALIBRATION = 0xFF
 """The switches' byte of a packet that tells of a calibration."""
 SWITCHES = ("right_toe", "right_heel", "left_toe", "left_heel")
 """The contact point of each of the lowest bits of the switches' byte."""
-MOST_COOLING = 10
+MAX_COOLING = 10
 
 
 class BoardMode(IntEnum):
@@ -42,8 +42,8 @@ def command_bytes(mode: BoardMode, cooling: int = 0) -> bytes:
     Raises:
         ValueError: there is no such strength.
     """
-    if not 0 <= cooling <= MOST_COOLING:
-        raise ValueError(f"the cooling's strength is 0 to {MOST_COOLING}, and {cooling} is not")
+    if not 0 <= cooling <= MAX_COOLING:
+        raise ValueError(f"the cooling's strength is 0 to {MAX_COOLING}, and {cooling} is not")
     body = bytes((0x03, cooling << 2 | mode))
     return bytes((START, *body, checksum(body), END))
 

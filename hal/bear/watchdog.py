@@ -75,15 +75,15 @@ class Watchdog:
         """The process."""
         return self._process.pid
 
-    def beat(self, heard: int = 0) -> None:
+    def beat(self, last_command: int = 0) -> None:
         """The graph is alive.
 
-        ``heard`` says when commands last came from another machine, by the monotonic clock [ns];
+        ``last_command`` says when commands last came from another machine, by the monotonic clock [ns];
         zero where they are made here. So the process notices silent links although this one hangs.
         """
         until = time.monotonic_ns() + self._limit
-        if heard:
-            until = min(until, heard + self._silence)
+        if last_command:
+            until = min(until, last_command + self._silence)
         struct.pack_into("Q", self._memory, UNTIL, until)
 
     @property

@@ -40,7 +40,7 @@ def report_fixed(truth: BaseTruth) -> None:
 
 @kernel
 def report_planar(position: Array, velocity: Array, truth: BaseTruth) -> None:
-    """The same of a base whose coordinates in the simulator are x, z and the pitch."""
+    """The pose and velocity of a base whose coordinates in the simulator are x, z and the pitch."""
     half = 0.5 * float(position[2])
     report_fixed(truth)
     truth.base_position[0], truth.base_position[2] = float(position[0]), float(position[1])
@@ -52,7 +52,7 @@ def report_planar(position: Array, velocity: Array, truth: BaseTruth) -> None:
 
 @kernel
 def report_floating(position: Array, velocity: Array, truth: BaseTruth) -> None:
-    """The same of a base whose coordinates are position and quaternion w, x, y, z."""
+    """The pose and velocity of a base whose coordinates are position and quaternion w, x, y, z."""
     for axis in range(3):
         truth.base_position[axis] = position[axis]
         truth.base_orientation[axis] = position[4 + axis]
@@ -99,7 +99,7 @@ class FixedBase:
         """Bring ``angular_velocity`` up to date."""
 
     def refreshing(self) -> list[KernelCall]:
-        """The same as calls."""
+        """The calls of ``refresh``."""
         return []
 
     def publishing(self, truth: RobotTruth) -> KernelCall:
@@ -141,7 +141,7 @@ class PlanarBase(FixedBase):
         read_pitch_rate(self._data.qvel, self.angular_velocity)
 
     def refreshing(self) -> list[KernelCall]:
-        """The same as calls."""
+        """The calls of ``refresh``."""
         return [KernelCall(read_pitch_rate, self._data.qvel, self.angular_velocity)]
 
     def publishing(self, truth: RobotTruth) -> KernelCall:

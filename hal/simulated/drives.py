@@ -20,8 +20,8 @@ from ...mathematics.kernel import kernel
 from ...mathematics.linear import multiply_vector
 from ...robots.description import RobotDescription
 from ..drive_control import Targets
-from .motor_feedback import Loops, MotorFeedback, close_loops
-from .state import DriveState, TickRecord, lower_to, raise_to
+from .motor_feedback import MotorFeedback, MotorLoops, close_loops
+from .state import DriveState, TickRecord, update_maximum, update_minimum
 
 
 class Motors(NamedTuple):
@@ -60,7 +60,7 @@ class MotorScratch(NamedTuple):
     speed: Array
     lower: Array
     upper: Array
-    wanted: Array
+    requested: Array
     torque: Array
 
 
@@ -108,18 +108,18 @@ def clip_joint_torque(
     motor_to_torque: Array,
     lower: Array,
     upper: Array,
-    motor_wanted: Array,
+    motor_requested: Array,
     motor_torque: Array,
 ) -> None:
     """Limit the joint ``torque`` [N m] to what the motors can produce.
 
-    ``motor_wanted`` receives the motor torques that are asked for, and ``motor_torque`` those that
+    ``motor_requested`` receives the motor torques that are asked for, and ``motor_torque`` those that
     are produced, within ``lower`` and ``upper``. ``torque_to_motor`` is the inverse of
     ``motor_to_torque``, which is the transpose of ``joint_to_motor``. What is not a number stays so.
     """
-    multiply_vector(torque_to_motor, torque, motor_wanted)
+    multiply_vector(torque_to_motor, torque, motor_requested)
     for k in range(motor_torque.shape[0]):
-        produced = float(motor_wanted[k])
+        produced = float(motor_requested[k])
         if produced < lower[k]:
             produced = float(lower[k])
         if produced > upper[k]:
@@ -140,25 +140,25 @@ def drive_motors(
     )
     clip_joint_torque(
         torque, motors.torque_to_motor, motors.motor_to_torque, scratch.lower, scratch.upper,
-        scratch.wanted, scratch.torque,
+        scratch.requested, scratch.torque,
     )  # fmt: skip
     for k in range(torque.shape[0]):
         produced, speed = float(scratch.torque[k]), float(scratch.speed[k])
-        if produced != scratch.wanted[k]:
+        if produced != scratch.requested[k]:
             record.saturated[k] += 1
-        raise_to(record.torque_high, k, produced)
-        lower_to(record.torque_low, k, produced)
-        raise_to(record.speed_high, k, speed)
-        lower_to(record.speed_low, k, speed)
-        raise_to(record.overload, k, produced - float(scratch.upper[k]))
-        raise_to(record.overload, k, float(scratch.lower[k]) - produced)
+        update_maximum(record.torque_high, k, produced)
+        update_minimum(record.torque_low, k, produced)
+        update_maximum(record.speed_high, k, speed)
+        update_minimum(record.speed_low, k, speed)
+        update_maximum(record.overload, k, produced - float(scratch.upper[k]))
+        update_maximum(record.overload, k, float(scratch.lower[k]) - produced)
         record.joint_torque[k] += torque[k]
 
 
 _ACTIVE, _DAMPING = int(CommandMode.ACTIVE), int(CommandMode.DAMPING)
 
 
-class Commands(NamedTuple):
+class CommandRing(NamedTuple):
     """A ring of commands, of which one is active and some are on their way: see ``DriveState``."""
 
     active: Counts
@@ -181,7 +181,7 @@ class Joints(NamedTuple):
 
 
 @kernel
-def follow_commands(commands: Commands, released: Array, joints: Joints) -> None:
+def follow_commands(commands: CommandRing, released: Array, joints: Joints) -> None:
     """Let the commands act that are due, and write the joint torques that the active one asks for.
 
     Args:
@@ -213,7 +213,7 @@ def follow_commands(commands: Commands, released: Array, joints: Joints) -> None
 
 @kernel
 def drive_joints(
-    commands: Commands,
+    commands: CommandRing,
     released: Array,
     joints: Joints,
     motors: Motors,
@@ -227,15 +227,15 @@ def drive_joints(
 
 @kernel
 def drive_loops(
-    commands: Commands,
+    commands: CommandRing,
     released: Array,
-    loops: Loops,
+    loops: MotorLoops,
     joints: Joints,
     motors: Motors,
     scratch: MotorScratch,
     record: MotorRecord,
 ) -> None:
-    """The same where the drives close the loops per motor, once a command has arrived."""
+    """As ``drive_joints``, but once a command has arrived each drive closes the loop of its motor."""
     follow_commands(commands, released, joints)
     active = int(commands.active[()])
     if int(commands.mode[active]) == _ACTIVE:
@@ -246,7 +246,7 @@ def drive_loops(
     drive_motors(joints.velocity, joints.torque, motors, scratch, record)
 
 
-class Given(NamedTuple):
+class CommandFields(NamedTuple):
     """The fields of ``JointCommand``."""
 
     mode: Counts
@@ -257,39 +257,43 @@ class Given(NamedTuple):
     damping: Array
 
 
-class Way(NamedTuple):
-    """How long a command is on its way: ``shortest`` (1,) [s], and up to ``jitter`` [s] longer, as a
-    number ``drawn`` (1,) between zero and one says, in physics steps of ``timestep`` [s]."""
+class CommandLatency(NamedTuple):
+    """The latency of a command: ``minimum + draw * jitter`` [s], rounded up to physics steps of
+    ``timestep`` [s]. ``minimum`` and ``draw``, a random number from zero to one, are (1,)."""
 
-    shortest: Array
+    minimum: Array
     jitter: float
-    drawn: Array
+    draw: Array
     timestep: float
 
 
 @kernel
 def send_command(
-    given: Given, step: Counts, way: Way, commands: Commands, last_due: Counts
+    command: CommandFields,
+    step: Counts,
+    latency: CommandLatency,
+    commands: CommandRing,
+    last_due: Counts,
 ) -> None:
-    """Put a command into the ring, behind those that are on their way.
+    """Put a command into the ring, behind those that have not arrived.
 
     ``step`` and ``last_due``, the arrival of the command sent last, have no dimension.
     """
-    delay = float(way.shortest[0])
-    if way.jitter != 0.0:
-        delay += way.jitter * float(way.drawn[0])
-    due = int(step[()]) + math.ceil(delay / way.timestep - 1e-9)
+    delay = float(latency.minimum[0])
+    if latency.jitter != 0.0:
+        delay += latency.jitter * float(latency.draw[0])
+    due = int(step[()]) + math.ceil(delay / latency.timestep - 1e-9)
     due = max(due, int(last_due[()]))
     pending = int(commands.pending[()])
     slot = (int(commands.active[()]) + 1 + pending) % commands.due.shape[0]
     targets = commands.targets
-    commands.mode[slot] = int(given.mode[()])
-    for k in range(given.torque.shape[0]):
-        targets.torque[slot, k] = given.torque[k]
-        targets.position[slot, k] = given.position[k]
-        targets.velocity[slot, k] = given.velocity[k]
-        targets.stiffness[slot, k] = given.stiffness[k]
-        targets.damping[slot, k] = given.damping[k]
+    commands.mode[slot] = int(command.mode[()])
+    for k in range(command.torque.shape[0]):
+        targets.torque[slot, k] = command.torque[k]
+        targets.position[slot, k] = command.position[k]
+        targets.velocity[slot, k] = command.velocity[k]
+        targets.stiffness[slot, k] = command.stiffness[k]
+        targets.damping[slot, k] = command.damping[k]
     commands.due[slot] = due
     last_due[()] = due
     commands.pending[()] = pending + 1
@@ -342,7 +346,7 @@ class Drives:
         self._feedback = feedback
         self._state = state
         limits = MotorLimits(robot, record)
-        self._commands = Commands(
+        self._commands = CommandRing(
             state.active, state.pending, state.due, state.mode,
             Targets(*(getattr(state, name) for name in Targets._fields)),
         )  # fmt: skip
@@ -388,8 +392,8 @@ class Drives:
         self._state.pending[()] = 0
         self._state.mode[int(self._state.active)] = CommandMode.DAMPING
 
-    def sending(self, command: JointCommand, step: Counts, way: Way) -> KernelCall:
+    def sending(self, command: JointCommand, step: Counts, latency: CommandLatency) -> KernelCall:
         """Sends a command in the physics step ``step``, a count without a dimension. It arrives as
-        late as its ``way`` is long, but not before earlier commands."""
-        given = Given(*(getattr(command, name) for name in Given._fields))
-        return KernelCall(send_command, given, step, way, self._commands, self._state.last_due)
+        late as its ``latency`` is long, but not before earlier commands."""
+        fields = CommandFields(*(getattr(command, name) for name in CommandFields._fields))
+        return KernelCall(send_command, fields, step, latency, self._commands, self._state.last_due)

@@ -19,12 +19,12 @@ from ...robots.transmission import motor_gains
 from ...runtime.language.signals import Field, Signal
 from ..drive_control import (
     DriveGains,
-    Errors,
     Gears,
     Goals,
     JointTargets,
-    Measured,
+    MeasuredMotion,
     Targets,
+    TrackingErrors,
     gears_of,
     joint_gains,
     make_goals,
@@ -46,17 +46,17 @@ class FeedbackState(Signal):
     seen_velocity = Field("n_joints", unit="rad/s", text="joint velocities in it")
 
 
-class Loops(NamedTuple):
-    """The drives' loops: how the goals are made and for how many physics ``steps``, what is kept of
-    them (``FeedbackState``), and scratch, of which the last three are (n_joints,)."""
+class MotorLoops(NamedTuple):
+    """The loops of all drives: the gears and gains that goals are made with, the physics ``steps`` between
+    two goals, the state (``FeedbackState``), and scratch, of which the last three are (n_joints,)."""
 
     gears: Gears
     steps: int
     following: Flags
     age: Counts
     goals: Goals
-    seen: Measured
-    errors: Errors
+    seen: MeasuredMotion
+    errors: TrackingErrors
     angle: Array
     speed: Array
     torque: Array
@@ -79,15 +79,15 @@ class MotorFeedback:
     ) -> None:  # fmt: skip
         n = len(robot.joints)
         stiffness, damping = joint_gains(params, robot)
-        self.loops = Loops(
+        self.loops = MotorLoops(
             gears_of(
                 robot, stiffness, damping, motor_gains(robot, stiffness, "N m/rad").motor,
                 motor_gains(robot, damping, "N m s/rad").motor, _LEAD * period,
             ),
             steps, state.following, state.age,
             Goals(state.torque, state.position, state.velocity),
-            Measured(np.zeros(n), np.zeros(n), state.seen_position, state.seen_velocity),
-            Errors(*(np.zeros(n) for _ in Errors._fields)),
+            MeasuredMotion(np.zeros(n), np.zeros(n), state.seen_position, state.seen_velocity),
+            TrackingErrors(*(np.zeros(n) for _ in TrackingErrors._fields)),
             *(np.zeros(n) for _ in range(3)),
         )  # fmt: skip
         self._state = state
@@ -116,7 +116,7 @@ class MotorFeedback:
 
 @kernel
 def close_loops(
-    loops: Loops,
+    loops: MotorLoops,
     targets: Targets,
     row: int,
     arrived: bool,

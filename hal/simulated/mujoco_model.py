@@ -46,7 +46,7 @@ if TYPE_CHECKING:
 
 
 GROUND_BIT = 1
-MOST_LIMBS = 30
+MAX_LIMBS = 30
 """The number of limbs that collision bits can distinguish; further limbs do not collide with the
 last of these."""
 CONTACT_TIME_CONSTANT = 0.004
@@ -181,7 +181,7 @@ def _limb_of_link(robot: RobotDescription) -> dict[str, int]:
     limb = {robot.base: 0}
     for joint in robot.joints:
         on_base = joint.parent == robot.base
-        following = min(max(limb.values()) + 1, MOST_LIMBS)
+        following = min(max(limb.values()) + 1, MAX_LIMBS)
         limb[joint.child] = following if on_base else limb[joint.parent]
     return limb
 
@@ -318,19 +318,19 @@ def build_world(
         ValueError: the simulator cannot express the robot; see ``build_mujoco_model``.
     """
     scene = params.build_scene()
-    for kept in _kept:
-        if kept.robot is robot and kept[1:4] == (scene, params.timestep, variation):
-            return copy(kept.model)
+    for cached in _model_cache:
+        if cached.robot is robot and cached[1:4] == (scene, params.timestep, variation):
+            return copy(cached.model)
     import mujoco
 
     model = build_mujoco_model(robot, scene=scene, timestep=params.timestep, variation=variation)
     # A state that has become NaN must be noticed, and not be replaced by the initial state.
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
-    _kept.append(_Kept(robot, scene, params.timestep, variation, copy(model)))
+    _model_cache.append(_CachedModel(robot, scene, params.timestep, variation, copy(model)))
     return model
 
 
-class _Kept(NamedTuple):
+class _CachedModel(NamedTuple):
     """A model that has been built, and what it was built from."""
 
     robot: RobotDescription
@@ -340,9 +340,9 @@ class _Kept(NamedTuple):
     model: MjModel
 
 
-_kept: deque[_Kept] = deque(maxlen=4)
+_model_cache: deque[_CachedModel] = deque(maxlen=4)
 """The models built last. The runs of a study mostly differ by what is not in the model, and building
-it takes longer than anything else before a run. Nobody is given the kept model itself."""
+it takes longer than anything else before a run. Callers get copies."""
 
 
 def joint_armature(robot: RobotDescription) -> Array:
@@ -368,7 +368,7 @@ def add_rotors(spec: MjSpec, robot: RobotDescription) -> None:
     Raises:
         ValueError: a motor couples two joints neither of which carries the other.
     """
-    complaint = unfit_motor(robot)
+    complaint = unsupported_motor(robot)
     if complaint:
         raise ValueError(f"{robot.name}: {complaint}")
     for motor in _shared_motors(robot):
@@ -381,7 +381,7 @@ def add_rotors(spec: MjSpec, robot: RobotDescription) -> None:
                 tendon.wrap_joint(joint.name, weight)
 
 
-def unfit_motor(robot: RobotDescription) -> str:
+def unsupported_motor(robot: RobotDescription) -> str:
     """A text that says which motor's rotor cannot be simulated, and why; empty if all can."""
     names = [joint.name for joint in robot.joints]
     above = [joints_above(robot, joint.child) for joint in robot.joints]

@@ -14,7 +14,7 @@ from ...runtime.language.block import Context, Metric, Misfit, State
 from ...runtime.language.parameters import Parameters
 from ..drive_control import gain_misfits, lost_gains
 from .motor_feedback import FeedbackState, MotorFeedback
-from .mujoco_model import unfit_motor
+from .mujoco_model import unsupported_motor
 from .simulated_robot import SimulatedRobot, SimulatorParameters
 from .stance import uneven_contacts
 from .state import DriveState, TickRecord
@@ -87,7 +87,7 @@ class MujocoRobot(SimulatedRobot):
         """Report a transmission that the simulator cannot express, gains that no drives can give, and
         feet that cannot stand."""
         assert isinstance(params, SimulatorParameters) and robot is not None
-        complaint = unfit_motor(robot)
+        complaint = unsupported_motor(robot)
         if complaint:
             yield Misfit(complaint, fix="correct `transmission` in the robot's description")
         elif params.bus_period is not None:
@@ -125,7 +125,7 @@ class MujocoRobot(SimulatedRobot):
             )
 
     @classmethod
-    def usual_delay(cls, params: Parameters) -> float:
+    def nominal_delay(cls, params: Parameters) -> float:
         """The latency that is simulated."""
         assert isinstance(params, SimulatorParameters)
         return params.latency
@@ -155,7 +155,7 @@ class MujocoRobot(SimulatedRobot):
 
     def setup(self) -> None:
         """Draw the world from the seed and build it."""
-        from .drives import Drives, Way
+        from .drives import CommandLatency, Drives
         from .plant import Plant
         from .random_streams import Purpose, uniform_call
         from .stance import RELEASED
@@ -176,11 +176,13 @@ class MujocoRobot(SimulatedRobot):
             *plant.sensors.reading_switches(self.physics.step, self.record, self.contacts.closed),
             *plant.truth.reporting(self.truth), self.reporting(),
         ])  # fmt: skip
-        way = self._way = Way(np.zeros(1), float(params.jitter), np.zeros(1), params.timestep)
-        jitter, _ = uniform_call(plant.streams[Purpose.JITTER], way.drawn)
+        latency = self._latency = CommandLatency(
+            np.zeros(1), float(params.jitter), np.zeros(1), params.timestep
+        )
+        jitter, _ = uniform_call(plant.streams[Purpose.JITTER], latency.draw)
         self._sending = CallSequence([
             *([jitter] if params.jitter else []),
-            drives.sending(self.command, self.physics.step, way),
+            drives.sending(self.command, self.physics.step, latency),
         ])  # fmt: skip
         self._settling = plant.simulating(drives, 1)
         self._ticking = plant.simulating(drives, steps, self.push)
@@ -195,7 +197,7 @@ class MujocoRobot(SimulatedRobot):
             self._settling,
             lambda pose, torque: drives.hold(pose, torque, plant.stiffness, plant.damping),
         )
-        self._way.shortest[0] = self.params.latency + plant.late
+        self._latency.minimum[0] = self.params.latency + plant.start_delay
 
     def read(self) -> None:
         """Publish the sensors, the truth at the present instant, and that all is well."""

@@ -37,15 +37,15 @@ from .stance import (
     place_standing,
 )
 from .state import (
-    Cleared,
     PhysicsState,
+    RecordTotals,
     StepRecord,
     StepSensors,
     TickRecord,
     clear,
     mean_over_steps,
-    note_step,
     read_encoders,
+    record_step,
 )
 from .truth import TruthReport
 
@@ -53,7 +53,7 @@ if TYPE_CHECKING:
     from mujoco import MjData, MjModel
 
 
-class Points(NamedTuple):
+class PushPoints(NamedTuple):
     """The points that a force may act at, in the simulator's memory.
 
     ``sites`` and ``bodies`` (n_points,) are the numbers of the points and of their bodies, ``places``
@@ -71,7 +71,7 @@ class Points(NamedTuple):
 
 
 @kernel
-def release(wrenches: Array) -> None:
+def clear_wrenches(wrenches: Array) -> None:
     """Nothing acts on any body."""
     for body in range(wrenches.shape[0]):
         for axis in range(6):
@@ -79,7 +79,7 @@ def release(wrenches: Array) -> None:
 
 
 @kernel
-def push_point(force: Array, point: Indices, points: Points) -> None:
+def apply_push(force: Array, point: Indices, points: PushPoints) -> None:
     """Let the ``force`` (3,) [N, world] act at the ``point``, without a dimension, of its body, which
     moves with the body."""
     fx, fy, fz = float(force[0]), float(force[1]), float(force[2])
@@ -106,18 +106,18 @@ class ExternalForces:
         self._robot = robot
         sites = [int(model.site(f"point/{name}").id) for name in robot.points]
         bodies = [int(model.body(body_name(link)).id) for link, _ in robot.points.values()]
-        self._points = Points(
+        self._points = PushPoints(
             np.array(sites, np.int64), np.array(bodies, np.int64), data.site_xpos, data.xipos,
             data.xfrc_applied, np.zeros(1, np.bool_),
         )  # fmt: skip
 
     def releasing(self) -> KernelCall:
         """Nothing acts any more."""
-        return KernelCall(release, self._points.wrenches)
+        return KernelCall(clear_wrenches, self._points.wrenches)
 
     def pushing(self, push: ExternalForce) -> KernelCall:
         """The push acts in the next physics step; ``check`` says whether it has a point."""
-        return KernelCall(push_point, push.force, push.point, self._points)
+        return KernelCall(apply_push, push.force, push.point, self._points)
 
     def check(self, push: ExternalForce) -> None:
         """Raise ``IndexError`` if the push has acted at a point that the robot does not have."""
@@ -223,9 +223,9 @@ class Plant:
         self._encoder = np.zeros(len(robot.joints))
         self.clearing = KernelCall(
             clear, *(getattr(record, name) for name in ("steps", "forbidden", "saturated")),
-            Cleared(*(getattr(record, name) for name in Cleared._fields)),
+            RecordTotals(*(getattr(record, name) for name in RecordTotals._fields)),
         )  # fmt: skip
-        self.late = 0.0
+        self.start_delay = 0.0
         self._attach(mujoco.MjData(self.model))
 
     @staticmethod
@@ -250,7 +250,7 @@ class Plant:
         self.truth = TruthReport(data, base, self._robot, self._params.build_scene(), self.record)
         record, sensors = self.record, self.sensors
         self._note = KernelCall(
-            note_step, self.physics.step, StepSensors(load, *self._sampled, self.position),
+            record_step, self.physics.step, StepSensors(load, *self._sampled, self.position),
             *self._limits, sensors.ground_force, sensors.bounce_steps,
             StepRecord(*(getattr(record, name) for name in StepRecord._fields)),
         )  # fmt: skip
@@ -287,7 +287,7 @@ class Plant:
         if params.random_start_phase:
             phase = float(stream(params.seed, Purpose.START_PHASE).random()) * self._period
         early = math.floor(phase / params.timestep)
-        self.late = phase - early * params.timestep
+        self.start_delay = phase - early * params.timestep
         self._step1.run()
         observed = math.ceil(OBSERVED_TIME / params.timestep)
         self._settle(step, math.ceil(SETTLING_TIME / params.timestep) + early - observed)

@@ -83,7 +83,7 @@ class StepRecord(NamedTuple):
     bounce_end: Counts
 
 
-class Cleared(NamedTuple):
+class RecordTotals(NamedTuple):
     """The sums and extremes of numbers that begin anew with every tick: see ``TickRecord``."""
 
     load: Array
@@ -98,7 +98,7 @@ class Cleared(NamedTuple):
 
 
 @kernel
-def clear(steps: Counts, forbidden: Counts, saturated: Counts, record: Cleared) -> None:
+def clear(steps: Counts, forbidden: Counts, saturated: Counts, record: RecordTotals) -> None:
     """Begin a new record. ``steps`` and ``forbidden`` are without a dimension."""
     steps[()] = forbidden[()] = 0
     for point in range(record.load.shape[0]):
@@ -153,21 +153,21 @@ def watch_switches(
 
 
 @kernel
-def raise_to(highest: Array, k: int, value: float) -> None:
+def update_maximum(highest: Array, k: int, value: float) -> None:
     """Element ``k`` becomes ``value`` if that is higher, or not a number."""
     if value > highest[k] or math.isnan(value):
         highest[k] = value
 
 
 @kernel
-def lower_to(lowest: Array, k: int, value: float) -> None:
+def update_minimum(lowest: Array, k: int, value: float) -> None:
     """Element ``k`` becomes ``value`` if that is lower, or not a number."""
     if value < lowest[k] or math.isnan(value):
         lowest[k] = value
 
 
 @kernel
-def note_step(
+def record_step(
     step: Counts,
     sensors: StepSensors,
     lower: Array,
@@ -199,5 +199,5 @@ def note_step(
         record.forbidden[()] = int(record.forbidden[()]) + 1
     for joint in range(lower.shape[0]):
         angle = float(sensors.position[joint])
-        raise_to(record.violation, joint, float(lower[joint]) - angle)
-        raise_to(record.violation, joint, angle - float(upper[joint]))
+        update_maximum(record.violation, joint, float(lower[joint]) - angle)
+        update_maximum(record.violation, joint, angle - float(upper[joint]))

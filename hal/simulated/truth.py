@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from mujoco import MjData
 
 
-class Instant(NamedTuple):
+class TrueState(NamedTuple):
     """What the simulator knows of the present instant.
 
     ``joint_position``, ``joint_velocity`` (n_joints,) [rad, rad/s]; ``com``, ``com_velocity`` and
@@ -42,7 +42,7 @@ class Instant(NamedTuple):
     boxes: Array
 
 
-class Peaks(NamedTuple):
+class TickExtremes(NamedTuple):
     """Sums and extremes over the physics steps of a tick: see ``TickRecord``."""
 
     steps: Counts
@@ -57,7 +57,7 @@ class Peaks(NamedTuple):
     speed_low: Array
 
 
-class Report(NamedTuple):
+class TruthFields(NamedTuple):
     """The fields of ``RobotTruth`` but those of the base."""
 
     joint_position: Array
@@ -98,7 +98,7 @@ def largest(values: Array) -> float:
 
 
 @kernel
-def report_contacts(instant: Instant, peaks: Peaks, report: Report) -> None:
+def report_contacts(instant: TrueState, peaks: TickExtremes, report: TruthFields) -> None:
     """The contact points: where they are, the ground under them, and the mean force on each."""
     steps = int(peaks.steps[()])
     for point in range(instant.below.shape[0]):
@@ -116,7 +116,7 @@ def report_contacts(instant: Instant, peaks: Peaks, report: Report) -> None:
 
 
 @kernel
-def report_truth(instant: Instant, peaks: Peaks, report: Report) -> None:
+def report_truth(instant: TrueState, peaks: TickExtremes, report: TruthFields) -> None:
     """Write the truth about a tick that has been simulated."""
     for axis in range(3):
         report.com[axis] = instant.com[axis]
@@ -155,7 +155,7 @@ class TruthReport:
     ) -> None:
         self._base = base
         boxes = [(*box.x, *box.y, box.top) for box in scene.boxes]
-        self._instant = Instant(
+        self._instant = TrueState(
             data.qpos[base.positions :],
             data.qvel[base.velocities :],
             data.sensor("com").data,
@@ -167,11 +167,11 @@ class TruthReport:
             np.array([scene.floor]),
             np.array(boxes, dtype=np.float64).reshape(-1, 5),
         )
-        self._peaks = Peaks(*(getattr(record, name) for name in Peaks._fields))
+        self._peaks = TickExtremes(*(getattr(record, name) for name in TickExtremes._fields))
 
     def reporting(self, truth: RobotTruth) -> tuple[KernelCall, KernelCall]:
         """Write all fields of the truth."""
-        report = Report(*(getattr(truth, name) for name in Report._fields))
+        report = TruthFields(*(getattr(truth, name) for name in TruthFields._fields))
         return (
             self._base.publishing(truth),
             KernelCall(report_truth, self._instant, self._peaks, report),

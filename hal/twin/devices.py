@@ -225,8 +225,8 @@ Fault = Callable[[int, bytes], bytes]
 """Takes an answer's device and bytes, and returns the bytes that really travel."""
 
 
-def faithful(device: int, answer: bytes) -> bytes:
-    """The answer as it is."""
+def unchanged(device: int, answer: bytes) -> bytes:
+    """No fault: the answer arrives as it was sent."""
     return answer
 
 
@@ -241,7 +241,7 @@ class EmulatedBus:
         fault: what happens to every answer on its way.
     """
 
-    def __init__(self, actuators: Iterable[EmulatedActuator], fault: Fault = faithful) -> None:
+    def __init__(self, actuators: Iterable[EmulatedActuator], fault: Fault = unchanged) -> None:
         self.actuators = {actuator.device: actuator for actuator in actuators}
         self.fault = fault
         self._reader = FrameReader()

@@ -17,7 +17,7 @@ from ..simulated.drives import MotorLimits, drive_motors
 from ..simulated.motor_feedback import motor_feedback
 from ..simulated.state import TickRecord
 from .devices import EmulatedActuator
-from .snapshot import Part
+from .snapshot import Attributes
 
 _SLOTS = 8
 """How many sets of goals may be on their way."""
@@ -68,7 +68,7 @@ class EmulatedDrives:
         self.position = np.zeros(n)
         """What every actuator's encoder reads [rad]; a stuck one stays."""
         self.velocity = np.zeros(n)
-        """The same of its velocity [rad/s]."""
+        """The velocity that every encoder reads [rad/s]."""
         self.stuck = np.zeros(n, dtype=np.bool_)
         """Which encoders are stuck."""
         self.goals = np.zeros((n, 6))
@@ -79,11 +79,11 @@ class EmulatedDrives:
         self.last_due = -(1 << 50)
         self.torque_sum, self.torque_steps = np.zeros(n), 0
         self.enabled, self.damped = np.zeros(n), np.zeros(n)
-        self._wanted, self._torque = np.zeros(n), np.zeros(n)
+        self._requested, self._torque = np.zeros(n), np.zeros(n)
         self._fresh_position, self._fresh_velocity = np.zeros(n), np.zeros(n)
         self._not_stuck = np.zeros(n, dtype=np.bool_)
 
-    def parts(self) -> list[Part]:
+    def parts(self) -> list[Attributes]:
         """What changes in a run."""
         names = (
             "current", "position", "velocity", "stuck", "goals", "enabled", "damped", "queue", "dues", "first",
@@ -144,18 +144,18 @@ class EmulatedDrives:
         """Write the joint torques [N m] of a physics step, from the joints' motion."""
         self.sense(position, velocity)
         self._arrive(step)
-        goals, current, wanted = self.goals, self.current, self._wanted
+        goals, current, requested = self.goals, self.current, self._requested
         motor_feedback(
             goals[:, 0], goals[:, 1], goals[:, 2], goals[:, 3], goals[:, 4],
             self.position, self.velocity, current,
         )  # fmt: skip
         np.minimum(current, goals[:, 5], out=current)
-        np.negative(goals[:, 5], out=wanted)
-        np.maximum(current, wanted, out=current)
+        np.negative(goals[:, 5], out=requested)
+        np.maximum(current, requested, out=current)
         np.multiply(current, self.enabled, out=current)
-        np.multiply(self._fresh_velocity, self.damped, out=wanted)
-        np.multiply(wanted, self._braking / self._constant, out=wanted)
-        np.subtract(current, wanted, out=current)
+        np.multiply(self._fresh_velocity, self.damped, out=requested)
+        np.multiply(requested, self._braking / self._constant, out=requested)
+        np.subtract(current, requested, out=current)
         np.multiply(current, self._constant, out=self._torque)
         np.multiply(self._torque, self.sign, out=self._torque)
         self._transmission.joint_torque(self._torque, self._limited)

@@ -64,7 +64,7 @@ class Faults:
         return [
             fault
             for fault in self.active(*kinds)
-            if fault.target in ("", target) and self._befalls(fault, target)
+            if fault.target in ("", target) and self._applies(fault, target)
         ]
 
     def draw(self, target: str, purpose: int) -> np.random.Generator:
@@ -72,21 +72,21 @@ class Faults:
         place = int.from_bytes(target.encode()[:6].ljust(6, b"_"), "big")
         return np.random.default_rng([self._seed, self.exchange, place, len(target), purpose])
 
-    def _befalls(self, fault: Fault, target: str) -> bool:
+    def _applies(self, fault: Fault, target: str) -> bool:
         return fault.share >= 1.0 or bool(self.draw(target, 0).random() < fault.share)
 
 
-def spoil(fault: Fault, answer: bytes, draws: np.random.Generator) -> bytes:
+def apply_fault(fault: Fault, answer: bytes, draws: np.random.Generator) -> bytes:
     """The bytes of a drive's answer that really travel; empty where none do in time."""
     if fault.kind == "truncated":
         return answer[: int(draws.integers(0, len(answer)))]
     if fault.kind == "corrupted":
-        return flip(answer, draws)
+        return corrupt_byte(answer, draws)
     return b""
 
 
-def flip(data: bytes, draws: np.random.Generator) -> bytes:
-    """The same bytes with one of them changed."""
+def corrupt_byte(data: bytes, draws: np.random.Generator) -> bytes:
+    """The data with one byte changed at random."""
     hurt = bytearray(data)
     hurt[int(draws.integers(0, len(hurt)))] ^= int(draws.integers(1, 256))
     return bytes(hurt)

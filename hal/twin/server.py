@@ -76,9 +76,9 @@ class PseudoTerminal:
                     self.send(answer)
 
 
-_LEAST = 6
+_SHORTEST_FRAME = 6
 """Bytes of the shortest instruction."""
-_PATIENCE = 0.5
+_FRAME_TIMEOUT = 0.5
 """After so long without a byte the beginning of an instruction is forgotten [s]."""
 
 
@@ -139,7 +139,9 @@ class TwinServer:
     def _to_bus(self, data: bytes) -> bytes:
         """Take what arrived; instructions are handled one by one, as they become whole."""
         now = time.monotonic()
-        if now - self._received > _PATIENCE:  # the rest of an instruction will not come any more
+        if (
+            now - self._received > _FRAME_TIMEOUT
+        ):  # the rest of an instruction will not come any more
             self._pending.clear()
         self._received = now
         self._pending += data
@@ -170,7 +172,7 @@ class TwinServer:
                 return found
             end = 4 + pending[3]
             possible = pending[2] <= LAST_DEVICE or pending[2] == BROADCAST
-            if end < _LEAST or not possible:
+            if end < _SHORTEST_FRAME or not possible:
                 del pending[:1]
                 continue
             if len(pending) < end:

@@ -1,4 +1,4 @@
-"""Keeps what changes in some objects as one array of numbers, for a snapshot of a run."""
+"""The changing attributes of Python objects as one array of numbers, for a snapshot of a run."""
 
 from __future__ import annotations
 
@@ -11,18 +11,24 @@ from numpy.typing import NDArray
 
 from ...mathematics.arrays import Array
 
-Part = tuple[object, tuple[str, ...]]
-"""An object, and the names of its attributes that change: arrays, numbers, or dictionaries of
-numbers whose keys do not change."""
+Attributes = tuple[object, tuple[str, ...]]
+"""An object, and the names of its attributes that change in a run.
+
+An attribute is an array, a number, or a dictionary of numbers whose keys do not change.
+"""
 
 
-class Frozen:
-    """The values of these attributes, in their order, as float64.
+class ObjectSnapshot:
+    """Saves the values of attributes to an array of float64, in their order, and restores them.
 
-    Whole numbers must be within 2^53. A member of an enumeration stays one.
+    Arrays are restored in place, so views of them stay valid. Whole numbers must be within 2^53. A
+    member of an enumeration stays one.
+
+    Attributes:
+        size: how many numbers there are.
     """
 
-    def __init__(self, parts: Sequence[Part]) -> None:
+    def __init__(self, parts: Sequence[Attributes]) -> None:
         self._places = [(owner, name) for owner, names in parts for name in names]
         self.size = sum(_values(getattr(owner, name)).size for owner, name in self._places)
 
@@ -34,22 +40,22 @@ class Frozen:
             out[start : start + values.size] = values.ravel()
             start += values.size
 
-    def load(self, kept: Array) -> None:
+    def load(self, values: Array) -> None:
         """Set all values to those that ``save`` wrote."""
         start = 0
         for owner, name in self._places:
-            present: Any = getattr(owner, name)
-            size = _values(present).size
-            values = kept[start : start + size]
+            current: Any = getattr(owner, name)
+            size = _values(current).size
+            saved = values[start : start + size]
             start += size
-            if isinstance(present, np.ndarray):
-                present[...] = values.reshape(present.shape)
-            elif isinstance(present, dict):
-                present.update(zip(present, values.tolist(), strict=True))
-            elif isinstance(present, IntEnum):
-                setattr(owner, name, type(present)(int(values[0])))
+            if isinstance(current, np.ndarray):
+                current[...] = saved.reshape(current.shape)
+            elif isinstance(current, dict):
+                current.update(zip(current, saved.tolist(), strict=True))
+            elif isinstance(current, IntEnum):
+                setattr(owner, name, type(current)(int(saved[0])))
             else:
-                setattr(owner, name, type(present)(values[0]))
+                setattr(owner, name, type(current)(saved[0]))
 
 
 def _values(value: Any) -> NDArray[Any]:

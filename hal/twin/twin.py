@@ -20,8 +20,8 @@ from ..simulated.simulated_robot import SimulatorParameters
 from ..simulated.state import DriveState, PhysicsState, TickRecord
 from .devices import EmulatedActuator, EmulatedBoard, EmulatedBus
 from .drives import EmulatedDrives
-from .faults import ANSWERS, Fault, Faults, flip, spoil
-from .snapshot import Part
+from .faults import ANSWERS, Fault, Faults, apply_fault, corrupt_byte
+from .snapshot import Attributes
 
 BRAKING = 0.5
 """Of an actuator with shorted windings [N m s/rad]: an estimate."""
@@ -67,7 +67,7 @@ class Twin:
         self._names = robot.transmission.motors
         self.actuators = [EmulatedActuator(hardware.motors[name].id) for name in self._names]
         self._by_device = {actuator.device: k for k, actuator in enumerate(self.actuators)}
-        self.bus = EmulatedBus(self.actuators, self._spoil)
+        self.bus = EmulatedBus(self.actuators, self._answer_with_faults)
         self.board = EmulatedBoard()
         self.drives = EmulatedDrives(robot, hardware, self.actuators, record, BRAKING)
         self.faults = Faults(faults, params.seed)
@@ -126,10 +126,10 @@ class Twin:
         self._sense()
         self._begin_packet()
 
-    def parts(self) -> list[Part]:
+    def parts(self) -> list[Attributes]:
         """What changes in a run, beside the memory that was given."""
         names = ("released", "exchanges", "zero", "before", "counted", "last_packet", "closed")
-        found: list[Part] = [(self, names), *self.drives.parts()]
+        found: list[Attributes] = [(self, names), *self.drives.parts()]
         found += [
             (actuator, ("status", "config", "errors", "corrupt", "silent_time"))
             for actuator in self.actuators
@@ -150,11 +150,11 @@ class Twin:
         if self.faults.active("pulled_cable"):
             raise PulledCableError("the cable of the drives' bus is pulled")
         for fault in self.faults.of("", "corrupted_request"):
-            data = flip(data, self.faults.draw(fault.kind, 1))
+            data = corrupt_byte(data, self.faults.draw(fault.kind, 1))
         answers = self.bus.receive(data)
         step = int(self.plant.physics.step)
         if bulk:
-            delay = self.plant.late
+            delay = self.plant.start_delay
             if self._params.jitter:
                 delay += self._params.jitter * self._jitter.random()
             step += math.ceil(delay / self._params.timestep - 1e-9)
@@ -185,7 +185,7 @@ class Twin:
         self.exchanges += 1
         self.faults.exchange = self.exchanges
         self.faults.now = (self.exchanges - self.zero) * self._period if self.released else -1.0
-        self._befall()
+        self._apply_drive_faults()
         for _ in range(self._steps):
             (self._pushed if self.released else self._step).run()
             if self._push is not None:
@@ -196,7 +196,7 @@ class Twin:
         self._sense()
         self._send_packet()
 
-    def push_by(self, push: ExternalForce | None) -> None:
+    def set_push(self, push: ExternalForce | None) -> None:
         """From now on this force from outside acts, once the gantry has let go; ``None``: none."""
         self._push = push
         self._pushed = self._step if push is None else self.plant.simulating(self, 1, push)
@@ -209,7 +209,7 @@ class Twin:
 
         def write() -> None:
             self.drives.joint_torque(int(step), position, velocity, out)
-            self._let_go()
+            self._release_gantry()
             if not self.released:
                 holding.run()
                 np.add(out, self._held, out=out)
@@ -222,7 +222,7 @@ class Twin:
         self.counted -= int(self._record.steps)
         self.plant.clear_record()
 
-    def _let_go(self) -> None:
+    def _release_gantry(self) -> None:
         """The gantry lets go when all drives are on and one is told to give a current."""
         if not self.released and self.drives.enabled.all() and self.drives.goals[:, 0].any():
             self.released = True
@@ -279,7 +279,7 @@ class Twin:
 
     # -- what goes wrong ---------------------------------------------------------------------
 
-    def _befall(self) -> None:
+    def _apply_drive_faults(self) -> None:
         """Let faults of drives begin and end."""
         if not self.faults:
             return
@@ -291,7 +291,7 @@ class Twin:
             if self.faults.of(name, "dead"):
                 actuator.status["torque_enable"] = 0.0
 
-    def _spoil(self, device: int, answer: bytes) -> bytes:
+    def _answer_with_faults(self, device: int, answer: bytes) -> bytes:
         """What travels of an answer."""
         if not self.faults:
             return answer
@@ -301,7 +301,7 @@ class Twin:
         for fault in self.faults.of(name, *ANSWERS):
             if fault.kind == "late":
                 self._late += answer
-            answer = spoil(fault, answer, self.faults.draw(name, 3))
+            answer = apply_fault(fault, answer, self.faults.draw(name, 3))
             if not answer:
                 break
         return answer

@@ -14,13 +14,13 @@ from ..bear.driven_robot import DrivenRobot, DriveParameters, read_hardware
 from ..bear.driver import DriveLaw, Driver
 from ..bear.motor_loop import CommandQueue
 from ..drive_control import joint_gains
-from ..simulated.mujoco_model import unfit_motor
+from ..simulated.mujoco_model import unsupported_motor
 from ..simulated.plant import Plant
 from ..simulated.simulated_robot import SimulatedRobot, SimulatorParameters
 from ..simulated.stance import uneven_contacts
 from ..simulated.state import DriveState, PhysicsState, TickRecord
 from .faults import Fault
-from .snapshot import Frozen, Part
+from .snapshot import Attributes, ObjectSnapshot
 from .twin import Twin
 
 
@@ -129,7 +129,7 @@ class TwinRobot(SimulatedRobot, DrivenRobot):
         """Report what the simulator cannot express, and gains that the drives cannot give."""
         assert robot is not None
         yield from super().requires(params, robot)
-        complaint = unfit_motor(robot) or uneven_contacts(robot)
+        complaint = unsupported_motor(robot) or uneven_contacts(robot)
         if complaint:
             yield Misfit(complaint, fix="correct the robot's description")
         if len(robot.contacts) > 7:
@@ -177,7 +177,7 @@ class TwinRobot(SimulatedRobot, DrivenRobot):
         )  # fmt: skip
         driver = _driver(robot, params, hardware, twin)
         queue = CommandQueue(driver.loop, robot, params.latency, hardware.bus.period)
-        kept = Frozen(_parts(twin, driver, queue))
+        kept = ObjectSnapshot(_parts(twin, driver, queue))
         return {**sizes, "n_kept": kept.size}
 
     def setup(self) -> None:
@@ -192,12 +192,12 @@ class TwinRobot(SimulatedRobot, DrivenRobot):
             robot, params, hardware, self.period, self.physics, self.record, self.gantry,
             tuple(params.faults),
         )  # fmt: skip
-        self.twin.push_by(self.push)
+        self.twin.set_push(self.push)
         self._reporting = self.twin.plant.truth.reporting(self.truth)
         self._hardware = hardware
         self.driver = _driver(robot, params, hardware, self.twin)
         self._queue = CommandQueue(self.driver.loop, robot, params.latency, self.period)
-        self._kept = Frozen(_parts(self.twin, self.driver, self._queue))
+        self._kept = ObjectSnapshot(_parts(self.twin, self.driver, self._queue))
 
     def open(self) -> None:
         """Stand in the gantry, find the drives and, if armed, lead them to the standing pose."""
@@ -230,7 +230,7 @@ class TwinRobot(SimulatedRobot, DrivenRobot):
 
     def damp(self) -> None:
         """One tick with the drives in damping and no external force."""
-        self.twin.push_by(None)
+        self.twin.set_push(None)
         self._pass_time(lambda: self._driver.damp(self._queue.cycles))
 
     def _pass_time(self, exchange: Callable[[], None]) -> None:
@@ -280,6 +280,6 @@ def _driver(
     return Driver(robot, hardware, VirtualBusPort(twin), VirtualBoardPort(twin), law)
 
 
-def _parts(twin: Twin, driver: Driver, queue: CommandQueue) -> list[Part]:
+def _parts(twin: Twin, driver: Driver, queue: CommandQueue) -> list[Attributes]:
     """All that changes in a run and lies in no declared state."""
     return [*twin.parts(), *driver.loop.parts(), *queue.parts()]

@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 
 from ...runtime.language.parameter_change import ParameterChange
 from ...runtime.running.memory import Snapshot
-from ...runtime.running.notes import Note
+from ...runtime.running.sinks import Note
 from .format import (
     BUS,
     FORMAT,

@@ -27,8 +27,8 @@ from typing import Any, Literal
 from ...runtime.language.errors import AloftError
 from ...runtime.language.parameter_change import ParameterChange
 from ...runtime.running.memory import BoundGraph
-from ...runtime.running.notes import Note, parameter_note
 from ...runtime.running.run_result import RunResult
+from ...runtime.running.sinks import Note, parameter_note
 from ..file.header import header_of
 from ..file.reader import read
 from ..viewing.robot_shapes import missing_meshes

@@ -25,7 +25,7 @@ import numpy as np
 
 from ...runtime.running.failures import describe
 from ...runtime.running.memory import Snapshot
-from ...runtime.running.notes import Note
+from ...runtime.running.sinks import Note
 from ..file.format import Header
 from .live_feed import LiveFeed
 from .place import Place, cause_of, split_name, take_place

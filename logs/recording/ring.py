@@ -11,7 +11,7 @@ that nobody contends for is taken and given back in between, which POSIX says sy
 reading the counter and reading records, and besides believes no record whose two sequence numbers
 are not the one that is due.
 
-The memory has no name, see ``runtime.running.shared_memory``: the reader keeps what a writer that
+The memory has no name, see ``runtime.running.memory.nameless_memory``: the reader keeps what a writer that
 is killed had written.
 """
 
@@ -28,7 +28,7 @@ try:
 except ImportError:  # on Windows, which limits no sizes
     resource = None  # type: ignore[assignment]  # not on Windows
 
-from ...runtime.running.shared_memory import nameless_memory
+from ...runtime.running.memory import nameless_memory
 
 ALIGNMENT = 64
 CONTROL = 256

@@ -22,8 +22,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...runtime.running.memory import Snapshot
-from ...runtime.running.notes import Note, parameter_note
 from ...runtime.running.run_result import RunResult
+from ...runtime.running.sinks import Note, parameter_note
 from ..file.format import BUS, KEYFRAMES, NOTE, PACKED, ROWS, STATE, Header, spans, time_columns
 from ..file.header import make_header
 from ..file.messages import ARROW, CLOSING, FILE_HEAD, HEAD, Content, Message, sealed, split

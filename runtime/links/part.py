@@ -7,11 +7,16 @@ source would have written, and rows of several parts can be laid over one anothe
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from hashlib import blake2b
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ..language.block import Block
+from ..language.layout import Layout
 from ..language.parameters import Parameters
 from ..language.stages import BlockSpec, CheckedGraph, ClockSpec
 from ..placement.placed import Link, PlacedGraph
@@ -19,18 +24,14 @@ from ..running.executor import Executor
 from ..running.memory import BoundGraph
 from ..running.run_result import RunResult
 from ..running.sinks import Sink
+from ..transports.transport import Transport, data_key
 from .command_watch import CommandWatch
-from .conductor import Conductor, FaultTeller, Gate
-from .free_conductor import FreeConductor
-from .inbox import Inbox, Received, received_block_type
-from .latest import TICK_TIME, Health, LatestInbox, TickTime, health_path
+from .coordinator import Conductor, FaultTeller, FreeConductor, Gate, PartClock, SpreadParameters
+from .free_link import TICK_TIME, Health, LatestInbox, TickTime, health_path
+from .lockstep_link import Inbox, Received, Send, received_block_type
 from .message import MessageReader, MessageWriter
-from .others import Others, Phase
-from .outbox import Send
-from .part_clock import PartClock
 from .path_ages import PathAges, path_sinks
-from .spread_parameters import SpreadParameters
-from .transport import Transport, data_key
+from .peers import Others, Phase
 
 PATIENCE = 30.0
 """Seconds that a part in lockstep waits for a message before it gives up."""
@@ -252,3 +253,50 @@ def run_part(
         bound.path_ages = path_sinks(bound.placed.graph, clock.kind)
     sinks = [teller, *bound.path_ages, *sinks]
     return Executor(bound, clock=clock, sinks=sinks, **options).run(ticks)
+
+
+class Whole:
+    """Takes from each part's bytes what that part has computed.
+
+    Args:
+        placed: the graph.
+        layout: the layout of the bus or of the state of the whole graph.
+        parts: the layout of each part's bytes, by machine.
+
+    Raises:
+        ValueError: a field is of another type or shape in a part.
+    """
+
+    def __init__(self, placed: PlacedGraph, layout: Layout, parts: Mapping[str, Layout]) -> None:
+        self._layout = layout
+        self._copies: dict[str, list[tuple[int, int, int]]] = {}
+        owners = {spec.path: spec.machine for spec in placed.graph.blocks}
+        for name, slot in layout.slots.items():
+            machine = owners[name.rpartition(".")[0].rpartition(".")[0]]
+            part = parts[machine]
+            if name not in part.slots:
+                raise ValueError(f"{name} is not in the part of {machine}")
+            other = part.slots[name]
+            if (slot.section, slot.shape) != (other.section, other.shape):
+                raise ValueError(f"{name} is of another type or shape on {machine}")
+            first, last = layout.byte_range(name)
+            start = part.byte_range(name)[0]
+            copies = self._copies.setdefault(machine, [])
+            if copies and copies[-1][1] == first and start - first == copies[-1][2] - copies[-1][0]:
+                copies[-1] = (copies[-1][0], last, copies[-1][2])
+            else:
+                copies.append((first, last, start))
+
+    def rows(self, parts: Mapping[str, NDArray[np.uint8]]) -> NDArray[np.uint8]:
+        """The rows (n, bytes) of the whole from those of each part, (n, bytes of that part)."""
+        count = len(next(iter(parts.values())))
+        rows = np.zeros((count, self._layout.size), np.uint8)
+        for machine, copies in self._copies.items():
+            for first, last, start in copies:
+                rows[:, first:last] = parts[machine][:, start : start + last - first]
+        return rows
+
+
+def hash_of(rows: NDArray[Any]) -> str:
+    """The run hash of rows (ticks, bytes), as ``sinks.RunHash`` has it."""
+    return blake2b(np.ascontiguousarray(rows).data, digest_size=16).hexdigest()

@@ -14,7 +14,7 @@ from ..language.stages import CheckedGraph
 from ..placement.measured_age import LinkTimes, Timeline, measured_ages
 from ..placement.placed import PlacedGraph
 from ..running.memory import BoundGraph
-from .latest import TICK_TIME, health_path
+from .free_link import TICK_TIME, health_path
 
 LATEST = 20_000
 """The last ticks of a run that are looked at."""

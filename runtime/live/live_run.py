@@ -16,8 +16,7 @@ from ..loading import LoadError, load, load_text
 from ..running.memory import Memory
 from .parameter_endpoint import EndpointError, answers, ask, ask_to_watch, set_parameters
 from .texts import ValueTexts, tick_text, time_texts
-from .window import ENDED, RATE, STARTING, Shape, digest
-from .window_reader import Look, WindowReader
+from .window import ENDED, RATE, STARTING, Look, Shape, WindowReader, digest
 
 STILL = 1.0
 """Seconds without a new tick after which it is said that the graph stands still."""

@@ -17,13 +17,12 @@ from struct import Struct
 from typing import Any
 from zlib import crc32
 
-from ..links.transport import Take, Transport, window_key
 from ..running.memory import BoundGraph
-from ..running.notes import Note
 from ..running.run_result import RunResult
+from ..running.sinks import Note
 from ..running.ticker import Ticker
-from .window import Shape, Window, digest
-from .window_reader import Look, WindowReader, look_of
+from ..transports.transport import Take, Transport, window_key
+from .window import Look, Shape, Window, WindowReader, digest, look_of
 
 RATE = 5.0
 """How often the window is sent [Hz]."""

@@ -19,17 +19,15 @@ from ..language.block import Block, Metric
 from ..language.errors import AloftError, ExitCode, RunError
 from ..language.stages import CheckedGraph, ClockSpec
 from .failures import describe, locate
-from .interrupts import Interrupts
 from .life_cycle import LifeCycle, LifeState
 from .memory import BoundGraph
-from .notes import Note, TakesNotes
 from .pacing import TimeSource, WallTime
 from .real_time import NO_WISHES, RealTime
 from .run_result import RunResult, TakesAbandoned, TakesResult, merge_metrics
-from .sinks import GivesMetrics, MemoryLog, RunHash, Sink
+from .sinks import GivesMetrics, MemoryLog, Note, RunHash, Sink, TakesNotes
 from .ticker import TakesTicker, Ticker, hang_text
 from .timing import block_times
-from .watchdog import Watchdog
+from .watchdog import Interrupts, Watchdog
 
 
 class Executor:

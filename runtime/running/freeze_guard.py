@@ -19,8 +19,7 @@ from numpy.typing import NDArray
 
 from ..language.stages import CheckedGraph
 from .failures import INSTALLED
-from .memory import BoundGraph
-from .shared_memory import nameless_memory
+from .memory import BoundGraph, nameless_memory
 
 BEATS = 4
 """Beats in every limit of time."""

@@ -12,13 +12,12 @@ from numpy.typing import NDArray
 
 from ..language.errors import AloftError
 from ..language.stages import CheckedGraph
-from ..links.hub import Hub
-from ..links.part import BoundPart, run_part
-from ..links.whole import Whole, hash_of
+from ..links.part import BoundPart, Whole, hash_of, run_part
 from ..placement.place import place
 from ..placement.placed import PlacedGraph
 from ..running.run_result import RunResult
 from ..running.sinks import Sink
+from ..transports.hub import Hub
 
 Interfere = Callable[[str, bytes], Iterable[bytes]]
 

@@ -16,10 +16,10 @@ from ...mathematics.compiling.compile_calls import compile_calls
 from ..language.block import Metric
 from ..language.stages import CheckedGraph, ClockSpec
 from ..links.part import CONDUCTOR, PREPARED, STARTED, BoundPart
-from ..links.transport import Take
 from ..placement.place import place
 from ..running.run_result import merge_metrics
 from ..running.ticker import Ticker
+from ..transports.transport import Take
 
 Travel = Callable[[str, int], int | None]
 """Gives how long a message takes [ns], by the key of its link and the time; ``None`` if it is lost."""

@@ -3,7 +3,7 @@
 import pytest
 
 from aloft.benchmarks.links.link_delays import jump, link_delays, told, travel
-from aloft.runtime.links.latest import LatestInbox
+from aloft.runtime.links.free_link import LatestInbox
 
 from ...cli.conftest import run_for_json
 

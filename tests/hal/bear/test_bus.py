@@ -25,7 +25,7 @@ def bus(emulated: EmulatedBus) -> Iterator[BearBus]:
 
 def test_ping_and_scan(bus: BearBus) -> None:
     assert bus.ping(2).data == b"\x01\x00\x02\x00"
-    assert bus.ping(2).trouble == ""
+    assert bus.ping(2).problem == ""
     bus.reply_time = 0.02
     assert list(bus.scan(range(1, 5))) == [1, 2]
 

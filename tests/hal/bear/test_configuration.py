@@ -27,7 +27,7 @@ def test_a_twins_is_without_fault() -> None:
     for name in ("bruce", "go2", "solo12", "talos"):
         robot = find_robot(name)
         made = Hardware.for_twin(robot)
-        assert made.misfits(robot) == []
+        assert made.find_faults(robot) == []
         peak = robot.motors.peak_torque.max() / made.drives.torque_constant
         assert peak <= made.drives.current_limit - made.drives.current_margin + 1e-9
 

@@ -142,16 +142,16 @@ def driving() -> Driver:
 
 
 @pytest.mark.parametrize(
-    ("age", "objection", "text"),
+    ("age", "stop_reason", "text"),
     [
         (0.02, "", "no new command has come for "),
         (PATIENCE, "the dead man's switch was let go", "the dead man's switch was let go"),
     ],
 )
-def test_the_motor_thread_damps(driving: Driver, age: float, objection: str, text: str) -> None:
+def test_the_motor_thread_damps(driving: Driver, age: float, stop_reason: str, text: str) -> None:
     """When commands grow old, and when there is an objection: the graph says nothing meanwhile."""
     loop = driving.loop
-    thread = MotorThread(loop, age, lambda: objection)
+    thread = MotorThread(loop, age, lambda: stop_reason)
     thread.start()
     try:
         end = time.monotonic() + PATIENCE

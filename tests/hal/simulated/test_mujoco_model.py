@@ -32,7 +32,7 @@ def built(monkeypatch: pytest.MonkeyPatch) -> list[str]:
         return original(robot, **options)
 
     monkeypatch.setattr(mujoco_model, "build_mujoco_model", build)
-    mujoco_model._kept.clear()
+    mujoco_model._model_cache.clear()
     return names
 
 
@@ -59,4 +59,4 @@ def test_what_is_in_the_model_makes_another_world(built: list[str]) -> None:
     assert usual not in [bytes_of(model) for model in others]
     for k in range(9):
         build_world(FLAT, ROBOT, Variation(friction=0.5 + 0.01 * k))
-    assert len(mujoco_model._kept) == 4, "older ones are forgotten"
+    assert len(mujoco_model._model_cache) == 4, "older ones are forgotten"

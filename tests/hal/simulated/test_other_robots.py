@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from aloft.blocks.signals import CommandMode
-from aloft.hal.simulated.mujoco_model import build_mujoco_model, unfit_motor
+from aloft.hal.simulated.mujoco_model import build_mujoco_model, unsupported_motor
 from aloft.hal.simulated.mujoco_robot import MujocoRobot
 from aloft.robots.description import RobotDescription
 from aloft.runtime.testing.bench import BlockBench
@@ -125,12 +125,12 @@ def test_a_rotor_geared_to_two_limbs_is_reported_at_load(quadruped: Data) -> Non
     matrix[0, 3] = 1.0
     quadruped["transmission"]["joint_to_motor"] = matrix.tolist()
     robot = described(quadruped)
-    assert unfit_motor(robot).startswith(
+    assert unsupported_motor(robot).startswith(
         "motor front_left_hip_joint_motor is geared to front_left_hip_joint and "
         "front_right_hip_joint, and neither joint carries the other"
     )
     (misfit,) = MujocoRobot.requires(MujocoRobot.Params(), robot)
-    assert misfit.message == unfit_motor(robot)
+    assert misfit.message == unsupported_motor(robot)
 
 
 def test_two_equal_motors_on_two_joints_need_no_tendon(quadruped: Data) -> None:

@@ -9,7 +9,7 @@ import pytest
 
 from aloft.blocks.signals import CommandMode, DrivePhase
 from aloft.hal.bear.protocol import FrameReader, frame_bytes
-from aloft.hal.twin.faults import Fault, Faults, flip, read_fault
+from aloft.hal.twin.faults import Fault, Faults, corrupt_byte, read_fault
 from aloft.hal.twin.twin_robot import TwinRobot
 from aloft.robots.description import find_robot
 from aloft.runtime.language.errors import AloftError
@@ -160,7 +160,7 @@ def test_a_share_is_drawn_from_seed_exchange_and_place_only() -> None:
 def test_one_changed_byte_is_no_good_frame_any_more() -> None:
     frame = frame_bytes(3, 0x80, bytes(range(12)))
     for seed in range(300):
-        hurt = flip(frame, np.random.default_rng(seed))
+        hurt = corrupt_byte(frame, np.random.default_rng(seed))
         assert hurt != frame and len(hurt) == len(frame)
         assert [found.data for found in FrameReader().feed(hurt)] != [bytes(range(12))]
 

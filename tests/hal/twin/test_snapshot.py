@@ -4,7 +4,7 @@ from enum import IntEnum
 
 import numpy as np
 
-from aloft.hal.twin.snapshot import Frozen
+from aloft.hal.twin.snapshot import ObjectSnapshot
 
 
 class Colour(IntEnum):
@@ -25,7 +25,7 @@ class Thing:
 
 def test_all_values_come_back() -> None:
     thing = Thing()
-    frozen = Frozen([(thing, ("array", "flags", "count", "on", "colour", "named"))])
+    frozen = ObjectSnapshot([(thing, ("array", "flags", "count", "on", "colour", "named"))])
     kept = np.zeros(frozen.size)
     frozen.save(kept)
     array = thing.array

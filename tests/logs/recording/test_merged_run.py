@@ -17,13 +17,13 @@ from aloft.logs.recording.merged_run import (
 )
 from aloft.logs.recording.recorder import Recorder
 from aloft.runtime.language.errors import AloftError
-from aloft.runtime.links.hub import Hub
 from aloft.runtime.placement.place import place
 from aloft.runtime.placement.placed import PlacedGraph
 from aloft.runtime.running.executor import run
 from aloft.runtime.running.memory import BoundGraph
 from aloft.runtime.testing.graphs import Use, checked_graph
 from aloft.runtime.testing.spread import run_parts_of
+from aloft.runtime.transports.hub import Hub
 
 from ...runtime.links.example_graphs import ring
 

@@ -20,8 +20,8 @@ from aloft.runtime.loading import load
 from aloft.runtime.loading.checking.adjust import adjust
 from aloft.runtime.running.executor import Executor
 from aloft.runtime.running.memory import BoundGraph
-from aloft.runtime.running.notes import parameter_note
 from aloft.runtime.running.run_result import RunResult
+from aloft.runtime.running.sinks import parameter_note
 
 GRAPH = """
 rate: 200 Hz

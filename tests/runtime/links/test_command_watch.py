@@ -7,7 +7,6 @@ import pytest
 
 from aloft.runtime.language.stages import WATCHDOG, CheckedGraph, LinkPolicy, LinkSettings
 from aloft.runtime.links.command_watch import CommandWatch
-from aloft.runtime.links.hub import Hub
 from aloft.runtime.links.part import BoundPart
 from aloft.runtime.loading import LoadError, load
 from aloft.runtime.loading.problems import Code
@@ -15,6 +14,7 @@ from aloft.runtime.placement.commands import command_sources, silence_limit
 from aloft.runtime.placement.place import place
 from aloft.runtime.placement.placed import Link
 from aloft.runtime.testing.spread import run_spread
+from aloft.runtime.transports.hub import Hub
 
 from .example_graphs import Counter, ring
 from .test_free_running import Quiet, free

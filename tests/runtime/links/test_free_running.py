@@ -9,13 +9,13 @@ import pytest
 
 from aloft.runtime.language.errors import AloftError, ExitCode
 from aloft.runtime.language.stages import CheckedGraph, ClockSpec, LinkPolicy, LinkSettings
-from aloft.runtime.links.hub import Hub
-from aloft.runtime.links.latest import LatestInbox
+from aloft.runtime.links.free_link import LatestInbox
 from aloft.runtime.links.part import BoundPart, part_clock, run_part
 from aloft.runtime.loading.checking.adjust import adjust
 from aloft.runtime.placement.place import place
 from aloft.runtime.running.run_result import RunResult
 from aloft.runtime.testing.spread import run_spread
+from aloft.runtime.transports.hub import Hub
 
 from ...waiting import wait_for
 from .example_graphs import Counter, ring

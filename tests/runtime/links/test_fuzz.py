@@ -8,11 +8,11 @@ from typing import Any
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from aloft.runtime.links.hub import Hub
-from aloft.runtime.links.others import Others
+from aloft.runtime.links.peers import Others
 from aloft.runtime.placement.place import place
 from aloft.runtime.running.executor import run
 from aloft.runtime.testing.spread import run_spread
+from aloft.runtime.transports.hub import Hub
 
 from .example_graphs import ring
 

@@ -11,13 +11,13 @@ import numpy as np
 import pytest
 
 from aloft.runtime.language.errors import AloftError, ExitCode
-from aloft.runtime.links.hub import Hub
 from aloft.runtime.links.part import BoundPart
 from aloft.runtime.loading import load
 from aloft.runtime.loading.checking.adjust import adjust
 from aloft.runtime.placement.place import place, spread
 from aloft.runtime.running.executor import run
 from aloft.runtime.testing.spread import run_spread
+from aloft.runtime.transports.hub import Hub
 
 from ...waiting import wait_for
 from .example_graphs import Counter, endpoints, random_graph, ring

@@ -11,12 +11,12 @@ from zlib import crc32
 import numpy as np
 import pytest
 
-from aloft.runtime.links.transport import window_key
 from aloft.runtime.live.part_feed import _HEAD, PartFeed, packed, read_part
 from aloft.runtime.live.window import digest
 from aloft.runtime.loading import load
 from aloft.runtime.running.executor import Executor
 from aloft.runtime.running.memory import BoundGraph
+from aloft.runtime.transports.transport import window_key
 
 
 class Kept:

@@ -25,7 +25,7 @@ from aloft.runtime.placement.placed import PlacedGraph
 
 from ...logs.viewing.browser import PROGRAM, Browser
 from ...waiting import free_port
-from .test_live_page import LINE, STATE, Page
+from .test_live_server import LINE, STATE, Page
 
 GRAPH = """\
 rate: 100 Hz

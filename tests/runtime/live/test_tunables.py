@@ -3,8 +3,11 @@
 from pathlib import Path
 from typing import Any
 
-from aloft.runtime.live.tunables import Tunables
-from aloft.runtime.loading import load
+import pytest
+
+from aloft.runtime.language.errors import AloftError
+from aloft.runtime.live.tunables import FIRST_LINE, Tunables, write_overlay
+from aloft.runtime.loading import load, load_text
 from aloft.runtime.loading.checking.adjust import entries
 from aloft.runtime.running.memory import BoundGraph
 
@@ -43,3 +46,51 @@ def test_inside_of_the_jump() -> None:
         numbers = row["value"] if row["kind"] == "numbers" else [row["value"]]
         if row["kind"] in ("number", "numbers"):
             assert all(row["low"] <= x <= row["high"] for x in numbers), row["path"]
+
+
+def row(path: str, value: Any, start: Any, unit: str = "") -> dict[str, Any]:
+    return {"path": path, "value": value, "start": start, "unit": unit}
+
+
+ROWS = [
+    row("wave.frequency", 5.0, 2.0, "Hz"),
+    row("wave.phase", 0.0, 0.0, "rad"),
+    row("inner/twice.gain", [1.5, 2.5], 2.0),
+]
+
+
+def test_it_includes_the_graph_and_sets_what_changed(graph_file: Path) -> None:
+    folder = graph_file.parent / "tuned"
+    folder.mkdir()
+    path = folder / "fast.yaml"
+    assert write_overlay(path, load(graph_file), ROWS) == ["wave.frequency", "inner/twice.gain"]
+    assert path.read_text().splitlines() == [
+        FIRST_LINE,
+        'include: ["../waves.yaml"]',
+        "set:",
+        "  wave.frequency: 5.0  # was 2.0 Hz",
+        "  inner/twice.gain: [1.5, 2.5]  # was 2.0",
+    ]
+    graph = load(path)
+    assert graph.block("wave").params.frequency == 5.0  # type: ignore[attr-defined]
+    assert graph.block("inner/twice").params.gain == [1.5, 2.5]  # type: ignore[attr-defined]
+    assert graph.base_rate == 200.0
+    write_overlay(path, load(graph_file), ROWS[:1])
+    assert "twice" not in path.read_text(), "its own file is replaced"
+
+
+def test_what_is_refused(graph_file: Path) -> None:
+    graph, path = load(graph_file), graph_file.parent / "other.yaml"
+    with pytest.raises(AloftError, match="no parameter has another value than when the run began"):
+        write_overlay(path, graph, ROWS[1:2])
+    path.write_text("rate: 1 Hz\n")
+    with pytest.raises(AloftError, match=r"other\.yaml is there already; give another name with"):
+        write_overlay(path, graph, ROWS)
+    assert path.read_text() == "rate: 1 Hz\n"
+    with pytest.raises(AloftError, match="cannot be written"):
+        write_overlay(graph_file.parent / "no" / "such.yaml", graph, ROWS)
+    with pytest.raises(AloftError, match=r"the file would not load: .*wave\.frequency cannot be"):
+        write_overlay(path, graph, [row("wave.frequency", -1.0, 2.0)])
+    text = "rate: 1 Hz\nblocks: {a: {use: blocks.Constant, with: {value: [7]}}}"
+    with pytest.raises(AloftError, match="not run from a file that is still there"):
+        write_overlay(path, load_text(text, "nowhere.yaml"), ROWS)

@@ -7,12 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
-from aloft.runtime.live.window import ENDED, RATE, RUNNING, SEQUENCE, Shape, Window
-from aloft.runtime.live.window_reader import WindowReader
+from aloft.runtime.live.window import ENDED, RATE, RUNNING, SEQUENCE, Shape, Window, WindowReader
 from aloft.runtime.loading import load
 from aloft.runtime.running.executor import Executor
-from aloft.runtime.running.memory import BoundGraph
-from aloft.runtime.running.shared_memory import nameless_memory
+from aloft.runtime.running.memory import BoundGraph, nameless_memory
 from aloft.runtime.running.timing import STAMPED_TICKS
 
 

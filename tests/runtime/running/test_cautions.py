@@ -5,7 +5,7 @@ from __future__ import annotations
 from aloft.blocks.general.vector import Vector
 from aloft.runtime.language.block import Block, Output
 from aloft.runtime.running.executor import run
-from aloft.runtime.running.notes import Note
+from aloft.runtime.running.sinks import Note
 from aloft.runtime.testing.graphs import Use, checked_graph
 
 

@@ -2,9 +2,15 @@
 
 from __future__ import annotations
 
+import platform
 from pathlib import Path
 
-from aloft.runtime.running.machine_check import Finding, examine_machine
+from aloft.runtime.running.machine_check import (
+    LIBRARIES,
+    Finding,
+    examine_libraries,
+    examine_machine,
+)
 
 
 def system(folder: Path, **files: str) -> dict[str, Finding]:
@@ -39,3 +45,23 @@ def test_an_ordinary_machine_is_told_what_to_change(tmp_path: Path) -> None:
         assert not found[name].good and found[name].change, found[name]
     assert "paused for 50 ms every 1 s" in found["throttling"].found
     assert "powersave" in found["clock frequency"].found
+
+
+def test_all_load() -> None:
+    finding = examine_libraries()
+    assert finding.good and not finding.change
+    assert finding.found == f"all {len(LIBRARIES)} load with Python {platform.python_version()}"
+
+
+def test_what_the_system_lacks_is_said_with_its_package() -> None:
+    def load(name: str) -> None:
+        if name == "pinocchio":
+            raise ImportError("libgomp.so.1: cannot open shared object file: No such file")
+        if name == "zenoh":
+            raise ModuleNotFoundError("No module named 'zenoh'")
+
+    finding = examine_libraries(load)
+    assert not finding.good
+    assert "pinocchio cannot be loaded: libgomp.so.1: cannot open shared object" in finding.found
+    assert "zenoh cannot be loaded: No module named 'zenoh'" in finding.found
+    assert finding.change == "`apt install libgomp1`, `pip install --force-reinstall eclipse-zenoh`"

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from aloft.runtime.language.stages import CheckedGraph, LinkPolicy, LinkSettings
-from aloft.runtime.links.latest import LatestInbox
+from aloft.runtime.links.free_link import LatestInbox
 from aloft.runtime.links.part import BoundPart
 from aloft.runtime.testing.virtual_spread import VirtualRun, run_virtual
 

@@ -5,7 +5,7 @@ import time
 
 import pytest
 
-from aloft.runtime.links.mailbox import Mailbox, MailTimeoutError
+from aloft.runtime.links.lockstep_link import Mailbox, MailTimeoutError
 
 
 def test_items_that_come_early_are_kept_and_surplus_ones_counted() -> None:

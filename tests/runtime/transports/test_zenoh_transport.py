@@ -12,7 +12,7 @@ import zenoh
 
 from aloft.runtime.language.errors import AloftError
 from aloft.runtime.language.stages import MachineSpec
-from aloft.runtime.links.zenoh_transport import LEASE, ZenohTransport, as_chunk, session_config
+from aloft.runtime.transports.zenoh_transport import LEASE, ZenohTransport, as_chunk, session_config
 
 from ...waiting import free_port, wait_for
 

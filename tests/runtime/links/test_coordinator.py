@@ -1,6 +1,6 @@
 """A part's clock keeps the first wish to end, and ends only when all parts have agreed."""
 
-from aloft.runtime.links.part_clock import PartClock
+from aloft.runtime.links.coordinator import PartClock
 
 
 def test_a_wish_alone_does_not_end_the_run() -> None:

@@ -13,14 +13,13 @@ import numpy as np
 import pytest
 
 from aloft.runtime.language.stages import LinkPolicy, MachineSpec
-from aloft.runtime.links.key_folder import make_keys, secured
-from aloft.runtime.links.observer import Observer
+from aloft.runtime.links.observer import ROW_HEADER, Observer, Showing, read_row
 from aloft.runtime.links.part import BoundPart, run_part
-from aloft.runtime.links.showing import ROW_HEADER, Showing, read_row
-from aloft.runtime.links.zenoh_transport import ZenohTransport
 from aloft.runtime.placement.place import place
 from aloft.runtime.placement.placed import PlacedGraph
 from aloft.runtime.running.run_result import RunResult
+from aloft.runtime.transports.keys import make_keys, secured
+from aloft.runtime.transports.zenoh_transport import ZenohTransport
 
 from ...waiting import free_port
 from .test_free_running import free, wait_for

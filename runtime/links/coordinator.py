@@ -1,28 +1,138 @@
-"""Keeps the parts of a graph together in lockstep: they start, end each tick and stop as one."""
+"""Keeps the parts of a graph together: in lockstep they start, end each tick and stop as one; free
+parts start together, and each keeps its own time.
+
+A change of live parameters takes effect in one tick on all machines, or on none.
+"""
 
 from __future__ import annotations
 
 import json
+import threading
+from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import IntEnum
 from struct import Struct
 from typing import Any
 
-from ..language.block import Block
-from ..language.errors import RunError
+from ..language.block import Block, Clock
+from ..language.errors import AloftError, RunError
 from ..language.parameter_change import Adjustment
+from ..language.parameters import Parameters
+from ..loading.checking.adjust import adjust
+from ..running.failures import describe
+from ..running.live_parameters import LiveParameters
 from ..running.memory import BoundGraph
-from ..running.notes import Note
+from ..running.sinks import Note
+from ..transports.transport import Take, Transport, tick_key
 from .command_watch import CommandWatch
-from .inbox import Inbox
-from .latest import LatestInbox
-from .mailbox import Mailbox, MailTimeoutError
-from .others import Others, PeerError, Phase
-from .outbox import Send
-from .part_clock import PartClock
-from .spread_parameters import SpreadParameters
-from .transport import Take, Transport, tick_key
+from .free_link import LatestInbox
+from .lockstep_link import Inbox, Mailbox, MailTimeoutError, Send
+from .peers import Others, PeerError, Phase
+
+
+class PartClock(Clock):
+    """A clock that ends the run only when all parts have agreed to end after the same tick.
+
+    A block or a signal asks for the end as ever, by ``stop_reason`` and ``stopped_by``. The wish of
+    whoever asks first is kept in ``wish``, and the conductor tells it to the others. A signal may
+    come at any time, so without this a part could end a tick before the others.
+    """
+
+    def __init__(self, base_period: float) -> None:
+        self.wish: tuple[str, str] | None = None
+        self._agreed: tuple[str, str] | None = None
+        self._heeded = False
+        self.heard: Callable[[], int] | None = None
+        """What says when commands were last heard; see ``CommandWatch.heard``."""
+        super().__init__(base_period)
+
+    def commands_heard(self) -> int:
+        """When the most silent link that brings commands last brought one [ns]."""
+        return 0 if self.heard is None else self.heard()
+
+    def agree(self, reason: str, block: str) -> None:
+        """End the run after this tick."""
+        self._agreed = (reason, block)
+
+    @property
+    def stop_reason(self) -> str | None:
+        """Why all parts end after this tick."""
+        return self._agreed[0] if self._agreed else None
+
+    @stop_reason.setter
+    def stop_reason(self, reason: str | None) -> None:
+        if reason is None:
+            self.wish = self._agreed = None
+        self._heeded = reason is not None and self.wish is None
+        if reason is not None and self._heeded:
+            self.wish = (reason, "")
+
+    @property
+    def stopped_by(self) -> str:
+        """The path of the block that asked first."""
+        return self._agreed[1] if self._agreed else ""
+
+    @stopped_by.setter
+    def stopped_by(self, block: str) -> None:
+        if self._heeded and self.wish is not None:
+            self.wish = (self.wish[0], block)
+
+
+class SpreadParameters(LiveParameters):
+    """The parameters of one part, and of what stands for the other parts' blocks.
+
+    An adjustment that is handed in here waits until the tick ends. Then all parts get it as a
+    proposal, each tries it, and only if all can take it over it stays.
+    """
+
+    def __init__(self, blocks: Mapping[str, Block]) -> None:
+        super().__init__(blocks)
+        self.handed_in: deque[Adjustment] = deque(maxlen=1)
+        self._tried: Adjustment | None = None
+        self._before: Mapping[str, Parameters] = {}
+
+    def proposal(self) -> Adjustment | None:
+        """The adjustment that waits here, if any."""
+        return self.handed_in.popleft() if self.handed_in else None
+
+    def try_settings(self, settings: Mapping[str, Any]) -> str:
+        """Take over another part's proposal for now. Returns why it cannot be, or an empty text."""
+        try:
+            return self.try_out(adjust(self.blocks, settings))
+        except AloftError as error:
+            return str(error)
+
+    def try_out(self, adjustment: Adjustment) -> str:
+        """Take over an adjustment for now. Returns why it cannot be, or an empty text."""
+        self._before = {path: self.blocks[path].params for path in adjustment.params}
+        self._tried = adjustment
+        for path, params in adjustment.params.items():
+            self.blocks[path].params = params
+            try:
+                self.blocks[path].on_parameters()
+            except Exception as error:  # noqa: BLE001  # the block's reason goes to whoever asked
+                self.undo()
+                return f"block '{path}' refuses the change: {describe(error)}"
+        return ""
+
+    def undo(self) -> None:
+        """Go back to the parameters before what was tried, if anything was."""
+        for path, params in self._before.items():
+            self.blocks[path].params = params
+            self.blocks[path].on_parameters()
+        self._before, self._tried = {}, None
+
+    def keep(self, tick: int) -> None:
+        """Keep what was tried; it holds from ``tick`` on."""
+        assert self._tried is not None
+        self._tried.tick = tick
+        for change in self._tried.changes():
+            self.changes.append(change)
+            for listener in self.listeners:
+                listener(change)
+        self._before, self._tried = {}, None
+
 
 _HEAD = Struct("<8sqB")
 _ROUNDS = 16
@@ -319,3 +429,86 @@ class Gate(Block):
 
     def step(self) -> None:
         """Never called: a gate is not in the order of execution."""
+
+
+BEACON_PERIOD = 0.5
+"""Seconds between two beacons during the run, from which clock offsets are estimated."""
+
+
+class FreeConductor(Conductor):
+    """Starts the parts together, as in lockstep, and then lets each keep its own time.
+
+    A tick waits for nobody. A part whose run ends in order ends the others too, and so does a
+    fault. One that is gone does not: what its links' policies say of late messages holds, and it
+    may come back. Beacons during the run are sent by a thread of their own.
+    """
+
+    _quiet: threading.Event | None = None
+
+    def listen(self) -> None:
+        """Nothing to listen to: a tick ends when it ends here."""
+
+    def reach(self, phase: Phase) -> None:
+        """Wait for the others; a part that moves actuators does not join a run that goes on.
+
+        Raises:
+            AloftError: the others are running, and this part has actuators.
+        """
+        if phase is Phase.PREPARED and self.moves and self.others.are_running():
+            raise AloftError(
+                "the other machines are running already, and this part moves actuators, which it "
+                "never enables by itself. Stop the run everywhere and start it again"
+            )
+        super().reach(phase)
+        if phase is Phase.STARTED:
+            self._quiet = threading.Event()
+            threading.Thread(target=self._repeat, args=(self._quiet,), daemon=True).start()
+
+    def _repeat(self, quiet: threading.Event) -> None:
+        while not quiet.wait(BEACON_PERIOD):
+            self.others.say()
+
+    def update(self) -> None:
+        """Look whether another part has ended or failed and whether commands still come, and take
+        over changed parameters.
+
+        Raises:
+            PeerError: another part failed.
+        """
+        clock = self._clock
+        ended = self.others.ended() or self._watch.complaint()
+        if ended:
+            clock.stop_reason = ended
+        if clock.wish is not None:
+            clock.agree(*clock.wish)
+        if self._parameters.handed_in:
+            self._change(clock.tick)
+
+    def _change(self, tick: int) -> None:
+        adjustment = self._parameters.proposal()
+        if adjustment is None:
+            return
+        away = [path for path in adjustment.params if path in self.elsewhere]
+        if away:
+            adjustment.error = (
+                f"block '{away[0]}' runs on {self.elsewhere[away[0]]}, and parts that run free "
+                "change only their own parameters; change it there"
+            )
+        else:
+            adjustment.error = self._parameters.try_out(adjustment)
+            if not adjustment.error:
+                self._parameters.keep(tick + 1)
+        adjustment.answered = True
+
+    def tell_fault(self, note: Note, last_recorded: int) -> None:
+        """Tell the others of a fault here, by a beacon."""
+        known = self.others.started and self.others.heard_fault
+        if self._opened and not self._told and not known:
+            self._told = True
+            self.others.say(str(note.data.get("message", note.text)))
+
+    def close(self) -> None:
+        """Stop the beacons, and disconnect as in lockstep."""
+        if self._quiet is not None:
+            self._quiet.set()
+        super().close()

@@ -2,7 +2,8 @@
 
 Every part tells all others how far it is in *beacons*, which it repeats until all have answered. So
 a beacon that is lost, doubled or late does no harm. A beacon says what its sender has heard of the
-receiver, which answers at once if that is old.
+receiver, which answers at once if that is old. Beacons also give the offset of the other machine's
+clock.
 """
 
 from __future__ import annotations
@@ -11,16 +12,59 @@ import json
 import os
 import threading
 import time
-from collections.abc import Callable, Iterable, Mapping
+from collections import deque
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from enum import IntEnum
 from typing import Any
 
 from ..language.errors import RunError
 from ..placement.placed import PlacedGraph
-from .clock_offset import ClockOffset
+from ..transports.transport import Take, Transport, beacon_key
 from .identity import Identity
-from .transport import Take, Transport, beacon_key
+
+KEPT = 20
+"""Estimates among which the best is chosen: as clocks drift, older ones are forgotten."""
+
+
+class ClockOffset:
+    """Estimates how far the monotonic clock of one other machine is ahead. All times are in nanoseconds.
+
+    The method is that of NTP. With t1 when a beacon left here, t2 when it arrived there, t3 when one
+    left there and t4 when that arrived here, the other clock is ahead by
+    ((t2 - t1) + (t3 - t4)) / 2. The error is at most half of the time on the way,
+    (t4 - t1) - (t3 - t2), whatever share of it each direction took. Of the last ``KEPT`` estimates
+    the one with the shortest time on the way counts.
+
+    Attributes:
+        offset: how far the other clock is ahead; zero before there is an estimate.
+        uncertainty: the largest possible error of ``offset``; -1 before there is an estimate.
+    """
+
+    def __init__(self) -> None:
+        self.offset = 0
+        self.uncertainty = -1
+        self._estimates: deque[tuple[int, int]] = deque(maxlen=KEPT)
+        self._theirs = self._arrived = 0
+
+    def stamp(self, now: int) -> list[int]:
+        """What a beacon that leaves now carries: its time, and the latest beacon that has come."""
+        return [now, self._theirs, self._arrived]
+
+    def hear(self, stamp: Sequence[int], now: int) -> None:
+        """Take the stamp of a beacon that has arrived now."""
+        left_there, left_here, arrived_there = (int(value) for value in stamp)
+        self._theirs, self._arrived = left_there, now
+        if not left_here:
+            return
+        on_the_way = (now - left_here) - (left_there - arrived_there)
+        if on_the_way < 0:
+            return  # the clock of a machine that was started again
+        ahead = ((arrived_there - left_here) + (left_there - now)) // 2
+        self._estimates.append((on_the_way, ahead))
+        shortest, self.offset = min(self._estimates)
+        self.uncertainty = shortest // 2
+
 
 REPEAT = 0.05
 """Seconds between two beacons while a part waits for the others."""

@@ -13,9 +13,9 @@ from ..language.block import Block, Output
 from ..language.signals import Field, Signal
 from ..language.stages import LinkPolicy
 from ..placement.placed import Link
-from .inbox import PROBE
+from .lockstep_link import PROBE
 from .message import DamagedMessageError, Message, MessageReader
-from .others import Others
+from .peers import Others
 
 TICK_TIME = "~tick"
 """The path of the block that keeps when ticks began."""

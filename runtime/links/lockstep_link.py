@@ -1,16 +1,86 @@
-"""The receiving end of one link in lockstep: it gives a block the message of exactly its tick."""
+"""The two ends of a link: the block that sends, and the block that gives others what was received.
+
+In lockstep the receiving end waits for the message of exactly its tick.
+"""
 
 from __future__ import annotations
 
 import time
-from typing import Any, Protocol
+from collections.abc import Callable
+from queue import Empty, SimpleQueue
+from typing import Any, Generic, Protocol, TypeVar
 
 from ..language.block import Block
 from ..language.errors import RunError
 from ..placement.placed import Link
-from .mailbox import Mailbox, MailTimeoutError
-from .message import DamagedMessageError, MessageReader
-from .others import Others
+from ..transports.transport import Take
+from .message import DamagedMessageError, MessageReader, MessageWriter
+from .peers import Others
+
+T = TypeVar("T")
+SLICE = 0.05
+"""Seconds of waiting after which it is looked whether waiting still helps."""
+
+
+class MailTimeoutError(Exception):
+    """What was waited for has not come in time."""
+
+
+class Mailbox(Generic[T]):
+    """Keeps what arrives on threads of the network for one reader, by a growing number (a tick).
+
+    What arrives early is kept, so a network may change the order. What arrives twice or late is
+    counted and thrown away.
+
+    Attributes:
+        surplus: how many items came twice or after they had been needed.
+    """
+
+    def __init__(self, check: Callable[[], None]) -> None:
+        self._check = check
+        self._queue: SimpleQueue[tuple[int, T] | None] = SimpleQueue()
+        self._early: dict[int, T] = {}
+        self.surplus = 0
+
+    def put(self, number: int, item: T) -> None:
+        """Leave an item; any thread may."""
+        self._queue.put((number, item))
+
+    def wake(self) -> None:
+        """Make a reader that waits look at once whether waiting still helps."""
+        self._queue.put(None)
+
+    def take(self, number: int, patience: float) -> T:
+        """The item with that number; waits for it.
+
+        ``check`` is called whenever nothing has come for a while, and ends the wait by raising.
+
+        Raises:
+            MailTimeoutError: it has not come within ``patience`` seconds.
+        """
+        if number in self._early:
+            return self._early.pop(number)
+        end: float | None = None
+        while True:
+            try:
+                found = self._queue.get(timeout=SLICE)
+            except Empty:
+                found = None
+            if found is None:
+                if self._queue.empty():
+                    self._check()
+                now = time.monotonic()
+                end = now + patience - SLICE if end is None else end
+                if now > end:
+                    raise MailTimeoutError
+                continue
+            if found[0] == number:
+                return found[1]
+            if found[0] < number or found[0] in self._early:
+                self.surplus += 1
+            else:
+                self._early[found[0]] = found[1]
+
 
 PROBE = -1
 """The tick of a message that only shows that the link works."""
@@ -134,3 +204,26 @@ def received_block_type(block_type: type[Block]) -> type[Received]:
         kind.inputs, kind.outputs = block_type.inputs, block_type.outputs
         _TYPES[block_type] = kind
     return _TYPES[block_type]
+
+
+class Send(Block):
+    """Sends what another machine reads of a block's outputs, each time that block has run."""
+
+    writer: MessageWriter | None = None
+    put: Take | None = None
+
+    def connect(
+        self, writer: MessageWriter, put: Take, clock: Callable[[], int] = time.monotonic_ns
+    ) -> None:
+        """Take what makes the messages, what sends them, and the time [ns]."""
+        self.writer, self.put, self.now = writer, put, clock
+
+    def probe(self) -> None:
+        """Send a message that only shows that the link works."""
+        assert self.writer is not None and self.put is not None
+        self.put(self.writer.write(PROBE, self.now()))
+
+    def step(self) -> None:
+        """Send."""
+        assert self.writer is not None and self.put is not None
+        self.put(self.writer.write(self.context.clock.tick, self.now()))

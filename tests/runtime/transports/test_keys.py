@@ -14,16 +14,23 @@ import pytest
 
 from aloft.runtime.language.errors import AloftError
 from aloft.runtime.language.stages import MachineSpec
-from aloft.runtime.links.access import access_control, keys_from, observers_access
-from aloft.runtime.links.certificates import AUTHORITY_KEY, KEY, Authority
-from aloft.runtime.links.key_folder import SESSION, host_of, make_keys, secured
-from aloft.runtime.links.transport import data_key
-from aloft.runtime.links.zenoh_transport import ZenohTransport, session_config
 from aloft.runtime.placement.place import place
 from aloft.runtime.placement.placed import PlacedGraph
+from aloft.runtime.transports.access import access_control, keys_from, observers_access
+from aloft.runtime.transports.keys import (
+    AUTHORITY_KEY,
+    KEY,
+    SESSION,
+    Authority,
+    host_of,
+    make_keys,
+    secured,
+)
+from aloft.runtime.transports.transport import data_key
+from aloft.runtime.transports.zenoh_transport import ZenohTransport, session_config
 
 from ...waiting import free_port, wait_for
-from .example_graphs import ring
+from ..links.example_graphs import ring
 
 pytest.importorskip("cryptography")
 COMMANDS = "aloft/{}/data/far/onboard/last"

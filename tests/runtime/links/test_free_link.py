@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from aloft.runtime.language.stages import LinkPolicy
-from aloft.runtime.links.clock_offset import ClockOffset
-from aloft.runtime.links.latest import LatestInbox, LinkHealth
+from aloft.runtime.links.free_link import LatestInbox, LinkHealth
 from aloft.runtime.links.message import MessageReader, MessageWriter
+from aloft.runtime.links.peers import ClockOffset
 from aloft.runtime.placement.place import place
 from aloft.runtime.running.memory import Memory
 

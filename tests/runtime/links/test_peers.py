@@ -2,7 +2,7 @@
 
 import random
 
-from aloft.runtime.links.clock_offset import ClockOffset
+from aloft.runtime.links.peers import ClockOffset
 
 MS = 1_000_000
 
