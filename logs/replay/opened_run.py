@@ -22,7 +22,7 @@ import yaml
 from numpy.typing import NDArray
 
 from ...robots.description import RobotDescription, RobotError, find_robot
-from ...runtime.drawing.values import shown
+from ...runtime.drawing.page import shown
 from ...runtime.language.errors import AloftError, ExitCode
 from ...runtime.language.layout import Layout
 from ...runtime.language.parameter_change import ParameterChange

@@ -24,7 +24,7 @@ from ...runtime.language.errors import AloftError
 from ...runtime.language.layout import Layout
 from ...runtime.language.parameter_change import ParameterChange
 from ...runtime.language.stages import CheckedGraph, ClockSpec
-from ...runtime.loading.checking.adjust import adjust
+from ...runtime.loading.checking.parameters import adjust
 from ...runtime.running.differences import Comparison, Difference, Translation
 from ...runtime.running.executor import Executor
 from ...runtime.running.feeding import Fed, Feed, fed_graph

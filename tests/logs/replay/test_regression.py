@@ -14,7 +14,7 @@ from aloft.logs.replay.opened_run import OpenedRun
 from aloft.logs.replay.regression import capture, write_test
 from aloft.logs.replay.replay import KeptRun, Keyframes, ReplayError
 from aloft.runtime.loading import load
-from aloft.runtime.loading.checking.adjust import adjust
+from aloft.runtime.loading.checking.parameters import adjust
 from aloft.runtime.running.executor import Executor
 from aloft.runtime.running.memory import BoundGraph
 from aloft.runtime.testing import StretchError

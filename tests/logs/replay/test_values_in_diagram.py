@@ -15,8 +15,7 @@ import pytest
 import aloft
 from aloft.logs.recording.recorder import Recorder
 from aloft.logs.replay.opened_run import OpenedRun, TickValues
-from aloft.runtime.drawing.page_server import page_server
-from aloft.runtime.drawing.values import shown
+from aloft.runtime.drawing.page import page_server, shown
 from aloft.runtime.running.run_result import RunResult
 
 GRAPH = """\
