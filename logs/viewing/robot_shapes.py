@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from ...mathematics.arrays import Array
 from ...robots.description import Link, Look, Mesh, RobotDescription, Shape
-from ...robots.importing.mesh_triangles import mesh_triangles, simplified
-from ...robots.importing.packages import find_file
+from ...robots.importing.meshes import mesh_triangles, simplified
+from ...robots.importing.urdf_text import find_file
 from ...robots.kinematics import link_poses, matrices_of_quaternions
 
 USUAL_REACH = 0.4
