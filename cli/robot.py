@@ -19,11 +19,9 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from ..logs.file.reader import RecordedRun
-    from ..robots.identification.delay import Delay
-    from ..robots.identification.rigid_body import RigidBody
-    from ..robots.reading import ReadRobot
+    from ..robots.description import ReadRobot
+    from ..robots.identification import Delay, RigidBody
     from ..robots.robot_description import RobotDescription
-
 
 robot = typer.Typer(
     name="robot",
@@ -137,13 +135,13 @@ def _faults_reported(as_json: bool) -> Iterator[None]:
 
 
 def _read(name: str) -> ReadRobot:
-    from ..robots.reading import path_of, read
+    from ..robots.description import path_of, read
 
     return read(path_of(name))
 
 
 def _draw(found: ReadRobot, picture: Path) -> None:
-    from ..robots.drawing import draw_robot
+    from ..robots.report import draw_robot
 
     try:
         draw_robot(found.description, picture)
@@ -154,8 +152,8 @@ def _draw(found: ReadRobot, picture: Path) -> None:
 def _imported(file: Path, out: Path | None, force: bool) -> tuple[Path, str, list[str]]:
     """Where the YAML goes, its text and its notes. Raises ``RobotError`` for a file that is wrong
     and ``AloftError`` for one that must not be written."""
+    from ..robots.description import MODEL_FILES
     from ..robots.importing.new_yaml import new_yaml
-    from ..robots.reading import MODEL_FILES
 
     if file.suffix not in MODEL_FILES:
         kinds = ", ".join(MODEL_FILES)
@@ -293,9 +291,12 @@ def _identified(
     import numpy as np
 
     from ..mathematics.rotations import to_matrix
-    from ..robots.identification.delay import identify_delay
-    from ..robots.identification.motion import Motion
-    from ..robots.identification.rigid_body import IdentificationError, identify_rigid_body
+    from ..robots.identification import (
+        IdentificationError,
+        Motion,
+        identify_delay,
+        identify_rigid_body,
+    )
 
     names = {
         "position": f"{robot}.joints.position", "velocity": f"{robot}.joints.velocity",
