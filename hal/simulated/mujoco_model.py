@@ -36,8 +36,8 @@ from ...mathematics.constants import GRAVITY
 from ...robots.ball_feet import ball_feet
 from ...robots.description import RobotDescription
 from ...robots.link_poses import contact_centres, joints_above
+from ..random_streams import Purpose, stream
 from .base import BASES
-from .random_streams import Purpose, stream
 from .scenes import Scene
 from .simulated_robot import SimulatorParameters
 

@@ -155,9 +155,9 @@ class MujocoRobot(SimulatedRobot):
 
     def setup(self) -> None:
         """Draw the world from the seed and build it."""
+        from ..random_streams import Purpose, uniform_call
         from .drives import CommandLatency, Drives
         from .plant import Plant
-        from .random_streams import Purpose, uniform_call
         from .stance import RELEASED
 
         robot, params = self.robot, self.params

@@ -122,6 +122,12 @@ class SimulatorParameters(DriveGains):
         0.0, unit="s", ge=0, le=0.1, text="for how long a switch chatters after each change"
     )
 
+    sensor_errors: float = parameter(
+        1.0, ge=0,
+        text="factor on noise and bias of the sensors that the robot's description mounts; 0: they "
+        "have no errors",
+    )  # fmt: skip
+
     drive_damping: float | None = parameter(
         None, unit="N m s/rad", ge=0,
         text="joint damping of a drive in its damping mode; none: a third of the damping that "

@@ -13,9 +13,9 @@ from ...mathematics.compiling.library_call import LibraryCall
 from ...robots.robot_description import RobotDescription
 from ..bear.configuration import Hardware
 from ..bear.protocol import BROADCAST, Instruction, frame_bytes
+from ..random_streams import Purpose
 from ..simulated.drives import Drives
 from ..simulated.plant import Plant
-from ..simulated.random_streams import Purpose
 from ..simulated.simulated_robot import SimulatorParameters
 from ..simulated.state import DriveState, PhysicsState, TickRecord
 from .devices import EmulatedActuator, EmulatedBoard, EmulatedBus
