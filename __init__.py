@@ -10,9 +10,13 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from .logs.recording.finished_run import write_recording
+    from .mathematics.arrays import Array1D, Array2D
+    from .mathematics.compiling.expressions import cross
+    from .mathematics.kernel import kernel
     from .runtime.building import GraphBuilder
     from .runtime.graph import Graph, load
     from .runtime.language.block import Block, Input, Output, State
+    from .runtime.language.context import Clock
     from .runtime.language.errors import AloftError, BlockError, RunError
     from .runtime.language.parameters import Parameters, live_parameter, parameter
     from .runtime.language.signals import Field, Signal
@@ -23,6 +27,10 @@ if TYPE_CHECKING:
 __version__ = "0.2.0"
 
 _HOMES = {
+    "cross": "mathematics.compiling.expressions",
+    "kernel": "mathematics.kernel",
+    **dict.fromkeys(("Array1D", "Array2D"), "mathematics.arrays"),
+    "Clock": "runtime.language.context",
     "write_recording": "logs.recording.finished_run",
     **dict.fromkeys(("Block", "Input", "Output", "State"), "runtime.language.block"),
     **dict.fromkeys(("AloftError", "BlockError", "RunError"), "runtime.language.errors"),
@@ -37,8 +45,11 @@ _HOMES = {
 
 __all__ = [
     "AloftError",
+    "Array1D",
+    "Array2D",
     "Block",
     "BlockError",
+    "Clock",
     "Field",
     "Graph",
     "GraphBuilder",
@@ -52,6 +63,8 @@ __all__ = [
     "State",
     "SteppedRun",
     "__version__",
+    "cross",
+    "kernel",
     "live_parameter",
     "load",
     "parameter",

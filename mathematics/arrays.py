@@ -1,14 +1,37 @@
-"""The types of the arrays that the whole package computes with, named once."""
+"""The types of the arrays that the whole package computes with, named once.
+
+A kernel that is written as equations says of each array how many dimensions it has: ``Array1D`` is a
+vector, ``Array2D`` a matrix. ``Array``, ``Flags`` and ``Indices`` leave it open.
+"""
 
 from __future__ import annotations
 
-from typing import TypeAlias
+from typing import Annotated, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
+
+
+class Rank(NamedTuple):
+    """How many dimensions an array has, and the type of its elements for Python."""
+
+    dimensions: int
+    element: type
+
 
 Array: TypeAlias = NDArray[np.float64]
 Flags: TypeAlias = NDArray[np.bool_]
 Indices: TypeAlias = NDArray[np.int64]
 Counts: TypeAlias = NDArray[np.int64]
 """As ``Indices``, for numbers that say how many."""
+
+Array0D: TypeAlias = Annotated[Array, Rank(0, float)]
+Array1D: TypeAlias = Annotated[Array, Rank(1, float)]
+Array2D: TypeAlias = Annotated[Array, Rank(2, float)]
+Array3D: TypeAlias = Annotated[Array, Rank(3, float)]
+Flags0D: TypeAlias = Annotated[Flags, Rank(0, bool)]
+Flags1D: TypeAlias = Annotated[Flags, Rank(1, bool)]
+Flags2D: TypeAlias = Annotated[Flags, Rank(2, bool)]
+Indices0D: TypeAlias = Annotated[Indices, Rank(0, int)]
+Indices1D: TypeAlias = Annotated[Indices, Rank(1, int)]
+Indices2D: TypeAlias = Annotated[Indices, Rank(2, int)]

@@ -1,38 +1,82 @@
 """Kernels are the functions with the time-critical mathematics, marked so that they can be found
 and compiled.
 
-A kernel runs as plain Python and also compiles, unchanged, in Numba's nopython mode. So it uses
-only what both support and compute alike:
+A kernel runs as plain Python and as machine code, with the same bits. It is written as equations::
 
-* Arguments are arrays, floats, ints, bools, and named tuples of these, by position; no defaults,
-  keywords or other objects. Arrays that belong together travel as one named tuple.
+    @kernel
+    def filter_velocity(R: Array2D, v: Array1D, memory: FilterState, alpha: float) -> None:
+        memory.velocity[:] = alpha * memory.velocity + (1.0 - alpha) * (R @ v)
+        memory.count = memory.count + 1
+
+Before it runs or is compiled, ``compiling/equations`` rewrites statements on whole arrays into loops. What a
+kernel may use:
+
+* Arguments are arrays, floats, ints, bools, signals, and named tuples of these, by position; no
+  defaults, keywords or other objects. An argument says its type; ``Array1D`` and ``Array2D`` say how
+  many dimensions there are. A scalar field of a signal reads and is assigned like a number.
 * Results go into arrays of the caller, or are returned as numbers or a tuple of numbers. Nothing is
   allocated: scratch memory is an argument too.
+* ``x[:] = ...``, ``x[3:6] += ...`` and ``A[i, :] = ...`` with ``+ - * /``, ``R @ v``, ``R.T``,
+  ``cross(a, b)``, and functions of numbers, which apply to each element. Sums of ``@`` go from the
+  first product to the last. Outside such statements ``a @ b`` of two vectors is a number.
 * It calls other kernels, ``math``, and NumPy's functions in the form that writes into a given
-  array, with the array passed by position: ``np.subtract(a, b, out)``. ``np.minimum`` and
-  ``np.maximum`` take it only as a keyword, so kernels cannot use them. It uses no lists, dicts,
-  strings or comprehensions.
+  array, with the array passed by position: ``np.subtract(a, b, out)``. It uses no lists, dicts,
+  strings or comprehensions. A member of an ``IntEnum`` stands for its number.
 * It raises no errors, reads no globals except constants, and is deterministic.
-* Elements of arrays are read with ``float`` or ``int``, which makes plain Python faster and costs
-  nothing when compiled.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from types import CodeType, FunctionType
 from typing import Any, TypeVar
+
+from .compiling.kernel_registry import is_kernel, register, written_code
+from .compiling.kernel_registry import kernels as kernels  # noqa: PLC0414  also imported from here
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 
-_kernels: dict[str, Callable[..., Any]] = {}
+_expanded: set[int] = set()
 
 
 def kernel(function: _Function) -> _Function:
-    """Mark a function of a module as a kernel; the function itself stays unchanged."""
-    _kernels[f"{function.__module__}.{function.__qualname__}"] = function
+    """Mark a function as a kernel: of a module, or a step in the class of a block.
+
+    It stays a plain function. Its equations become loops when it is first called.
+    """
+    plain: Any = function.__func__ if isinstance(function, staticmethod) else function
+    if register(plain):
+        plain.__code__ = _expanding_code(plain)
     return function
 
 
-def kernels() -> dict[str, Callable[..., Any]]:
-    """The kernels of all modules imported so far, by ``module.name`` in order of definition."""
-    return dict(_kernels)
+def expand(function: Any) -> None:
+    """Let a kernel have loops in place of equations, if that has not been done.
+
+    Raises:
+        EquationError: a statement cannot be rewritten; the text says where and why.
+    """
+    if id(function) not in _expanded and is_kernel(function) and function.__closure__ is None:
+        from .compiling.equations import expanded_code
+
+        function.__code__ = expanded_code(function, written_code(function))
+        _expanded.add(id(function))
+
+
+def _expanding_code(function: FunctionType) -> CodeType:
+    """Code that expands a kernel when it is first called, and then calls it."""
+
+    def call(*arguments: Any, **keywords: Any) -> Any:
+        expand(function)
+        return function(*arguments, **keywords)
+
+    def stand_in(*arguments: Any, **keywords: Any) -> Any:
+        target: Any = "call"
+        return target(*arguments, **keywords)
+
+    written, code = function.__code__, stand_in.__code__
+    return code.replace(
+        co_consts=tuple(call if constant == "call" else constant for constant in code.co_consts),
+        co_name=written.co_name, co_qualname=written.co_qualname,
+        co_filename=written.co_filename, co_firstlineno=written.co_firstlineno,
+    )  # fmt: skip

@@ -22,7 +22,7 @@ PACKAGES = (
 ALLOWED: dict[str, tuple[str, ...]] = {
     "mathematics": (),
     "robots": ("mathematics",),
-    "runtime/language": ("robots", "mathematics/compiling"),
+    "runtime/language": ("robots", "mathematics/compiling", "mathematics/kernel"),
     "runtime/running": (
         "runtime/language", "runtime/loading/reading/selection", "robots", "mathematics/compiling",
     ),

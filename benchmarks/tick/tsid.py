@@ -355,12 +355,12 @@ class TsidController(WholeBodyController):
     def use(self, program: TsidProgram) -> None:
         """Solve by TSID from now on."""
         self.program = program
-        self.kernel_calls, self.attention = (), np.ones(1, np.int64)
+        self.kernel_calls, self.event = (), np.ones(1, np.int64)
 
-    def attend(self) -> None:
+    def on_event(self) -> None:
         """See ``WholeBodyController``."""
         if self.program is None:
-            super().attend()
+            super().on_event()
             return
         command = self.command
         if not self.phase.stance.any():

@@ -171,7 +171,7 @@ class SafetyMonitor(KernelBlock):
             Command(*(getattr(self.command, name) for name in Command._fields)), self._verdict,
         )  # fmt: skip
         self.kernel_calls = (watching,)
-        self.attention = self._verdict.fault[:1]
+        self.event = self._verdict.fault[:1]
 
     def on_parameters(self) -> None:
         given = self.params.damping
@@ -179,7 +179,7 @@ class SafetyMonitor(KernelBlock):
             self._peak / _DAMPED_SPEED if given is None else given.resolve(self.robot)
         )
 
-    def attend(self) -> None:
+    def on_event(self) -> None:
         state, verdict = self.state, self._verdict
         if state.fault[()] == Fault.NONE:
             fault = Fault(int(verdict.fault[0]))

@@ -301,20 +301,20 @@ class WholeBodyController(KernelBlock):
         self._arrange()
 
     def _arrange(self) -> None:
-        """Let the step be kernels alone if the tasks and the solver are; else leave it to ``attend``."""
+        """Let the step be kernels alone if the tasks and the solver are; else leave it to ``on_event``."""
         calls = [call for kind in PHASE_KINDS for call in self._gains[kind]]
         own = all(type(task).update is KernelTask.update for task in self._tasks)
         if not self._own or not own or len(set(map(id, calls))) < len(calls):
-            self.kernel_calls, self.attention = (), np.ones(1, np.int64)
+            self.kernel_calls, self.event = (), np.ones(1, np.int64)
             return
         for kind in PHASE_KINDS:
             for call in self._gains[kind]:
                 call.when = getattr(self._turns, kind)
         self._solve.when = self._turns.loaded
         self.kernel_calls = (self._take_turns, *calls, self._solve, self._keep)
-        self.attention = self._unsolved
+        self.event = self._unsolved
 
-    def attend(self) -> None:
+    def on_event(self) -> None:
         """Do what is left to Python: other solvers and other tasks, and ticks without a solution."""
         if not self.kernel_calls and self._step_in_python():
             return

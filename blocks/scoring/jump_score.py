@@ -100,9 +100,9 @@ class JumpScore(KernelBlock):
             *((comparing,) if self._planned else ()),
             following,
         )
-        self.attention = self._verdict.ending
+        self.event = self._verdict.ending
 
-    def attend(self) -> None:
+    def on_event(self) -> None:
         """Ask for the end of the run."""
         landed = float(self._verdict.landed[0])
         self.request_stop(

@@ -131,9 +131,9 @@ class StandScore(KernelBlock):
             *footing.unrolling(truth.joint_position, truth.base_orientation, record.foot),
             following,
         )
-        self.attention = self._ending
+        self.event = self._ending
 
-    def attend(self) -> None:
+    def on_event(self) -> None:
         """Ask for the end of the run."""
         fell = self._ending[0] == _FELL
         self.request_stop("the robot fell" if fell else f"judged at {self.time:.2f} s")

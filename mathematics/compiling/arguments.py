@@ -9,6 +9,7 @@ arguments there are two words with which machine code reports a division by zero
 from __future__ import annotations
 
 import ctypes
+from collections import namedtuple
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
@@ -52,10 +53,28 @@ class RecordType:
     kind: type
     parts: tuple[ArgumentType, ...]
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        if self.kind.__module__ == __name__:  # made by ``record_type``
+            names = getattr(self.kind, "_fields", ())
+            return _same_record, (self.kind.__name__, names, self.parts)
+        return RecordType, (self.kind, self.parts)
+
     def __str__(self) -> str:
         parts = ",".join(map(str, self.parts))
         names = ",".join(getattr(self.kind, "_fields", ()))
         return f"{self.kind.__module__}.{self.kind.__qualname__}:{names}({parts})"
+
+
+@cache
+def record_type(name: str, fields: tuple[str, ...]) -> type:
+    """The named tuple of some fields of a signal or of parameters: one class for each choice."""
+    made = namedtuple(name, fields)  # type: ignore[misc]  # the names are known only now
+    made.__module__ = __name__
+    return made
+
+
+def _same_record(name: str, fields: tuple[str, ...], parts: tuple[ArgumentType, ...]) -> RecordType:
+    return RecordType(record_type(name, fields), parts)
 
 
 ArgumentType = NumberType | ArrayType | RecordType

@@ -9,10 +9,13 @@ from __future__ import annotations
 import hashlib
 import types
 from collections.abc import Callable, Iterator, Mapping
+from enum import IntEnum
 from typing import Any
 
-from ..kernel import kernels
 from .arguments import ArgumentType
+from .equations import VERSION, reports_event
+from .kernel_registry import kernels, written_code
+from .kinds import argument_kinds
 
 
 def fingerprint(kernel: Callable[..., Any], signature: tuple[ArgumentType, ...], tools: str) -> str:
@@ -22,7 +25,7 @@ def fingerprint(kernel: Callable[..., Any], signature: tuple[ArgumentType, ...],
         tools: whatever else decides on the machine code: versions, options, the processor.
     """
     digest = hashlib.blake2b(digest_size=16)
-    digest.update(tools.encode())
+    digest.update(f"{tools}; equations {VERSION}".encode())
     for part in signature:
         digest.update(f"|{part}".encode())
     marked = {id(function) for function in kernels().values()}
@@ -42,18 +45,23 @@ def closure(kernel: Any, marked: set[int]) -> list[Any]:
         if any(function is other for other in found):
             continue
         found.append(function)
-        values = (function.__globals__.get(name) for name in function.__code__.co_names)
+        values = (function.__globals__.get(name) for name in written_code(function).co_names)
         pending += [value for value in values if id(value) in marked]
     return found
 
 
 def _texts(function: Any, marked: set[int]) -> Iterator[str]:
     """The byte code of a function, and the constants of its module that it reads."""
-    yield from _code_texts(function.__code__)
+    code = written_code(function)
+    yield from _code_texts(code)
+    yield f"|{argument_kinds(function)}{reports_event(function)}"
     scope: Mapping[str, Any] = function.__globals__
-    for name in function.__code__.co_names:
+    for name in code.co_names:
         if name in scope and id(scope[name]) not in marked:
             value = scope[name]
+            if isinstance(value, type) and issubclass(value, IntEnum):
+                yield f"|{name}={[(member.name, int(member)) for member in value]}"
+                continue
             plain = isinstance(value, types.ModuleType | type) or callable(value)
             yield f"|{name}={getattr(value, '__name__', '') if plain else repr(value)}"
 

@@ -12,12 +12,13 @@ import subprocess
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
+from importlib import import_module
 from typing import Any, NamedTuple
 
-from ..kernel import kernels
 from . import store
 from .arguments import ArgumentType
 from .fingerprint import closure
+from .kernel_registry import kernels, written_code
 
 WORTH_A_PROCESS = 15_000
 """Bytes of Python's code that take longer to compile than another process takes to begin."""
@@ -59,7 +60,9 @@ def divide(jobs: Sequence[Job], processors: int) -> list[list[Job]]:
 
 def _code_below(kernel: Any, marked: set[int]) -> dict[int, int]:
     """The sizes of the code of a kernel and of all that it calls."""
-    return {id(function): len(function.__code__.co_code) for function in closure(kernel, marked)}
+    return {
+        id(function): len(written_code(function).co_code) for function in closure(kernel, marked)
+    }
 
 
 def processors() -> int:
@@ -100,7 +103,8 @@ def _start(share: Sequence[Job]) -> subprocess.Popen[bytes]:
 def _packed(job: Job) -> bytes:
     """A job for another process; empty where that could not find the kernel by its name."""
     try:
-        return pickle.dumps(job)
+        kernel = job.kernel
+        return pickle.dumps((job.name, kernel.__module__, kernel.__qualname__, job.signature))
     except (pickle.PicklingError, AttributeError):
         return b""
 
@@ -111,6 +115,8 @@ def main() -> None:
 
     translator = Translator()
     for words in pickle.load(sys.stdin.buffer):
-        with suppress(CompileError, ImportError, AttributeError, EOFError):
-            job: Job = pickle.loads(words)
-            store.save(job.name, translator.object_code(job.kernel, job.signature))
+        with suppress(CompileError, ImportError, AttributeError, EOFError, KeyError):
+            name, module, qualname, signature = pickle.loads(words)
+            import_module(module)
+            kernel = kernels()[f"{module}.{qualname}"]
+            store.save(name, translator.object_code(kernel, signature))

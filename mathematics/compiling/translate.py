@@ -11,8 +11,9 @@ import types as python_types
 from collections.abc import Callable
 from typing import Any
 
-from ..kernel import kernels
+from ..kernel import expand
 from .arguments import HEADER, ArgumentType, ArrayType, NumberType
+from .kernel_registry import kernels, written_code
 from .linking import LIBRARY, linked_once
 from .machine_code import ENTRY, assemble
 from .pipeline import kernel_pipeline
@@ -53,8 +54,9 @@ class Translator:
         """numba's dispatcher of a kernel, in whose scope the kernels it calls are dispatchers."""
         name = self._marked.get(id(kernel), f"{kernel.__module__}.{kernel.__qualname__}")
         if name not in self._dispatchers:
+            expand(kernel)
             scope = dict(kernel.__globals__)
-            for used in kernel.__code__.co_names:
+            for used in written_code(kernel).co_names:
                 if id(scope.get(used)) in self._marked:
                     scope[used] = self._prepare(scope[used])
             copy = python_types.FunctionType(kernel.__code__, scope, kernel.__name__)

@@ -32,7 +32,9 @@ from pathlib import Path
 from typing import Any, ClassVar, Generic, Literal, Self, TypeVar, overload
 
 import numpy as np
+from numpy.typing import NDArray
 
+from ...mathematics.compiling.kernel_call import KernelCall
 from ...robots.description import RobotDescription
 from .context import Clock as Clock  # noqa: PLC0414  also imported from here
 from .context import Context as Context  # noqa: PLC0414
@@ -40,6 +42,7 @@ from .errors import BlockError, DeclarationError
 from .parameters import Parameters
 from .quantities import Carried, Given
 from .signals import Signal
+from .steps import PythonCall, declare_steps
 from .terrain import Terrain
 
 S = TypeVar("S", bound=Signal)
@@ -147,6 +150,12 @@ class Block:
     """
 
     Params: ClassVar[type[Parameters]] = Parameters
+    Constants: ClassVar[type[Signal] | None] = None
+    """What follows from the parameters and the robot: ``prepare`` writes it into ``constants``."""
+    Scratch: ClassVar[type[Signal] | None] = None
+    """Room for what a step computes on its way, in ``scratch``. No value lasts until the next step."""
+    named_steps: ClassVar[Mapping[str, Any]] = {}
+    """The steps that name what they take, by the name of the method; see ``steps``."""
     inputs: ClassVar[Mapping[str, Input[Any]]] = {}
     outputs: ClassVar[Mapping[str, Output[Any]]] = {}
     states: ClassVar[Mapping[str, State[Any]]] = {}
@@ -170,6 +179,14 @@ class Block:
 
     params: Parameters
     context: Context
+    constants: Any
+    scratch: Any
+    kernel_calls: Sequence[KernelCall | PythonCall] = ()
+    """What ``step`` or ``emit`` consists of, where that is nothing but calls."""
+    update_calls: Sequence[KernelCall | PythonCall] = ()
+    """What ``update`` consists of, likewise."""
+    event: NDArray[np.int64] | None = None
+    """Not zero where the last step asks for ``on_event``, (1,); none where it never does."""
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
         super().__init_subclass__(**kwargs)
@@ -181,10 +198,13 @@ class Block:
         cls.inputs = {**cls.inputs, **{n: p for n, p in ports.items() if isinstance(p, Input)}}
         cls.outputs = {**cls.outputs, **{n: p for n, p in ports.items() if isinstance(p, Output)}}
         cls.states = {**cls.states, **{n: p for n, p in ports.items() if isinstance(p, State)}}
+        declare_steps(cls)
 
     def __init__(self, params: Parameters, context: Context) -> None:
         self.params = params
         self.context = context
+        self.parameter_arrays: dict[str, NDArray[Any]] = {}
+        """The parameters that kernels read, in the arrays in which they read them."""
 
     @classmethod
     def is_moore(cls) -> bool:
@@ -346,6 +366,17 @@ class Block:
 
     def setup(self) -> None:
         """Build models and scratch arrays, once, after the ports are bound."""
+
+    def prepare(self) -> None:
+        """Write into ``constants`` what follows from the parameters.
+
+        Called after ``setup``, and again between two ticks when live parameters have changed. It
+        writes neither state nor outputs. If it raises, the old parameters are restored, and the
+        change is refused with the error's text.
+        """
+
+    def on_event(self) -> None:
+        """Do in Python what the last step asked for by returning true."""
 
     def on_parameters(self) -> None:
         """Take over live parameters that have changed in ``self.params``, between two ticks.

@@ -6,13 +6,15 @@ the same dimension: ``force: 70 N``, ``duration: 10 ms``.
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Mapping, Sequence
 from functools import partial
-from typing import Any
+from typing import Any, Literal, get_args, get_origin
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 from pydantic.fields import FieldInfo
 
+from ...mathematics.compiling.kinds import ArrayKind, Kind
 from .errors import UnitError
 from .units import parse_quantity
 
@@ -81,6 +83,11 @@ class Parameters(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, defer_build=True)
 
+    @classmethod
+    def kernel_kinds(cls) -> Mapping[str, Kind]:
+        """What the equations of a kernel see of each parameter."""
+        return parameter_kinds(cls)
+
     @model_validator(mode="before")
     @classmethod
     def _read_quantities(cls, data: Any) -> Any:
@@ -95,3 +102,33 @@ class Parameters(BaseModel):
                 except UnitError:
                     continue  # stays a text, which pydantic then reports at its own place
         return converted
+
+
+def parameter_kinds(params: type[Parameters]) -> dict[str, Kind]:
+    """What a kernel sees of each parameter: numbers, rows of numbers, and words."""
+    scope = vars(sys.modules[params.__module__])
+    return {
+        name: kind
+        for name, info in params.model_fields.items()
+        if (kind := _parameter_kind(info.annotation, scope)) is not None
+    }
+
+
+def _parameter_kind(annotation: Any, scope: Mapping[str, Any]) -> Kind:
+    if annotation in (float, int, bool):
+        return ArrayKind((), annotation)
+    origin, inner = get_origin(annotation), get_args(annotation)
+    if origin is Literal and all(isinstance(word, str) for word in inner):
+        return ArrayKind((), int, inner)
+    if origin is tuple and inner and inner[-1] is not Ellipsis:
+        kinds = [_parameter_kind(_bare(each), scope) for each in inner]
+        if all(isinstance(kind, ArrayKind) and not kind.shape for kind in kinds):
+            return ArrayKind((len(inner),))
+    if origin in (tuple, list) and inner and _parameter_kind(_bare(inner[0]), scope) is not None:
+        return ArrayKind((None,))
+    return None
+
+
+def _bare(annotation: Any) -> Any:
+    """``float`` for ``Annotated[float, ...]``."""
+    return get_args(annotation)[0] if hasattr(annotation, "__metadata__") else annotation

@@ -23,6 +23,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self, overload
 import numpy as np
 from numpy.typing import NDArray
 
+from ...mathematics.compiling.kinds import ArrayKind, Kind
 from .errors import DeclarationError
 from .units import Unit, parse_unit
 
@@ -99,6 +100,10 @@ class Field:
             return self
         raise AttributeError(f"{owner.__name__}.{self.name} is not bound to memory")
 
+    if TYPE_CHECKING:  # a scalar field is assigned like a number; see ``Signal.__setattr__``
+
+        def __set__(self, instance: Signal, value: Any) -> None: ...
+
     def resolve(self, dimensions: Mapping[str, int]) -> tuple[int, ...]:
         """The shape in numbers.
 
@@ -136,13 +141,17 @@ class Signal:
     if not TYPE_CHECKING:  # a type checker would conclude that any name may be assigned
 
         def __setattr__(self, name: str, value: Any) -> None:
-            """Refuse to replace a field, which would silently leave the graph's memory unchanged.
+            """Write a number into a scalar field: ``signal.count = 3``.
 
             Raises:
-                AttributeError: always, unless the value is the field's own view, which is what
-                    ``signal.field += x`` assigns.
+                AttributeError: there is no such field, or it is an array, which would silently leave
+                    the graph's memory unchanged; ``signal.field += x`` assigns its own view.
             """
-            if name in type(self).fields and getattr(self, name, None) is value:
+            view = getattr(self, name, None)  # using __dict__ would slow down every later access
+            if name in type(self).fields and view is value:
+                return
+            if view is not None and view.ndim == 0:
+                view[()] = value
                 return
             raise AttributeError(
                 f"{type(self).__name__}.{name} cannot be assigned: a field is a view of the "
@@ -151,6 +160,18 @@ class Signal:
                 else f"{type(self).__name__} has no field {name!r}; it has "
                 + ", ".join(type(self).fields)
             )
+
+    @classmethod
+    def kernel_kinds(cls) -> Mapping[str, Kind]:
+        """What the equations of a kernel see of each field: its known sizes and its elements."""
+        elements: Mapping[str, type] = {"float64": float, "int64": int, "bool": bool}
+        return {
+            name: ArrayKind(
+                tuple(size if isinstance(size, int) else None for size in field.shape),
+                elements[field.dtype_name],
+            )
+            for name, field in cls.fields.items()
+        }
 
     @classmethod
     def allocate(cls, dimensions: Mapping[str, int] | None = None) -> Self:

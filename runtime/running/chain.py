@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Callable, Sequence
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,17 +24,17 @@ from ...mathematics.compiling.chain_code import (
     chain_function,
     rows_of,
 )  # fmt: skip
-from ...mathematics.compiling.kernel_call import KernelCall
 from ..language.block import Block
 from ..language.errors import RunError
-from ..language.kernel_block import KernelBlock
+
+Calls = Literal["kernel_calls", "update_calls"]
+"""The calls of a block's ``step`` or ``emit``, or those of its ``update``."""
 
 
-def can_be_chained(block: Block) -> bool:
-    """Whether a block's step is nothing but compiled kernels."""
-    if not isinstance(block, KernelBlock) or not block.kernel_calls:
-        return False
-    return all(call.compiled is not None for call in block.kernel_calls)
+def can_be_chained(block: Block, which: Calls = "kernel_calls") -> bool:
+    """Whether a block's step, or its update, is nothing but compiled kernels."""
+    calls = getattr(block, which)
+    return bool(calls) and all(call.compiled is not None for call in calls)
 
 
 class Chain:
@@ -43,12 +44,18 @@ class Chain:
         blocks: the blocks, for each of which ``can_be_chained`` holds.
         numbers: the number of each, which is written to ``running`` while it runs.
         running: (1,), of the graph.
+        which: what the blocks run.
     """
 
     def __init__(
-        self, blocks: Sequence[Block], numbers: Sequence[int], running: NDArray[np.int64]
+        self,
+        blocks: Sequence[Block],
+        numbers: Sequence[int],
+        running: NDArray[np.int64],
+        which: Calls = "kernel_calls",
     ) -> None:
-        self.blocks = tuple(block for block in blocks if isinstance(block, KernelBlock))
+        self.blocks = tuple(blocks)
+        self._which: Calls = which
         self.owners = tuple(block.context.path for block in self.blocks)
         self._numbers = tuple(numbers)
         self._running = running
@@ -56,8 +63,8 @@ class Chain:
         self._now: Callable[[], int] | None = None
         self._cursor: NDArray[np.int64] = np.zeros(1, np.int64)
         self._first_stamp = 0
-        self._attending: KernelBlock | None = None
-        self._failed: KernelBlock | None = None
+        self._attending: Block | None = None
+        self._failed: Block | None = None
         self.refresh()
 
     def refresh(self) -> None:
@@ -66,12 +73,12 @@ class Chain:
         Raises:
             RunError: a block has a call that is not compiled.
         """
-        entries: list[tuple[int, KernelCall]] = []
+        entries: list[tuple[int, Any]] = []
         for place, block in enumerate(self.blocks):
-            if not can_be_chained(block):
+            if not can_be_chained(block, self._which):
                 path = block.context.path
                 raise RunError(f"block '{path}' has a kernel that did not compile", block=path)
-            entries += [(place, call) for call in block.kernel_calls]
+            entries += [(place, call) for call in getattr(block, self._which)]
         self._calls = [(call.compiled, call.when) for _, call in entries]
         """Keeps machine code and arguments alive."""
         self._places = [place for place, _ in entries]
@@ -80,8 +87,8 @@ class Chain:
         rows[:, OWNER] = [self._numbers[place] for place in self._places]
         for place, block in enumerate(self.blocks):
             last = rows[len(self._places) - 1 - self._places[::-1].index(place)]
-            if block.attention is not None:
-                last[ATTENTION] = block.attention.ctypes.data
+            if block.event is not None and self._which == "kernel_calls":
+                last[ATTENTION] = block.event.ctypes.data
             if self._now is not None and place < len(self.blocks) - 1:
                 last[STAMP] = 8 * (self._first_stamp + place)
         self._table = table
@@ -114,17 +121,17 @@ class Chain:
     def _attend(self, entry: int) -> None:
         place = self._places[entry]
         self._attending = self.blocks[place]
-        self._attending.attend()
+        self._attending.on_event()
         self._attending = None
         if self._now is not None and place < len(self.blocks) - 1:
             address = int(self._cursor[0]) + 8 * (self._first_stamp + place)
             ctypes.c_int64.from_address(address).value = self._now()
 
     @property
-    def _next(self) -> KernelBlock:
+    def _next(self) -> Block:
         return self.blocks[self._places[min(int(self._table[NEXT]), len(self._places) - 1)]]
 
     @property
-    def current(self) -> KernelBlock:
+    def current(self) -> Block:
         """The block that runs, or whose failure ended the last run."""
         return self._attending or self._failed or self._next

@@ -16,6 +16,7 @@ from ...mathematics.compiling.kernel_call import KernelCall, collect_calls
 from ..language.block import Block
 from ..language.errors import AloftError
 from ..language.parameter_change import Adjustment, ParameterChange
+from ..language.steps import refresh_parameters
 from .failures import describe
 
 ANSWER_TIME = 2.0
@@ -79,7 +80,9 @@ class LiveParameters:
 
     def _take_over(self, block: Block) -> None:
         with collect_calls() as calls:
+            refresh_parameters(block)
             block.on_parameters()
+            block.prepare()
         if self.compile is not None and calls:
             self.compile(calls)
 

@@ -23,6 +23,7 @@ from ..language.errors import DeclarationError, RunError
 from ..language.layout import ALIGNMENT, LARGEST, Layout, PortLayout
 from ..language.signals import DTYPES, Signal
 from ..language.stages import BlockSpec, CheckedGraph
+from ..language.steps import bind_steps
 from .failures import blame
 from .live_parameters import LiveParameters
 
@@ -95,7 +96,7 @@ class Memory:
 
     def __init__(self, blocks: Iterable[BlockSpec], robot: RobotDescription | None = None) -> None:
         specs = tuple(blocks)
-        outputs, constants, states = [], [], []
+        outputs, constants, states, own = [], [], [], []
         for spec in specs:
             for name, output in spec.block_type.outputs.items():
                 outputs.append(PortLayout(f"{spec.path}.{name}", output.signal, spec.dimensions))
@@ -104,14 +105,21 @@ class Memory:
                     constants.append(
                         PortLayout(f"{spec.path}.{name}", port.signal, spec.dimensions)
                     )
-            if spec.block_type.states:
+            kind = spec.block_type
+            inner = {"constants": kind.Constants, "scratch": kind.Scratch}
+            if kind.states or any(inner.values()):
                 with blame(spec, "state_dimensions"):
                     further = spec.block_type.state_dimensions(spec.params, robot)
                 sizes = {**spec.dimensions, **further}
                 for name, state in spec.block_type.states.items():
                     states.append(PortLayout(f"{spec.path}.{name}", state.signal, sizes))
+                for name, signal in inner.items():
+                    if signal is not None:
+                        own.append(PortLayout(f"{spec.path}.{name}", signal, sizes))
         self.bus = _allocate(Layout.of([*outputs, *constants]), "signals")
         self.state = _allocate(Layout.of(states), "states")
+        self.own = _allocate(Layout.of(own), "constants")
+        """Constants and scratch: they follow from parameters and inputs, so no snapshot has them."""
         for spec in specs:
             for name, port in spec.block_type.inputs.items():
                 if name not in spec.wires:
@@ -144,6 +152,18 @@ class Memory:
             setattr(block, name, self.bus.signal(output.signal, f"{spec.path}.{name}"))
         for name, state in spec.block_type.states.items():
             setattr(block, name, self.state.signal(state.signal, f"{spec.path}.{name}"))
+        kind = spec.block_type
+        if kind.Constants is not None:
+            block.constants = self.own.signal(kind.Constants, f"{spec.path}.constants")
+        if kind.Scratch is not None:
+            block.scratch = self.own.signal(kind.Scratch, f"{spec.path}.scratch")
+
+    def set_up(self, block: Block, spec: BlockSpec) -> None:
+        """Bind a block and let it set itself up; then its step can run."""
+        self.bind(block, spec)
+        block.setup()
+        block.prepare()
+        bind_steps(block)
 
     def snapshot(self, tick: int) -> Snapshot:
         """A copy of both buffers."""
@@ -200,8 +220,7 @@ class BoundGraph:
         )
         with blame(spec, "setup"):
             block = spec.block_type(spec.params, context)
-            self.memory.bind(block, spec)
-            block.setup()
+            self.memory.set_up(block, spec)
         return block
 
     def snapshot(self) -> Snapshot:

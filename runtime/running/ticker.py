@@ -19,7 +19,7 @@ from ..language.block import Block
 from ..language.errors import RunError
 from ..language.schedule import phases
 from ..language.stages import ClockSpec
-from .chain import Chain, can_be_chained
+from .chain import Calls, Chain, can_be_chained
 from .failures import Hang, describe
 from .finite import FiniteCheck, NotFiniteError
 from .memory import BoundGraph
@@ -96,7 +96,7 @@ class Ticker:
     def _make_program(self, active: Sequence[str]) -> Program:
         calls: list[Callable[[], Any]] = []
         owners: list[str | Chain] = []
-        updates: list[tuple[str, Callable[[], Any]]] = []
+        updates: list[tuple[str | Chain, Callable[[], Any]]] = []
         for path, chain in self._in_chains(active):
             block: Any = self.bound.blocks[path]
             if chain is not None:
@@ -105,30 +105,35 @@ class Ticker:
                 continue
             if type(block).is_moore():
                 calls.append(block.emit)
-                updates.append((path, block.update))
             else:
                 calls.append(block.step)
             owners.append(path)
+        moore = [path for path in active if type(self.bound.blocks[path]).is_moore()]
+        for path, chain in self._in_chains(moore, "update_calls"):
+            block = self.bound.blocks[path]
+            updates.append((path, block.update) if chain is None else (chain, chain.run))
         if self._finite is not None:
             calls.append(self._finite.check)
             owners.append("")
-        for path, update in updates:
+        for owner, update in updates:
             calls.append(update)
-            owners.append(path)
+            owners.append(owner)
         return Program(calls, owners, self._now if self._timing else None)
 
-    def _in_chains(self, active: Sequence[str]) -> list[tuple[str, Chain | None]]:
+    def _in_chains(
+        self, active: Sequence[str], which: Calls = "kernel_calls"
+    ) -> list[tuple[str, Chain | None]]:
         """The blocks, those that follow each other in a chain only once, with their chain."""
         blocks, numbers = self.bound.blocks, {p: k for k, p in enumerate(self.bound.graph.order)}
         found: list[tuple[str, Chain | None]] = []
-        pieces = groupby(active, lambda path: self._fused and can_be_chained(blocks[path]))
+        pieces = groupby(active, lambda path: self._fused and can_be_chained(blocks[path], which))
         for chained, group in pieces:
             paths = list(group)
             if not chained:
                 found += [(path, None) for path in paths]
                 continue
             members = [blocks[path] for path in paths]
-            chain = Chain(members, [numbers[path] for path in paths], self.bound.running)
+            chain = Chain(members, [numbers[path] for path in paths], self.bound.running, which)
             found.append((paths[0], chain))
         return found
 

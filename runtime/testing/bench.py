@@ -97,8 +97,7 @@ class BlockBench(Generic[B]):
         self.memory = Memory([spec], description)
         with collect_calls() as calls:
             self.block: B = block_type(params, context)
-            self.memory.bind(self.block, spec)
-            self.block.setup()
+            self.memory.set_up(self.block, spec)
         if not plain:
             compile_calls(calls)
         self._is_moore = block_type.is_moore()

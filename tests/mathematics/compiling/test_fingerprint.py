@@ -6,7 +6,7 @@ import numpy as np
 
 from aloft.mathematics.compiling.arguments import type_of
 from aloft.mathematics.compiling.fingerprint import fingerprint
-from aloft.mathematics.kernel import _kernels
+from aloft.mathematics.compiling.kernel_registry import _kernels
 
 SOURCE = """
 SCALE = {scale}

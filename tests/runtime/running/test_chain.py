@@ -72,13 +72,13 @@ class Smooth(KernelBlock):
     def on_parameters(self) -> None:
         """The calls are made anew, which a chain must notice."""
         gain, limit = np.array([self.params.gain]), self.params.limit
-        self.attention = np.zeros(1, np.int64)
+        self.event = np.zeros(1, np.int64)
         self.kernel_calls = (
             KernelCall(low_pass, self.u.value, gain, self.counts.steps, self.y.value),
-            KernelCall(divide, self.y.value, self.counts.steps, limit, self.attention),
+            KernelCall(divide, self.y.value, self.counts.steps, limit, self.event),
         )
 
-    def attend(self) -> None:
+    def on_event(self) -> None:
         self.attended.append(self.tick)
         if self.params.attend == "stop":
             self.request_stop("enough")

@@ -1,0 +1,82 @@
+"""What the arguments of a kernel are: arrays of so many dimensions, numbers, and records of these."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Mapping
+from enum import IntEnum
+from functools import cache
+from typing import Any, NamedTuple
+
+from ..arrays import Rank
+from .kernel_registry import arguments_of
+
+
+class ArrayKind(NamedTuple):
+    """An array: the size of each dimension where it is known, and the type of an element.
+
+    A parameter that is one of some ``words`` is kept as the place of its word among them.
+    """
+
+    shape: tuple[int | None, ...]
+    element: type = float
+    words: tuple[str, ...] = ()
+
+    @property
+    def rank(self) -> int:
+        """The number of dimensions."""
+        return len(self.shape)
+
+
+class RecordKind(NamedTuple):
+    """Something with named parts: a signal, parameters, or a named tuple."""
+
+    name: str
+    parts: Mapping[str, Kind]
+
+
+class NumberKind(NamedTuple):
+    """A number."""
+
+
+Kind = ArrayKind | RecordKind | NumberKind | None
+"""What an expression is; ``None`` where that is not known."""
+NUMBER = NumberKind()
+
+
+def kind_of_annotation(annotation: Any, scope: Mapping[str, Any]) -> Kind:
+    """What an annotation, or the text of one, says; ``scope`` has the names in it."""
+    if isinstance(annotation, str):
+        try:
+            annotation = eval(annotation, dict(scope))
+        except Exception:  # noqa: BLE001  # a name that only type checkers see
+            return None
+    if annotation in (float, int, bool):
+        return NUMBER
+    if hasattr(annotation, "kernel_kinds"):
+        return RecordKind(annotation.__name__, annotation.kernel_kinds())
+    for mark in getattr(annotation, "__metadata__", ()):
+        if isinstance(mark, Rank):
+            return ArrayKind((None,) * mark.dimensions, mark.element)
+    if (
+        isinstance(annotation, type)
+        and issubclass(annotation, tuple)
+        and hasattr(annotation, "_fields")
+    ):
+        scope = vars(sys.modules[annotation.__module__])
+        notes = annotation.__annotations__
+        parts = {n: kind_of_annotation(notes[n], scope) for n in annotation._fields if n in notes}
+        return RecordKind(annotation.__name__, parts)
+    if isinstance(annotation, type) and issubclass(annotation, IntEnum):
+        return NUMBER
+    return None
+
+
+@cache
+def argument_kinds(function: Any) -> Mapping[str, Kind]:
+    """What each argument of a kernel is, by its annotation or by what the block declares."""
+    given: Mapping[str, Kind] = getattr(function, "declared_kinds", {})
+    return {
+        name: given.get(name) or kind_of_annotation(function.__annotations__.get(name), function.__globals__)
+        for name in arguments_of(function)
+    }  # fmt: skip
