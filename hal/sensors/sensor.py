@@ -74,10 +74,9 @@ class RosMessage:
 
 @dataclass(frozen=True)
 class Arrow:
-    """Draws the vector in ``field``, in the sensor's frame, as an arrow of ``scale`` metres a unit."""
+    """Draws the force [N] in ``field``, in the sensor's axes, as an arrow where the sensor is."""
 
     field: str
-    scale: float
 
 
 class Sensor(ABC):

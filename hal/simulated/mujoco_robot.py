@@ -161,7 +161,10 @@ class MujocoRobot(SimulatedRobot):
         from .stance import RELEASED
 
         robot, params = self.robot, self.params
-        plant = self.plant = Plant(robot, params, self.period, self.physics, self.record)
+        plant = self.plant = Plant(
+            robot, params, self.period, self.physics, self.record,
+            getattr(self, "sensor_memory", None),
+        )  # fmt: skip
         steps = round(self.period / params.timestep)
         damping = RELEASED * plant.damping
         if params.drive_damping is not None:
@@ -174,6 +177,7 @@ class MujocoRobot(SimulatedRobot):
         self._reading = CallSequence([
             *plant.reading(self.imu, self.joints),
             *plant.sensors.reading_switches(self.physics.step, self.record, self.contacts.closed),
+            *plant.sensors.reading_mounted(self.mounted()),
             *plant.truth.reporting(self.truth), self.reporting(),
         ])  # fmt: skip
         latency = self._latency = CommandLatency(

@@ -27,7 +27,7 @@ from ..random_streams import Purpose, RandomStreams, stream
 from ..sensors.sensor import mounted_sensors
 from .base import BASES
 from .mujoco_model import Variation, body_name, build_world, draw_variation
-from .sensors import SensorMemory, SimulatedSensors
+from .sensors import SimulatedSensors
 from .simulated_robot import SimulatorParameters
 from .stance import (
     StartCheck,
@@ -40,6 +40,7 @@ from .stance import (
 from .state import (
     PhysicsState,
     RecordTotals,
+    SensorMemory,
     StepRecord,
     StepSensors,
     TickRecord,

@@ -14,25 +14,16 @@ from ...mathematics.compiling.call_sequence import Call
 from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.kernel import kernel
 from ...robots.description import RobotDescription
-from ...runtime.language.signals import Field, Signal
+from ...runtime.language.signals import Signal
 from ..random_streams import Purpose, RandomStreams, sensor_stream, stream
 from ..sensors.noise import DelayLine, FieldErrors, NoiseModel, delay_sample
 from ..sensors.sensor import MountedSensor, mounted_sensors
 from ..sensors.switches import Switches
 from .simulated_robot import SimulatorParameters
-from .state import TickRecord
+from .state import SensorMemory, TickRecord
 
 if TYPE_CHECKING:
     from mujoco import MjData, MjModel
-
-
-class SensorMemory(Signal):
-    """What the sensors that the description mounts keep from tick to tick."""
-
-    total = Field("n_sensed", text="sums over the physics steps since the last sample")
-    steps = Field("n_mounted", dtype="int64", text="physics steps since the last sample")
-    samples = Field("n_sensor_samples", text="past samples, for readings that are late")
-    count = Field("n_mounted", dtype="int64", text="samples so far")
 
 
 @kernel

@@ -17,9 +17,19 @@ from .scene_part import Colors, Moments
 from .scene_ports import ScenePorts
 from .scene_push import PushPart
 from .scene_robot import RobotPart
+from .scene_sensors import SensorPart
 from .scene_terrain import TerrainPart
 
-PARTS = (TerrainPart, RobotPart, ContactPart, MassCentrePart, PlanPart, FootTargetPart, PushPart)
+PARTS = (
+    TerrainPart,
+    RobotPart,
+    ContactPart,
+    MassCentrePart,
+    PlanPart,
+    FootTargetPart,
+    PushPart,
+    SensorPart,
+)
 
 
 class Scene:
