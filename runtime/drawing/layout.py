@@ -1,12 +1,101 @@
-"""Routes wires with right angles: through the gaps between columns, and back below all blocks."""
+"""Gives every node and wire of a diagram its place, in pixels from the top left.
+
+Nodes stand in the columns of ``layers``, wires as straight as can be. Wires have right angles: they pass through
+the gaps between columns, and lead back below all blocks.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from .diagram import OUT, Wire
-from .geometry import NOTE, Box, Drawing, Line, note_of, width_of
-from .layers import Layers, Pass
+from .diagram import INTO, OUT, Diagram, Node, Wire
+from .layers import Layers, Pass, Place, arrange
+
+ROW = 18.0
+"""From one port to the next."""
+HEAD = 42.0
+"""Height of a block's title and of what it uses."""
+FOOT = 9.0
+PAD = 7.0
+TITLE, USE, PORT = 15.0, 11.0, 13.0
+"""Sizes of texts."""
+NOTE = 10.0
+_RAISED = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
+_NARROW = frozenset("fijlrtI.,:;|!'()[] /-")
+_WIDE = frozenset("mwMWABCDGHNOQRUVXYZ%@_")
+
+
+def width_of(text: str, size: float) -> float:
+    """About how wide a text is; fonts differ a little."""
+    units = sum(0.36 if c in _NARROW else 0.74 if c in _WIDE else 0.585 for c in text)
+    return units * size
+
+
+@dataclass
+class Box:
+    """A node in its place; ``inside`` is the drawing of an open box, relative to (x, y)."""
+
+    node: Node
+    width: float
+    height: float
+    x: float = 0.0
+    y: float = 0.0
+    inside: Drawing | None = None
+
+    def port(self, name: str, outputs: bool) -> float:
+        """The height of a port above the page's lower edge, that is, its y relative to the box."""
+        ports = self.node.outputs if outputs else self.node.inputs
+        if self.inside is not None:
+            border = self.inside.boxes[INTO if outputs is False else OUT]
+            return border.y + border.port(name, not outputs)
+        first = HEAD if self.node.path not in (INTO, OUT) else 6.0
+        return first + ROW * (ports.index(name) + 0.5)
+
+
+@dataclass(frozen=True)
+class Line:
+    """A wire, or a part that several wires share, as a path of right angles."""
+
+    points: tuple[tuple[float, float], ...]
+    wire: Wire
+    ends: bool = True
+    """Whether it ends at a block's input, with an arrow head."""
+
+
+@dataclass
+class Drawing:
+    """Boxes by path, lines, and the points where lines branch."""
+
+    diagram: Diagram
+    boxes: dict[str, Box]
+    lines: list[Line] = field(default_factory=list)
+    dots: list[tuple[float, float, Wire]] = field(default_factory=list)
+    width: float = 0.0
+    height: float = 0.0
+
+
+def note_of(wire: Wire) -> str:
+    """What stands on a wire that is not a plain one: delay, change of rate, what is selected."""
+    notes = [f"z⁻{str(wire.delay).translate(_RAISED)}"] if wire.delay else []
+    notes += [wire.transition] if wire.transition else []
+    port = wire.source[1].rpartition(".")[2]
+    selected = wire.said.partition(f".{port}")[2]
+    if selected and not wire.said.startswith(("[", "{")):
+        notes.append(selected)
+    return " ".join(notes)
+
+
+def size_of(node: Node) -> tuple[float, float]:
+    """Width and height of a block or a closed box."""
+    rows = max(len(node.inputs), len(node.outputs))
+    if node.path in (INTO, OUT):
+        return 0.0, 12.0 + ROW * rows
+    left = max((width_of(node.labels.get(p, p), PORT) for p in node.inputs), default=0.0)
+    right = max((width_of(node.labels.get(p, p), PORT) for p in node.outputs), default=0.0)
+    head = max(width_of(node.title, TITLE) * 1.08, width_of(node.use, USE))
+    both = left + right + (18.0 if left and right else 0.0)
+    return round(max(head, both, 74.0) + 2 * PAD), HEAD + ROW * rows + FOOT
+
 
 _TRACK = 6.5
 """From one vertical line to the next."""
@@ -221,3 +310,152 @@ def column_gaps(router: Router) -> list[float]:
         notes = max((width_of(note_of(w), NOTE) for w in ends), default=0.0)
         widths.append(max(least, 28.0 + _TRACK * count + notes))
     return widths
+
+
+_GAP = 22.0
+"""Between two nodes of a column."""
+_PASS_GAP = 9.0
+"""Between passages of wires."""
+_MARGIN = 14.0
+_STEP = 24.0
+"""Smaller steps in a line that passes a column are taken out."""
+_FAR = 1e9
+_ITERATIONS = 120
+
+
+def draw(diagram: Diagram) -> Drawing:
+    """The drawing of a diagram, with the drawings of open boxes inside."""
+    boxes: dict[str, Box] = {}
+    for path, node in diagram.nodes.items():
+        if node.inside is None:
+            boxes[path] = Box(node, *size_of(node))
+            continue
+        inside = draw(node.inside)
+        width = max(inside.width, size_of(node)[0])
+        boxes[path] = Box(node, width, inside.height + HEAD, inside=inside)
+        _shift(inside, 0.0, HEAD)
+    layers = arrange(diagram)
+    heights = _heights(layers, boxes)
+    drawing = Drawing(diagram, boxes)
+    for path, box in boxes.items():
+        box.y = heights[path]
+    router = Router(layers, boxes, {p: h for p, h in heights.items() if isinstance(p, Pass)})
+    gaps = column_gaps(router)
+    x = gaps[0]
+    for number, column in enumerate(layers.columns):
+        width = max((boxes[p].width for p in column if isinstance(p, str)), default=0.0)
+        router.columns.append((x, x + width))
+        for place in column:
+            if isinstance(place, str):
+                boxes[place].x = x + 0.5 * (width - boxes[place].width)
+        x += width + gaps[number + 1]
+    drawing.width = x
+    for border, edge in ((INTO, 0.0), (OUT, x)):
+        if border in boxes:
+            boxes[border].x = edge
+    router.route(drawing)
+    _fit(drawing)
+    return drawing
+
+
+def _heights(layers: Layers, boxes: dict[str, Box]) -> dict[Place, float]:
+    """The y of the upper edge of every node, and of every passage."""
+    y: dict[Place, float] = {}
+    for column in layers.columns:
+        top = 0.0
+        for place in column:
+            y[place] = top
+            top += _height(place, boxes) + (_PASS_GAP if isinstance(place, Pass) else _GAP)
+    links: dict[Place, list[tuple[Place, float, float, float]]] = {}
+    for (a, b), ends in layers.links.items():
+        for out, into in ends:
+            weight = (1.0, 4.0, 16.0)[isinstance(a, Pass) + isinstance(b, Pass)]
+            from_a = boxes[a].port(out, True) if isinstance(a, str) else 0.0
+            from_b = boxes[b].port(into, False) if isinstance(b, str) else 0.0
+            links.setdefault(a, []).append((b, from_a, from_b, weight))
+            links.setdefault(b, []).append((a, from_b, from_a, weight))
+    for sweep in range(_ITERATIONS):
+        columns = layers.columns if sweep % 2 == 0 else layers.columns[::-1]
+        for column in columns:
+            wishes = []
+            for place in column:
+                found = links.get(place, ())
+                total = sum(weight for *_, weight in found)
+                wish = sum((y[o] + there - here) * w for o, here, there, w in found)
+                wishes.append((wish / total if total else y[place], max(total, 0.1)))
+            _settle(column, wishes, y, boxes)
+    _straighten(layers, y, boxes)
+    least = min(y.values(), default=0.0)
+    return {place: round(value - least + _MARGIN) for place, value in y.items()}
+
+
+def _straighten(layers: Layers, y: dict[Place, float], boxes: dict[str, Box]) -> None:
+    """Take small steps out of the lines that pass columns, where there is room."""
+    before = {b: (a, ends[0][0]) for (a, b), ends in layers.links.items() if isinstance(b, Pass)}
+    for column in layers.columns:
+        for number, place in enumerate(column):
+            if not isinstance(place, Pass):
+                continue
+            source, port = before[place]
+            wish = y[source] + (boxes[source].port(port, True) if isinstance(source, str) else 0.0)
+            low, high = -_FAR, _FAR
+            if number:
+                above = column[number - 1]
+                low = y[above] + _height(above, boxes) + _PASS_GAP
+            if number + 1 < len(column):
+                high = y[column[number + 1]] - _PASS_GAP
+            if abs(wish - y[place]) < _STEP and low <= wish <= high:
+                y[place] = wish
+
+
+def _height(place: Place, boxes: dict[str, Box]) -> float:
+    return boxes[place].height if isinstance(place, str) else 0.0
+
+
+def _settle(
+    column: list[Place],
+    wishes: list[tuple[float, float]],
+    y: dict[Place, float],
+    boxes: dict[str, Box],
+) -> None:
+    """Move the places of a column as near to their wishes as their order and distances allow.
+
+    This is isotonic regression: neighbours that would overlap move together to their mean wish.
+    """
+    starts, top = [], 0.0
+    for number, place in enumerate(column):
+        if number:
+            before = column[number - 1]
+            both = isinstance(before, Pass) and isinstance(place, Pass)
+            top += _height(before, boxes) + (_PASS_GAP if both else _GAP)
+        starts.append(top)
+    blocks: list[list[float]] = []  # of places that move together: sum, weight, count
+    for (wish, weight), start in zip(wishes, starts, strict=True):
+        blocks.append([(wish - start) * weight, weight, 1])
+        while len(blocks) > 1 and blocks[-2][0] / blocks[-2][1] > blocks[-1][0] / blocks[-1][1]:
+            last = blocks.pop()
+            blocks[-1] = [a + b for a, b in zip(blocks[-1], last, strict=True)]
+    number = 0
+    for total, weight, count in blocks:
+        for _ in range(int(count)):
+            y[column[number]] = total / weight + starts[number]
+            number += 1
+
+
+def _fit(drawing: Drawing) -> None:
+    """Make the drawing as high as what is in it."""
+    low = [box.y + box.height for box in drawing.boxes.values()]
+    low += [y for line in drawing.lines for _, y in line.points]
+    drawing.height = max(low, default=0.0) + _MARGIN
+
+
+def _shift(drawing: Drawing, dx: float, dy: float) -> None:
+    """Move all that is drawn, but not what is inside of boxes, which is relative to them."""
+    for box in drawing.boxes.values():
+        box.x += dx
+        box.y += dy
+    drawing.lines = [
+        type(line)(tuple((x + dx, y + dy) for x, y in line.points), line.wire, line.ends)
+        for line in drawing.lines
+    ]
+    drawing.dots = [(x + dx, y + dy, wire) for x, y, wire in drawing.dots]

@@ -3,7 +3,7 @@
 import pytest
 
 from aloft.runtime.language.stages import CheckedGraph
-from aloft.runtime.loading.checking.adjust import adjust, entries
+from aloft.runtime.loading.checking.parameters import adjust, entries
 from aloft.runtime.loading.load import load_text
 from aloft.runtime.loading.problems import LoadError
 from aloft.runtime.running.memory import BoundGraph

@@ -10,7 +10,7 @@ from aloft.runtime.language.fit import find_misfits, fix_without_robot, has
 from aloft.runtime.language.parameters import Parameters
 from aloft.runtime.language.registry import find_block
 from aloft.runtime.loading import LoadError, load_text
-from aloft.runtime.loading.checking.adjust import adjust
+from aloft.runtime.loading.checking.parameters import adjust
 from aloft.runtime.running.memory import BoundGraph
 from aloft.runtime.testing.bench import BlockBench
 

@@ -4,8 +4,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from aloft.runtime.drawing.diagram import INTO, OUT, Diagram, diagram
-from aloft.runtime.drawing.geometry import Drawing
-from aloft.runtime.drawing.placing import draw
+from aloft.runtime.drawing.layout import Drawing, draw
 from aloft.runtime.loading import load
 
 from .test_layers import NAMES, diagram_of

@@ -6,9 +6,14 @@ import pytest
 
 from aloft.runtime.language.stages import MachineSpec
 from aloft.runtime.loading import load, load_text
-from aloft.runtime.placement.picture import link_rows, machine_rows, placement_json
-from aloft.runtime.placement.place import place, spread
-from aloft.runtime.placement.placed import PlacementError
+from aloft.runtime.placement.placed import (
+    PlacementError,
+    link_rows,
+    machine_rows,
+    place,
+    placement_json,
+    spread,
+)
 
 PATH = Path("graph.yaml")
 HEAD = """
