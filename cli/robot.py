@@ -18,7 +18,7 @@ from .shared.output import console, errors_reported, print_error, print_json, sa
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from ..robots.reading import ReadRobot
+    from ..robots.description import ReadRobot
 
 robot = typer.Typer(
     name="robot",
@@ -133,13 +133,13 @@ def _faults_reported(as_json: bool) -> Iterator[None]:
 
 
 def _read(name: str) -> ReadRobot:
-    from ..robots.reading import path_of, read
+    from ..robots.description import path_of, read
 
     return read(path_of(name))
 
 
 def _draw(found: ReadRobot, picture: Path) -> None:
-    from ..robots.drawing import draw_robot
+    from ..robots.report import draw_robot
 
     try:
         draw_robot(found.description, picture)
@@ -150,8 +150,8 @@ def _draw(found: ReadRobot, picture: Path) -> None:
 def _imported(file: Path, out: Path | None, force: bool) -> tuple[Path, str, list[str]]:
     """Where the YAML goes, its text and its notes. Raises ``RobotError`` for a file that is wrong
     and ``AloftError`` for one that must not be written."""
+    from ..robots.description import MODEL_FILES
     from ..robots.importing.new_yaml import new_yaml
-    from ..robots.reading import MODEL_FILES
 
     if file.suffix not in MODEL_FILES:
         kinds = ", ".join(MODEL_FILES)
@@ -195,7 +195,9 @@ def _print_robot(out: Console, about: dict[str, Any]) -> None:
         out.print(table("feet", ("foot", "kind", "link", "contact points"), feet))
     sensors = about["sensors"]
     imu = "an IMU" if sensors["imu"] else "no IMU"
-    say(out, f"sensors: {sensors['encoders']} encoders, {imu}, {sensors['switches']} switches")
+    mounted = "".join(f", {name} ({what})" for name, what in sensors["mounted"].items())
+    counted = f"{sensors['encoders']} encoders, {imu}, {sensors['switches']} switches{mounted}"
+    say(out, f"sensors: {counted}")
     if about["points"]:
         say(out, f"points to push at: {', '.join(about['points'])}")
     for note in about["missing"]:

@@ -40,7 +40,7 @@ from pydantic import ValidationError
 from ...mathematics.arrays import Array
 from ...mathematics.compiling.call_sequence import Call
 from ...robots.description import RobotDescription
-from ...robots.parts import MountedSensorPart
+from ...robots.robot_description import MountedSensorPart
 from ...runtime.language.errors import BlockError
 from ...runtime.language.parameters import Parameters, parameter
 from ...runtime.language.registry import find_class

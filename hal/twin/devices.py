@@ -11,7 +11,7 @@ import numpy as np
 
 from ...blocks.signals import ImuReading
 from ...blocks.signals.drive_conditions import HEALTHY
-from ...robots.parts import MountedSensorPart
+from ...robots.robot_description import MountedSensorPart
 from ..bear.protocol import (
     BROADCAST,
     CONFIG,

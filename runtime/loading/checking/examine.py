@@ -7,8 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from ....robots.description import find_robot
-from ....robots.shipped import robot_names
+from ....robots.description import find_robot, robot_names
 from ...language.block import Block
 from ...language.errors import BlockError, UnknownBlockError
 from ...language.fit import fix_without_robot

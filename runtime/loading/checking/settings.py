@@ -8,8 +8,7 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
-from ....robots.description import RobotDescription, RobotError, find_robot
-from ....robots.shipped import robot_names
+from ....robots.description import RobotDescription, RobotError, find_robot, robot_names
 from ...language.fit import fix_without_robot
 from ...language.stages import ClockSpec, Position
 from ..flattening.flat import ROBOT_FILES, FlatGraph
