@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import yaml
 
 from aloft.blocks.signals import CommandMode
-from aloft.robots.description import RobotDescription, find_robot, robot_from_data
+from aloft.robots.description import RobotDescription, find_robot
 from aloft.runtime.testing.bench import BlockBench
 
 BRUCE = Path(__file__).parents[3] / "robots/bruce/bruce.yaml"
@@ -17,9 +18,8 @@ BRUCE = Path(__file__).parents[3] / "robots/bruce/bruce.yaml"
 
 def bruce_with(**sensors: Mapping[str, Any]) -> RobotDescription:
     """BRUCE, with these sensors mounted."""
-    data = yaml.safe_load(BRUCE.read_text(encoding="utf-8"))
-    data["sensors"] = {**data.get("sensors", {}), **sensors}
-    return robot_from_data(data)
+    with TemporaryDirectory() as folder:
+        return find_robot(write_bruce_with(Path(folder), **sensors).name, Path(folder))
 
 
 def write_bruce_with(folder: Path, **sensors: Mapping[str, Any]) -> Path:
