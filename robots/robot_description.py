@@ -235,6 +235,11 @@ class Sensors(Part):
         """The further sensors by name, in the order of the description."""
         return self.__pydantic_extra__ or {}
 
+    @property
+    def built_in(self) -> Sensors:
+        """The sensors without those that are mounted on links."""
+        return Sensors(imu=self.imu, switches=self.switches)
+
 
 BASE_VELOCITIES = {"floating": 6, "planar": 3, "fixed": 0}
 """The number of velocities of each kind of base."""

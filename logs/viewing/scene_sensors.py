@@ -8,8 +8,8 @@ import numpy as np
 
 from ...hal.sensors.sensor import MountedSensor, SensorError, mounted_sensors
 from ...robots.description import RobotDescription
-from .scene_contacts import ARROW_RADIUS, force_arrows
-from .scene_part import Moments, ScenePart
+from .contacts import ARROW_RADIUS, force_arrows
+from .drawing import Moments, ScenePart
 from .scene_ports import Ports, ports_of
 
 

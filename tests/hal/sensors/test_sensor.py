@@ -58,9 +58,7 @@ def test_declared_errors_and_the_factor_on_them() -> None:
     bias = robot.block.plant.sensors.mounted[0].bias("specific_force")
     assert 0.02 < np.abs(bias).max() <= 0.2
     np.testing.assert_allclose(forces.mean(axis=0), bias + [0, 0, 9.81], atol=0.01)
-    ideal = BlockBench(
-        MujocoRobot, {"sensor_errors": 0.0}, robot=bruce_with(foot_imu=FOOT_IMU)
-    )
+    ideal = BlockBench(MujocoRobot, {"sensor_errors": 0.0}, robot=bruce_with(foot_imu=FOOT_IMU))
     assert not ideal.block.plant.sensors.mounted[0].bias("specific_force").any()
 
 
@@ -108,20 +106,26 @@ def test_packets_carry_float32_and_the_twin_reads_them() -> None:
     twin.step(2)
     reading = twin.get("foot_imu").specific_force
     assert (reading != 0.0).any()
-    assert twin.block.driver.board.samples["foot_imu"].angular_velocity.astype(np.float32).tolist() == (
-        twin.block.driver.board.samples["foot_imu"].angular_velocity.tolist()
-    )
+    assert twin.block.driver.board.samples["foot_imu"].angular_velocity.astype(
+        np.float32
+    ).tolist() == (twin.block.driver.board.samples["foot_imu"].angular_velocity.tolist())
 
 
 @pytest.mark.parametrize(
     ("change", "text"),
     [
-        ({"kind": "imv"}, "sensor foot_imu: there is no kind of sensor 'imv': .*; did you mean imu?"),
+        (
+            {"kind": "imv"},
+            "sensor foot_imu: there is no kind of sensor 'imv': .*; did you mean imu?",
+        ),
         ({"kind": "math:pi"}, "sensor foot_imu: math:pi is no MountedSensor"),
         ({"link": "right_fot"}, "bruce has no link 'right_fot'; did you mean right_foot?"),
         ({"noise": {"rate": {}}}, "noise of 'rate'; imu has the fields angular_velocity, "),
         ({"noise": {"specific_force": {"noise": -1}}}, "noise.specific_force.noise: Input should"),
-        ({"nose": {}}, "sensor foot_imu: nose: Extra inputs .*; imu has kind, link, position, noise"),
+        (
+            {"nose": {}},
+            "sensor foot_imu: nose: Extra inputs .*; imu has kind, link, position, noise",
+        ),
     ],
 )
 def test_a_wrong_sensor_is_named(change: Any, text: str) -> None:
