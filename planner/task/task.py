@@ -309,7 +309,9 @@ class JumpTask(FreeTimes):
             "task": self.resolved(robot).content(),
             # The task says itself which actuators it is planned for; no plan depends on sensors that
             # are mounted on links.
-            "robot": robot.changed(profile="", sensors=robot.sensors.built_in).model_dump(mode="json"),
+            "robot": robot.changed(profile="", sensors=robot.sensors.built_in).model_dump(
+                mode="json"
+            ),
         }
         text = json.dumps(whole, sort_keys=True, separators=(",", ":"))
         return hashlib.sha256(text.encode()).hexdigest()[:20]
