@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     from ...logs.viewing.viewer import Viewer
     from ...runtime.language.stages import CheckedGraph
-    from ...runtime.running.real_time import RealTime
+    from ...runtime.running.real_time import RealTimeOptions
     from ...runtime.running.run_result import RunResult
     from ...runtime.running.sinks import Sink
 
@@ -28,7 +28,13 @@ class Runs(Protocol):
         """The graph that runs."""
 
     def run(
-        self, *, sinks: Sequence[Sink], log: bool, plain: bool, fuse: bool, real_time: RealTime
+        self,
+        *,
+        sinks: Sequence[Sink],
+        log: bool,
+        plain: bool,
+        fuse: bool,
+        real_time: RealTimeOptions,
     ) -> RunResult:
         """Run it once."""
 
@@ -52,14 +58,14 @@ def run_once(
     traceback: bool = False,
     plain: bool = False,
     fuse: bool = True,
-    real_time: RealTime | None = None,
+    real_time: RealTimeOptions | None = None,
 ) -> ExitCode:
     """Run the graph, record and show it, and print the result; ``said`` are warnings so far,
     ``also`` is what else the JSON object has, and ``times`` says whether those of blocks are
     printed."""
     from ...logs.recording.recorder import Recorder
     from ...runtime.running.freeze_guard import FreezeGuard
-    from ...runtime.running.real_time import NO_WISHES
+    from ...runtime.running.real_time import NO_REAL_TIME
     from ..shared.progress import TickCounter, compiling_shown, progress_bar
     from ..shared.viewing import how_to_view
     from .last_words import LastWords
@@ -79,7 +85,7 @@ def run_once(
         with FreezeGuard(graph.checked, as_json=as_json) as guard:
             result = graph.run(
                 sinks=[*recorders, counter, last_words, *sinks, guard], log=False, plain=plain,
-                fuse=fuse, real_time=real_time or NO_WISHES,
+                fuse=fuse, real_time=real_time or NO_REAL_TIME,
             )  # fmt: skip
     recording = recorder.recording if recorder is not None else None
     problem = recorder.problem if recorder is not None and record is not None else ""

@@ -68,7 +68,7 @@ def live_changes(params: Parameters) -> Iterator[tuple[str, Parameters]]:
     which it alone is changed to another legal value."""
     for name, info in type(params).model_fields.items():
         if is_live(info):
-            for path, value in _others(getattr(params, name), info.annotation):
+            for path, value in _peers(getattr(params, name), info.annotation):
                 changed = _with(params, name, value)
                 if changed is not None:
                     yield f"{name}{path}", changed
@@ -84,15 +84,15 @@ def _with(params: Any, name: str, value: Any) -> Any:
     return changed if changed != params else None
 
 
-def _others(value: Any, annotation: Any) -> Iterator[tuple[str, Any]]:
+def _peers(value: Any, annotation: Any) -> Iterator[tuple[str, Any]]:
     """Values that differ from ``value``, usually legal ones first, each with the path inside it."""
     if isinstance(value, RootModel):
-        yield from _others(value.root, None)
+        yield from _peers(value.root, None)
     elif isinstance(value, dict):
         yield "", {name: 0.75 * item + 0.01 for name, item in value.items()}
     elif isinstance(value, BaseModel):
         for name, info in type(value).model_fields.items():
-            for path, other in _others(getattr(value, name), info.annotation):
+            for path, other in _peers(getattr(value, name), info.annotation):
                 changed = _with(value, name, other)
                 if changed is not None:
                     yield f".{name}{path}", changed

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ..language.errors import AloftError
 from ..language.stages import CheckedGraph
-from ..links.part import BoundPart, Whole, hash_of, run_part
+from ..links.part import BoundPart, MergedLayout, hash_of, run_part
 from ..placement.place import place
 from ..placement.placed import PlacedGraph
 from ..running.run_result import RunResult
@@ -44,7 +44,7 @@ class SpreadRun:
         layouts = {machine: part.memory.bus.layout for machine, part in self.parts.items()}
         layout = next(iter(layouts.values()))
         rows = {machine: log.rows()[: self.ticks] for machine, log in self._logs().items()}
-        return Whole(self.placed, layout, layouts).rows(rows)
+        return MergedLayout(self.placed, layout, layouts).rows(rows)
 
     @property
     def run_hash(self) -> str:
@@ -61,7 +61,7 @@ def run_spread(
     *,
     interfere: Interfere | None = None,
     prepare: Callable[[Mapping[str, BoundPart], Hub], None] | None = None,
-    patience: float = 5.0,
+    timeout: float = 5.0,
     wall_time: float = 60.0,
     **options: Any,
 ) -> SpreadRun:
@@ -72,7 +72,7 @@ def run_spread(
         ticks: how many ticks; by default the graph's duration.
         interfere: what happens to messages on their way; see ``Hub``.
         prepare: called with all parts and the hub before they start.
-        patience: the seconds that parts wait for one another.
+        timeout: the seconds that parts wait for one another.
         wall_time: the seconds after which it is an error that they still run.
         options: of the executor.
 
@@ -82,7 +82,7 @@ def run_spread(
     hub = Hub()
     hub.interfere = interfere
     return run_parts_of(
-        place(graph), hub, ticks=ticks, prepare=prepare, patience=patience, wall_time=wall_time,
+        place(graph), hub, ticks=ticks, prepare=prepare, timeout=timeout, wall_time=wall_time,
         **options,
     )  # fmt: skip
 
@@ -94,14 +94,14 @@ def run_parts_of(
     *,
     ticks: int | None = None,
     prepare: Callable[[Mapping[str, BoundPart], Hub], None] | None = None,
-    patience: float = 5.0,
+    timeout: float = 5.0,
     wall_time: float = 60.0,
     **options: Any,
 ) -> SpreadRun:
     """As ``run_spread``, with a hub and with sinks for each machine."""
     parts = {
         machine.name: BoundPart(
-            placed, machine.name, hub.transport(), patience=patience, connect_time=patience
+            placed, machine.name, hub.transport(), timeout=timeout, connect_timeout=timeout
         )
         for machine in placed.machines
     }

@@ -15,15 +15,15 @@ from typing import Any
 from ...mathematics.compiling.compile_calls import compile_calls
 from ..language.block import Metric
 from ..language.stages import CheckedGraph, ClockSpec
-from ..links.part import CONDUCTOR, PREPARED, STARTED, BoundPart
+from ..links.part import COORDINATOR, PREPARED, STARTED, BoundPart
 from ..placement.place import place
 from ..running.run_result import merge_metrics
 from ..running.ticker import Ticker
-from ..transports.transport import Take
+from ..transports.transport import MessageCallback
 
 Travel = Callable[[str, int], int | None]
 """Gives how long a message takes [ns], by the key of its link and the time; ``None`` if it is lost."""
-_RUNTIME = (CONDUCTOR, PREPARED, STARTED)
+_RUNTIME = (COORDINATOR, PREPARED, STARTED)
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,7 @@ class _Network:
 
     def __init__(self, time: _Time, travel: Travel) -> None:
         self.time, self.travel = time, travel
-        self.takers: dict[str, Take] = {}
+        self.takers: dict[str, MessageCallback] = {}
         self.waiting: list[tuple[int, int, str, bytes]] = []
         self._count = 0
 
@@ -85,16 +85,16 @@ class _VirtualTransport:
     def open(self, machine: str, lost: Callable[[str], None]) -> None:
         """Nothing to do."""
 
-    def publisher(self, key: str) -> Take:
+    def publisher(self, key: str) -> MessageCallback:
         return lambda data: self._network.send(key, data)
 
-    def shower(self, key: str) -> Take:
+    def background_publisher(self, key: str) -> MessageCallback:
         return self.publisher(key)
 
     def before_close(self, call: Callable[[], None]) -> None:
         """Nothing to do: it does not close."""
 
-    def subscribe(self, key: str, take: Take) -> None:
+    def subscribe(self, key: str, take: MessageCallback) -> None:
         self._network.takers[key] = take
 
     def close(self) -> None:
@@ -127,8 +127,8 @@ def run_virtual(
         for machine in placed.machines
     }
     for name, part in parts.items():
-        for other in part.others.names:
-            part.others.assume_started(other, parts[other].others.run)
+        for other in part.peers.names:
+            part.peers.assume_started(other, parts[other].peers.run)
         part.open_links()
         if not plain:
             compile_calls(part.kernel_calls)
