@@ -20,7 +20,7 @@ from ..logs.recording.recorder import Recorder
 from ..runtime.graph import load
 from ..runtime.language.errors import ExitCode
 from ..runtime.language.stages import CheckedGraph, ClockSpec
-from ..runtime.loading.shipped import FOLDER
+from ..runtime.loading.reading.files import FOLDER
 from ..runtime.running.executor import Executor
 from ..runtime.running.memory import BoundGraph
 from ..runtime.running.run_result import RunResult

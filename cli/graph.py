@@ -16,7 +16,7 @@ from .shared.output import console, errors_reported, print_json, say, table
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from ..runtime.drawing.values import Values
+    from ..runtime.drawing.page import Values
     from ..runtime.language.stages import CheckedGraph
 
 
@@ -65,8 +65,7 @@ def graph(
     graph on several machines all parts, with --keys, --as and --local as for `aloft top`.
     """
     from ..runtime.loading import load, picture
-    from ..runtime.placement.picture import placement_json
-    from ..runtime.placement.place import place
+    from ..runtime.placement.placed import place, placement_json
 
     with errors_reported(as_json):
         if as_table + mermaid + flat + as_json + (web or live) > 1:
@@ -114,8 +113,8 @@ def draw_files(
         AloftError: there is no such sub-graph, or a file cannot be written.
     """
     from ..runtime.drawing.diagram import diagram, subgraphs
-    from ..runtime.drawing.placing import draw
-    from ..runtime.drawing.svg import svg as svg_text
+    from ..runtime.drawing.layout import draw
+    from ..runtime.drawing.render import svg as svg_text
     from ..runtime.loading.problems import listing
 
     known = subgraphs(graph)
@@ -128,7 +127,7 @@ def draw_files(
             svg.write_text(svg_text(drawing, graph.name), encoding="utf-8")
             typer.echo(f"diagram: {svg}", err=True)
         if png is not None:
-            from ..runtime.drawing.png import save_png
+            from ..runtime.drawing.render import save_png
 
             save_png(drawing, png, dark=dark)
             typer.echo(f"diagram: {png}", err=True)
@@ -138,8 +137,7 @@ def draw_files(
 
 def serve(graph: CheckedGraph, values: Values | None = None) -> None:
     """Show the diagram in a browser until Ctrl-C is pressed."""
-    from ..runtime.drawing.loopback import ADDRESS
-    from ..runtime.drawing.page_server import page_server
+    from ..runtime.drawing.page import ADDRESS, page_server
     from .shared.viewing import open_page
 
     server = page_server(graph, values=values)
@@ -211,8 +209,7 @@ def print_ages(out: Console, graph: CheckedGraph) -> None:
 
 def print_machines(out: Console, graph: CheckedGraph) -> None:
     """Print which machine runs which blocks, and one row for each link between them."""
-    from ..runtime.placement.picture import link_rows, machine_rows
-    from ..runtime.placement.place import place
+    from ..runtime.placement.placed import link_rows, machine_rows, place
 
     placed = place(graph)
     columns = ("machine", "endpoint", "runs", "sends", "receives")

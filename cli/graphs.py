@@ -10,7 +10,7 @@ def graphs(
     as_json: AsJson = False,
 ) -> None:
     """List the shipped graphs by the addresses that every verb takes: aloft run aloft:jump."""
-    from ..runtime.loading.shipped import shipped_graphs, summary
+    from ..runtime.loading.reading.files import shipped_graphs, summary
 
     found = [(address, str(path), summary(path)) for address, path in shipped_graphs().items()]
     if as_json:

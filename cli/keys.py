@@ -30,7 +30,7 @@ def keys(
 ) -> None:
     """Make the certificates and sessions of all machines of a graph: mutual TLS, least access."""
     from ..runtime.loading import load
-    from ..runtime.placement.place import place
+    from ..runtime.placement.placed import place
     from ..runtime.transports.access import keys_from
     from ..runtime.transports.keys import make_keys
 

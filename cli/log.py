@@ -195,7 +195,7 @@ def merge(
         run_hash_of,
     )
     from ..logs.replay.opened_run import OpenedRun
-    from ..runtime.placement.place import place
+    from ..runtime.placement.placed import place
     from ..runtime.running.memory import BoundGraph
 
     with errors_reported(as_json):

@@ -18,7 +18,7 @@ from .shared.output import console, errors_reported, print_error, print_json, sa
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from ..robots.reading import ReadRobot
+    from ..robots.description import ReadRobot
 
 robot = typer.Typer(
     name="robot",
@@ -133,13 +133,13 @@ def _faults_reported(as_json: bool) -> Iterator[None]:
 
 
 def _read(name: str) -> ReadRobot:
-    from ..robots.reading import path_of, read
+    from ..robots.description import path_of, read
 
     return read(path_of(name))
 
 
 def _draw(found: ReadRobot, picture: Path) -> None:
-    from ..robots.drawing import draw_robot
+    from ..robots.report import draw_robot
 
     try:
         draw_robot(found.description, picture)
@@ -150,8 +150,8 @@ def _draw(found: ReadRobot, picture: Path) -> None:
 def _imported(file: Path, out: Path | None, force: bool) -> tuple[Path, str, list[str]]:
     """Where the YAML goes, its text and its notes. Raises ``RobotError`` for a file that is wrong
     and ``AloftError`` for one that must not be written."""
+    from ..robots.description import MODEL_FILES
     from ..robots.importing.new_yaml import new_yaml
-    from ..robots.reading import MODEL_FILES
 
     if file.suffix not in MODEL_FILES:
         kinds = ", ".join(MODEL_FILES)

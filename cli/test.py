@@ -87,7 +87,7 @@ def sort_targets(
     """
     from ..runtime.language.registry import find_block
     from ..runtime.loading import load
-    from ..runtime.loading.checking.adjust import plain_parameters
+    from ..runtime.loading.checking.parameters import plain_parameters
 
     blocks: list[tuple[str, type[Block], dict[str, Any] | None]] = []
     paths = []

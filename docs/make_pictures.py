@@ -26,8 +26,8 @@ from aloft.logs.recording.recorder import Recorder
 from aloft.logs.recording.whole_view import write_view
 from aloft.logs.viewing.viewer import ViewerError, start_viewer
 from aloft.runtime.drawing.diagram import diagram
-from aloft.runtime.drawing.placing import draw
-from aloft.runtime.drawing.svg import svg
+from aloft.runtime.drawing.layout import draw
+from aloft.runtime.drawing.render import svg
 from aloft.runtime.live.live_run import LiveRun
 from aloft.runtime.live.live_server import LiveServer
 from aloft.runtime.live.parameter_endpoint import EndpointError

@@ -12,7 +12,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-from aloft.robots.importing.packages import find_file
+from aloft.robots.importing.urdf_text import find_file
 
 PAGE = Path(__file__).parent / "robots.md"
 URDF = "package://example-robot-data/robots/go1_description/urdf/go1.urdf"

@@ -30,8 +30,7 @@ import numpy as np
 from ..mathematics.arrays import Array
 from ..mathematics.compiling.kernel_call import KernelCall
 from ..mathematics.kernel import kernel
-from ..mathematics.linear import multiply_vector
-from ..mathematics.reproducible import product
+from ..mathematics.linear_algebra import multiply_vector, product
 from ..robots.robot_description import RobotDescription
 from ..robots.transmission import MotorGains, motor_gains
 from ..runtime.language.block import Misfit

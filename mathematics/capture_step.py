@@ -1,4 +1,4 @@
-"""Where a robot that loses its balance must step, and how a foot gets there.
+"""Balance of a standing robot: its stability margin, where it must step when that is lost, and how a foot gets there.
 
 The linear inverted pendulum of height h has the natural frequency w, w^2 = g / h. Its capture point
 
@@ -14,6 +14,9 @@ step toward humanoid push recovery", Humanoids 2006; Englsberger et al., IROS 20
 from __future__ import annotations
 
 import math
+
+import numpy as np
+from numpy.typing import NDArray
 
 from .arrays import Array, Flags, Indices
 from .constants import GRAVITY
@@ -236,3 +239,42 @@ def swing_points(
         acceleration[i, 0] = approach(float(position[i, 0]), float(velocity[i, 0]), x, left)
         acceleration[i, 1] = approach(float(position[i, 1]), float(velocity[i, 1]), y, left)
         acceleration[i, 2] = approach(float(position[i, 2]), float(velocity[i, 2]), z, until)
+
+
+@kernel
+def support_margin(
+    points: NDArray[np.float64], loaded: NDArray[np.bool_], x: float, y: float
+) -> float:
+    """The distance [m] of the place (``x``, ``y``) from the edge of the support polygon.
+
+    The support polygon is the convex hull of the ``loaded`` ones of ``points`` (n, 2 or 3). The
+    margin is positive inside, and negative outside or if the hull has no area. A pair of points
+    that has all others on its left is an edge, and the margin is the smallest distance of the place
+    to the left of an edge. Near a corner, outside, it is less than the true distance. With one
+    loaded point it is minus the distance to that point, with none it is minus one metre.
+    """
+    count, first, margin = points.shape[0], -1, math.inf
+    for i in range(count):
+        if not loaded[i]:
+            continue
+        first = i if first < 0 else first
+        ax, ay = float(points[i, 0]), float(points[i, 1])
+        for j in range(count):
+            if not loaded[j]:
+                continue
+            dx, dy = float(points[j, 0]) - ax, float(points[j, 1]) - ay
+            length = math.sqrt(dx * dx + dy * dy)
+            if length < 1e-9:
+                continue
+            leftmost = True
+            for k in range(count):
+                side = dx * (float(points[k, 1]) - ay) - dy * (float(points[k, 0]) - ax)
+                leftmost = leftmost and (side >= -1e-12 or not loaded[k])
+            if leftmost:
+                margin = min(margin, (dx * (y - ay) - dy * (x - ax)) / length)
+    if first < 0:
+        return -1.0
+    if margin == math.inf:
+        dx, dy = float(points[first, 0]) - x, float(points[first, 1]) - y
+        return -math.sqrt(dx * dx + dy * dy)
+    return margin

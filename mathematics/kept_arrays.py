@@ -1,8 +1,8 @@
-"""Arrays that take long to compute, kept in the user's cache folder between processes.
+"""Results that take long to compute, kept in the user's cache folder between processes.
 
-They are found again under a digest of everything that decides on them, given by the caller, and of
-what NumPy may compute with on this processor. So they are the bits that computing them again would
-give, and where nothing can be read or written they are computed again.
+They are found again under a digest of everything that decides on them: data given by the caller, the code
+and libraries (``code_digest``), and what NumPy may compute with on this processor. So they are the bits that
+computing them again would give, and where nothing can be read or written they are computed again.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import tempfile
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from functools import cache
-from importlib import import_module
+from importlib import import_module, metadata
 from pathlib import Path
 from typing import Any
 
@@ -87,3 +87,23 @@ def _write(place: Path, arrays: Arrays) -> None:
     kept = sorted(place.parent.iterdir(), key=lambda path: path.stat().st_mtime)
     for old in kept[:-MOST_FILES]:
         old.unlink(missing_ok=True)
+
+
+LIBRARIES = ("numpy", "pin")
+"""What computes, beside this package."""
+
+
+@cache
+def code_digest(*folders: str) -> bytes:
+    """A digest of all source files in these folders of the package, such as ``planner/models``, and
+    of the versions of the libraries that compute."""
+    root, digest = Path(__file__).parents[1], hashlib.blake2b(digest_size=16)
+    for folder in folders:
+        for path in sorted((root / folder).rglob("*.py")):
+            digest.update(path.relative_to(root).as_posix().encode() + b"\0" + path.read_bytes())
+    for name in LIBRARIES:
+        try:
+            digest.update(f"{name} {metadata.version(name)}\n".encode())
+        except metadata.PackageNotFoundError:
+            continue
+    return digest.digest()

@@ -1,11 +1,29 @@
-"""The landing law of the paper (IV), and how a foot moves to its landing place in flight."""
+"""Where feet land after a flight: the landing law of the paper (IV), and how the body turns while the legs move.
+
+Without contact the angular momentum k about the centre of mass c is constant, so whatever the legs
+do the body turns against it. With the base's angular velocity w in its own axes, joint velocities
+q', and the centroidal momentum matrix A,
+
+    k = A_kw w + A_kq q'          so  w = W k - B q',               W = A_kw^-1, B = W A_kq
+    p_i' - c' = D_i w + E_i q'    so  p_i' - c' = D_i W k + G_i q',  G_i = E_i - D_i B
+
+where p_i is a contact point, D_i = J_i,w - A_lw / m and E_i = J_i,q - A_lq / m. G is the generalised
+Jacobian of robots that float in space. It says by which joint motion the feet go where they should,
+and thus how far the base turns on the way. BRUCE's legs are two thirds of its mass: feet that keep
+their place in the world move by 33 mm in the base for every 0.1 rad that the base turns, and that
+turns it by 0.07 rad more.
+"""
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
+
+import numpy as np
 
 from .arrays import Array
 from .kernel import kernel
+from .linear_algebra import multiply_matrices, solve_positive, solve_rows
 
 
 @kernel
@@ -137,3 +155,213 @@ def heading_matrix(angle: float, out: Array) -> None:
     out[:, :] = 0.0
     out[0, 0] = out[1, 1] = cosine
     out[0, 1], out[1, 0], out[2, 2] = -sine, sine, 1.0
+
+
+_HELD = 1e6
+"""The weight of a shift in height that is held at its bound; the others' weights are near one."""
+
+
+class FlightMap(NamedTuple):
+    """How the base turns, and what it takes to compute it.
+
+    Attributes:
+        drift: the base's angular velocity in world axes per angular momentum with the joints
+            still, (3, 3).
+        carried: the velocity that the contact points then have, (3 n_contacts, 3).
+        turn: the base's rotation about the world's x and y axes [rad] per displacement of the
+            contact points as seen from the centre of mass [m], (2, 3 n_contacts).
+        jacobian, inverse, reaction: G, W and B.
+        normal, lever: scratch of shapes (n_joints, n_joints) and (3, 3).
+        answers: scratch, (2, n_joints).
+    """
+
+    drift: Array
+    carried: Array
+    turn: Array
+    jacobian: Array
+    inverse: Array
+    reaction: Array
+    normal: Array
+    lever: Array
+    answers: Array
+
+
+def flight_map(n_joints: int, n_contacts: int) -> FlightMap:
+    """The memory for ``map_flight``."""
+    rows = 3 * n_contacts
+    return FlightMap(
+        drift=np.zeros((3, 3)),
+        carried=np.zeros((rows, 3)),
+        turn=np.zeros((2, rows)),
+        jacobian=np.zeros((rows, n_joints)),
+        inverse=np.zeros((3, 3)),
+        reaction=np.zeros((3, n_joints)),
+        normal=np.zeros((n_joints, n_joints)),
+        lever=np.zeros((3, 3)),
+        answers=np.zeros((2, n_joints)),
+    )
+
+
+@kernel
+def map_flight(
+    momentum: Array, jacobian: Array, rotation: Array, mass: float, damping: float, out: FlightMap
+) -> None:
+    """Compute ``out`` for the present configuration.
+
+    Args:
+        momentum: the centroidal momentum matrix A, (6, 6 + n_joints), linear rows first.
+        jacobian: of the contact points, (n_contacts, 3, 6 + n_joints).
+        rotation: from the base to the world, (3, 3).
+        mass: of the robot [kg].
+        damping: of the joint motion where a leg is nearly stretched [m].
+    """
+    n = out.reaction.shape[1]
+    invert(momentum[3:6, 3:6], out.inverse)
+    multiply_matrices(out.inverse, momentum[3:6, 6:], out.reaction)
+    multiply_matrices(rotation, out.inverse, out.drift)
+    for i in range(jacobian.shape[0]):
+        for j in range(3):
+            for k in range(3):
+                lever = float(momentum[j, 3 + k]) / mass
+                out.lever[j, k] = float(jacobian[i, j, 3 + k]) - lever
+        rows = out.jacobian[3 * i : 3 * i + 3]
+        multiply_matrices(out.lever, out.inverse, out.carried[3 * i : 3 * i + 3])
+        multiply_matrices(out.lever, out.reaction, rows)
+        for j in range(3):
+            for k in range(n):
+                along = float(jacobian[i, j, 6 + k]) - float(momentum[j, 6 + k]) / mass
+                rows[j, k] = along - float(rows[j, k])
+    multiply_matrices(out.jacobian.T, out.jacobian, out.normal)
+    for k in range(n):
+        out.normal[k, k] += damping * damping
+    multiply_matrices(rotation[0:2], out.reaction, out.answers)
+    solve_rows(out.normal, out.answers)
+    multiply_matrices(out.answers, out.jacobian.T, out.turn)
+    for i in range(2):
+        for k in range(out.turn.shape[1]):
+            out.turn[i, k] = -float(out.turn[i, k])
+
+
+@kernel
+def predict_tilt(
+    flight: FlightMap,
+    tilt: Array,
+    momentum: Array,
+    way: Array,
+    time: float,
+    later: float,
+    side: Array,
+    goal: Array,
+    turn: Array,
+) -> None:
+    """The base's tilt at touchdown, and how shifts of the landing place change it.
+
+    Args:
+        tilt: the base's rotation from the planned orientation now, in world axes [rad], (3,).
+        momentum: the angular momentum that was not planned, (3,).
+        way: how far the contact points still have to go to their planned places, as seen from the
+            centre of mass [m], (3 n_contacts,).
+        time: left until touchdown without a shift [s].
+        later: by how much a shift of the feet upwards delays touchdown [s/m].
+        side: 1 for contact points of a left foot, -1 of a right one, 0 in the middle, (n_contacts,).
+        goal: becomes the rotation about x and y at touchdown if the feet land as planned, (2,).
+        turn: becomes its change [rad/m] per shift of the feet ahead, to the left, apart and
+            upwards, (2, 4).
+    """
+    for j in range(2):
+        value, rate = float(tilt[j]), 0.0
+        for k in range(3):
+            rate += float(flight.drift[j, k]) * float(momentum[k])
+        turn[j, :] = 0.0
+        for i in range(way.shape[0]):
+            carried = 0.0
+            for k in range(3):
+                carried += float(flight.carried[i, k]) * float(momentum[k])
+            per_way = float(flight.turn[j, i])
+            value += per_way * float(way[i])
+            rate -= per_way * carried
+            if i % 3 == 2:
+                turn[j, 3] += per_way
+            else:
+                turn[j, i % 3] += per_way
+            if i % 3 == 1:
+                turn[j, 2] += float(side[i // 3]) * per_way
+        goal[j] = value + time * rate
+        turn[j, 3] += later * rate
+
+
+class LandingCost(NamedTuple):
+    """What the choice of the landing place weighs up.
+
+    Attributes:
+        goal: the shifts that are best for the momenta: ahead, to the left, apart [m], (3,).
+        weight: of deviations from these three and of the shift in height, without unit, and of the
+            tilt about x and y [m^2/rad^2], (6,).
+        free: the lowest and highest tilt about x and y that costs nothing [rad], (2, 2).
+        bounds: lowest and highest shift in height [m], (2,).
+    """
+
+    goal: Array
+    weight: Array
+    free: Array
+    bounds: Array
+
+
+@kernel
+def choose_shift(tilt: Array, turn: Array, cost: LandingCost, matrix: Array, shift: Array) -> None:
+    """The ``shift`` (4,) of the feet ahead, to the left, apart and upwards [m] that costs least::
+
+        sum_i weight_i (shift_i - goal_i)^2 + weight_3 shift_3^2
+            + sum_j weight_(4+j) (tilt_j + turn_j shift - free_j)^2   with shift_3 within the bounds
+
+    free_j is the nearest tilt that costs nothing: within ``free`` the one that the goal leads to
+    anyway, and beyond it the bound.
+
+    Args:
+        tilt, turn: see ``predict_tilt``.
+        matrix: scratch, (4, 4).
+    """
+    bound = 0.0
+    for attempt in range(2):
+        matrix[:, :] = 0.0
+        for i in range(4):
+            weight, goal = float(cost.weight[i]), bound
+            if i < 3:
+                goal = float(cost.goal[i])
+            elif attempt == 1:
+                weight = _HELD
+            matrix[i, i] = weight
+            shift[i] = weight * goal
+        for j in range(2):
+            aimed = float(tilt[j])
+            for i in range(3):
+                aimed += float(turn[j, i]) * float(cost.goal[i])
+            free = min(max(aimed, float(cost.free[j, 0])), float(cost.free[j, 1]))
+            weight = float(cost.weight[4 + j]) if aimed != free else 0.0
+            for i in range(4):
+                part = weight * float(turn[j, i])
+                shift[i] -= part * (float(tilt[j]) - free)
+                for k in range(4):
+                    matrix[i, k] += part * float(turn[j, k])
+        solve_positive(matrix, shift)
+        bound = min(max(float(shift[3]), float(cost.bounds[0])), float(cost.bounds[1]))
+        if bound == float(shift[3]):
+            return
+
+
+@kernel
+def invert(matrix: Array, out: Array) -> None:
+    """The inverse of a regular matrix (3, 3), by its cofactors; zero for a singular one."""
+    for i in range(3):
+        a, b = (i + 1) % 3, (i + 2) % 3
+        for j in range(3):
+            c, d = (j + 1) % 3, (j + 2) % 3
+            first = float(matrix[a, c]) * float(matrix[b, d])
+            out[j, i] = first - float(matrix[a, d]) * float(matrix[b, c])
+    determinant = 0.0
+    for j in range(3):
+        determinant += float(matrix[0, j]) * float(out[j, 0])
+    scale = 1.0 / determinant if abs(determinant) > 1e-300 else 0.0
+    for i in range(3):
+        for j in range(3):
+            out[i, j] *= scale

@@ -22,8 +22,7 @@ from numpy.typing import NDArray
 
 from .arrays import Array, Indices
 from .kernel import kernel
-from .least_squares import solve_rows
-from .linear import multiply_vector
+from .linear_algebra import multiply_vector, solve_rows
 
 DAMPING = 1e-8
 """Added to the squared levers [m^2] of the joints, so that a straight leg has a finite inverse."""

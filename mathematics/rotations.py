@@ -1,9 +1,10 @@
-"""Rotations as pure functions over arrays: quaternions, matrices, exponential and logarithm.
+"""Rotations as pure functions over arrays: quaternions, matrices, Euler angles, exponential and logarithm.
 
 A quaternion is x, y, z, w (Hamilton) and takes body vectors to the world. Functions write their
 result into ``out``, which may be the same array as an argument, and allocate no memory. Angles are
-in rad. Elements are read with ``float``, because Python's arithmetic on single numbers is faster
-than NumPy's.
+in rad. Roll, pitch and yaw are a rotation about z by yaw, then about the new y by pitch, then about x by
+roll: R = Rz(yaw) Ry(pitch) Rx(roll). Elements are read with ``float``, because Python's arithmetic on
+single numbers is faster than NumPy's.
 """
 
 from __future__ import annotations
@@ -240,3 +241,54 @@ def mean_heading(rotations: Array, counted: NDArray[np.bool_]) -> float:
             x += float(rotations[i, 0, 0])
             y += float(rotations[i, 1, 0])
     return math.atan2(y, x)
+
+
+@kernel
+def unit(
+    x: float, y: float, z: float, default_x: float, default_y: float, default_z: float
+) -> tuple[float, float, float]:
+    """The unit vector along (x, y, z), or the default where there is no direction.
+
+    Dividing by the largest element first keeps very long and very short vectors exact.
+    """
+    largest = max(abs(x), abs(y), abs(z))
+    if largest < 1e-300:
+        return default_x, default_y, default_z
+    x, y, z = x / largest, y / largest, z / largest
+    size = math.sqrt(x * x + y * y + z * z)
+    return x / size, y / size, z / size
+
+
+@kernel
+def from_euler(angles: Array, out: Array) -> None:
+    """The unit quaternion (4) of roll, pitch and yaw [rad]."""
+    r, p, y = 0.5 * float(angles[0]), 0.5 * float(angles[1]), 0.5 * float(angles[2])
+    cr, sr, cp, sp, cy, sy = (
+        math.cos(r), math.sin(r), math.cos(p), math.sin(p), math.cos(y), math.sin(y),
+    )  # fmt: skip
+    out[0] = sr * cp * cy - cr * sp * sy
+    out[1] = cr * sp * cy + sr * cp * sy
+    out[2] = cr * cp * sy - sr * sp * cy
+    out[3] = cr * cp * cy + sr * sp * sy
+
+
+@kernel
+def to_euler(quaternion: Array, out: Array) -> None:
+    """Roll (-pi to pi), pitch (-pi/2 to pi/2) and yaw (-pi to pi) [rad] of a unit quaternion.
+
+    Where pitch is at its end only the sum or difference of the others is defined, and they are
+    ill-conditioned near it.
+    """
+    x, y, z, w = (
+        float(quaternion[0]),
+        float(quaternion[1]),
+        float(quaternion[2]),
+        float(quaternion[3]),
+    )
+    sine = 2.0 * (w * y - z * x)
+    side = 2.0 * (x * y + w * z)
+    front = 1.0 - 2.0 * (y * y + z * z)
+    out[0] = math.atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
+    # not the arc sine, which would lose half the digits near its end
+    out[1] = math.atan2(sine, math.sqrt(side * side + front * front))
+    out[2] = math.atan2(side, front)

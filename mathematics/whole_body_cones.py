@@ -1,11 +1,24 @@
-"""The whole-body controller's program with round friction cones, from its terms to torques, as a kernel.
+"""The whole-body controller's program with round friction cones |f_t| <= mu f_z, from its terms to torques, as a kernel.
 
-It is ``whole_body_solution`` with other constraints: planes that touch the cones (``friction_cones``). They are
-added where the solution leaves a cone until it does so by little; then Newton steps make it exact.
+It is ``whole_body_solution`` with other constraints: planes that touch the cones. They are added where the
+solution leaves a cone until it does so by little; then Newton steps make it exact.
+
+Two facts make it exact. A plane that touches a cone along a direction u, u'f_t <= mu f_z, holds for all forces
+in the cone, so the program with some of these planes in the place of the cones has a lower minimum, and planes
+where its solution leaves the cones raise it (outer approximation). And a cone is curved across u only: with the
+multiplier p of the cone and r = |f_t|, its curvature in the Lagrangian is p / r (1 - u u'), which maps f_t to
+zero. So a Newton step for the cones is the program with this matrix added to the Hessian, the same gradient,
+and the plane at the present u; where u no longer changes the conditions of optimality hold. At a cone's apex
+the planes themselves are enough, because their normals are in the cone's polar.
+
+References: J. E. Kelley, "The cutting-plane method for solving convex programs", J. SIAM 8, 1960; J. F. Bonnans,
+H. Ramirez, "Perturbation analysis of second-order cone programming problems", Mathematical Programming 104,
+2005 (the curvature).
 """
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -21,18 +34,6 @@ from .active_set import (
     solve_program,
 )
 from .arrays import Array, Flags, Indices
-from .friction_cones import (
-    PLANES,
-    Cones,
-    add_bending,
-    add_curvature,
-    bend,
-    cone_memory,
-    cut,
-    touch,
-    turned,
-    write_planes,
-)
 from .kernel import kernel
 from .whole_body_qp import PYRAMID_ROWS, RigidBodyTerms, TaskRows
 from .whole_body_reduction import (
@@ -52,6 +53,211 @@ from .whole_body_solution import (
     reduce_program,
     write_forces,
 )
+
+PLANES = 8
+"""Planes of a cone at the same time, besides those of its pyramid. At most three are active."""
+APEX = 1e-6
+"""A force is at its cone's apex if its tangential part is less than this [N]."""
+NEAR = 2e-2
+"""Planes closer to each other than this [rad] are one plane in a Newton step. The active-set method fulfils a
+plane up to 1e-10 N, so it cannot tell apart two that differ by less than the root of that, and would choose
+any."""
+
+
+class Cones(NamedTuple):
+    """The planes of the cones, and what a Newton step has of them.
+
+    ``planes`` (n_contacts, PLANES, 2) are unit vectors u in the order of their rows, the first ``used``
+    (n_contacts,) of them; ``direction`` (n_contacts, 2) is u, ``curvature`` (n_contacts,) is p / r.
+    """
+
+    planes: Array
+    used: Indices
+    direction: Array
+    curvature: Array
+
+
+def cone_memory(n_contacts: int) -> Cones:
+    """Zero memory for so many cones."""
+    return Cones(
+        np.zeros((n_contacts, PLANES, 2)), np.zeros(n_contacts, np.int64),
+        np.zeros((n_contacts, 2)), np.zeros(n_contacts),
+    )  # fmt: skip
+
+
+@kernel
+def write_planes(
+    count: int, n: int, first: int, friction: float, cones: Cones, program: Program
+) -> int:
+    """Rows for all planes of ``count`` cones, from row ``first`` on; zero where there is none yet.
+
+    Returns the number of rows in all.
+    """
+    for point in range(count):
+        for k in range(PLANES):
+            row = first + PLANES * point + k
+            program.bound[row] = 0.0
+            for i in range(n):
+                program.matrix[row, i] = 0.0
+            if k < cones.used[point]:
+                program.matrix[row, 3 * point] = cones.planes[point, k, 0]
+                program.matrix[row, 3 * point + 1] = cones.planes[point, k, 1]
+                program.matrix[row, 3 * point + 2] = -friction
+    return first + PLANES * count
+
+
+@kernel
+def add_plane(
+    point: int,
+    first: int,
+    friction: float,
+    cones: Cones,
+    program: Program,
+    memory: ActiveSetMemory,
+) -> None:
+    """A plane along the cone's ``direction``. Where all are in use, it takes the place of the one that
+    is not active and farthest from it."""
+    x, y = float(cones.direction[point, 0]), float(cones.direction[point, 1])
+    place = int(cones.used[point])
+    if place < PLANES:
+        cones.used[point] = place + 1
+    else:
+        place, nearest = 0, 2.0
+        for k in range(PLANES):
+            near = x * float(cones.planes[point, k, 0]) + y * float(cones.planes[point, k, 1])
+            if near < nearest and not memory.is_active[first + PLANES * point + k]:
+                place, nearest = k, near
+    row = first + PLANES * point + place
+    cones.planes[point, place, 0], cones.planes[point, place, 1] = x, y
+    program.matrix[row, 3 * point], program.matrix[row, 3 * point + 1] = x, y
+    program.matrix[row, 3 * point + 2] = -friction
+    memory.size[row] = math.sqrt(1.0 + friction * friction)
+
+
+@kernel
+def look_along(point: int, x: Array, cones: Cones) -> float:
+    """Make a cone's ``direction`` that of its tangential force; returns the size of that [N]. At the
+    apex it returns zero, and the direction stays."""
+    a, b = float(x[3 * point]), float(x[3 * point + 1])
+    size = math.sqrt(a * a + b * b)
+    if size <= APEX:
+        return 0.0
+    cones.direction[point, 0], cones.direction[point, 1] = a / size, b / size
+    return size
+
+
+@kernel
+def cut(
+    count: int,
+    first: int,
+    friction: float,
+    tolerance: float,
+    cones: Cones,
+    program: Program,
+    memory: ActiveSetMemory,
+    x: Array,
+) -> int:
+    """Add a plane where a force has left its cone by more than that share; returns how many."""
+    added = 0
+    for point in range(count):
+        size = look_along(point, x, cones)
+        outside = size - friction * float(x[3 * point + 2]) > tolerance * size
+        if size > 0.0 and outside:
+            add_plane(point, first, friction, cones, program, memory)
+            added += 1
+    return added
+
+
+@kernel
+def touch(count: int, friction: float, tolerance: float, cones: Cones, x: Array) -> None:
+    """Have a plane along every force that presses its cone or has left it by more than that share, and
+    no other plane near it. The rows of the program are not changed."""
+    for point in range(count):
+        size = look_along(point, x, cones)
+        outside = size - friction * float(x[3 * point + 2]) > tolerance * size
+        if size == 0.0 or not (cones.curvature[point] > 0.0 or outside):
+            continue
+        a, b = float(cones.direction[point, 0]), float(cones.direction[point, 1])
+        kept, farthest, least = 0, 0, 2.0
+        for k in range(int(cones.used[point])):
+            c, d = float(cones.planes[point, k, 0]), float(cones.planes[point, k, 1])
+            near = a * c + b * d
+            if near > 0.0 and abs(a * d - b * c) < NEAR:
+                continue
+            if near < least:
+                farthest, least = kept, near
+            cones.planes[point, kept, 0], cones.planes[point, kept, 1] = c, d
+            kept += 1
+        place = kept if kept < PLANES else farthest
+        cones.planes[point, place, 0], cones.planes[point, place, 1] = a, b
+        cones.used[point] = min(kept + 1, PLANES)
+
+
+@kernel
+def bend(
+    count: int, active: int, first: int, cones: Cones, memory: ActiveSetMemory, x: Array
+) -> None:
+    """Compute ``direction`` and ``curvature`` from a solution and its ``active`` multipliers.
+
+    The multiplier of a cone is the sum of those of its planes, the pyramid's among them.
+    """
+    for point in range(count):
+        cones.curvature[point] = 0.0
+    for j in range(active):
+        row = int(memory.active[j])
+        if row >= first:
+            point = (row - first) // PLANES
+        elif row < PYRAMID_ROWS * count and row % PYRAMID_ROWS < 4:
+            point = row // PYRAMID_ROWS
+        else:
+            continue
+        cones.curvature[point] = float(cones.curvature[point]) + float(memory.multipliers[j])
+    for point in range(count):
+        size = look_along(point, x, cones)
+        pressure = max(float(cones.curvature[point]), 0.0)
+        cones.curvature[point] = pressure / size if size > 0.0 else 0.0
+
+
+@kernel
+def add_curvature(count: int, cones: Cones, hessian: Array) -> None:
+    """Add p / r (1 - u u') of every cone to the Hessian."""
+    for point in range(count):
+        value, i = float(cones.curvature[point]), 3 * point
+        a, b = float(cones.direction[point, 0]), float(cones.direction[point, 1])
+        hessian[i, i] = float(hessian[i, i]) + value * b * b
+        hessian[i + 1, i + 1] = float(hessian[i + 1, i + 1]) + value * a * a
+        hessian[i, i + 1] = float(hessian[i, i + 1]) - value * a * b
+        hessian[i + 1, i] = float(hessian[i + 1, i]) - value * a * b
+
+
+@kernel
+def add_bending(count: int, cones: Cones, x: Array, gradient: Array) -> None:
+    """Add p / r (1 - u u') f_t of every cone to the gradient."""
+    for point in range(count):
+        i = 3 * point
+        a, b = float(cones.direction[point, 0]), float(cones.direction[point, 1])
+        across = float(cones.curvature[point]) * (a * float(x[i + 1]) - b * float(x[i]))
+        gradient[i] = float(gradient[i]) - across * b
+        gradient[i + 1] = float(gradient[i + 1]) + across * a
+
+
+@kernel
+def turned(count: int, friction: float, cones: Cones, x: Array) -> float:
+    """How far the solution is from its cones: the largest angle [rad] between a pressed cone's
+    ``direction`` and its force, or share by which a force leaves its cone."""
+    worst = 0.0
+    for point in range(count):
+        a, b = float(x[3 * point]), float(x[3 * point + 1])
+        size = math.sqrt(a * a + b * b)
+        if size <= APEX:
+            continue
+        worst = max(worst, (size - friction * float(x[3 * point + 2])) / size)
+        if cones.curvature[point] > 0.0:
+            across = float(cones.direction[point, 0]) * b - float(cones.direction[point, 1]) * a
+            along = float(cones.direction[point, 0]) * a + float(cones.direction[point, 1]) * b
+            worst = max(worst, abs(across) / size if along > 0.0 else 2.0)
+    return worst
+
 
 CUTS = 60
 """The most rounds in which planes are added, in each approach."""

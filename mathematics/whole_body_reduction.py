@@ -27,7 +27,7 @@ import numpy as np
 
 from .arrays import Array, Indices
 from .kernel import kernel
-from .triangular import factorise, solve_rows_transposed, solve_transposed, solve_upper
+from .linear_algebra import factorise, solve_rows_transposed, solve_transposed, solve_upper
 from .whole_body_qp import Bounds, RigidBodyTerms, TaskRows
 
 

@@ -1,4 +1,4 @@
-"""Positions and velocities of the contact points relative to the base."""
+"""Positions and velocities of the contact points relative to the base, from the tree of a robot's bodies."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..mathematics.arrays import Array, Indices
-from ..mathematics.body_tree import (
+from ..mathematics.body_dynamics import (
     BodyMotion,
     BodyTree,
     body_motion,
@@ -19,10 +19,25 @@ from ..mathematics.body_tree import (
 from ..mathematics.compiling.kernel_call import KernelCall
 from ..mathematics.kernel import kernel
 from ..mathematics.rotations import rotate_back
-from .ball_feet import ball_feet
-from .body_tree import body_tree
-from .link_poses import contact_centres, link_poses
+from .kinematics import ball_feet, contact_centres, link_poses_in_base
 from .robot_description import RobotDescription
+
+
+def body_tree(robot: RobotDescription) -> BodyTree:
+    """The links and joints of the robot, in the description's order of joints."""
+    links = {link.name: link for link in robot.links}
+    bodies = [links[robot.base], *(links[joint.child] for joint in robot.joints)]
+    index = {link.name: k for k, link in enumerate(bodies)}
+    joints = robot.joints
+    return BodyTree(
+        np.array([index[joint.parent] for joint in joints], dtype=np.int64),
+        np.array([joint.origin for joint in joints], dtype=np.float64).reshape(-1, 3),
+        np.array([joint.axis for joint in joints], dtype=np.float64).reshape(-1, 3),
+        np.array([joint.kind == "slide" for joint in joints], dtype=np.bool_),
+        np.array([link.mass for link in bodies], dtype=np.float64),
+        np.array([link.com for link in bodies], dtype=np.float64),
+        np.array([link.inertia for link in bodies], dtype=np.float64),
+    )
 
 
 class Contacts(NamedTuple):
@@ -262,7 +277,7 @@ def _pattern(robot: RobotDescription) -> Array:
     Where the points p_i stand so, turned by a heading, the sum over x_i p_i + y_i (p_i x up)
     points ahead, as far as the pattern is symmetric.
     """
-    poses = link_poses(robot, robot.standing_position)
+    poses = link_poses_in_base(robot, robot.standing_position)
     places = np.zeros((len(robot.contacts), 3))
     for ball in ball_feet(robot):
         turn, place = poses[robot.feet[ball.foot].link]

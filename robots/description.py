@@ -1,10 +1,17 @@
-"""Finds the description of a robot by name, or reads it from a file."""
+"""Finds the description of a robot by name or file, reads it and checks it."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import lru_cache
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from .parts import (
+from .importing.urdf_text import SCHEME, find_file, package_of
+from .placed_yaml import PlacedYaml
+from .robot_description import (
+    BASE_VELOCITIES,
     ActuatorProfile,
     ContactPoint,
     Foot,
@@ -14,14 +21,185 @@ from .parts import (
     Mesh,
     MotorRating,
     Motors,
+    RobotDescription,
     Sensors,
     Shape,
     Transmission,
     Vector3,
 )
-from .reading import find, read
-from .robot_description import BASE_VELOCITIES, RobotDescription
-from .validation import RobotError, RobotFault
+from .validation import RobotError, RobotFault, find_faults
+
+if TYPE_CHECKING:
+    from .importing.description_data import Imported
+
+
+SHIPPED = Path(__file__).parent
+MODEL_FILES = (".urdf", ".xml", ".mjcf")
+YAML_FILES = (".yaml", ".yml")
+DISTRIBUTIONS = {"example-robot-data": "example-robot-data"}
+"""What to install for a package of files, where it is not called as the package."""
+
+
+@dataclass(frozen=True)
+class ReadRobot:
+    """A robot that was read: its ``description``, the file it is from, the URDF or MJCF behind it
+    if there is one, and what that lacks or what was approximated in ``notes``."""
+
+    description: RobotDescription
+    path: Path
+    model_file: Path | None = None
+    notes: tuple[str, ...] = ()
+
+
+def path_of(name: str, folder: Path | None = None) -> Path:
+    """The file that describes the robot called ``name``, ours or relative to ``folder``.
+
+    Raises:
+        LookupError: there is none; the message names the robots that there are.
+    """
+    if name.endswith((*YAML_FILES, *MODEL_FILES)):
+        path = (folder or Path()) / name
+        if not path.is_file():
+            raise LookupError(f"no robot description at {path}")
+        return path
+    path = SHIPPED / name / f"{name}.yaml"
+    if not path.is_file():
+        raise LookupError(f"no robot called {name!r}; there is {', '.join(robot_names())}")
+    return path
+
+
+def find(name: str, folder: Path | None = None) -> RobotDescription:
+    """The robot called ``name``; see ``description.find_robot``."""
+    path = path_of(name, folder)
+    return (_read_shipped(path) if path.is_relative_to(SHIPPED) else read(path)).description
+
+
+@lru_cache(maxsize=16)
+def _read_shipped(path: Path) -> ReadRobot:
+    return read(path)
+
+
+def read(path: Path) -> ReadRobot:
+    """The robot that a YAML, URDF or MJCF file describes.
+
+    A YAML of the same name beside a URDF or MJCF file adds what that lacks; a YAML with a key
+    ``file`` adds to the file that it names.
+
+    Raises:
+        RobotError: the file cannot be read, or describes no robot; it carries every fault.
+    """
+    if path.suffix in MODEL_FILES:
+        beside = next((p for s in YAML_FILES if (p := path.with_suffix(s)).is_file()), None)
+        return _read_model(path, beside, PlacedYaml.read(beside) if beside else None)
+    text = PlacedYaml.read(path)
+    if isinstance(text.data, dict) and "file" in text.data:
+        return _read_model(_named_file(path, text), path, text)
+    data = text.data
+    _complete(data)
+    faults = [*text.faults, *find_faults(data)]
+    if faults:
+        raise RobotError(str(path), [text.placed(fault) for fault in faults])
+    return ReadRobot(_with_places(RobotDescription.model_validate(data), path.parent), path)
+
+
+def _named_file(path: Path, text: PlacedYaml) -> Path:
+    """The URDF or MJCF file that a YAML names. Raises ``RobotError`` where it is not there."""
+    name = text.data["file"]
+    if isinstance(name, str) and name.endswith(MODEL_FILES):
+        found = find_file(name, path.parent)
+        if found is not None:
+            return found
+    expected = "the path of a URDF or MJCF file, from this file's folder or as package://NAME/PATH"
+    message, fix = f"there is no file {name}", ""
+    if not isinstance(name, str) or not name.endswith(MODEL_FILES):
+        message = f"file cannot be {name!r}"
+    elif name.startswith(SCHEME):
+        package = package_of(name)
+        message = (
+            f"there is no file {name}: no folder {package} is above this file, and no installed "
+            "Python package brings it"
+        )
+        fix = f"pip install {DISTRIBUTIONS.get(package, package)}"
+    fault = RobotFault(("file",), message, expected, str(name), fix)
+    raise RobotError(str(path), [text.placed(fault)])
+
+
+def _read_model(path: Path, added: Path | None, text: PlacedYaml | None) -> ReadRobot:
+    from .importing.description_data import import_robot, written_path
+    from .importing.fit_to_ground import fit_to_ground
+
+    content = text.data if text is not None and text.data is not None else {}
+    if not isinstance(content, Mapping):
+        fault = RobotFault((), "this adds nothing to a robot", "a mapping")
+        raise RobotError(str(added), [text.placed(fault) if text else fault])
+    imported = import_robot(path, content)
+    faults = [*(text.faults if text else ()), *imported.faults]
+    # A fault of the YAML's own keys also shows in what is made of them: once is enough.
+    own = {fault.path[:2] for fault in faults}
+    found = find_faults(imported.data)
+    faults += [f for f in found if written_path(f, imported.data)[:2] not in own]
+    if faults:
+        placed = [_placed(fault, imported, text) for fault in faults]
+        raise RobotError(str(added or path), placed)
+    robot = RobotDescription.model_validate(imported.data)
+    robot = _with_places(robot, (added or path).parent)
+    robot, more = fit_to_ground(robot, "standing" in content, imported.model.pose)
+    return ReadRobot(robot, added or path, path, (*imported.notes, *more))
+
+
+def _with_places(robot: RobotDescription, folder: Path) -> RobotDescription:
+    """The robot with meshes that are found from anywhere; a description in ``folder`` names them."""
+    if not robot.looks:
+        return robot
+    from .importing.looks import located
+
+    looks = {
+        link: look.model_copy(
+            update={
+                "meshes": tuple(
+                    mesh.model_copy(update={"file": located(mesh.file, folder)})
+                    for mesh in look.meshes
+                )
+            }
+        )
+        for link, look in robot.looks.items()
+    }
+    return robot.changed(looks=looks)
+
+
+def _placed(fault: RobotFault, imported: Imported, added: PlacedYaml | None) -> RobotFault:
+    """The fault with its place: in the YAML where that says it, else in the URDF or MJCF file."""
+    from .importing.description_data import placed_in_model, written_path
+
+    path = written_path(fault, imported.data)
+    if added is not None and added.holds(path):
+        return added.placed(replace(fault, path=path))
+    in_model = placed_in_model(fault, imported.data, imported.model)
+    if added is None or in_model.line:
+        return in_model
+    return added.placed(replace(fault, path=path))
+
+
+def _complete(data: object) -> None:
+    """Fill in what a description may leave out: one motor a joint, called as the joint."""
+    if not isinstance(data, dict) or "transmission" in data:
+        return
+    joints = data.get("joints")
+    if not isinstance(joints, list):
+        return
+    from .importing.description_data import own_motors
+
+    names = [joint.get("name") if isinstance(joint, dict) else None for joint in joints]
+    if all(isinstance(name, str) for name in names):
+        data["transmission"] = own_motors([str(name) for name in names])
+
+
+@lru_cache(maxsize=1)
+def robot_names() -> tuple[str, ...]:
+    """The names a graph may give after ``robot:``, sorted."""
+    found = Path(__file__).parent.glob("*/*.yaml")
+    return tuple(sorted(path.stem for path in found if path.stem == path.parent.name))
+
 
 __all__ = [
     "BASE_VELOCITIES",

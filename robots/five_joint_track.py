@@ -1,6 +1,6 @@
 """One tick of a five-joint leg that follows a foot's target: joint angles and velocities.
 
-The kernels here put those of ``five_joint_leg`` and ``five_joint_reach`` in order for a tick, so
+The kernels here put those of ``five_joint_leg`` in order for a tick, so
 that a leg is one call.
 """
 
@@ -13,14 +13,18 @@ import numpy as np
 
 from ..mathematics.arrays import Array, Flags, Indices
 from ..mathematics.kernel import kernel
-from .five_joint_leg import Leg, forward, inverse, jacobian, yaw_share
-from .five_joint_reach import (
+from .five_joint_leg import (
+    Leg,
+    forward,
+    inverse,
     inverse_velocity,
+    jacobian,
     keep_along,
     line_rate,
     pitched_line,
     slide,
     slow_stretch,
+    yaw_share,
 )
 
 _FASTEST = 100.0

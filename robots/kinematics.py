@@ -1,19 +1,26 @@
-"""The forward kinematics of a robot from its description, for many instants at once.
+"""Forward kinematics of a robot from its description, and where its feet are, in plain NumPy.
 
-For pictures and tests, not for control: plain NumPy, vectorised over the instants and
-independent of the libraries that the controller and the simulator use.
+``link_poses`` takes many instants at once, with the base anywhere; ``link_poses_in_base`` one position of the
+joints, seen from the base. For set-up, checks and pictures, not for control, and independent of the libraries
+that the controller and the simulator use. During a run use ``PinocchioModel``.
+
+A foot with one contact point is a ball, which rolls on the ground. Its contact point, and its sole, are the
+ball's lowest point in the world, whatever the foot's orientation: the point one radius straight below the
+centre. The description gives the positions of these points at the zero pose. Contact points of other feet are
+fixed to the foot.
 """
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from ..mathematics.arrays import Array
-from ..mathematics.reproducible import product
-from .parts import Joint
-from .robot_description import RobotDescription
+from ..mathematics.linear_algebra import product
+from .robot_description import Joint, RobotDescription
 
 
 @dataclass(frozen=True)
@@ -132,3 +139,126 @@ def link_poses(
         turn = rotations_about(joint.axis, joint_position[:, k])
         rotation[:, child] = product(rotation[:, parent], turn)
     return LinkPoses(names, position, rotation)
+
+
+def link_poses_in_base(
+    robot: RobotDescription, position: Array
+) -> Mapping[str, tuple[Array, Array]]:
+    """The rotation (3, 3) from link to base and the origin [m, base frame] (3,) of every link.
+
+    Args:
+        robot: its joints must be listed after those that carry them.
+        position: of the joints [rad, or m for a slide], (n_joints,).
+    """
+    poses = {robot.base: (np.eye(3), np.zeros(3))}
+    for joint, value in zip(robot.joints, position.tolist(), strict=True):
+        turn, place = poses[joint.parent]
+        origin = place + product(turn, np.array(joint.origin))
+        if joint.kind == "slide":
+            poses[joint.child] = (turn, origin + product(turn, np.array(joint.axis) * value))
+        else:
+            poses[joint.child] = (product(turn, axis_rotation(joint.axis, value)), origin)
+    return poses
+
+
+def axis_rotation(axis: tuple[float, float, float], angle: float) -> Array:
+    """The matrix (3, 3) that turns vectors by ``angle`` [rad] about the unit vector ``axis``."""
+    x, y, z = axis
+    cos, sin = math.cos(angle), math.sin(angle)
+    rest = 1.0 - cos
+    return np.array(
+        [
+            [cos + x * x * rest, x * y * rest - z * sin, x * z * rest + y * sin],
+            [y * x * rest + z * sin, cos + y * y * rest, y * z * rest - x * sin],
+            [z * x * rest - y * sin, z * y * rest + x * sin, cos + z * z * rest],
+        ]
+    )
+
+
+def contact_centres(robot: RobotDescription) -> Array:
+    """The centre of the round rubber of every contact point [m, link frame], (n_contacts, 3).
+
+    A contact's ``position`` is the lowest point of its rubber at the zero pose, where all link
+    frames are parallel to the base's: the centre is ``radius`` above it in the link's own frame.
+    It does not change as the link turns: what touches the ground is always the lowest point of
+    the same sphere.
+    """
+    rows = [np.add(contact.position, (0.0, 0.0, contact.radius)) for contact in robot.contacts]
+    return np.array(rows).reshape(-1, 3)
+
+
+def standing_heights(robot: RobotDescription) -> Array:
+    """The heights of the contact points above the base's origin [m] in the upright standing pose,
+    (n_contacts,). All are equal where every foot can stand on level ground."""
+    poses = link_poses_in_base(robot, robot.standing_position)
+    links = {foot.name: foot.link for foot in robot.feet}
+    owners, centres = robot.foot_of_contact(), contact_centres(robot)
+    heights = np.zeros(len(robot.contacts))
+    for k, contact in enumerate(robot.contacts):
+        turn, place = poses[links[contact.foot]]
+        if owners.count(owners[k]) == 1:  # a ball: straight below its centre
+            heights[k] = (place + product(turn, centres[k]))[2] - contact.radius
+        else:
+            heights[k] = (place + product(turn, np.array(contact.position)))[2]
+    return heights
+
+
+def standing_com(robot: RobotDescription) -> Array:
+    """The centre of mass in the standing pose [m, base frame], (3,)."""
+    poses = link_poses_in_base(robot, robot.standing_position)
+    total = np.zeros(3)
+    for link in robot.links:
+        turn, place = poses[link.name]
+        total += link.mass * (place + product(turn, np.array(link.com)))
+    return np.asarray(total / robot.total_mass)
+
+
+def joints_above(robot: RobotDescription, link: str) -> list[bool]:
+    """Which joints lie between the base and a link, in the description's order."""
+    above = [False] * len(robot.joints)
+    while link != robot.base:
+        index = next(k for k, joint in enumerate(robot.joints) if joint.child == link)
+        above[index] = True
+        link = robot.joints[index].parent
+    return above
+
+
+@dataclass(frozen=True, eq=False)
+class BallFoot:
+    """A foot with one contact point: the indices of ``foot`` and ``point``, the ``radius`` [m] of
+    the ball, and its ``centre`` in the frame of the foot's link [m], (3,)."""
+
+    foot: int
+    point: int
+    radius: float
+    centre: Array
+
+
+def ball_feet(robot: RobotDescription) -> tuple[BallFoot, ...]:
+    """The robot's feet with exactly one contact point, in the order of its contact points."""
+    centres = contact_centres(robot)
+    owners = robot.foot_of_contact()
+    return tuple(
+        BallFoot(foot, point, contact.radius, centres[point])
+        for point, (foot, contact) in enumerate(zip(owners, robot.contacts, strict=True))
+        if owners.count(foot) == 1
+    )
+
+
+def standing_feet(robot: RobotDescription) -> Array:
+    """The sole centres (n_feet, 3) [m] from the centre of mass, of a robot in its standing pose."""
+    level = np.array([[0.0, 0.0, 0.0, 1.0]])
+    poses = link_poses(robot, np.zeros((1, 3)), level, robot.standing_position[None])
+    com, feet = np.zeros(3), np.zeros((len(robot.feet), 3))
+    for link in robot.links:
+        place, turn = poses.of(link.name)
+        com += link.mass / robot.total_mass * (place[0] + product(turn[0], np.array(link.com)))
+    for number, foot in enumerate(robot.feet):
+        place, turn = poses.of(foot.link)
+        feet[number] = place[0] + product(turn[0], np.array(foot.sole)) - com
+    return feet
+
+
+def foot_sides(feet: Array) -> tuple[float, ...]:
+    """For every foot 1 on the left of the base, -1 on the right, 0 in the middle (1 mm)."""
+    return tuple(math.copysign(1.0, y) if abs(y) > 1e-3 else 0.0 for y in feet[:, 1].tolist())

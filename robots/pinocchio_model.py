@@ -14,8 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .parts import Joint
-from .robot_description import RobotDescription
+from .robot_description import Joint, RobotDescription
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..mathematics.arrays import Array
-from ..mathematics.reproducible import inverse, product
+from ..mathematics.linear_algebra import inverse, product
 from .robot_description import RobotDescription
 
 _SWEEPS = 10_000

@@ -15,8 +15,7 @@ from xml.etree.ElementTree import Element, SubElement
 import numpy as np
 
 from ..mathematics.arrays import Array
-from .parts import Joint, Link, Shape
-from .robot_description import RobotDescription
+from .robot_description import Joint, Link, RobotDescription, Shape
 
 FREE = 1e3
 """The limits [m] of a slide that has none: a URDF demands some."""

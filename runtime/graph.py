@@ -126,8 +126,8 @@ class Graph:
     def _repr_html_(self) -> str:
         """The block diagram, for notebooks."""
         from .drawing.diagram import diagram
-        from .drawing.placing import draw
-        from .drawing.svg import svg
+        from .drawing.layout import draw
+        from .drawing.render import svg
 
         return svg(draw(diagram(self.checked)), self.checked.name)
 

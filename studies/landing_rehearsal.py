@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 
 from ..mathematics.arrays import Array
-from ..mathematics.reproducible import inverse, product
+from ..mathematics.linear_algebra import inverse, product
 from ..planner.library.rehearsed import ZERO, Deviation, Rehearsed, Vector
 from ..planner.task.plan import JumpPlan
 from ..runtime.graph import load

@@ -7,7 +7,7 @@ from typing import Any
 from ..hal.simulated.simulated_robot import SimulatorParameters
 from ..planner.library.shipped import shipped_folder
 from ..runtime.language.errors import AloftError
-from ..runtime.loading.reading.file_settings import settings_of
+from ..runtime.loading.reading.files import settings_of
 
 
 def trial_settings(trial: str, option: str = "--trial") -> dict[str, Any]:

@@ -6,16 +6,15 @@ from aloft.blocks.control import balance_law, followed_plan
 from aloft.blocks.jumping import capture_law, plan_progress, turn_timing
 from aloft.blocks.scoring import footing, jump_following, jump_series, stand_following, stand_score
 from aloft.hal.simulated import base, plant
-from aloft.mathematics.body_tree import BodyMotion
-from aloft.mathematics.flight_prediction import LandingCost, flight_map
+from aloft.mathematics.body_dynamics import BodyMotion
 from aloft.mathematics.joint_feedback import Feedback, Motion, SoftStops
+from aloft.mathematics.landing_law import LandingCost, flight_map
 from aloft.mathematics.pid import PidGains, PidMemory
 from aloft.robots.description import find_robot
 from aloft.robots.five_joint_leg import read_leg
 from aloft.robots.five_joint_track import FootMotion, LegSettings, LegTargets
 from aloft.robots.limb import read_limb
-from aloft.robots.limb_inverse import limb_scratch
-from aloft.robots.limb_track import limb_geometry, limb_memory
+from aloft.robots.limb_inverse import limb_geometry, limb_memory, limb_scratch
 
 LEG = read_leg(find_robot("bruce"), 0)
 LIMB = read_limb(find_robot("bruce"), 0)
@@ -249,19 +248,19 @@ UNUSED = {
         np.array([-0.1, 0.1, 0.0]), 0.1, 0.03, 0.13, 0.015, SOLES, NORMAL((4, 3)),
         np.ones(4, bool), np.zeros(4, bool), np.zeros((4, 3)),
     ),
-    "aloft.mathematics.flight_prediction.map_flight": (
+    "aloft.mathematics.landing_law.map_flight": (
         np.vstack([NORMAL((3, 16)), np.hstack([REGULAR, NORMAL((3, 13))])]), NORMAL((4, 3, 16)),
         np.eye(3), 4.8, 0.5, flight_map(10, 4),
     ),
-    "aloft.mathematics.flight_prediction.predict_tilt": (
+    "aloft.mathematics.landing_law.predict_tilt": (
         FLIGHT, np.array([0.1, -0.05, 0.02]), np.array([0.02, 0.03, -0.01]), NORMAL(12), 0.2,
         0.7, np.array([1.0, 1.0, -1.0, -1.0]), np.zeros(2), np.zeros((2, 4)),
     ),
-    "aloft.mathematics.flight_prediction.choose_shift": (
+    "aloft.mathematics.landing_law.choose_shift": (
         np.array([0.1, -0.05]), NORMAL((2, 4)), LANDING, np.zeros((4, 4)), np.zeros(4),
     ),
-    "aloft.mathematics.flight_prediction.invert": (REGULAR, np.zeros((3, 3))),
-    "aloft.mathematics.least_squares.solve_rows": (
+    "aloft.mathematics.landing_law.invert": (REGULAR, np.zeros((3, 3))),
+    "aloft.mathematics.linear_algebra.solve_rows": (
         REGULAR + REGULAR.T, np.array([[0.3, -0.2, 0.5], [1.0, 0.4, -0.7]]),
     ),
     "aloft.blocks.control.balance_law.pattern_turn": (
@@ -276,11 +275,11 @@ UNUSED = {
         LIMB.links, LIMB.tip, MIDDLE, np.zeros((5, 6)), np.zeros((4, 3)),
     ),
     "aloft.robots.limb.limb_jacobian": (LIMB.links, np.ones((5, 6)), POSE, np.zeros((6, 5))),
-    "aloft.robots.limb_error.aim": (POSE[0], POSE[1:], np.zeros((4, 3))),
-    "aloft.robots.limb_error.foot_error": (
+    "aloft.robots.limb.aim": (POSE[0], POSE[1:], np.zeros((4, 3))),
+    "aloft.robots.limb.foot_error": (
         LIMB.tip, POSE, TARGET, np.array([1.0, 0.9, 0.3]), np.zeros(6),
     ),
-    "aloft.robots.limb_error.weigh_rows": (
+    "aloft.robots.limb.weigh_rows": (
         LIMB.tip, POSE, TARGET, np.array([1.0, 0.9, 0.3]), np.ones((6, 5)),
     ),
     "aloft.robots.limb_inverse.approach": (*CHAIN, 3, limb_scratch(5), MIDDLE),
@@ -290,23 +289,23 @@ UNUSED = {
     "aloft.robots.limb_inverse.limb_velocity": (
         *CHAIN, MIDDLE, np.ones(6), 3e-4, limb_scratch(5), np.zeros(5),
     ),
-    "aloft.robots.limb_track.watch_foot": (
+    "aloft.robots.limb_inverse.watch_foot": (
         LIMB_GEOMETRY, FOOT, True, np.array(0.1), 0.002, np.array(True), TARGET, limb_memory(5),
     ),
-    "aloft.robots.limb_track.follow_limb": (
+    "aloft.robots.limb_inverse.follow_limb": (
         LIMB_GEOMETRY, 0, FOOT, np.tile(MIDDLE, 2), np.array(True), np.tile(MIDDLE + 0.1, 2), *FOLLOWING,
     ),
-    "aloft.robots.limb_error.turning": (LIMB.tip, POSE, TARGET, 0.002, 10.0, np.zeros(3)),
+    "aloft.robots.limb.turning": (LIMB.tip, POSE, TARGET, 0.002, 10.0, np.zeros(3)),
     "aloft.robots.limb_inverse._stuck": (LIMB.limits, 1, 0.3, 1.0),
-    "aloft.robots.limb_error._along": (POSE, LIMB.tip),
-    "aloft.robots.limb_error._product": (POSE, TARGET, 1, 2),
-    "aloft.mathematics.directions.unit": (0.1, 0.2, 0.3, 1.0, 0.0, 0.0),
-    "aloft.robots.five_joint_reach.slide": (
+    "aloft.robots.limb._along": (POSE, LIMB.tip),
+    "aloft.robots.limb._product": (POSE, TARGET, 1, 2),
+    "aloft.mathematics.rotations.unit": (0.1, 0.2, 0.3, 1.0, 0.0, 0.0),
+    "aloft.robots.five_joint_leg.slide": (
         LEG.hip, LEG.plane, LEG.signs, LEG.limits, np.add(LEG.hip, [0.25, 0.02, -0.3]), np.eye(3), 0.005,
         0.1, 0.05, np.zeros(3), np.zeros(5),
     ),
     "aloft.mathematics.rotations.skew": (np.ones(3), np.zeros((3, 3))),
-    "aloft.robots.five_joint_reach.pitched_line": (np.eye(3), 0.4, np.zeros(3)),
+    "aloft.robots.five_joint_leg.pitched_line": (np.eye(3), 0.4, np.zeros(3)),
     "aloft.mathematics.rotations.yaw": (np.array([0.1, 0.2, 0.3, 0.9]),),
     "aloft.blocks.control.balance_law.lengthen": (
         np.array([0.01, -0.04, 0.0]), 0.7, 0.02, 0.25, 0.2, 0.6, *(np.ones(3) for _ in range(3)),
@@ -327,13 +326,13 @@ UNUSED = {
         SoftStops(np.tile([-0.8, 0.7], (5, 1)), np.array([0.1]), np.array([2.0]), np.full(5, 60.0), np.full(5, 1.5)),
         Feedback(*(np.full(5, x) for x in (40.0, 0.2, 1.0, 0.3))),
     ),
-    "aloft.robots.five_joint_reach.keep_along": (
+    "aloft.robots.five_joint_leg.keep_along": (
         np.array([0.0, 0.6, 0.8]), np.array([0.1, 0.2, 0.3]),
     ),
     "aloft.mathematics.inertial_filter.right_up": (
         np.array([0.0, 0.0, 0.0, 1.0]), np.array([0.3, 0.2, 9.8]), 0.01, np.zeros(3),
     ),
-    "aloft.mathematics.invariant_contacts.remove_contact": (1, np.full((37, 37), 0.5)),
+    "aloft.mathematics.invariant_filter.remove_contact": (1, np.full((37, 37), 0.5)),
     "aloft.mathematics.extended_pose.exponential": (
         np.linspace(-0.5, 0.6, 12), np.zeros(4), np.zeros((3, 3)),
     ),
@@ -349,33 +348,33 @@ UNUSED = {
     ),
     "aloft.blocks.control.balance_law.add_quadratic_growth": (np.ones(3), 0.6, 0.25, np.zeros(3), np.zeros(3)),
     "aloft.blocks.general.periods.first_tick": (0.5, 0.002),
-    "aloft.mathematics.linear.add_product": (POSE, POSE[0], np.ones(4)),
-    "aloft.mathematics.linear.multiply_matrices": (POSE, TARGET[1:], np.zeros((4, 3))),
-    "aloft.mathematics.discretisation.matrix_exponential": (
+    "aloft.mathematics.linear_algebra.add_product": (POSE, POSE[0], np.ones(4)),
+    "aloft.mathematics.linear_algebra.multiply_matrices": (POSE, TARGET[1:], np.zeros((4, 3))),
+    "aloft.mathematics.linear_systems.matrix_exponential": (
         4.0 * POSE[1:], np.zeros((3, 3)), np.zeros((3, 3)), np.zeros((3, 3)),
     ),
-    "aloft.mathematics.second_order_filter.first_order": (20.0, 0.002, True, np.zeros(5)),
-    "aloft.mathematics.second_order_filter.second_order": (20.0, 0.7, 0.002, False, np.zeros(5)),
-    "aloft.mathematics.second_order_filter.band_stop": (20.0, 2.0, 0.002, np.zeros(5)),
-    "aloft.mathematics.second_order_filter.settle": (COEFFICIENTS, POSE[0], np.ones((3, 2))),
-    "aloft.mathematics.second_order_filter.advance": (
+    "aloft.mathematics.linear_systems.first_order": (20.0, 0.002, True, np.zeros(5)),
+    "aloft.mathematics.linear_systems.second_order": (20.0, 0.7, 0.002, False, np.zeros(5)),
+    "aloft.mathematics.linear_systems.band_stop": (20.0, 2.0, 0.002, np.zeros(5)),
+    "aloft.mathematics.linear_systems.settle": (COEFFICIENTS, POSE[0], np.ones((3, 2))),
+    "aloft.mathematics.linear_systems.advance": (
         COEFFICIENTS, POSE[0], np.ones((3, 2)), np.zeros(3),
     ),
     "aloft.mathematics.pid.start_pid": (GAINS, POSE[0], POSE[2], PidMemory(*np.ones((3, 3)))),
     "aloft.mathematics.pid.step_pid": (
         GAINS, POSE[0], POSE[2], POSE[3], PidMemory(*np.ones((3, 3))), np.zeros(3),
     ),
-    "aloft.mathematics.lookup.interval": (np.linspace(-1.0, 1.0, 9), 0, 9, 0.3),
-    "aloft.mathematics.lookup.interpolate": (np.linspace(-1.0, 1.0, 4), POSE[:, 2], 0.3, True),
-    "aloft.mathematics.lookup.interpolate_grid": (
+    "aloft.mathematics.interpolation.interval": (np.linspace(-1.0, 1.0, 9), 0, 9, 0.3),
+    "aloft.mathematics.interpolation.interpolate": (np.linspace(-1.0, 1.0, 4), POSE[:, 2], 0.3, True),
+    "aloft.mathematics.interpolation.interpolate_grid": (
         np.array([0.0, 1.0, 2.0, 4.0]), np.array([2, 2]), POSE[:, 1], np.array([0.3, 5.0]), False,
         np.zeros(2, np.int64), np.zeros(2),
     ),
-    "aloft.mathematics.transfer_function.advance": (
+    "aloft.mathematics.linear_systems.advance_transfer_function": (
         POSE[1:], POSE[0], TARGET[0], 0.5, POSE[:, 0], TARGET, np.zeros(3), np.zeros(4),
     ),
-    "aloft.mathematics.euler_angles.from_euler": (POSE[1], np.zeros(4)),
-    "aloft.mathematics.euler_angles.to_euler": (np.array([0.1, 0.2, 0.3, 0.92]), np.zeros(3)),
+    "aloft.mathematics.rotations.from_euler": (POSE[1], np.zeros(4)),
+    "aloft.mathematics.rotations.to_euler": (np.array([0.1, 0.2, 0.3, 0.92]), np.zeros(3)),
     "aloft.mathematics.whole_body_qp.share_weight": (
         np.array([True, False, True, True]), 50.0, np.zeros((4, 3)),
     ),

@@ -2,7 +2,7 @@
 
 import pytest
 
-from aloft.robots.shipped import robot_names
+from aloft.robots.description import robot_names
 from aloft.runtime.language.errors import AloftError, BlockError
 from aloft.runtime.language.registry import find_block, known_names
 from aloft.runtime.testing.bench import BlockBench

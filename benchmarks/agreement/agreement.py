@@ -18,8 +18,8 @@ from ...mathematics.active_set import INFEASIBLE
 from ...mathematics.arrays import Array, Flags, Indices
 from ...mathematics.compiling.compile_calls import compile_calls
 from ...mathematics.compiling.kernel_call import KernelCall
-from ...mathematics.cone_program import SOLVED as CLARABEL_SOLVED
-from ...mathematics.cone_program import ConeProgramSolver
+from ...mathematics.quadratic_program import SOLVED as CLARABEL_SOLVED
+from ...mathematics.quadratic_program import ConeProgramSolver
 from ...mathematics.whole_body_cones import cone_solution_memory, solve_whole_body_cones
 from ...mathematics.whole_body_qp import joint_torque
 from ...mathematics.whole_body_solution import SOLVED, Solution

@@ -11,7 +11,7 @@ from ...blocks.control.whole_body_controller import WholeBodyController
 from ...mathematics.arrays import Array, Flags
 from ...mathematics.whole_body_qp import RigidBodyTerms, TaskRows
 from ...runtime.graph import load
-from ...runtime.loading.shipped import FOLDER
+from ...runtime.loading.reading.files import FOLDER
 from ...runtime.running.executor import Executor
 from ...runtime.running.memory import BoundGraph
 

@@ -1,6 +1,6 @@
 """Jumps of BRUCE with the controller on another machine, free-running, with links that take their time.
 
-In virtual time (``runtime/testing/virtual_spread``): both parts tick at 500 Hz at phases drawn from the
+In virtual time (``runtime/testing/spread``): both parts tick at 500 Hz at phases drawn from the
 seed. Every message takes the same time; or, with jitter, up to so much longer, so that messages may
 overtake each other; and, with loss, a share of them never comes. All of that is drawn from the
 seed, for each link by itself. The controller is told what it has to expect: the robot's own delay,
@@ -15,8 +15,8 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from ...runtime.loading import load
-from ...runtime.loading.shipped import FOLDER
-from ...runtime.testing.virtual_spread import VirtualRun, run_virtual
+from ...runtime.loading.reading.files import FOLDER
+from ...runtime.testing.spread import VirtualRun, run_virtual
 from ..rows import Row
 
 GRAPH = FOLDER / "machines" / "jump_two.yaml"

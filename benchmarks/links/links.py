@@ -28,8 +28,7 @@ from ...runtime.links.lockstep_link import LockstepReceiver
 from ...runtime.links.message import HEADER, MessageReader, MessageWriter
 from ...runtime.links.peers import ClockOffset
 from ...runtime.loading import load_text
-from ...runtime.placement.place import place
-from ...runtime.placement.placed import Link, PlacedGraph
+from ...runtime.placement.placed import Link, PlacedGraph, place
 from ...runtime.running.memory import Memory
 from ...runtime.transports.transport import Transport, data_key
 from ...runtime.transports.zenoh_transport import ZenohTransport

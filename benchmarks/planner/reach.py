@@ -12,7 +12,7 @@ from ...planner.task.errors import PlanError
 from ...planner.task.read_task import read_task
 from ...planner.task.task import make_task
 from ...robots.description import find_robot
-from ...runtime.loading.shipped import FOLDER
+from ...runtime.loading.reading.files import FOLDER
 from ..rows import Row
 
 REACH: dict[str, dict[str, Any]] = {

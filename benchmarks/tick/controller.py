@@ -14,7 +14,7 @@ from ...mathematics.compiling.compile_calls import compile_calls
 from ...runtime.graph import load
 from ...runtime.language.block import Block
 from ...runtime.language.stages import CheckedGraph, ClockSpec
-from ...runtime.loading.shipped import FOLDER
+from ...runtime.loading.reading.files import FOLDER
 from ...runtime.running.executor import Executor
 from ...runtime.running.memory import BoundGraph
 from ...runtime.running.pacing import WallTime

@@ -8,8 +8,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ...mathematics.arrays import Array, Flags, Indices
+from ...mathematics.interpolation import minimum_jerk
 from ...mathematics.kernel import kernel
-from ...mathematics.polynomials import minimum_jerk
 from ...mathematics.rotations import (
     conjugate,
     exponential,

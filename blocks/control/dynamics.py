@@ -8,16 +8,14 @@ import numpy as np
 
 from ...mathematics.arrays import Array, Indices
 from ...mathematics.body_dynamics import (
-    Inertias,
-    MotionTerms,
-    equations_of_motion,
-    inertias,
-)
-from ...mathematics.body_tree import (
     BodyMotion,
     BodyTree,
+    Inertias,
+    MotionTerms,
     acceleration_at,
     body_motion,
+    equations_of_motion,
+    inertias,
     move_bodies,
     place_bodies,
     place_of,
@@ -26,8 +24,8 @@ from ...mathematics.body_tree import (
 from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.kernel import kernel
 from ...mathematics.rotations import normalise, rotate_back, to_matrix
-from ...robots.ball_feet import ball_feet
-from ...robots.body_tree import body_tree
+from ...robots.contact_kinematics import body_tree
+from ...robots.kinematics import ball_feet
 from ...runtime.language.block import Input, Output
 from ...runtime.language.kernel_block import KernelBlock
 from ..signals import BaseState, DynamicsTerms, JointState, MassEstimate

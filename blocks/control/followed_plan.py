@@ -6,8 +6,8 @@ import math
 from typing import NamedTuple
 
 from ...mathematics.arrays import Array, Flags, Indices
+from ...mathematics.interpolation import minimum_jerk
 from ...mathematics.kernel import kernel
-from ...mathematics.polynomials import minimum_jerk
 from ...robots.five_joint_track import LegTargets
 
 BEFORE = 0.006

@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from ...mathematics.arrays import Array
-from ...mathematics.kept_arrays import kept_arrays
-from ...mathematics.package_code import code_digest
-from ...mathematics.reproducible import product
+from ...mathematics.kept_arrays import code_digest, kept_arrays
+from ...mathematics.linear_algebra import product
 from ...robots.description import RobotDescription
 from ...robots.pinocchio_model import build_pinocchio_model
 

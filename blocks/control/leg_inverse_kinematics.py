@@ -22,7 +22,7 @@ from ...robots.five_joint_track import (
     watch_line,
 )
 from ...robots.limb import chain_to
-from ...robots.limb_track import follow_limb, limb_geometry, limb_memory, watch_foot
+from ...robots.limb_inverse import follow_limb, limb_geometry, limb_memory, watch_foot
 from ...runtime.language.block import Input, Misfit, Output, State
 from ...runtime.language.kernel_block import KernelBlock
 from ...runtime.language.parameters import Parameters, live_parameter, parameter

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...mathematics.arrays import Array, Flags, Indices
-from ...mathematics.cone_program import ConeProgramSolver
+from ...mathematics.quadratic_program import ConeProgramSolver
 from ...mathematics.whole_body_qp import PYRAMID_ROWS
 from .whole_body_program import FullProgram
 

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from ...mathematics.compiling.kernel_call import KernelCall
-from ...mathematics.reproducible import inverse, product
+from ...mathematics.linear_algebra import inverse, product
 from ...runtime.language.block import Input, Metric, Output, State
 from ...runtime.language.kernel_block import KernelBlock
 from ...runtime.language.parameters import live_parameter, parameter

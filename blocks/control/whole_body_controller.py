@@ -97,7 +97,7 @@ class WholeBodyController(KernelBlock):
     the solution is exact up to rounding and depends on the inputs alone
     (``mathematics/whole_body_reduction``). Where it finds none, the whole program is given to DAQP.
     With another ``solver`` every tick's whole program is given to that one. With ``cones: round`` the
-    own method solves the program with the cones themselves, as exactly (``mathematics/friction_cones``), and
+    own method solves the program with the cones themselves, as exactly (``mathematics/whole_body_cones``), and
     where it finds no solution Clarabel gets the whole program; of the other solvers only Clarabel takes it.
 
     Without a point in stance there is nothing to solve: torque, force and acceleration are zero,

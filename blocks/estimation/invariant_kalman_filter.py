@@ -10,8 +10,7 @@ import numpy as np
 from ...mathematics.arrays import Array
 from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.constants import GRAVITY
-from ...mathematics.invariant_propagation import error_transition
-from ...robots.ball_feet import ball_feet
+from ...mathematics.invariant_filter import error_transition
 from ...robots.contact_kinematics import (
     ContactKinematics,
     Measured,
@@ -19,6 +18,7 @@ from ...robots.contact_kinematics import (
     see_contacts,
 )
 from ...robots.description import RobotDescription
+from ...robots.kinematics import ball_feet
 from ...runtime.language.block import Input, Output, State
 from ...runtime.language.kernel_block import KernelBlock
 from ...runtime.language.parameters import Parameters

@@ -8,25 +8,24 @@ from ...mathematics.arrays import Array, Flags, Indices
 from ...mathematics.constants import GRAVITY
 from ...mathematics.extended_pose import retract
 from ...mathematics.inertial_filter import misalignment, propagate, turn, upright
-from ...mathematics.invariant_contacts import (
+from ...mathematics.invariant_filter import (
     add_contact,
     add_contact_noise,
+    correct,
     height_row,
     innovation,
+    input_jacobian,
     measurement_jacobian,
     place_jacobian,
-    remove_contact,
-    world_definition_jacobian,
-)
-from ...mathematics.invariant_propagation import (
-    input_jacobian,
     propagate_covariance,
+    remove_contact,
     sample_deviations,
     vector_deviation,
+    weigh,
+    world_definition_jacobian,
 )
-from ...mathematics.kalman_update import correct, weigh
 from ...mathematics.kernel import kernel
-from ...mathematics.linear import multiply_matrices, multiply_vector
+from ...mathematics.linear_algebra import multiply_matrices, multiply_vector
 from ...mathematics.rotations import rotate, to_matrix
 from .invariant_records import Base, Estimate, Health, Points, Samples, Tuning, Work
 

@@ -8,7 +8,7 @@ from typing import NamedTuple
 from ...mathematics.arrays import Array, Flags, Indices
 from ...mathematics.constants import GRAVITY
 from ...mathematics.kernel import kernel
-from ...mathematics.linear import multiply_vector
+from ...mathematics.linear_algebra import multiply_vector
 from ...mathematics.mass_filter import (
     LegScratch,
     base_force_map,

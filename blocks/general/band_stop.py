@@ -7,7 +7,7 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import NDArray
 
-from ...mathematics.second_order_filter import band_stop
+from ...mathematics.linear_systems import band_stop
 from ...runtime.language.block import Context, Misfit
 from ...runtime.language.parameters import Parameters, parameter
 from .elements import Elements

@@ -10,7 +10,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ...mathematics.second_order_filter import first_order, second_order
+from ...mathematics.linear_systems import first_order, second_order
 from ...runtime.language.block import Context, Misfit
 from ...runtime.language.parameters import Parameters, parameter
 from .elements import Elements

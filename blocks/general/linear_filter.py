@@ -7,7 +7,7 @@ from abc import abstractmethod
 import numpy as np
 from numpy.typing import NDArray
 
-from ...mathematics.second_order_filter import advance, settle
+from ...mathematics.linear_systems import advance, settle
 from ...runtime.language.block import Block, Input, Misfit, Output, State
 from ...runtime.language.signals import Field, Signal
 from .quantity_parameters import Keeps

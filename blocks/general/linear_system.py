@@ -8,8 +8,8 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ...mathematics.discretisation import discretise
-from ...mathematics.linear import add_product, multiply_vector
+from ...mathematics.linear_algebra import add_product, multiply_vector
+from ...mathematics.linear_systems import discretise
 from ...robots.description import RobotDescription
 from ...runtime.language.block import Block, Input, Misfit, Output, State
 from ...runtime.language.parameters import Parameters, parameter

@@ -8,7 +8,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from ...mathematics.lookup import interpolate_grid
+from ...mathematics.interpolation import interpolate_grid
 from ...robots.description import RobotDescription
 from ...runtime.language.block import Block, Input, Misfit, Output
 from ...runtime.language.parameters import Parameters, parameter

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ...mathematics.linear import multiply_vector
+from ...mathematics.linear_algebra import multiply_vector
 from ...robots.description import RobotDescription
 from ...runtime.language.block import Block, Input, Output
 from ...runtime.language.parameters import Parameters, parameter

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ...mathematics.euler_angles import to_euler
+from ...mathematics.rotations import to_euler
 from ...runtime.language.block import Block, Input, Output
 from .rotation_signals import EulerAngles, OfQuaternion, Quaternion
 

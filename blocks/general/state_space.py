@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ...mathematics.linear import multiply_vector
+from ...mathematics.linear_algebra import multiply_vector
 from .linear_system import LinearSystem
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ...mathematics.linear import add_product, multiply_vector
+from ...mathematics.linear_algebra import add_product, multiply_vector
 from ...robots.description import RobotDescription
 from ...runtime.language.block import Misfit
 from ...runtime.language.parameters import Parameters, parameter

@@ -9,7 +9,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ...mathematics.lookup import interpolate
+from ...mathematics.interpolation import interpolate
 from ...robots.description import RobotDescription
 from ...runtime.language.block import Block, Context, Misfit, Output
 from ...runtime.language.parameters import Parameters, parameter

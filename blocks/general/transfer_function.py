@@ -7,8 +7,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from ...mathematics.discretisation import controllable_form, discretise
-from ...mathematics.transfer_function import advance
+from ...mathematics.linear_systems import advance_transfer_function, controllable_form, discretise
 from ...robots.description import RobotDescription
 from ...runtime.language.block import Block, Input, Misfit, Output, State
 from ...runtime.language.parameters import Parameters, parameter
@@ -83,6 +82,6 @@ class TransferFunction(Scales, Block):
 
     def step(self) -> None:
         """Filter one sample."""
-        advance(
+        advance_transfer_function(
             self._a, self._b, self._c, self._d, self.u.value, self.x.value, self._next, self.y.value
         )

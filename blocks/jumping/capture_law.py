@@ -12,11 +12,11 @@ from ...mathematics.capture_step import (
     farthest_foot,
     limit_foothold,
     spread_to_feet,
+    support_margin,
     swing_points,
 )
 from ...mathematics.kernel import kernel
 from ...mathematics.rotations import mean_heading
-from ...mathematics.support_margin import support_margin
 from ..signals import Phase
 
 _EARLIEST, _LATEST = 0.6, 1.5

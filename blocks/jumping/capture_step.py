@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...mathematics.compiling.kernel_call import KernelCall
-from ...robots.standing_feet import foot_sides, standing_feet
+from ...robots.kinematics import foot_sides, standing_feet
 from ...runtime.language.block import Input, Output, State
 from ...runtime.language.kernel_block import KernelBlock
 from ...runtime.language.parameters import Parameters, live_parameter

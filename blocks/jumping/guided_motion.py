@@ -25,8 +25,8 @@ from typing import Any
 import numpy as np
 
 from ...mathematics.arrays import Array
-from ...robots.ball_feet import ball_feet
 from ...robots.description import RobotDescription
+from ...robots.kinematics import ball_feet
 from ...robots.limb import FootKind, foot_shape
 from ...robots.pinocchio_model import PinocchioModel
 from ...runtime.language.block import Misfit

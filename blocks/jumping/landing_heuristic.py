@@ -10,7 +10,7 @@ import pydantic
 
 from ...mathematics.compiling.kernel_call import KernelCall
 from ...robots.description import RobotDescription
-from ...robots.standing_feet import foot_sides, standing_feet
+from ...robots.kinematics import foot_sides, standing_feet
 from ...runtime.language.block import Input, Misfit, Output, State
 from ...runtime.language.kernel_block import KernelBlock
 from ...runtime.language.parameters import Parameters, live_parameter, parameter
@@ -74,7 +74,7 @@ class LandingHeuristic(KernelBlock):
     With ``law: predicted`` the landing place is chosen anew in every tick, from the momenta that
     were not planned, by what it does to the torso. Feet that keep their place in the world turn a
     torso that tilts even further; drawn up they turn BRUCE's forward, by 5 to 8 deg per cm
-    (``mathematics/flight_prediction``). All feet are shifted ahead, to the left, apart and upwards
+    (``mathematics/landing_law``). All feet are shifted ahead, to the left, apart and upwards
     by the s that costs least::
 
         (s_x - g_x)^2 + (s_y - g_y)^2 + (apart_cost (s_a - g_a))^2 + (height_cost s_z)^2

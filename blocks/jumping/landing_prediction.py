@@ -10,17 +10,18 @@ import numpy as np
 
 from ...mathematics.arrays import Array, Indices
 from ...mathematics.constants import GRAVITY
-from ...mathematics.flight_prediction import (
+from ...mathematics.kernel import kernel
+from ...mathematics.landing_law import (
     FlightMap,
     LandingCost,
     choose_shift,
     flight_map,
+    heading_matrix,
     map_flight,
     predict_tilt,
+    pull_to_place,
 )
-from ...mathematics.kernel import kernel
-from ...mathematics.landing_law import heading_matrix, pull_to_place
-from ...mathematics.linear import multiply_vector
+from ...mathematics.linear_algebra import multiply_vector
 from ...mathematics.rotations import conjugate, from_matrix, logarithm, multiply
 from ...robots.description import RobotDescription
 from ...runtime.language.parameters import Parameters, live_parameter

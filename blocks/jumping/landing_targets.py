@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 from ...mathematics.arrays import Array, Flags, Indices
 from ...mathematics.constants import GRAVITY
+from ...mathematics.interpolation import minimum_jerk
 from ...mathematics.kernel import kernel
 from ...mathematics.landing_law import (
     hasten,
@@ -18,8 +19,7 @@ from ...mathematics.landing_law import (
     swing,
     turn_places,
 )
-from ...mathematics.linear import multiply_matrices, multiply_vector
-from ...mathematics.polynomials import minimum_jerk
+from ...mathematics.linear_algebra import multiply_matrices, multiply_vector
 from ...mathematics.rotations import (
     conjugate,
     cross,

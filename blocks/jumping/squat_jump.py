@@ -16,7 +16,7 @@ import numpy as np
 
 from ...mathematics.arrays import Array
 from ...mathematics.constants import GRAVITY
-from ...mathematics.polynomials import minimum_jerk, quintic
+from ...mathematics.interpolation import minimum_jerk, quintic
 from ...planner.library.jump_table import JumpTable
 from ...robots.description import RobotDescription
 from ...robots.pinocchio_model import PinocchioModel

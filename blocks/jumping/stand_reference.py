@@ -7,7 +7,7 @@ from functools import lru_cache
 import numpy as np
 
 from ...mathematics.arrays import Array
-from ...mathematics.polynomials import minimum_jerk
+from ...mathematics.interpolation import minimum_jerk
 from ...planner.library.jump_table import JumpTable
 from ...robots.description import RobotDescription
 from ...robots.pinocchio_model import build_pinocchio_model

@@ -12,10 +12,9 @@ from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.constants import GRAVITY
 from ...mathematics.kernel import kernel
 from ...mathematics.rotations import rotate, yaw
-from ...robots.ball_feet import ball_feet
 from ...robots.description import RobotDescription
+from ...robots.kinematics import ball_feet, standing_heights
 from ...robots.limb import place_limb, read_limb
-from ...robots.link_poses import standing_heights
 
 FALL_SHARE = 0.315
 """A base below this share of its standing height counts as fallen: 0.12 m for BRUCE."""

@@ -6,9 +6,9 @@ from math import sqrt
 from typing import Any, NamedTuple, TypeVar
 
 from ...mathematics.arrays import Array, Counts, Flags
+from ...mathematics.capture_step import support_margin
 from ...mathematics.kernel import kernel
 from ...mathematics.rotations import tilt
-from ...mathematics.support_margin import support_margin
 from ...runtime.language.signals import Signal
 from .footing import Footing, least_load, points_missing
 from .stand_criteria import NEVER, StandCriteria

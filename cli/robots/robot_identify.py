@@ -14,8 +14,7 @@ from ..shared.output import console, errors_reported, print_json, say, table
 
 if TYPE_CHECKING:
     from ...logs.file.reader import RecordedRun
-    from ...robots.identification.delay import Delay
-    from ...robots.identification.rigid_body import RigidBody
+    from ...robots.identification import Delay, RigidBody
     from ...robots.robot_description import RobotDescription
 
 Recording = Annotated[Path, typer.Argument(help="The recording of a run, a file .rrd.")]
@@ -81,9 +80,12 @@ def _identified(
     import numpy as np
 
     from ...mathematics.rotations import to_matrix
-    from ...robots.identification.delay import identify_delay
-    from ...robots.identification.motion import Motion
-    from ...robots.identification.rigid_body import IdentificationError, identify_rigid_body
+    from ...robots.identification import (
+        IdentificationError,
+        Motion,
+        identify_delay,
+        identify_rigid_body,
+    )
 
     names = {
         "position": f"{robot}.joints.position", "velocity": f"{robot}.joints.velocity",

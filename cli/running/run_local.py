@@ -23,8 +23,7 @@ from ...runtime.language.errors import AloftError, ExitCode, RunError
 from ...runtime.language.stages import CheckedGraph
 from ...runtime.links.path_ages import NAME
 from ...runtime.loading import load
-from ...runtime.placement.place import place
-from ...runtime.placement.placed import PlacedGraph
+from ...runtime.placement.placed import PlacedGraph, place
 from ...runtime.running.memory import BoundGraph
 from ...runtime.running.run_result import RunResult, merge_metrics
 from ...runtime.running.timing import BlockTimes

@@ -11,7 +11,7 @@ from ...runtime.language.stages import CheckedGraph
 from ...runtime.links.observer import StatusPublisher
 from ...runtime.links.part import BoundPart, run_part
 from ...runtime.live.part_feed import PartFeed
-from ...runtime.placement.place import place
+from ...runtime.placement.placed import place
 from ...runtime.running.real_time import NO_REAL_TIME, RealTimeOptions
 from ...runtime.running.run_result import RunResult
 from ...runtime.running.sinks import Sink

@@ -24,7 +24,7 @@ def graph_of(robot: str) -> Path:
 
 def jump_graphs() -> dict[str, Path]:
     """The shipped graph in which each robot jumps, by the robot's name."""
-    from ...runtime.loading.shipped import PREFIX, shipped_graphs
+    from ...runtime.loading.reading.files import PREFIX, shipped_graphs
 
     return {
         name.removeprefix(f"{PREFIX}robots/").removesuffix("_jump"): path

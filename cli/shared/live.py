@@ -62,7 +62,7 @@ def open_live_run(name: str, elsewhere: Elsewhere | None = None) -> WatchedRun:
 def _whole(run: LiveRun, path: Path, elsewhere: Elsewhere | None) -> WatchedRun:
     """The whole of the graph of which ``run`` is the part that answers at ``path``."""
     from ...runtime.live.spread_run import SpreadRun
-    from ...runtime.placement.place import place
+    from ...runtime.placement.placed import place
     from ...runtime.transports.keys import secured
 
     placed = place(run.graph)
@@ -94,7 +94,7 @@ def _spread_elsewhere(elsewhere: Elsewhere) -> SpreadRun | None:
     """
     from ...runtime.live.spread_run import SpreadRun
     from ...runtime.loading import load
-    from ...runtime.placement.place import place
+    from ...runtime.placement.placed import place
     from ...runtime.transports.keys import secured
     from .local_runs import settings_of
 

@@ -36,7 +36,7 @@ def observer_of(
     """
     from ...runtime.links.observer import Observer
     from ...runtime.loading import load
-    from ...runtime.placement.place import place
+    from ...runtime.placement.placed import place
     from ...runtime.transports.keys import secured
     from .local_runs import settings_of
 

@@ -55,8 +55,8 @@ def diagram_of(run: RecordedRun) -> bytes:
     """The block diagram of the graph that ran, as PNG; nothing where its code has gone since."""
     from ...logs.replay.opened_run import OpenedRun
     from ...runtime.drawing.diagram import diagram
-    from ...runtime.drawing.placing import draw as drawn
-    from ...runtime.drawing.png import save_png
+    from ...runtime.drawing.layout import draw as drawn
+    from ...runtime.drawing.render import save_png
 
     try:
         graph = OpenedRun(run, Path(run.header.source).parent).graph

@@ -17,7 +17,7 @@ from ...blocks.signals import CommandMode, JointCommand
 from ...mathematics.arrays import Array, Counts, Flags
 from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.kernel import kernel
-from ...mathematics.linear import multiply_vector
+from ...mathematics.linear_algebra import multiply_vector
 from ...robots.description import RobotDescription
 from ..drive_control import Targets
 from .motor_feedback import MotorFeedback, MotorLoops, close_loops

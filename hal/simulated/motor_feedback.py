@@ -13,7 +13,7 @@ import numpy as np
 
 from ...mathematics.arrays import Array, Counts, Flags
 from ...mathematics.kernel import kernel
-from ...mathematics.linear import multiply_vector
+from ...mathematics.linear_algebra import multiply_vector
 from ...robots.robot_description import RobotDescription
 from ...robots.transmission import motor_gains
 from ...runtime.language.signals import Field, Signal

@@ -33,9 +33,8 @@ import numpy as np
 
 from ...mathematics.arrays import Array
 from ...mathematics.constants import GRAVITY
-from ...robots.ball_feet import ball_feet
 from ...robots.description import RobotDescription
-from ...robots.link_poses import contact_centres, joints_above
+from ...robots.kinematics import ball_feet, contact_centres, joints_above
 from .base import BASES
 from .random_streams import Purpose, stream
 from .scenes import Scene

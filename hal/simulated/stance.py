@@ -14,12 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...mathematics.arrays import Array
+from ...mathematics.capture_step import support_margin
 from ...mathematics.constants import GRAVITY
-from ...mathematics.reproducible import product
-from ...mathematics.support_margin import support_margin
-from ...robots.ball_feet import ball_feet
+from ...mathematics.linear_algebra import product
 from ...robots.description import RobotDescription
-from ...robots.link_poses import joints_above, standing_com, standing_heights
+from ...robots.kinematics import ball_feet, joints_above, standing_com, standing_heights
 from ...runtime.language.errors import BlockError
 from .base import BASES, FixedBase
 from .mujoco_model import body_name

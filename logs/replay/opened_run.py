@@ -22,7 +22,6 @@ from ...runtime.language.layout import Layout
 from ...runtime.language.parameter_change import ParameterChange
 from ...runtime.language.stages import CheckedGraph
 from ...runtime.loading import load_text
-from ...runtime.loading.reading.earlier_versions import in_present_form
 from ...runtime.running.memory import BoundGraph, Snapshot
 from ..file.header import machine, versions
 from ..file.reader import RecordedRun, read
@@ -68,7 +67,7 @@ class OpenedRun:
     def restored(self) -> Restored:
         """The graph's text, and the files that were taken from the recording."""
         header = self.file.header
-        text = in_present_form(header.graph, header.versions.get("aloft", ""), header.robot)
+        text = header.graph
         if not self.restore:
             return Restored(text, {}, (), frozenset())
         return restored(header, text, self.folder, Path(self._place.name))

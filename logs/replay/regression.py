@@ -17,7 +17,7 @@ from ...runtime.language.layout import Layout
 from ...runtime.language.registry import block_name
 from ...runtime.language.schedule import runs_at
 from ...runtime.language.stages import BlockSpec, CheckedGraph
-from ...runtime.loading.checking.adjust import plain_parameters
+from ...runtime.loading.checking.parameters import plain_parameters
 from ...runtime.running.differences import Difference
 from ...runtime.running.memory import BoundGraph
 from ...runtime.testing.stretch import Setting, Stretch

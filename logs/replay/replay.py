@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from ...runtime.language.errors import AloftError
 from ...runtime.language.stages import CheckedGraph, ClockSpec
-from ...runtime.loading.checking.adjust import adjust
+from ...runtime.loading.checking.parameters import adjust
 from ...runtime.running.differences import Comparison, Difference, Translation
 from ...runtime.running.executor import Executor
 from ...runtime.running.memory import BoundGraph, Snapshot

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from ...runtime.drawing.values import shown
+from ...runtime.drawing.page import shown
 from ..file.reader import RecordedRun
 
 

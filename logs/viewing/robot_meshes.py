@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from ...mathematics.arrays import Array
 from ...robots.description import Link, Look, Mesh, RobotDescription
-from ...robots.importing.mesh_triangles import mesh_triangles, simplified
-from ...robots.importing.packages import find_file
+from ...robots.importing.meshes import mesh_triangles, simplified
+from ...robots.importing.urdf_text import find_file
 from ...robots.kinematics import matrices_of_quaternions
 from .robot_shapes import capsules, shapes_of
 

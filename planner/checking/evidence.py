@@ -12,9 +12,8 @@ from numpy.typing import NDArray
 from ...blocks.signals import Phase
 from ...mathematics.arrays import Array
 from ...mathematics.constants import GRAVITY
-from ...robots.ball_feet import ball_feet
 from ...robots.description import Motors, RobotDescription
-from ...robots.kinematics import LinkPoses, link_poses, matrices_of_quaternions
+from ...robots.kinematics import LinkPoses, ball_feet, link_poses, matrices_of_quaternions
 from ...robots.welding import welded
 from ..models.symmetry import mirrored_pairs, symmetrised
 from ..task.plan import JumpPlan

@@ -14,7 +14,7 @@ import os
 from collections.abc import Callable
 from pathlib import Path
 
-from ...mathematics.package_code import code_digest
+from ...mathematics.kept_arrays import code_digest
 from ..task.whole_file import write_whole
 
 FOLDERS = ("planner/checking", "planner/models", "planner/task", "robots", "mathematics")

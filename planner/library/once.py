@@ -12,8 +12,7 @@ from collections import OrderedDict
 from collections.abc import Callable, Hashable
 from typing import Generic, TypeVar
 
-from ...mathematics.kept_arrays import kept_arrays
-from ...mathematics.package_code import code_digest
+from ...mathematics.kept_arrays import code_digest, kept_arrays
 from ...robots.robot_description import RobotDescription
 from ..checking.validity import require_valid
 from ..task.plan import ARRAYS, JumpPlan

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from ...blocks.signals import Phase
 from ...mathematics.arrays import Array
 from ...mathematics.constants import GRAVITY
-from ...mathematics.reproducible import product
+from ...mathematics.linear_algebra import product
 from ...robots.description import RobotDescription
 from ..checking.replay import flight_knots
 from ..models.exact_dynamics import ExactDynamics, JointMotion, joint_motion

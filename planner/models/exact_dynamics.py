@@ -18,9 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...mathematics.arrays import Array
-from ...mathematics.reproducible import product
-from ...robots.ball_feet import ball_feet
+from ...mathematics.linear_algebra import product
 from ...robots.description import RobotDescription
+from ...robots.kinematics import ball_feet
 from ...robots.pinocchio_model import build_pinocchio_model
 from .coasting import coast, joint_side
 from .pushing import push, pushed_side

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...mathematics.arrays import Array
-from ...mathematics.reproducible import product
+from ...mathematics.linear_algebra import product
 from ...robots.kinematics import matrices_of_quaternions
 from ..task.plan import JumpPlan
 from .exact_dynamics import ExactDynamics

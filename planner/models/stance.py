@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from ...mathematics.arrays import Array
-from ...robots.ball_feet import ball_feet
 from ...robots.description import RobotDescription
+from ...robots.kinematics import ball_feet
 from ..task.errors import PlanError
 from ..task.task import JumpTask
 from .symbolic_model import SymbolicModel

@@ -15,8 +15,8 @@ from collections.abc import Sequence
 from typing import Any
 
 from ...mathematics.constants import GRAVITY
-from ...robots.ball_feet import ball_feet
 from ...robots.description import ContactPoint, Link, RobotDescription
+from ...robots.kinematics import ball_feet
 from ...robots.welding import HeldLoad
 from .symbolic_frames import (
     Expression,

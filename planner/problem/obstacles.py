@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 
 from ...mathematics.arrays import Indices
-from ...robots.ball_feet import ball_feet
 from ...robots.description import RobotDescription
+from ...robots.kinematics import ball_feet
 from ..models.coordinates import Coordinates
 from ..models.symbolic_model import SymbolicModel
 from ..task.sequence import Hop

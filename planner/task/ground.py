@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from ...mathematics.reproducible import product
+from ...mathematics.linear_algebra import product
 from ...robots.description import RobotDescription
-from ...robots.link_poses import contact_centres, link_poses
+from ...robots.kinematics import contact_centres, link_poses_in_base
 from .errors import TaskError
 from .sequence import SHORTEST_JUMP_OVER_AN_EDGE, Hop, Place, edge_of
 from .task import JumpTask
@@ -126,7 +126,7 @@ def _require_ground(task: JumpTask, robot: RobotDescription, ground: _Edges) -> 
 
 def _soles(robot: RobotDescription, place: Place) -> list[tuple[float, float]]:
     """Where the contact points are on the ground, as the robot stands at a place."""
-    poses = link_poses(robot, robot.standing_position)
+    poses = link_poses_in_base(robot, robot.standing_position)
     links = {foot.name: foot.link for foot in robot.feet}
     points = np.array(
         [

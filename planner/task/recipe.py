@@ -29,7 +29,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from ...mathematics.constants import GRAVITY
-from ...mathematics.reproducible import product
+from ...mathematics.linear_algebra import product
 from ...robots.description import RobotDescription
 from ...runtime.language.parameters import Parameters
 from .margins import Margins

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from ...mathematics.arrays import Array
-from ...mathematics.reproducible import product
+from ...mathematics.linear_algebra import product
 from ...robots.description import RobotDescription
 from ...robots.kinematics import link_poses
 from ...robots.limb import chain_to

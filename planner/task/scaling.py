@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from ...mathematics.reproducible import product
+from ...mathematics.linear_algebra import product
 from ...robots.description import RobotDescription
 from ...robots.kinematics import link_poses
 from ...runtime.language.parameters import Parameters

@@ -17,9 +17,8 @@ import numpy as np
 from ...mathematics.arrays import Array
 from ..validation import RobotError, RobotFault
 from ..validation.faults import listing
-from .bodies import Inertial, joined
 from .capsules import Capsule, coarse
-from .raw_model import RawBody, RawJoint, RawModel
+from .raw_model import Inertial, RawBody, RawJoint, RawModel, joined
 
 GROUND = "ground"
 """The base link of a robot that is bolted to the world by a file's own world body."""

@@ -1,21 +1,302 @@
-"""A full description as plain data, from a URDF or MJCF file and the short YAML that adds to it."""
+"""A full description as plain data, from a URDF or MJCF file and the short YAML that adds to it.
+
+The keys of the short YAML are those of a full description, but ``links`` and ``joints`` are mappings from a name
+to the values that differ, values in ``profiles`` may be left out where the file has them, and feet
+and named points may be given in the frame of any body of the file. A fault of the result is reported where it
+stands: in the YAML, or in the URDF or MJCF file.
+
+These formats give each joint at most an effort and a speed. What they leave open of an actuator profile is
+assumed here, cautiously, and said in the notes: the torque falls from 0.6 of the speed limit on, and a motor
+bears two fifths of its peak torque for long.
+"""
 
 from __future__ import annotations
 
+import math
+from collections import Counter
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any
 
-from ..parts import Joint, Link
-from ..robot_description import RobotDescription
+import numpy as np
+
+from ..robot_description import Joint, Link, RobotDescription
 from ..validation import RobotFault
-from .build import Built, build
+from ..validation.faults import listing, nearest
+from ..validation.find_faults import shown
+from .build import Built, Frame, build, tidy
 from .looks import link_looks
-from .overlay import Overlay
-from .rated_profile import rated_profile
-from .raw_model import RawModel
+from .raw_model import RawJoint, RawModel
 from .read_model import read_model
+from .urdf_text import XmlFile
+
+OWN_KEYS = ("file", "weld")
+_UP = np.array([0.0, 0.0, 1.0])
+RADIUS = 0.005
+"""The radius of a contact point for which the YAML gives none [m]."""
+
+
+class Overlay:
+    """The content of a short YAML, and what is wrong with it."""
+
+    def __init__(self, data: Mapping[str, Any]) -> None:
+        self.data = data
+        self.faults: list[RobotFault] = []
+
+    def add(self, path: tuple[str | int, ...], message: str, expected: str = "", found: str = "",
+            fix: str = "") -> None:  # fmt: skip
+        """Note a fault."""
+        self.faults.append(RobotFault(path, message, expected, found, fix))
+
+    def mapping(self, key: str) -> Mapping[str, Any]:
+        """The mapping under a key; empty, and a fault, where it is something else."""
+        value = self.data.get(key)
+        if value is None:
+            return {}
+        if not isinstance(value, Mapping):
+            self.add((key,), f"{key} cannot be {shown(value)}",
+                     f"a mapping from the names in the file to what differs: {key}: {{NAME: ...}}",
+                     shown(value))  # fmt: skip
+            return {}
+        return {str(name): each for name, each in value.items()}
+
+    def check_keys(self, legal: list[str]) -> None:
+        """Report unknown keys."""
+        for key in self.data:
+            if key not in legal and key not in OWN_KEYS:
+                right = nearest(str(key), [*legal, *OWN_KEYS])
+                fix = f"{right}: {shown(self.data[key])}" if right else ""
+                self.add((str(key),), f"the robot has no key {key!r}",
+                         listing([*OWN_KEYS, *legal], 20), repr(key), fix)  # fmt: skip
+
+    def welded(self, joints: list[str]) -> list[str]:
+        """The joints that ``weld`` names, by name or shell pattern."""
+        found: list[str] = []
+        given = self.data.get("weld", [])
+        if not isinstance(given, list) or not all(isinstance(each, str) for each in given):
+            self.add(("weld",), f"weld cannot be {shown(given)}", "a list of joints or patterns",
+                     shown(given))  # fmt: skip
+            return []
+        for k, pattern in enumerate(given):
+            matching = [name for name in joints if fnmatchcase(name, pattern)]
+            if not matching:
+                self.add(("weld", k), f"weld: the file has no joint {pattern}", listing(joints),
+                         pattern, nearest(pattern, joints))  # fmt: skip
+            found += matching
+        return found
+
+    def change(self, key: str, parts: list[dict[str, Any]], kind: type[Link | Joint]) -> None:
+        """Change the links or joints of the file that the YAML names."""
+        named = {part["name"]: part for part in parts}
+        fields = [name for name in kind.model_fields if name != "name"]
+        for name, change in self.mapping(key).items():
+            if name not in named:
+                self.add((key, name), f"the file has no {key[:-1]} {name}",
+                         listing(list(named)), name, nearest(name, named))  # fmt: skip
+            elif not isinstance(change, Mapping):
+                self.add((key, name), f"{key[:-1]} {name} cannot be {shown(change)}",
+                         f"a mapping with some of {listing(fields)}", shown(change))  # fmt: skip
+            else:
+                named[name].update(change)
+
+    def profiles(self, rated: Mapping[str, Any]) -> dict[str, Any]:
+        """The profiles of the YAML, filled from the file's; the file's alone where it has none."""
+        given = self.mapping("profiles")
+        if not given:
+            return {"rated": dict(rated)}
+        return {
+            name: _filled(profile, rated) if isinstance(profile, Mapping) else profile
+            for name, profile in given.items()
+        }
+
+    def frame(self, path: tuple[str | int, ...], name: Any, built: Built) -> Frame | None:
+        """The body of the file with that name; ``None``, and a fault, if there is none."""
+        if isinstance(name, str) and name in built.frames:
+            return built.frames[name]
+        self.add(path, f"the file has no link {shown(name)}", listing(list(built.frames), 60),
+                 shown(name), nearest(str(name), built.frames))  # fmt: skip
+        return None
+
+    def feet(self, built: Built) -> tuple[list[Any], list[Any]]:
+        """Feet and contact points as in a full description, from both ways to write them."""
+        feet, contacts = [], []
+        given = self.data.get("feet") or []
+        if not isinstance(given, list):
+            return given, self.data.get("contacts") or []
+        for k, foot in enumerate(given):
+            if not isinstance(foot, Mapping) or "at" not in foot:
+                feet.append(foot)
+                continue
+            made = self._foot(("feet", k), foot, built)
+            if made:
+                feet.append(made[0])
+                contacts += made[1]
+        own = self.data.get("contacts") or []
+        return feet, [*contacts, *own] if isinstance(own, list) else own
+
+    def _foot(
+        self, path: tuple[str | int, ...], foot: Mapping[str, Any], built: Built
+    ) -> tuple[dict[str, Any], list[dict[str, Any]]] | None:
+        """A foot given in the frame ``at`` of the file: a ball, or the points of a sole."""
+        legal = ("name", "at", "ball", "points", "radius")
+        for key in foot:
+            if key not in legal:
+                right = nearest(str(key), legal)
+                self.add((*path, str(key)), f"a foot has no key {key!r}", listing(legal), repr(key),
+                         f"{right}: {shown(foot[key])}" if right else "")  # fmt: skip
+        frame = self.frame((*path, "at"), foot["at"], built)
+        radius, name = foot.get("radius", RADIUS), str(foot.get("name", foot["at"]))
+        points = foot.get("points")
+        if frame is None or not isinstance(radius, (int, float)):
+            if frame is not None:
+                self.add((*path, "radius"), f"foot {name}: radius cannot be {shown(radius)}",
+                         "a number of m", shown(radius))  # fmt: skip
+            return None
+        if points is None:
+            centre = self._point((*path, "ball"), foot.get("ball", [0.0, 0.0, 0.0]))
+            if centre is None:
+                return None
+            lowest = tidy(frame.point(centre) - radius * _UP)
+            return {"name": name, "link": frame.link, "sole": lowest}, [
+                {"name": name, "foot": name, "position": lowest, "radius": radius}
+            ]
+        if isinstance(points, list):
+            points = {str(k + 1): point for k, point in enumerate(points)}
+        if not isinstance(points, Mapping) or not points:
+            self.add((*path, "points"), f"foot {name}: points cannot be {shown(points)}",
+                     "a list or mapping of points [x, y, z]", shown(points))  # fmt: skip
+            return None
+        places = {}
+        for each, point in points.items():
+            place = self._point((*path, "points", each), point)
+            if place is None:
+                return None
+            places[f"{name}_{each}"] = frame.point(place)
+        sole = tidy(np.mean(list(places.values()), axis=0))
+        return {"name": name, "link": frame.link, "sole": sole}, [
+            {"name": each, "foot": name, "position": place, "radius": radius}
+            for each, place in places.items()
+        ]
+
+    def _point(self, path: tuple[str | int, ...], value: Any) -> list[float] | None:
+        numbers = isinstance(value, list) and all(isinstance(each, (int, float)) for each in value)
+        if numbers and len(value) == 3:
+            return [float(each) for each in value]
+        self.add(path, f"a point cannot be {shown(value)}", "[x, y, z] in m", shown(value))
+        return None
+
+    def points(self, built: Built) -> dict[str, Any]:
+        """Named points, each on a link of the description or in the frame of a body of the file."""
+        found: dict[str, Any] = {}
+        links = [link["name"] for link in built.links]
+        for name, value in self.mapping("points").items():
+            found[name] = value
+            if isinstance(value, list) and len(value) == 2 and value[0] not in links:
+                frame = self.frame(("points", name, 0), value[0], built)
+                place = self._point(("points", name, 1), value[1])
+                if frame is not None and place is not None:
+                    found[name] = [frame.link, frame.point(place)]
+        return found
+
+
+def _filled(profile: Mapping[str, Any], rated: Mapping[str, Any]) -> dict[str, Any]:
+    """A profile with the file's values where it has none.
+
+    A value that it gives for all motors counts for all, also where the file has different ones.
+    """
+    motors = {
+        name: {key: value for key, value in rating.items() if key not in profile}
+        for name, rating in rated["motors"].items()
+    }
+    own = profile.get("motors", {})
+    if not isinstance(own, Mapping):
+        return {**rated, **profile}
+    for name, rating in own.items():
+        both = {**motors.pop(name, {}), **rating} if isinstance(rating, Mapping) else rating
+        motors[name] = both
+    return {**rated, **profile, "motors": {name: each for name, each in motors.items() if each}}
+
+
+NAME = "rated"
+CORNER = 0.6
+"""Corner speed as a share of the speed limit, which is taken for the no-load speed."""
+CONTINUOUS = 0.4
+"""Continuous torque as a share of the effort limit."""
+EFFORT = 100.0
+"""Peak torque [N m, N] where the file gives none."""
+SPEED = 20.0
+"""No-load speed [rad/s, m/s] where the file gives none."""
+KEYS = ("peak_torque", "corner_speed", "no_load_speed", "continuous_torque", "rotor_inertia",
+        "friction", "damping")  # fmt: skip
+
+
+def rated_profile(
+    joints: Mapping[str, RawJoint], is_urdf: bool, notes: list[str]
+) -> dict[str, Any]:
+    """The profile as plain data; joints that differ from most have an entry under ``motors``."""
+    values = {name: _values(joint, is_urdf) for name, joint in joints.items()}
+    efforts = [n for n, j in joints.items() if math.isnan(j.effort) or (is_urdf and j.effort <= 0)]
+    speeds = [n for n, j in joints.items() if not j.speed > 0 and values[n]["peak_torque"] > 0]
+    if efforts:
+        notes.append(f"no effort limit of {listing(efforts, 6)}: {EFFORT:g} N m is assumed")
+    if speeds:
+        notes.append(f"no speed limit of {listing(speeds, 6)}: {SPEED:g} rad/s is assumed")
+    driven = [value for value in values.values() if value["peak_torque"] > 0] or [
+        {**dict.fromkeys(KEYS, 0.0), "peak_torque": EFFORT, "continuous_torque": EFFORT,
+         "corner_speed": CORNER * SPEED, "no_load_speed": SPEED}
+    ]  # fmt: skip
+    common = {key: Counter(value[key] for value in driven).most_common(1)[0][0] for key in KEYS}
+    if not 0.0 <= common["corner_speed"] < common["no_load_speed"]:
+        common["corner_speed"] = CORNER * common["no_load_speed"]
+    motors = {
+        name: {key: value[key] for key in KEYS if value[key] != common[key]}
+        for name, value in values.items()
+    }
+    return {**common, "motors": {name: changed for name, changed in motors.items() if changed}}
+
+
+def _values(joint: RawJoint, is_urdf: bool) -> dict[str, float]:
+    known = joint.effort > 0.0 or (joint.effort == 0.0 and not is_urdf)
+    effort = joint.effort if known else EFFORT
+    speed = joint.speed if joint.speed > 0.0 else SPEED
+    return {
+        "peak_torque": effort,
+        "corner_speed": round(CORNER * speed, 9),
+        "no_load_speed": speed,
+        "continuous_torque": round(CONTINUOUS * effort, 9),
+        "rotor_inertia": joint.rotor_inertia,
+        "friction": joint.friction,
+        "damping": joint.damping,
+    }
+
+
+TAGS = {"links": ("link", "body"), "joints": ("joint", "joint")}
+"""The elements of a URDF and of MJCF that describe a part of a description."""
+
+
+def written_path(fault: RobotFault, data: Mapping[str, Any]) -> tuple[str | int, ...]:
+    """The path of a fault as a short YAML has it: links and joints by name, contacts by foot."""
+    path = fault.path
+    if len(path) > 1 and path[0] == "contacts" and isinstance(path[1], int):
+        # Contact points of a short YAML are in its feet.
+        feet = [foot["name"] for foot in data["feet"]]
+        foot = data["contacts"][path[1]]["foot"]
+        return ("feet", feet.index(foot)) if foot in feet else path
+    if len(path) > 1 and path[0] in TAGS and isinstance(path[1], int):
+        return (path[0], str(data[path[0]][path[1]]["name"]), *path[2:])
+    return path
+
+
+def placed_in_model(fault: RobotFault, data: Mapping[str, Any], model: RawModel) -> RobotFault:
+    """The fault with the line of the link or joint in the URDF or MJCF file, if it is one's."""
+    path = written_path(fault, data)
+    line = column = 0
+    if len(path) > 1 and path[0] in TAGS:
+        tag = TAGS[str(path[0])][not model.is_urdf]
+        line, column = XmlFile(model.path).place(tag, str(path[1]))
+    return replace(fault, path=path, file=str(model.path), line=line, column=column)
 
 
 @dataclass(frozen=True)

@@ -13,8 +13,7 @@ import numpy as np
 from ...mathematics.arrays import Array
 from ..kinematics import quaternions_of_matrices, rotations_about
 from . import capsules as fit
-from .packages import SCHEME, find_file
-from .urdf_text import XmlFile
+from .urdf_text import SCHEME, XmlFile, find_file
 
 
 @dataclass(frozen=True)

@@ -1,17 +1,26 @@
-"""A first short YAML for a URDF or MJCF file."""
+"""Writes a first short YAML for a URDF or MJCF file, as far as it can be found, with the feet guessed.
+
+A foot is the last link of a limb of two joints or more that reaches down, at the zero of all
+joints, nearly as far as the farthest one does. Balls that the file has there for collisions are
+taken for its contact points; else it is a ball foot at the lowest body of the link.
+"""
 
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from ..robot_description import RobotDescription
 from ..validation import RobotError, find_faults
+from ..validation.faults import number, vector
+from .build import Built, Frame
 from .description_data import Imported, import_robot
 from .fit_to_ground import fit_to_ground
-from .guess_feet import guess_feet
-from .write_yaml import yaml_text
+from .raw_model import RawModel
 
 
 def new_yaml(file: Path, target: Path) -> tuple[str, list[str]]:
@@ -35,6 +44,167 @@ def new_yaml(file: Path, target: Path) -> tuple[str, list[str]]:
 
 
 def _placed(imported: Imported, faults: Any) -> list[Any]:
-    from .places import placed_in_model
+    from .description_data import placed_in_model
 
     return [placed_in_model(fault, imported.data, imported.model) for fault in faults]
+
+
+REACH = 0.1
+"""By how much less than the farthest limb a foot reaches down, as a share."""
+LEVEL = 0.01
+"""Contact points lie within this height [m]."""
+RADIUS = 0.02
+"""The radius of a foot whose shape the file does not give [m]."""
+
+
+def guess_feet(model: RawModel, built: Built) -> list[dict[str, Any]]:
+    """The feet as a short YAML has them: ``name``, ``at``, ``ball`` or ``points``, ``radius``."""
+    heights = {link: _lowest(model, built, link) for link in _limb_ends(built)}
+    lowest = min(heights.values(), default=0.0)
+    if lowest >= 0.0:
+        return []
+    ends = [link for link, height in heights.items() if height <= (1.0 - REACH) * lowest]
+    return [_foot(model, built, link) for link in ends]
+
+
+def _limb_ends(built: Built) -> list[str]:
+    """Links at the end of a chain of two joints or more."""
+    parent = {joint["child"]: joint["parent"] for joint in built.joints}
+    ends = [link for link in parent if link not in parent.values()]
+    return [link for link in ends if parent[link] != built.base]
+
+
+def _origins(built: Built) -> dict[str, Any]:
+    """Where every link is at the zero of all joints [m, base frame]."""
+    places = {built.base: np.zeros(3)}
+    for joint in built.joints:
+        places[joint["child"]] = places[joint["parent"]] + np.array(joint["origin"])
+    return places
+
+
+def _bodies(built: Built, link: str) -> dict[str, Frame]:
+    return {name: frame for name, frame in built.frames.items() if frame.link == link}
+
+
+def _lowest(model: RawModel, built: Built, link: str) -> float:
+    """The lowest height of a link, with all that is fixed to it, at the zero of all joints [m]."""
+    height = _origins(built)[link][2]
+    found = [height]
+    for name, frame in _bodies(built, link).items():
+        found.append(height + frame.position[2])
+        shapes = model.bodies[name].capsules if name in model.bodies else ()
+        found += [height + frame.position[2] + shape.lowest(frame.rotation) for shape in shapes]
+    return float(min(found))
+
+
+def _foot(model: RawModel, built: Built, link: str) -> dict[str, Any]:
+    bodies = _bodies(built, link)
+    bottom = _lowest(model, built, link) - _origins(built)[link][2]
+    balls = []
+    for name, frame in bodies.items():
+        for shape in model.bodies[name].capsules if name in model.bodies else ():
+            is_ball = np.linalg.norm(shape.end - shape.start) < 0.1 * shape.radius
+            if is_ball and frame.position[2] + shape.lowest(frame.rotation) < bottom + LEVEL:
+                balls.append((name, frame, 0.5 * (shape.start + shape.end), shape.radius))
+    if not balls:
+        name = min(bodies, key=lambda body: float(bodies[body].position[2]))
+        return {"name": name, "at": name, "radius": RADIUS}
+    name, _, centre, radius = balls[0]
+    if len(balls) == 1:
+        ball = [float(value) for value in np.round(centre, 6) + 0.0]
+        return {"name": name, "at": name, "ball": ball, "radius": round(radius, 6)}
+    points = []
+    for other, frame, middle, size in balls:
+        if other == name:
+            down = middle - size * frame.rotation[2]
+            points.append([float(value) for value in np.round(down, 6) + 0.0])
+    return {"name": name, "at": name, "points": points, "radius": round(radius, 6)}
+
+
+def yaml_text(
+    file: str, robot: RobotDescription, feet: list[dict[str, Any]], notes: list[str]
+) -> str:
+    """The YAML's text.
+
+    Args:
+        file: what the YAML's key ``file`` says.
+        robot: as it was read with these feet.
+        feet: that were guessed, as ``guess_feet`` gives them.
+        notes: what the file lacks, which become comments.
+    """
+    lines = [
+        f"# What {Path(file).name} does not say of the robot. Everything here was guessed or found by",
+        "# `aloft robot import`: look at each part, correct it, and write where its numbers are from.",
+        f"file: {file}",
+        f"name: {robot.name}",
+        'text: ""',
+        f"base_joint: {robot.base_joint}",
+        "",
+    ]
+    lines += [f"# {note}." for note in notes]
+    lines += ["", *_feet(feet), "", *_profile(robot), "", *_sensors(robot)]
+    if feet:
+        lines += ["", *_angles("standing", robot.standing)]
+    lines += [
+        "",
+        "# Joints that stand still at an angle while the robot is at work: arms, a waist.",
+    ]
+    lines.append("held: {}")
+    return "\n".join(lines) + "\n"
+
+
+def _feet(feet: list[dict[str, Any]]) -> list[str]:
+    if not feet:
+        return [
+            "# No feet were found: nothing reaches down. Without any, leave this out.",
+            "feet: []",
+        ]
+    lines = [
+        "# GUESSED: the ends of the limbs that reach lowest. `at` is a link of the file, `ball` the",
+        "# centre of a ball foot in its frame, `points` the lowest points of a sole.",
+        "feet:",
+    ]
+    for foot in feet:
+        lines.append(f"  - name: {foot['name']}")
+        lines.append(f"    at: {foot['at']}")
+        if "ball" in foot and any(foot["ball"]):
+            lines.append(f"    ball: {vector(foot['ball'])}")
+        if "points" in foot:
+            lines.append("    points:")
+            lines += [f"      - {vector(point)}" for point in foot["points"]]
+        lines.append(f"    radius: {number(foot['radius'])}")
+    return lines
+
+
+def _profile(robot: RobotDescription) -> list[str]:
+    rated = robot.profiles["rated"]
+    keys = ("peak_torque", "corner_speed", "no_load_speed", "continuous_torque")
+    lines = [
+        "# From the file: peak torques (effort limits) and no-load speeds (speed limits). ASSUMED: the",
+        "# torque falls from 0.6 of the no-load speed on, and two fifths of it can be held for long.",
+        "# MISSING where zero: rotor inertia at the gearbox output, friction, damping. A value given",
+        "# here counts for all motors; `motors: {NAME or PATTERN: {peak_torque: ...}}` for some.",
+        "profiles:",
+        "  rated:",
+    ]
+    values = {key: getattr(rated, key) for key in keys}
+    if rated.motors:
+        lines.append("    # " + ", ".join(f"{key}: {number(v)}" for key, v in values.items()))
+    else:
+        lines += [f"    {key}: {number(value)}" for key, value in values.items()]
+    for key in ("rotor_inertia", "friction", "damping"):
+        lines.append(f"    {key}: {number(getattr(rated, key))}")
+    return lines
+
+
+def _sensors(robot: RobotDescription) -> list[str]:
+    text = f"{{imu: {str(robot.sensors.imu).lower()}, switches: {str(robot.sensors.switches).lower()}}}"
+    return [
+        "# ASSUMED: an IMU at the base's origin, and a switch in every contact point.",
+        f"sensors: {text}",
+    ]
+
+
+def _angles(key: str, angles: Mapping[str, float]) -> list[str]:
+    lines = ["# Found: soles on one level, the centre of mass over their middle.", f"{key}:"]
+    return lines + [f"  {name}: {round(angle, 9):.9g}" for name, angle in angles.items()]

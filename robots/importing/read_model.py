@@ -17,12 +17,10 @@ import numpy as np
 
 from ...mathematics.arrays import Array
 from . import capsules as fit
-from .bodies import NOTHING, Inertial, full_tensor
 from .looks import NOTHING_SEEN, RawLook, RawMesh, urdf_looks
-from .mesh_files import READABLE, mesh_corners
-from .packages import find_file
-from .raw_model import RawBody, RawJoint, RawModel
-from .urdf_text import UrdfJoint, XmlFile, check_urdf, urdf_joints
+from .meshes import READABLE, mesh_corners
+from .raw_model import NOTHING, Inertial, RawBody, RawJoint, RawModel, full_tensor
+from .urdf_text import UrdfJoint, XmlFile, check_urdf, find_file, urdf_joints
 
 
 def read_model(path: Path) -> RawModel:

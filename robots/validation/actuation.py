@@ -8,9 +8,8 @@ from fnmatch import fnmatchcase
 
 import numpy as np
 
-from ..parts import ActuatorProfile, MotorRating, Transmission
-from .draft import Draft, read
-from .faults import Path, listing, nearest, number
+from ..robot_description import ActuatorProfile, MotorRating, Transmission
+from .faults import Draft, Path, listing, nearest, number, read
 
 LARGEST_CONDITION = 1e8
 """The largest condition number of a transmission; beyond it motor torques are rounding errors."""

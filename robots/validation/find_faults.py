@@ -1,20 +1,17 @@
-"""All checks of a description, one after the other."""
+"""All checks of a description, one after the other; first whether every key is known and holds a value of the right type."""
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Mapping
+from typing import Any, get_args, get_origin
+
+from pydantic import BaseModel, ValidationError
 
 from ..robot_description import RobotDescription
 from .actuation import check_actuation
-from .bodies import check_bodies
-from .draft import Draft
-from .faults import RobotFault
-from .joints import check_joints
-from .looks import check_looks
-from .names import check_names
+from .faults import Draft, Path, RobotFault, listing, nearest
 from .stance import check_feet, check_poses
-from .tree import check_tree
-from .types import check_types
+from .structure import check_bodies, check_joints, check_looks, check_names, check_tree
 
 
 def find_faults(data: Any) -> tuple[RobotFault, ...]:
@@ -38,3 +35,92 @@ def find_faults(data: Any) -> tuple[RobotFault, ...]:
     check_poses(draft)
     check_looks(draft)
     return tuple(draft.faults)
+
+
+def check_types(draft: Draft, kind: type[BaseModel]) -> None:
+    """Report every key that is unknown or missing and every value of a wrong type."""
+    try:
+        kind.model_validate(draft.data)
+    except ValidationError as error:
+        for each in error.errors(include_url=False):
+            _report(draft, kind, each["loc"], each["type"], each.get("input"), each["msg"])
+
+
+def _report(
+    draft: Draft, kind: type[BaseModel], path: Path, code: str, value: Any, said: str
+) -> None:
+    owner, key = where(draft.data, path[:-1]), path[-1]
+    if code == "extra_forbidden":
+        legal = list(_model_at(kind, path[:-1]).model_fields)
+        right = nearest(str(key), legal)
+        draft.add(
+            path, f"{owner} has no key {key!r}", listing(legal, 20), repr(key),
+            f"{right}: {shown(value)}" if right else "",
+        )  # fmt: skip
+    elif code == "missing":
+        if isinstance(key, int):
+            draft.add(path[:-1], f"{owner}: too few values", f"at least {key + 1}", f"{key}")
+        else:
+            draft.add(path, f"{owner} lacks {key!r}", f"a value for {key!r}", "nothing")
+    else:
+        said = said.removeprefix("Input should be ").removeprefix("Value should have ")
+        said = said.replace("a valid string", "text").replace("a valid tuple", "a list")
+        said = said.replace("a valid dictionary", "a mapping").replace(
+            "a valid boolean", "true or false"
+        )
+        said = said.replace(", unable to parse string as a number", "").replace(
+            "a valid number", "a number"
+        )
+        said = said.partition(" or instance of")[0].partition(" after validation")[0]
+        name = key if not isinstance(key, int) else f"value {key + 1}"
+        draft.add(path, f"{owner}: {name} cannot be {shown(value)}", said, shown(value))
+
+
+def shown(value: Any) -> str:
+    """A value as it would be written in the file, cut off where it is long."""
+    if value is None:
+        return "nothing"
+    if isinstance(value, bool):
+        return str(value).lower()
+    text = repr(value) if isinstance(value, str) else str(value)
+    return text if len(text) <= 60 else f"{text[:57]}..."
+
+
+def where(data: Any, path: Path) -> str:
+    """What stands at a path, in words: ``link shank``, ``profile koala``, ``the robot``."""
+    words: list[str] = []
+    singular = {"links": "link", "joints": "joint", "feet": "foot", "contacts": "contact",
+                "shapes": "shape", "profiles": "profile"}  # fmt: skip
+    for depth, key in enumerate(path):
+        holder, data = data, _inside(data, key)
+        kind = singular.get(str(path[depth - 1])) if depth else None
+        if isinstance(key, int):
+            name = data.get("name") if isinstance(data, Mapping) else None
+            text = f"{kind or words.pop()} {name if isinstance(name, str) else key + 1}"
+            words.append(text)
+        elif kind and isinstance(holder, Mapping):
+            words.append(f"{kind} {key}")
+        elif key not in singular:
+            words.append(str(key))
+    return ", ".join(words) or "the robot"
+
+
+def _inside(data: Any, key: str | int) -> Any:
+    try:
+        return data[key]
+    except (KeyError, IndexError, TypeError):
+        return None
+
+
+def _model_at(kind: type[BaseModel], path: Path) -> type[BaseModel]:
+    """The model that describes what stands at a path."""
+    found: Any = kind
+    for key in path:
+        if isinstance(found, type) and issubclass(found, BaseModel):
+            found = found.model_fields[str(key)].annotation
+        else:
+            found = next(arg for arg in reversed(get_args(found)) if arg is not Ellipsis)
+        while get_origin(found) is not None and type(None) in get_args(found):
+            found = next(arg for arg in get_args(found) if arg is not type(None))
+    assert isinstance(found, type) and issubclass(found, BaseModel)
+    return found

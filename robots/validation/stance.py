@@ -5,9 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
-from ..parts import ContactPoint, Foot, Joint
-from .draft import Draft
-from .faults import Path, number, vector
+from ..robot_description import ContactPoint, Foot, Joint
+from .faults import Draft, Path, number, vector
 
 MARGIN = 1e-9
 """By how much a pose may exceed a joint's limit [rad, m]: rounding."""

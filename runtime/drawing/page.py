@@ -1,21 +1,32 @@
-"""The diagram as a page for a browser: a click on a block shows its details, one on a box opens it."""
+"""The diagram as a page for a browser, and the server that shows it to browsers of this machine only.
+
+A click on a block shows its contract, its parameters and its place in the file; one on a box opens it. For a run
+the page has the values on the wires at a tick, and the time that each block took.
+"""
 
 from __future__ import annotations
 
 import base64
 import hashlib
 import json
+import threading
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from html import escape
-from typing import Any
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from typing import Any, Protocol
+from urllib.parse import parse_qs, urlsplit
 
-from ..language.stages import CheckedGraph
-from .details import details
+import numpy as np
+from numpy.typing import NDArray
+
+from ..language.reference import PortReference, block_reference
+from ..language.stages import BlockSpec, CheckedGraph
+from ..loading.picture import BlockRow, table
+from ..loading.reading.nodes import text_of
 from .diagram import diagram, subgraphs
-from .placing import draw
-from .svg import svg
-from .values import Values
+from .layout import draw
+from .render import svg
 
 _STYLE = """
 :root{color-scheme:light dark} body{margin:0;font:14px/1.45 'DejaVu Sans',Verdana,Arial,sans-serif;
@@ -198,3 +209,148 @@ def policy(addition: str = "") -> str:
         "connect-src 'self'; "
         "base-uri 'none'; form-action 'self'; frame-ancestors 'none'"
     )
+
+
+def page_server(
+    graph: CheckedGraph, port: int = 0, values: Values | None = None
+) -> ThreadingHTTPServer:
+    """The server, which listens on the loopback address but does not serve yet.
+
+    With ``values`` the page shows them, and asks for those of a tick by ``/at?tick=``.
+
+    Raises:
+        OSError: the port is taken.
+    """
+
+    one_at_a_time = threading.Lock()
+
+    class Handler(LoopbackHandler):
+        content_policy = policy()
+
+        def do_GET(self) -> None:
+            if not self.is_ours():
+                return
+            address = urlsplit(self.path)
+            asked = parse_qs(address.query)
+            tick = asked.get("tick", [""])[0]
+            if address.path == "/at" and values is not None and tick.isdecimal():
+                with one_at_a_time:
+                    found = values.at(int(tick))
+                self.answer(json.dumps(found), "application/json")
+            elif address.path == "/":
+                self.answer(page(graph, asked.get("closed", []), values), "text/html")
+            else:
+                self.send_error(404)
+
+    return ThreadingHTTPServer((ADDRESS, port), Handler)
+
+
+def details(graph: CheckedGraph) -> dict[str, dict[str, Any]]:
+    """The details of every block that a user wrote, by path, as plain data."""
+    specs = {spec.path: spec for spec in graph.blocks}
+    return {row.path: _of(row, specs[row.path]) for row in table(graph) if "~" not in row.path}
+
+
+def _of(row: BlockRow, spec: BlockSpec) -> dict[str, Any]:
+    reference = block_reference(row.use, spec.block_type)
+    values = spec.params.model_dump(mode="json")
+    offset = f", from tick {row.offset_ticks}" if row.offset_ticks else ""
+    return {
+        "use": row.use,
+        "place": str(spec.where) if spec.where is not None else "",
+        "rate": f"{row.rate_hz:g} Hz{offset}",
+        "order": row.order,
+        "machine": spec.machine,
+        "summary": reference.summary,
+        "text": reference.text,
+        "inputs": [[item.name, item.text().partition(" <- ")[2]] for item in row.inputs],
+        "sources": {name: wire.source for name, wire in spec.wires.items()},
+        "outputs": [[port.name, _fields(port, spec)] for port in reference.outputs],
+        "parameters": [
+            [item.name, _short(values.get(item.name)), item.unit, item.text]
+            for item in reference.parameters
+        ],
+    }
+
+
+def _fields(port: PortReference, spec: BlockSpec) -> str:
+    """The fields of an output with what they carry in this graph."""
+    found = []
+    for field in port.fields:
+        carried = spec.quantities.get(f"{port.name}.{field.name}")
+        found.append(f"{field.name}: {field.type}" + (f" {carried}" if carried else ""))
+    return f"{port.signal}: {', '.join(found)}"
+
+
+def _short(value: Any) -> str:
+    text = "none" if value is None else text_of(value)
+    return text if len(text) <= 120 else f"{text[:117]}..."
+
+
+MOST = 16
+"""Numbers of one field that are shown; of more the first, and how many there are."""
+
+
+class Values(Protocol):
+    """A run whose values can be asked for."""
+
+    ticks: tuple[int, int]
+    """The first and the last tick."""
+    period: float
+    """The duration of a tick [s]."""
+    times: Mapping[str, str]
+    """What there is to say of the time that a block took, by the block's path."""
+
+    def at(self, tick: int) -> Mapping[str, str]:
+        """Every field of every output at a tick, by ``block.port.field``."""
+
+
+def shown(value: NDArray[Any], unit: str = "") -> str:
+    """The numbers of a field as a short text."""
+    flat = np.ravel(value)
+    texts = [f"{x:.6g}" if flat.dtype.kind == "f" else str(x) for x in flat[:MOST].tolist()]
+    text = ", ".join(texts) if flat.size != 1 else texts[0]
+    if flat.size > MOST:
+        text += f", ... ({flat.size} in all)"
+    if flat.size != 1:
+        text = f"[{text}]"
+    return f"{text} {unit}".rstrip()
+
+
+ADDRESS = "127.0.0.1"
+
+
+class LoopbackHandler(BaseHTTPRequestHandler):
+    """Answers requests that were made to the loopback address by its name."""
+
+    content_policy = "default-src 'none'"
+
+    def is_ours(self) -> bool:
+        """Whether the request was made to this machine; if not, it is refused.
+
+        A page of another site whose name was made to point here (DNS rebinding) still says its name
+        in ``Host``.
+        """
+        host, _, port = (self.headers.get("Host") or "").rpartition(":")
+        server_port = str(self.connection.getsockname()[1])
+        if host in (ADDRESS, "localhost") and port == server_port:
+            return True
+        self.send_error(403, "this page is for this machine only")
+        return False
+
+    def answer(self, text: str, kind: str, status: int = 200) -> None:
+        """Send a text; no other page may read or embed it."""
+        body = text.encode()
+        self.send_response(status)
+        self.send_header("Content-Type", f"{kind}; charset=utf-8")
+        self.send_header("Content-Length", str(len(body)))
+        self.send_header("Content-Security-Policy", self.content_policy)
+        self.send_header("Cross-Origin-Resource-Policy", "same-origin")
+        self.send_header("Cache-Control", "no-store")
+        self.send_header("Referrer-Policy", "no-referrer")
+        self.send_header("X-Content-Type-Options", "nosniff")
+        self.end_headers()
+        self.wfile.write(body)
+
+    def log_message(self, format: str, *args: object) -> None:
+        """Say nothing about requests."""

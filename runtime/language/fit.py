@@ -7,8 +7,7 @@ from difflib import get_close_matches
 
 from pydantic import BaseModel
 
-from ...robots.description import RobotDescription
-from ...robots.shipped import robot_names
+from ...robots.description import RobotDescription, robot_names
 from .block import Block, Context, Misfit, Need
 from .parameters import Parameters
 from .per_joint import PerJoint

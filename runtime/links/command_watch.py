@@ -12,8 +12,7 @@ import time
 from collections.abc import Callable, Sequence
 from typing import Protocol
 
-from ..placement.commands import command_sources, silence_limit
-from ..placement.placed import Link, PlacedGraph
+from ..placement.placed import Link, PlacedGraph, command_sources, silence_limit
 
 
 class WatchedLink(Protocol):

@@ -19,7 +19,7 @@ from ..language.block import Block, Clock
 from ..language.errors import AloftError, RunError
 from ..language.parameter_change import Adjustment
 from ..language.parameters import Parameters
-from ..loading.checking.adjust import adjust
+from ..loading.checking.parameters import adjust
 from ..running.failures import describe
 from ..running.live_parameters import LiveParameters
 from ..running.memory import BoundGraph

@@ -202,7 +202,7 @@ def link_input_type(block_type: type[Block]) -> type[LinkInput]:
     """The stand-in for blocks of that type on other machines."""
     if block_type not in _TYPES:
         body: dict[str, Any] = {"__doc__": LinkInput.__doc__, "Params": block_type.Params}
-        kind: type[LinkInput] = type(f"Received{block_type.__name__}", (LinkInput,), body)
+        kind: type[LinkInput] = type(f"LinkInput{block_type.__name__}", (LinkInput,), body)
         kind.inputs, kind.outputs = block_type.inputs, block_type.outputs
         _TYPES[block_type] = kind
     return _TYPES[block_type]

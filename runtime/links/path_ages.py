@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ..language.block import Metric
 from ..language.stages import CheckedGraph
-from ..placement.measured_age import LinkTimes, Timeline, measured_ages
+from ..placement.age import LinkTimes, Timeline, measured_ages
 from ..placement.placed import PlacedGraph
 from ..running.memory import BoundGraph
 from .free_link import TICK_TIME, health_path

@@ -179,7 +179,7 @@ def _bus_of(graph: CheckedGraph, wanted: str) -> tuple[Layout, str, Collection[s
         return layout, "", [spec.path for spec in graph.blocks]
     if graph.machines:
         from ..links.part import part_graph
-        from ..placement.place import place
+        from ..placement.placed import place
 
         placed = place(graph)
         for machine in placed.machines:

@@ -15,8 +15,7 @@ from pathlib import Path
 from typing import Any, Literal, Protocol
 from urllib.parse import parse_qs, urlsplit
 
-from ..drawing.loopback import ADDRESS, LoopbackHandler
-from ..drawing.page import Addition, page, policy
+from ..drawing.page import ADDRESS, Addition, LoopbackHandler, page, policy
 from ..language.errors import AloftError
 from ..language.stages import CheckedGraph
 from .tunables import Tunables, write_overlay

@@ -26,7 +26,7 @@ from pathlib import Path
 from typing import Any
 
 from ..language.errors import AloftError
-from ..loading.checking.adjust import adjust, entries
+from ..loading.checking.parameters import adjust, entries
 from ..loading.problems import LoadError
 from ..running.live_parameters import LiveParameters
 from ..running.memory import BoundGraph

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..drawing.values import shown
+from ..drawing.page import shown
 from ..language.layout import Layout
 from ..language.stages import CheckedGraph
 

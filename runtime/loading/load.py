@@ -9,8 +9,8 @@ from .checking.examine import examine
 from .flattening.flat import FlatGraph
 from .flattening.flatten import flatten_file, flatten_text
 from .problems import LoadError, Problems, Report
+from .reading.files import graph_path
 from .reading.overrides import Overrides
-from .shipped import graph_path
 
 
 def load(path: str | Path, overrides: Overrides = ()) -> CheckedGraph:

@@ -11,8 +11,7 @@ from ..language.delay import Delay
 from ..language.quantities import Quantity
 from ..language.registry import block_name
 from ..language.stages import BlockSpec, CheckedGraph, Wire
-from .checking.inserted import ConstantSignal
-from .gathering import Gather
+from .checking.inserted import ConstantSignal, Gather
 
 _COLOURS = ("#cfe2f3", "#fce5cd", "#d9ead3", "#ead1dc", "#fff2cc", "#d9d2e9")
 """The colours of the machines in a diagram."""

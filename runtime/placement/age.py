@@ -1,15 +1,22 @@
-"""How old the newest sample of one output can be when an input that depends on it is used.
+"""How old the newest sample of an output is when an input that depends on it is used.
 
-Computed before a run, from rates, offsets, order, delays and the limits of free-running links. The
-age counts from the tick in which the sample was taken until the reader runs again, since a robot
-applies a command until then. Of several ways from the output to the input the
-one that brings the newest sample counts; so a way that goes round in a loop does not.
+``worst_age`` computes it before a run, from rates, offsets, order, delays and the limits of free-running
+links; ``measured_ages`` computes it from the times at which ticks began and messages were read in a run.
+The age counts from the tick in which the sample was taken until the reader runs again, since a robot
+applies a command until then. Of several ways from the output to the input the one that brings the
+newest sample counts; so a way that goes round in a loop does not. Across machines the measured age has
+the error of the estimated clock offset; within one machine there is none.
 """
 
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from math import lcm
+
+import numpy as np
+from numpy.typing import NDArray
 
 from ..language.delay import Delay
 from ..language.schedule import runs_at
@@ -129,3 +136,167 @@ def worst_age(graph: CheckedGraph, source: str, target: str) -> float | None:
         held = reader.period_ticks * graph.base_period
         worst = max(worst or 0.0, now - newest + held)
     return worst
+
+
+SampleTime = int | None
+"""When the newest sample was taken that a value depends on, by the clock of a machine [ns]."""
+
+
+@dataclass(frozen=True)
+class LinkTimes:
+    """What a free-running link gave in each tick of its reader, each (n,).
+
+    Attributes:
+        tick: the tick in which the source had run; -1 before the first message.
+        sent: when the message was made, by the sender's clock [ns].
+        read: when it was read, by the reader's clock [ns].
+        age: how old it was then [ns].
+    """
+
+    tick: Sequence[int]
+    sent: Sequence[int]
+    read: Sequence[int]
+    age: Sequence[int]
+
+
+@dataclass(frozen=True)
+class Timeline:
+    """The ticks of one part, and when each began by the clock of its machine [ns], each (n,); and the
+    links that it received, by their source."""
+
+    ticks: Sequence[int]
+    began: Sequence[int]
+    links: Mapping[str, LinkTimes] = field(default_factory=dict)
+
+
+class _Part:
+    """Follows through the ticks of one part which sample each value depends on."""
+
+    def __init__(
+        self, graph: CheckedGraph, machine: str | None, timeline: Timeline, source: str, target: str
+    ) -> None:
+        self.graph, self.timeline, self.source = graph, timeline, source
+        self.reader, _, self.port = target.rpartition(".")
+        self.specs = {spec.path: spec for spec in graph.blocks}
+        order = dict.fromkeys([*graph.order, *self.specs])
+        self.own = [self.specs[p] for p in order if machine in (None, self.specs[p].machine)]
+        self.kept: dict[str, deque[SampleTime]] = {
+            spec.path: deque([None] * depth(spec), maxlen=depth(spec))
+            for spec in self.own
+            if spec.block_type.is_moore()
+        }
+        self.output: dict[str, SampleTime] = {}
+        self.sampled: SampleTime = None
+        self.known: dict[tuple[int, str], SampleTime] = {}
+        """What the outputs of a tick depend on; the output that is followed has its own name."""
+        self.found: list[tuple[int, SampleTime]] = []
+        self.done = False
+
+    def run(self, parts: Mapping[str, _Part]) -> Iterator[None]:
+        """Go through all ticks; stops to wait for what another part has not come to yet."""
+        at = self.source.rpartition(".")[0]
+        for place, tick in enumerate(self.timeline.ticks):
+            active = [s for s in self.own if runs_at(tick, s.period_ticks, s.offset_ticks)]
+            for spec in active:
+                if spec.path in self.kept:
+                    self.output[spec.path] = self.kept[spec.path][0]
+                else:
+                    yield from self._collect(spec, place, parts)
+                self.known[tick, spec.path] = self.output[spec.path]
+                if spec.path == at:
+                    self.sampled = self.timeline.began[place]
+                    self.known[tick, self.source] = self.sampled
+                if spec.path == self.reader and spec.path not in self.kept:
+                    yield from self._note(spec, place, parts)
+            for spec in active:
+                if spec.path in self.kept:
+                    yield from self._collect(spec, place, parts, keep=True)
+                    if spec.path == self.reader:
+                        yield from self._note(spec, place, parts)
+        self.done = True
+
+    def _collect(
+        self, spec: BlockSpec, place: int, parts: Mapping[str, _Part], *, keep: bool = False
+    ) -> Iterator[None]:
+        newest: SampleTime = None
+        for name in spec.wires:
+            yield from self._arrives(spec, name, place, parts)
+            time = self._read(spec, name, place, parts)
+            newest = time if newest is None or (time is not None and time > newest) else newest
+        if keep:
+            self.kept[spec.path].append(newest)
+        else:
+            self.output[spec.path] = newest
+
+    def _note(self, spec: BlockSpec, place: int, parts: Mapping[str, _Part]) -> Iterator[None]:
+        yield from self._arrives(spec, self.port, place, parts)
+        self.found.append((place, self._read(spec, self.port, place, parts)))
+
+    def _link(self, spec: BlockSpec, name: str) -> LinkTimes | None:
+        return self.timeline.links.get(spec.wires[name].source_block)
+
+    def _arrives(
+        self, spec: BlockSpec, name: str, place: int, parts: Mapping[str, _Part]
+    ) -> Iterator[None]:
+        """Wait until the sender has come to the tick whose message was read here."""
+        link, source = self._link(spec, name), spec.wires[name].source_block
+        if link is None:
+            return
+        sender, tick = parts[self.specs[source].machine], link.tick[place]
+        while not sender.done and (tick, source) not in sender.known:
+            if tick < sender.timeline.ticks[0]:
+                return
+            yield
+
+    def _read(
+        self, spec: BlockSpec, name: str, place: int, parts: Mapping[str, _Part]
+    ) -> SampleTime:
+        wire, link = spec.wires[name], self._link(spec, name)
+        followed = wire.source == self.source
+        if link is None:
+            return self.sampled if followed else self.output.get(wire.source_block)
+        sender = parts[self.specs[wire.source_block].machine]
+        taken = sender.known.get((link.tick[place], self.source if followed else wire.source_block))
+        if taken is None:
+            return None
+        return link.read[place] - link.age[place] - (link.sent[place] - taken)
+
+
+def measured_ages(
+    graph: CheckedGraph, timelines: Mapping[str, Timeline], source: str, target: str
+) -> NDArray[np.float64]:
+    """The age [s] of the newest sample of ``source`` at ``target``, at every run of the reader.
+
+    Args:
+        graph: the graph.
+        timelines: when ticks began, by machine; one alone stands for all machines, as in one
+            process and in lockstep.
+        source: an output, ``block.port``.
+        target: an input, ``block.port``.
+
+    Returns:
+        (n,), from the first run of the reader that depends on a sample. As in ``worst_age`` an age
+        counts until the reader runs again.
+    """
+    alone = len(timelines) == 1
+    parts = {
+        machine: _Part(graph, None if alone else machine, timeline, source, target)
+        for machine, timeline in timelines.items()
+        if len(timeline.ticks)
+    }
+    waiting = {machine: part.run(parts) for machine, part in parts.items()}
+    while waiting:
+        before = {machine: len(part.known) for machine, part in parts.items()}
+        for machine in list(waiting):
+            # it goes on until it waits for another part
+            if next(waiting[machine], "done") == "done":
+                del waiting[machine]
+        if waiting and before == {machine: len(part.known) for machine, part in parts.items()}:
+            break  # the recordings do not belong together
+    ages = []
+    for part in parts.values():
+        began = part.timeline.began
+        for (_, newest), (following, _) in zip(part.found, part.found[1:], strict=False):
+            if newest is not None:
+                ages.append((began[following] - newest) * 1e-9)
+    return np.array(ages, np.float64)

@@ -62,7 +62,7 @@ def playback_block_type(block_type: type[Block]) -> type[PlaybackBlock]:
         return _TYPES[block_type]
     base = _PlaybackMoore if block_type.is_moore() else _PlaybackMealy
     body = {"__doc__": PlaybackBlock.__doc__, "Params": block_type.Params}
-    kind: type[PlaybackBlock] = type(f"Fed{block_type.__name__}", (base,), body)
+    kind: type[PlaybackBlock] = type(f"Playback{block_type.__name__}", (base,), body)
     kind.inputs, kind.outputs = block_type.inputs, block_type.outputs
     _TYPES[block_type] = kind
     return kind

@@ -1,7 +1,14 @@
-"""Runs all parts of a placed graph in the threads of one process, in lockstep and in virtual time."""
+"""Runs all parts of a placed graph in one process, for tests and for measurements of links.
+
+``run_spread`` runs them in threads, in lockstep. ``run_virtual`` runs free-running parts: they tick at
+their own phases, messages take the time that the caller says, and computing takes none. One thread goes from
+event to event, so a run is the same on every machine, however busy it is. Beacons are left out: the parts count as
+started, and have one clock.
+"""
 
 from __future__ import annotations
 
+import heapq
 import threading
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -10,14 +17,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...mathematics.compiling.compile_calls import compile_calls
+from ..language.block import Metric
 from ..language.errors import AloftError
-from ..language.stages import CheckedGraph
-from ..links.part import BoundPart, MergedLayout, hash_of, run_part
-from ..placement.place import place
-from ..placement.placed import PlacedGraph
-from ..running.run_result import RunResult
+from ..language.stages import CheckedGraph, ClockSpec
+from ..links.part import COORDINATOR, PREPARED, STARTED, BoundPart, MergedLayout, hash_of, run_part
+from ..placement.placed import PlacedGraph, place
+from ..running.run_result import RunResult, merge_metrics
 from ..running.sinks import Sink
+from ..running.ticker import Ticker
 from ..transports.hub import Hub
+from ..transports.transport import MessageCallback
 
 Interfere = Callable[[str, bytes], Iterable[bytes]]
 
@@ -127,3 +137,169 @@ def run_parts_of(
     if failures:
         raise AloftError("; ".join(failures))
     return SpreadRun(placed, {name: results[name] for name in parts}, parts)
+
+
+Travel = Callable[[str, int], int | None]
+"""Gives how long a message takes [ns], by the key of its link and the time; ``None`` if it is lost."""
+_RUNTIME = (COORDINATOR, PREPARED, STARTED)
+
+
+@dataclass(frozen=True)
+class VirtualRun:
+    """What a run gave: whether it succeeded and why, its metrics, its parts, and how long it was [s]."""
+
+    success: bool
+    reason: str
+    metrics: Mapping[str, Metric]
+    parts: Mapping[str, BoundPart]
+    duration_s: float
+
+
+class _Time:
+    """The virtual time [ns]."""
+
+    def __init__(self) -> None:
+        self.time = 1_000_000_000
+
+    def now(self) -> int:
+        return self.time
+
+    def sleep(self, seconds: float) -> None:
+        """Nobody sleeps: ticks are events."""
+
+
+class _Network:
+    """Messages on their way; a part's transport hands them over."""
+
+    def __init__(self, time: _Time, travel: Travel) -> None:
+        self.time, self.travel = time, travel
+        self.takers: dict[str, MessageCallback] = {}
+        self.waiting: list[tuple[int, int, str, bytes]] = []
+        self._count = 0
+
+    def send(self, key: str, data: bytes) -> None:
+        travel = self.travel(key, self.time.time)
+        if travel is not None:
+            self._count += 1
+            heapq.heappush(self.waiting, (self.time.time + travel, self._count, key, data))
+
+    def deliver(self) -> None:
+        """Hand over the next message."""
+        instant, _, key, data = heapq.heappop(self.waiting)
+        self.time.time = instant
+        take = self.takers.get(key)
+        if take is not None:
+            take(data)
+
+
+class _VirtualTransport:
+    """One part's end of the network."""
+
+    is_open = True
+
+    def __init__(self, network: _Network) -> None:
+        self._network = network
+
+    def open(self, machine: str, lost: Callable[[str], None]) -> None:
+        """Nothing to do."""
+
+    def publisher(self, key: str) -> MessageCallback:
+        return lambda data: self._network.send(key, data)
+
+    def background_publisher(self, key: str) -> MessageCallback:
+        return self.publisher(key)
+
+    def before_close(self, call: Callable[[], None]) -> None:
+        """Nothing to do: it does not close."""
+
+    def subscribe(self, key: str, take: MessageCallback) -> None:
+        self._network.takers[key] = take
+
+    def close(self) -> None:
+        """Nothing to do."""
+
+
+def run_virtual(
+    graph: CheckedGraph,
+    travel: Travel,
+    phases: Mapping[str, float] | None = None,
+    *,
+    plain: bool = False,
+) -> VirtualRun:
+    """Run a free-running graph for its duration, or until a block asks for the end.
+
+    Args:
+        graph: with machines; what it says of its clock does not matter.
+        travel: how long each message takes.
+        phases: when the first tick of each machine is, as a share of a period; by default zero.
+        plain: whether nothing is compiled.
+
+    Raises:
+        AloftError: the graph names no machines, or a part fails.
+    """
+    placed = place(graph)
+    time = _Time()
+    network = _Network(time, travel)
+    parts = {
+        machine.name: BoundPart(placed, machine.name, _VirtualTransport(network), clock=time.now)
+        for machine in placed.machines
+    }
+    for name, part in parts.items():
+        for other in part.peers.names:
+            part.peers.assume_started(other, parts[other].peers.run)
+        part.open_links()
+        if not plain:
+            compile_calls(part.kernel_calls)
+        assert name == part.machine
+    blocks = [
+        block for part in parts.values() for path, block in part.blocks.items()
+        if path not in _RUNTIME
+    ]  # fmt: skip
+    try:
+        for block in blocks:
+            block.start()
+        stopped = _go_through(graph, parts, network, time, phases or {})
+    finally:
+        for block in blocks:
+            block.stop_cycle()
+        for block in blocks:
+            block.close()
+    own: dict[str, Any] = {
+        path: dict(block.metrics())
+        for name, part in parts.items()
+        for path, block in part.blocks.items()
+        if path in [spec.path for spec in placed.blocks_on(name)]
+    }
+    metrics, unmet, praise = merge_metrics(own)
+    reason = unmet or praise or stopped or "ran to its end"
+    began = 1_000_000_000
+    return VirtualRun(unmet is None, reason, metrics, parts, (time.time - began) * 1e-9)
+
+
+def _go_through(
+    graph: CheckedGraph, parts: Mapping[str, BoundPart], network: _Network, time: _Time,
+    phases: Mapping[str, float],
+) -> str:  # fmt: skip
+    """Every tick and every message in the order of their instants; gives who ended the run, and why."""
+    tickers = {
+        name: Ticker(part, ClockSpec("free"), time, timing=False) for name, part in parts.items()
+    }
+    period = round(graph.base_period * 1e9)
+    due = [
+        (time.time + round(phases.get(name, 0.0) * period), number, name)
+        for number, name in enumerate(parts)
+    ]
+    heapq.heapify(due)
+    while due:
+        # a message that comes at the instant of a tick is there
+        while network.waiting and network.waiting[0][0] <= due[0][0]:
+            network.deliver()
+        instant, number, name = heapq.heappop(due)
+        time.time = instant
+        part = parts[name]
+        tickers[name].advance(1)
+        if part.clock.stop_reason is not None:
+            return f"{name}: {part.clock.stop_reason}"
+        if graph.ticks is None or part.clock.tick < graph.ticks:
+            heapq.heappush(due, (instant + period, number, name))
+    return ""

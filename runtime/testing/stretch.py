@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from ...robots.description import RobotDescription
 from ..language.block import Block
 from ..language.parameter_change import Adjustment
-from ..loading.checking.adjust import adjust
+from ..loading.checking.parameters import adjust
 from ..running.differences import bits, ulp_distance
 from ..running.live_parameters import LiveParameters
 from .bench import BlockBench

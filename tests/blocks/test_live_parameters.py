@@ -22,7 +22,7 @@ from aloft.runtime.language.parameters import Parameters, is_live
 from aloft.runtime.language.registry import find_block, known_names
 from aloft.runtime.running.live_parameters import LiveParameters
 from aloft.runtime.testing import BlockBench
-from aloft.runtime.testing.examples import live_changes, random_inputs
+from aloft.runtime.testing.conformance import live_changes, random_inputs
 
 TICKS = 150
 BEFORE = 3

@@ -15,7 +15,7 @@ from aloft.logs.viewing.viewer import ViewerError, start_viewer
 from aloft.runtime.language.errors import AloftError
 from aloft.runtime.links.observer import Observer
 from aloft.runtime.loading import load
-from aloft.runtime.placement.place import place
+from aloft.runtime.placement.placed import place
 
 from ..waiting import wait_for
 from .conftest import run_elsewhere, run_for_json, run_here

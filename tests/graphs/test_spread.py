@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from aloft.runtime.loading import load
-from aloft.runtime.loading.shipped import shipped_graphs
-from aloft.runtime.placement.place import spread
+from aloft.runtime.loading.reading.files import shipped_graphs
+from aloft.runtime.placement.placed import spread
 from aloft.runtime.running.executor import run
 from aloft.runtime.testing.spread import run_spread
 

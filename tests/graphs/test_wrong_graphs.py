@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from aloft.robots.shipped import robot_names
+from aloft.robots.description import robot_names
 from aloft.runtime.language.errors import ExitCode
 from aloft.runtime.language.fit import fix_without_robot
 from aloft.runtime.loading import Code, LoadError, Report, check, load

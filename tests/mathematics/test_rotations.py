@@ -1,4 +1,9 @@
-"""The group laws, the two maps and their inverses, also near zero and near a half turn."""
+"""The group laws, the two maps and their inverses, also near zero and near a half turn.
+
+Unit vectors are of length one, point along, and fall back where there is no direction.
+
+Euler angles against SciPy, and there and back.
+"""
 
 from __future__ import annotations
 
@@ -6,11 +11,13 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
+from scipy.spatial.transform import Rotation
 
 from aloft.mathematics import rotations
+from aloft.mathematics.rotations import from_euler, to_euler, unit
 
 numbers = st.floats(-1.0, 1.0, allow_nan=False, width=64)
 vectors = arrays(np.float64, 3, elements=numbers)
@@ -174,3 +181,33 @@ def test_out_may_be_an_argument():
 def test_wrap(angle):
     assert abs(rotations.wrap(angle)) <= math.pi + 1e-12
     assert math.cos(rotations.wrap(angle) - angle) == pytest.approx(1.0)
+
+
+ELEMENT = st.floats(-1e300, 1e300)
+
+
+@given(ELEMENT, ELEMENT, ELEMENT)
+def test_a_unit_vector_points_along(x, y, z):
+    largest = max(abs(x), abs(y), abs(z))
+    assume(largest >= 1e-300)
+    direction = unit(x, y, z, 0.0, 0.0, 1.0)
+    assert abs(math.hypot(*direction) - 1.0) < 1e-15
+    size = math.hypot(x / largest, y / largest, z / largest)
+    for found, wanted in zip(direction, (x, y, z), strict=True):
+        assert abs(found * size - wanted / largest) < 1e-15
+
+
+def test_no_direction_gives_the_default():
+    assert unit(0.0, 0.0, 0.0, 0.6, 0.0, 0.8) == (0.6, 0.0, 0.8)
+    assert unit(1e-310, 0.0, -1e-305, 0.0, 1.0, 0.0) == (0.0, 1.0, 0.0)
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.floats(-3.1, 3.1), st.floats(-1.5, 1.5), st.floats(-3.1, 3.1))
+def test_there_and_back(roll: float, pitch: float, yaw: float) -> None:
+    quaternion, back = np.zeros(4), np.zeros(3)
+    from_euler(np.array([roll, pitch, yaw]), quaternion)
+    expected = Rotation.from_euler("ZYX", [yaw, pitch, roll]).as_quat()
+    assert abs(quaternion @ expected) == pytest.approx(1.0, abs=1e-14)
+    to_euler(quaternion, back)
+    np.testing.assert_allclose(back, [roll, pitch, yaw], atol=1e-12)

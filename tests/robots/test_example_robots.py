@@ -11,7 +11,7 @@ import pytest
 
 from aloft.hal.simulated.mujoco_model import build_mujoco_model
 from aloft.robots.description import RobotDescription, find_robot
-from aloft.robots.link_poses import link_poses, standing_com, standing_heights
+from aloft.robots.kinematics import link_poses_in_base, standing_com, standing_heights
 from aloft.robots.pinocchio_model import build_pinocchio_model
 
 from .example_robots import URDF, needs_robots, urdf
@@ -128,7 +128,7 @@ def test_the_shipped_robot_stands(name: str) -> None:
     heights = standing_heights(robot)
     np.testing.assert_allclose(heights, heights[0], rtol=0, atol=1e-8)
     com, soles = standing_com(robot), []
-    poses = link_poses(robot, robot.standing_position)
+    poses = link_poses_in_base(robot, robot.standing_position)
     for foot in robot.feet:
         turn, place = poses[foot.link]
         if sum(contact.foot == foot.name for contact in robot.contacts) > 1:

@@ -12,7 +12,7 @@ from hypothesis.extra.numpy import arrays
 
 from aloft.robots import five_joint_leg as legs
 from aloft.robots.description import find_robot
-from aloft.robots.five_joint_reach import inverse_velocity
+from aloft.robots.five_joint_leg import inverse_velocity
 from aloft.robots.kinematics import link_poses
 
 ROBOT = find_robot("bruce")

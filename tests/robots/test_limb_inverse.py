@@ -12,8 +12,7 @@ from hypothesis.extra.numpy import arrays
 
 from aloft.robots import five_joint_leg
 from aloft.robots.description import find_robot
-from aloft.robots.limb import FootKind, place_limb, read_limb
-from aloft.robots.limb_error import aim, foot_error, turning
+from aloft.robots.limb import FootKind, aim, foot_error, place_limb, read_limb, turning
 from aloft.robots.limb_inverse import (
     REACHED,
     approach,

@@ -9,7 +9,7 @@ from ...language.block import Block
 from ...language.quantities import UNCHECKED, Given, Quantity, quantity_of
 from ...language.unit_algebra import over
 from ..problems import Code, Problems
-from .draft import Draft
+from .block_check import Draft
 from .inserted import own_unit
 
 

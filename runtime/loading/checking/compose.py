@@ -18,12 +18,11 @@ from ...language.parameters import Parameters
 from ...language.quantities import quantity_of
 from ...language.signals import Field, Signal
 from ..flattening.flat import FlatBlock, FlatGraph, FlatWire, Item, Part
-from ..gathering import Piece, gather_block_type, part_signal
 from ..problems import Code, Problems, listing, nearest
 from ..reading.nodes import Entry, MapNode, text_of
 from ..reading.selection import Selection, runs, select
-from .draft import Draft
-from .inserted import read_values
+from .block_check import Draft
+from .inserted import Piece, gather_block_type, part_signal, read_values
 from .wire_check import WireCheck
 
 JOINTS = "n_joints"

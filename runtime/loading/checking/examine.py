@@ -7,8 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from ....robots.description import find_robot
-from ....robots.shipped import robot_names
+from ....robots.description import find_robot, robot_names
 from ...language.block import Block
 from ...language.errors import BlockError, UnknownBlockError
 from ...language.fit import fix_without_robot
@@ -21,16 +20,13 @@ from ..flattening.flat import FlatBlock, FlatGraph
 from ..flattening.machines import on_machines, read_machines
 from ..flattening.rates import check_hyperperiod, read_offset, read_period
 from ..problems import Code, Problems, nearest
+from .block_check import Draft, check_defaults, check_emit, check_fit, check_sizes, lacks_robot
 from .carry import carried_fields, carry, unchecked_wires
 from .compose import put_together
-from .declaration_check import check_defaults, check_emit
-from .draft import Draft
-from .fit import check_fit, lacks_robot
 from .inserted import insert_constant, insert_delay, read_values
 from .link_settings import check_paths, check_watchdog, read_link_settings
-from .parameter_check import check_parameters
+from .parameters import check_parameters
 from .settings import Settings, read_settings
-from .sizes import check_sizes
 from .told import resolve_told
 from .wire_check import WireCheck
 

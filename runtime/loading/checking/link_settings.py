@@ -7,12 +7,10 @@ from typing import Any
 
 from ...language.stages import CheckedGraph, LinkPolicy, LinkSettings, Position
 from ...placement.age import worst_age
-from ...placement.commands import command_sources, silence_limit
-from ...placement.placed import PlacementError
+from ...placement.placed import PlacementError, command_sources, silence_limit
 from ..flattening.flat import FlatGraph
 from ..problems import Code, Problems, listing, nearest
-from ..reading.nodes import Entry, MapNode, kind, plain
-from ..reading.quantity import read_quantity
+from ..reading.nodes import Entry, MapNode, kind, plain, read_quantity
 from ..reading.written import unknown_key, wrong_kind
 
 POLICY_KEYS = ("max_age", "late", "watch")

@@ -17,7 +17,7 @@ from ...language.registry import find_block
 from ..flattening.flat import FlatBlock, FlatGraph
 from ..problems import Code, Problems, listing, nearest
 from ..reading.nodes import Entry, MapNode, Node, ScalarNode, from_plain
-from .parameter_check import check_parameters
+from .parameters import check_parameters
 from .settings import Settings
 
 KEY = "from"

@@ -10,20 +10,23 @@ from pathlib import Path
 from ...language.stages import Position
 from ..problems import Code, Problems, listing, nearest
 from ..reading.document import read_file, read_mapping
-from ..reading.files import FileTree, Stack
-from ..reading.graph_keys import as_entry, is_graph_key, merge
-from ..reading.kinds_of_files import is_another_kind
+from ..reading.files import FileTree, Stack, addresses_like, is_another_kind
 from ..reading.nodes import Entry, MapNode, Node, ScalarNode, plain
-from ..reading.overrides import Override, Overrides, read_overrides, read_sets
-from ..reading.references import Bindings, report_unused
+from ..reading.overrides import (
+    Override,
+    Overrides,
+    as_entry,
+    is_graph_key,
+    merge,
+    read_overrides,
+    read_sets,
+)
 from ..reading.written import WrittenBlock, WrittenGraph, read_graph, wrong_kind
-from ..shipped import addresses_like
 from .flat import FlatBlock, FlatGraph, FlatWire
 from .links import Link, read_link
 from .machines import placed
 from .rates import wrap_offset
-from .subgraph_parameters import parameter_values
-from .subgraphs import Instance, Resolver
+from .subgraphs import Bindings, Instance, Resolver, parameter_values, report_unused
 
 _MAXIMAL_BLOCKS = 5000
 _SUFFIXES = (".yaml", ".yml")

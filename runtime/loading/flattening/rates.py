@@ -9,8 +9,7 @@ from ...language.errors import AloftError
 from ...language.schedule import hyperperiod
 from ...language.stages import Position
 from ..problems import Code, Problems
-from ..reading.nodes import Node, ScalarNode, kind
-from ..reading.quantity import read_quantity
+from ..reading.nodes import Node, ScalarNode, kind, read_quantity
 from .flat import FlatBlock
 
 

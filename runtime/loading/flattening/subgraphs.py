@@ -1,16 +1,20 @@
-"""Uses of sub-graphs, and the resolution of wires through them to the outputs of blocks."""
+"""Uses of sub-graphs: their parameters, and their wires, which are followed to the outputs of blocks.
+
+In a sub-graph's file ``$name`` stands for one of its parameters and ``inputs.name`` for one of its inputs.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import re
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 
 from ...language.stages import Position
-from ..problems import Code, Problems, listing, nearest
-from ..reading.nodes import MapNode, ScalarNode, kind
+from ..problems import Code, Problems, instead, listing, nearest
+from ..reading.nodes import ListNode, MapNode, Node, ScalarNode, kind, plain, text_of, texts_of
 from ..reading.selection import WHOLE, Selection
 from ..reading.written import WrittenGraph
-from .flat import FlatWire, Item, Part
+from .flat import FlatBlock, FlatWire, Item, Part
 from .links import Link
 
 UNWIRED = "unwired"
@@ -309,3 +313,129 @@ class Resolver:
             at=at,
             fix="remove 'delay'",
         )
+
+
+def parameter_values(
+    block: FlatBlock, subgraph: WrittenGraph, problems: Problems
+) -> dict[str, Node] | None:
+    """The values of a sub-graph's parameters for one use; ``None`` if one is missing."""
+    declared = {entry.key: entry for entry in subgraph.parameters}
+    misspelt: dict[str, None] = {}
+    for entry in block.parameters:
+        if entry.key not in declared:
+            similar = nearest(entry.key, declared)
+            misspelt.update(dict.fromkeys(similar[:1]))
+            problems.add(
+                Code.UNKNOWN_PARAMETER,
+                f"{subgraph.file} has no parameter {entry.key!r}",
+                entry.key_where,
+                at=f"{block.path}.{entry.key}",
+                expected=listing(declared),
+                found=entry.key,
+                nearest=similar,
+                fix=instead(entry.key, text_of(plain(entry.value)), entry.key_where, similar[0])
+                if similar
+                else f"remove {entry.key!r}",
+            )
+    values: dict[str, Node] = {}
+    complete = True
+    for name, entry in declared.items():
+        given = block.parameters.get(name)
+        default = entry.value
+        if given is not None:
+            values[name] = given.value
+        elif isinstance(default, ScalarNode) and default.value is None:
+            complete = False
+            if name in misspelt:
+                continue  # one mistake, one problem
+            problems.add(
+                Code.MISSING_PARAMETER,
+                f"{block.path} does not give the parameter {name!r}",
+                block.parameters.where,
+                at=f"{block.path}.{name}",
+                other=name,
+                other_where=entry.key_where,
+                fix=f"with: {{{name}: ...}}",
+            )
+        else:
+            values[name] = default
+    return values if complete else None
+
+
+_INPUT = re.compile(r"inputs\.([A-Za-z_][A-Za-z0-9_]*)(?:$|[.[])")
+
+
+@dataclass(frozen=True)
+class Bindings:
+    """The values of a sub-graph's parameters; ``values`` is ``None`` outside of a sub-graph."""
+
+    values: Mapping[str, Node] | None
+    problems: Problems
+
+    def substitute(self, node: Node) -> Node:
+        """The tree with every ``$name`` replaced; ``$$text`` is the text ``$text``."""
+        if isinstance(node, ScalarNode):
+            text = node.value
+            if not isinstance(text, str) or not text.startswith("$"):
+                return node
+            if text.startswith("$$"):
+                return replace(node, value=text[1:])
+            return self._value(text[1:], node)
+        if isinstance(node, ListNode):
+            return replace(node, items=tuple(self.substitute(item) for item in node.items))
+        entries = tuple(replace(e, value=self.substitute(e.value)) for e in node.entries)
+        return replace(node, entries=entries)
+
+    def _value(self, name: str, node: ScalarNode) -> Node:
+        if self.values is None:
+            self.problems.add(
+                Code.UNKNOWN_REFERENCE,
+                f"${name} stands for a parameter of a sub-graph, and this file is not one",
+                node.where,
+                found=f"${name}",
+                fix=f"write the value, or $${name} for the text",
+            )
+            return node
+        if name in self.values:
+            return self.values[name]
+        similar = nearest(name, self.values)
+        self.problems.add(
+            Code.UNKNOWN_REFERENCE,
+            f"${name} is no parameter of this sub-graph",
+            node.where,
+            expected=listing(self.values),
+            found=f"${name}",
+            nearest=tuple(f"${match}" for match in similar),
+            fix=f"${similar[0]}" if similar else f"parameters: {{{name}: ...}}",
+        )
+        return node
+
+
+def report_unused(
+    subgraph: WrittenGraph, files: Iterable[WrittenGraph], problems: Problems
+) -> None:
+    """Report parameters and inputs of a sub-graph that nothing in its ``files`` refers to."""
+    texts: dict[str, None] = {}
+    for file in files:
+        for entry in file.tree:
+            if entry.key not in ("parameters", "inputs"):
+                texts.update(dict.fromkeys(texts_of(entry.value)))
+    referred = {match[1] for match in map(_INPUT.match, texts) if match}
+    for entry in subgraph.parameters:
+        if f"${entry.key}" not in texts:
+            problems.add(
+                Code.UNUSED_PARAMETER,
+                f"nothing in this sub-graph uses its parameter {entry.key!r}",
+                entry.key_where,
+                at=entry.key,
+                fix=f"use it as ${entry.key}, or remove it",
+            )
+    for entry in subgraph.inputs:
+        if entry.key not in referred:
+            problems.add(
+                Code.UNUSED_INPUT,
+                f"nothing in this sub-graph reads its input {entry.key!r}",
+                entry.key_where,
+                at=entry.key,
+                fix=f"use it as inputs.{entry.key}, or remove it",
+            )

@@ -22,6 +22,7 @@ from .nodes import Entry, ListNode, MapNode, Node, Plain, ScalarNode
 _PREFIX = "tag:yaml.org,2002:"
 _LIMIT = 200_000  # values in one file, counting an alias each time it is used
 _DEPTH = 100  # levels of nesting; PyYAML's own composer overflows the stack on a hostile file
+_TOO_DEEP = f"nested more than {_DEPTH} levels deep"
 _BaseLoader: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 
 
@@ -152,6 +153,8 @@ def _report_syntax(error: yaml.MarkedYAMLError, text: str, shown: str, problems:
     if context is not None and (context.line, context.column) != (line, column):
         other = Position(shown, context.line + 1, context.column + 1)
     message = error.problem or error.context or "this is not YAML"
+    if "nesting depth" in message:  # libyaml's own limit, where it looks further ahead than we do
+        message = _TOO_DEEP
     fix = ""
     if line < len(lines) and lines[line][column : column + 1] == "\t":
         message, fix, other = "a tab where YAML wants spaces", "indent with spaces", None
@@ -255,7 +258,7 @@ class _Composer:
             self._unknown_tag(event.tag, where)
         self.depth += 1
         if self.depth > _DEPTH:
-            raise self._reject(Code.YAML, f"nested more than {_DEPTH} levels deep", where)
+            raise self._reject(Code.YAML, _TOO_DEEP, where)
         made = self._list(where) if isinstance(event, yaml.SequenceStartEvent) else self._map(where)
         self.depth -= 1
         return made

@@ -1,17 +1,60 @@
-"""Reads the files of a graph, each once, finds its includes and reports rings of includes."""
+"""Reads the files of a graph, each once, finds its includes and reports rings of includes.
+
+A shipped graph has an address in place of a path: ``aloft:jump``. A file that is no graph, such as a
+task or a study, is recognised, and the report names the command that it is for.
+"""
 
 from __future__ import annotations
 
 import os
+import re
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
-from ..problems import Code, Problems, nearest
+from ...language.stages import Position
+from ..problems import Code, LoadError, Problems, listing, nearest
 from .document import read_file
-from .nodes import ScalarNode
-from .written import WrittenGraph, read_graph
+from .nodes import MapNode, ScalarNode, plain, texts_of
+from .written import COMMON_KEYS, GRAPH_KEYS, WrittenGraph, read_graph
 
 Stack = tuple[tuple[Path, str], ...]
 """The files being read, outermost first; for each its real path and the name shown in messages."""
+
+PREFIX = "aloft:"
+FOLDER = Path(__file__).parents[3] / "graphs"
+
+
+def shipped_graphs() -> dict[str, Path]:
+    """The files of all shipped graphs by address, such as ``aloft:jump``, sorted."""
+    files = [*FOLDER.glob("*.yaml"), *FOLDER.glob("robots/*.yaml")]
+    by_name = {path.relative_to(FOLDER).with_suffix("").as_posix(): path for path in files}
+    return {f"{PREFIX}{name}": by_name[name] for name in sorted(by_name)}
+
+
+def graph_path(path: str | Path) -> Path:
+    """The file that a path or an address stands for; what is no known address stays as it is."""
+    text = str(path)
+    if not text.startswith(PREFIX):
+        return Path(path)
+    return shipped_graphs().get(text.removesuffix(".yaml"), Path(path))
+
+
+def addresses_like(path: Path) -> tuple[str, ...]:
+    """The addresses of shipped graphs that may be meant by a path where there is no file."""
+    known = shipped_graphs()
+    wanted = f"{PREFIX}{str(path.with_suffix('')).removeprefix(PREFIX).removeprefix('graphs/')}"
+    return (wanted,) if wanted in known else nearest(wanted, known)
+
+
+def summary(path: Path) -> str:
+    """What the comment at the top of a file says first; empty where there is none."""
+    words: list[str] = []
+    for line in path.read_text(encoding="utf-8").splitlines():
+        if not line.startswith("# "):
+            break
+        words.append(line.removeprefix("# "))
+    return " ".join(words).partition(". ")[0].rstrip(".")
 
 
 class FileTree:
@@ -114,3 +157,101 @@ class FileTree:
                 at=entry.key,
                 fix=f"move {entry.key!r} to the graph that uses the sub-graph",
             )
+
+
+def settings_of(path: Path) -> dict[str, Any]:
+    """Everything that a file and those it includes ``set``, as plain data.
+
+    Raises:
+        LoadError: one of the files cannot be read.
+    """
+    problems = Problems()
+    files = FileTree(problems)
+    written = files.read(path, str(path), subgraph=False)
+    gathered = files.gather(written, ((path.resolve(), str(path)),)) if written else []
+    if len(problems):
+        raise LoadError(problems.report(str(path)))
+    return {entry.key: plain(entry.value) for file in gathered for entry in file.sets}
+
+
+_STUDY = ("arms", "grid", "goals", "plots", "graphs", "graph", "tune", "draws_per_arm")
+_ROBOT = ("links", "joints", "feet", "profiles", "standing", "transmission")
+_TASK = ("rise", "distance_x", "distance_y", "landing_height", "jumps", "twist", "rotation")
+_HARDWARE = ("bus", "board", "drives", "motors", "soft_start", "dead_man")
+_PART = ("inputs", "outputs")
+
+_KINDS: Mapping[str, tuple[tuple[str, ...], str]] = {
+    "a study": (_STUDY, "aloft study {file}"),
+    "a robot's description": (_ROBOT, "in a graph: robot: {file}"),
+    "a task of the jump planner": (_TASK, "aloft plan {file}"),
+    "a robot's hardware": (
+        _HARDWARE,
+        "in a graph: robot: {{use: hal.BearRobot, with: {{hardware: {file}}}}}",
+    ),
+    "a sub-graph, a part of a graph": (_PART, "in a graph: blocks: {{part: {{use: {file}}}}}"),
+}
+
+
+def is_another_kind(tree: MapNode, shown: str, problems: Problems) -> bool:
+    """Whether a file given as a graph is none; then that is noted, with what to do with it.
+
+    A file with a key that only graphs have is a graph, however wrong the others are.
+    """
+    keys = [entry.key for entry in tree if not entry.key.startswith("_")]
+    of_graphs = [key for key in GRAPH_KEYS if key not in ("robot", "actuators")]
+    if "links" in keys and "joints" in keys:  # a robot's links, not those between machines
+        of_graphs.remove("links")
+    if any(key in of_graphs for key in keys):
+        return False
+    for kind, (telling, command) in _KINDS.items():
+        found = [key for key in keys if key in telling]
+        if found and ("blocks" not in keys or telling is _PART):
+            problems.add(
+                Code.WRONG_KIND,
+                f"{shown} is {kind}, not a graph that can be run",
+                Position(shown, 1, 1),
+                expected=f"keys such as {', '.join(GRAPH_KEYS[:3])}, blocks",
+                found=", ".join(found),
+                fix=command.format(file=shown),
+            )
+            return True
+    return _is_to_be_included(tree, keys, shown, problems)
+
+
+def _is_to_be_included(tree: MapNode, keys: list[str], shown: str, problems: Problems) -> bool:
+    """Whether a file changes or reads blocks that only a graph has which includes it.
+
+    A file with blocks of its own counts if it needs two more at least: one may be misspelt.
+    """
+    if not keys or any(key not in COMMON_KEYS for key in keys):
+        return False
+    files = FileTree(Problems())  # what is wrong in them is said when they are read as a graph
+    root = read_graph(tree, shown, Path(shown).parent, files.problems, subgraph=False)
+    *included, _ = files.gather(root, ((Path(shown).resolve(), shown),))
+    if files.incomplete or any(file.graph for file in (root, *included)):
+        return False
+    own: list[str] = []
+    named: dict[str, None] = {}
+    for file in (root, *included):
+        own += [block.name for block in file.blocks]
+        inputs = [block.inputs for block in file.blocks if block.inputs]
+        targets = [entry.key for entry in (*file.sets, *file.wires)]
+        sources = [*inputs, *(entry.value for entry in file.wires)]
+        for text in [*targets, *(text for node in sources for text in texts_of(node))]:
+            if found := _BLOCK.match(text):
+                named[found[1]] = None
+    missing = [name for name in named if name not in own]
+    if len(missing) < (2 if own else 1):
+        return False
+    problems.add(
+        Code.WRONG_KIND,
+        f"{shown} is a part that graphs include, not a graph that can be run",
+        Position(shown, 1, 1),
+        expected="a graph, which says its rate",
+        found=f"no rate, and settings or wires of blocks that are not here: {listing(missing)}",
+        fix=f"in a graph with such blocks: include: {shown}",
+    )
+    return True
+
+
+_BLOCK = re.compile(r"([A-Za-z]\w*)[./]")

@@ -10,8 +10,8 @@ import pytest
 from numpy.typing import NDArray
 
 from aloft.blocks.control.dynamics import Dynamics
-from aloft.robots.ball_feet import ball_feet
 from aloft.robots.description import find_robot
+from aloft.robots.kinematics import ball_feet
 from aloft.robots.pinocchio_model import build_pinocchio_model
 from aloft.runtime.testing import BlockBench
 

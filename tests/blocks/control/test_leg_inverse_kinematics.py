@@ -13,8 +13,8 @@ from hypothesis.extra.numpy import arrays
 from aloft.blocks.control.leg_inverse_kinematics import LegInverseKinematics
 from aloft.blocks.signals import Phase
 from aloft.robots import five_joint_leg
-from aloft.robots.ball_feet import ball_feet
 from aloft.robots.description import find_robot
+from aloft.robots.kinematics import ball_feet
 from aloft.robots.limb import place_limb, read_limb
 from aloft.runtime.language.errors import BlockError
 from aloft.runtime.testing import BlockBench

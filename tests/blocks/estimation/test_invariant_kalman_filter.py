@@ -13,9 +13,9 @@ from tests.robots.limbed_robots import quadruped
 
 from aloft.blocks.estimation.invariant_kalman_filter import InvariantKalmanFilter, tracked_points
 from aloft.mathematics import extended_pose, rotations
-from aloft.robots.ball_feet import ball_feet
 from aloft.robots.contact_kinematics import ContactKinematics
 from aloft.robots.description import find_robot
+from aloft.robots.kinematics import ball_feet
 from aloft.runtime.language.errors import BlockError
 from aloft.runtime.testing import BlockBench
 

@@ -19,7 +19,7 @@ from aloft.mathematics.landing_law import (
 )
 from aloft.mathematics.rotations import exponential, multiply, rotate, to_matrix
 from aloft.robots.description import find_robot
-from aloft.robots.standing_feet import foot_sides, standing_feet
+from aloft.robots.kinematics import foot_sides, standing_feet
 from aloft.runtime.testing import BlockBench
 
 from ...robots.limbed_robots import quadruped

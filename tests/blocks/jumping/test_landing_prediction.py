@@ -16,7 +16,7 @@ from aloft.mathematics.constants import GRAVITY
 from aloft.mathematics.landing_law import pull_to_place
 from aloft.mathematics.rotations import to_matrix
 from aloft.robots.description import find_robot
-from aloft.robots.standing_feet import standing_feet
+from aloft.robots.kinematics import standing_feet
 from aloft.runtime.testing import BlockBench
 
 from .test_landing_heuristic import LEVEL, fly, rotation_vector

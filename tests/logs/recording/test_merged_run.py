@@ -17,8 +17,7 @@ from aloft.logs.recording.merged_run import (
 )
 from aloft.logs.recording.recorder import Recorder
 from aloft.runtime.language.errors import AloftError
-from aloft.runtime.placement.place import place
-from aloft.runtime.placement.placed import PlacedGraph
+from aloft.runtime.placement.placed import PlacedGraph, place
 from aloft.runtime.running.executor import run
 from aloft.runtime.running.memory import BoundGraph
 from aloft.runtime.testing.graphs import Use, checked_graph

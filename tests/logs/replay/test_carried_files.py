@@ -14,8 +14,7 @@ from aloft.logs.recording.writer import RecordingWriter
 from aloft.logs.replay.carried_files import restored
 from aloft.logs.replay.opened_run import OpenedRun
 from aloft.logs.replay.replay import replay
-from aloft.robots.description import find_robot, read_description
-from aloft.robots.shipped import robot_names
+from aloft.robots.description import find_robot, read_description, robot_names
 from aloft.runtime.language.stages import CheckedGraph
 from aloft.runtime.loading import load
 from aloft.runtime.running.executor import Executor

@@ -18,7 +18,7 @@ from aloft.logs.replay.replay import replay
 from aloft.logs.replay.replayable import Keyframes
 from aloft.runtime.language.errors import AloftError
 from aloft.runtime.loading import load
-from aloft.runtime.loading.checking.adjust import adjust
+from aloft.runtime.loading.checking.parameters import adjust
 from aloft.runtime.running.executor import Executor
 from aloft.runtime.running.memory import BoundGraph
 from aloft.runtime.running.run_result import RunResult

@@ -15,7 +15,7 @@ from aloft.logs.replay.regression import capture, write_test
 from aloft.logs.replay.replay import ReplayError
 from aloft.logs.replay.replayable import KeptRun, Keyframes
 from aloft.runtime.loading import load
-from aloft.runtime.loading.checking.adjust import adjust
+from aloft.runtime.loading.checking.parameters import adjust
 from aloft.runtime.running.executor import Executor
 from aloft.runtime.running.memory import BoundGraph
 from aloft.runtime.testing import StretchError

@@ -17,7 +17,7 @@ from aloft.runtime.language.block import Block, Output, State
 from aloft.runtime.language.errors import BlockError
 from aloft.runtime.language.parameters import Parameters, parameter
 from aloft.runtime.language.stages import CheckedGraph
-from aloft.runtime.loading.checking.adjust import adjust
+from aloft.runtime.loading.checking.parameters import adjust
 from aloft.runtime.running.executor import Executor
 from aloft.runtime.running.memory import BoundGraph
 from aloft.runtime.testing import Use, checked_graph

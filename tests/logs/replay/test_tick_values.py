@@ -16,8 +16,7 @@ import aloft
 from aloft.logs.recording.recorder import Recorder
 from aloft.logs.replay.opened_run import OpenedRun
 from aloft.logs.replay.tick_values import TickValues
-from aloft.runtime.drawing.page_server import page_server
-from aloft.runtime.drawing.values import shown
+from aloft.runtime.drawing.page import page_server, shown
 from aloft.runtime.running.run_result import RunResult
 
 GRAPH = """\

@@ -13,7 +13,7 @@ from aloft.mathematics.compiling.compile_calls import compile_calls
 from aloft.mathematics.compiling.equations import EquationError, cross
 from aloft.mathematics.compiling.kernel_call import KernelCall
 from aloft.mathematics.kernel import expand, kernel
-from aloft.mathematics.linear import multiply_matrices, multiply_vector
+from aloft.mathematics.linear_algebra import multiply_matrices, multiply_vector
 
 
 class Colour(IntEnum):

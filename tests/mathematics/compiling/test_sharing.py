@@ -7,7 +7,7 @@ import sys
 import numpy as np
 import pytest
 
-from aloft.mathematics import landing_law, rotations, triangular
+from aloft.mathematics import landing_law, linear_algebra, rotations
 from aloft.mathematics.compiling import compile_calls as module
 from aloft.mathematics.compiling import sharing, store
 from aloft.mathematics.compiling.arguments import type_of
@@ -26,7 +26,7 @@ def jobs():
         (rotations.multiply, (FLOATS,) * 3),
         (rotations.exponential, (FLOATS,) * 2),
         (rotations.logarithm, (FLOATS,) * 2),
-        (triangular.solve_upper, (MATRIX, FLOATS)),
+        (linear_algebra.solve_upper, (MATRIX, FLOATS)),
         (landing_law.keep_within, (FLOATS,) * 3),
     )
     return [sharing.Job(f"{k:032d}", *job) for k, job in enumerate(found)]

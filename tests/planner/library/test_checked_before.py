@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from aloft.mathematics.package_code import code_digest
+from aloft.mathematics.kept_arrays import code_digest
 from aloft.planner.library import checked_before
 from aloft.planner.library.checked_before import noted_folder, unless_passed
 

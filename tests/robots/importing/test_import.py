@@ -11,8 +11,7 @@ import pytest
 import yaml
 
 from aloft.hal.simulated.mujoco_model import build_mujoco_model
-from aloft.robots.description import RobotDescription, find_robot
-from aloft.robots.reading import read
+from aloft.robots.description import RobotDescription, find_robot, read
 
 from .model_files import ARM, CART_POLE, ONE_LEG, PLANAR, SPHERICAL_HIP
 

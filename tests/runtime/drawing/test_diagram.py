@@ -9,11 +9,9 @@ from xml.etree import ElementTree
 import pytest
 
 from aloft.runtime.drawing.diagram import INTO, OUT, diagram, subgraphs
-from aloft.runtime.drawing.page import page, policy
-from aloft.runtime.drawing.page_server import page_server
-from aloft.runtime.drawing.placing import draw
-from aloft.runtime.drawing.png import save_png
-from aloft.runtime.drawing.svg import svg
+from aloft.runtime.drawing.layout import draw
+from aloft.runtime.drawing.page import page, page_server, policy
+from aloft.runtime.drawing.render import save_png, svg
 from aloft.runtime.language.stages import CheckedGraph
 from aloft.runtime.loading import load
 

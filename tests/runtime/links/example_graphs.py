@@ -10,7 +10,7 @@ from aloft.blocks.general.integrator import Integrator
 from aloft.blocks.general.sine_wave import SineWave
 from aloft.blocks.general.sum import Sum
 from aloft.runtime.language.stages import CheckedGraph, Wire
-from aloft.runtime.placement.place import spread
+from aloft.runtime.placement.placed import spread
 from aloft.runtime.testing.graphs import Use, checked_graph
 
 

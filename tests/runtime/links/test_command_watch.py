@@ -10,9 +10,7 @@ from aloft.runtime.links.command_watch import CommandWatch
 from aloft.runtime.links.part import BoundPart
 from aloft.runtime.loading import LoadError, load
 from aloft.runtime.loading.problems import Code
-from aloft.runtime.placement.commands import command_sources, silence_limit
-from aloft.runtime.placement.place import place
-from aloft.runtime.placement.placed import Link
+from aloft.runtime.placement.placed import Link, command_sources, place, silence_limit
 from aloft.runtime.testing.spread import run_spread
 from aloft.runtime.transports.hub import Hub
 

@@ -10,7 +10,7 @@ from aloft.runtime.language.stages import LinkPolicy
 from aloft.runtime.links.free_link import LatestReceiver, LinkHealth
 from aloft.runtime.links.message import MessageReader, MessageWriter
 from aloft.runtime.links.peers import ClockOffset
-from aloft.runtime.placement.place import place
+from aloft.runtime.placement.placed import place
 from aloft.runtime.running.memory import Memory
 
 from .example_graphs import ring

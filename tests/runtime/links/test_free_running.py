@@ -11,8 +11,8 @@ from aloft.runtime.language.errors import AloftError, ExitCode
 from aloft.runtime.language.stages import CheckedGraph, ClockSpec, LinkPolicy, LinkSettings
 from aloft.runtime.links.free_link import LatestReceiver
 from aloft.runtime.links.part import BoundPart, part_clock, run_part
-from aloft.runtime.loading.checking.adjust import adjust
-from aloft.runtime.placement.place import place
+from aloft.runtime.loading.checking.parameters import adjust
+from aloft.runtime.placement.placed import place
 from aloft.runtime.running.run_result import RunResult
 from aloft.runtime.testing.spread import run_spread
 from aloft.runtime.transports.hub import Hub

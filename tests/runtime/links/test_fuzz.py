@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from aloft.runtime.links.peers import PeerStates
-from aloft.runtime.placement.place import place
+from aloft.runtime.placement.placed import place
 from aloft.runtime.running.executor import run
 from aloft.runtime.testing.spread import run_spread
 from aloft.runtime.transports.hub import Hub

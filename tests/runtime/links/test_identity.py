@@ -4,7 +4,7 @@ from pathlib import Path
 
 from aloft.runtime.links.identity import Identity
 from aloft.runtime.loading import load_text
-from aloft.runtime.placement.place import place
+from aloft.runtime.placement.placed import place
 
 TEXT = """
 rate: 100 Hz

@@ -13,8 +13,8 @@ import pytest
 from aloft.runtime.language.errors import AloftError, ExitCode
 from aloft.runtime.links.part import BoundPart
 from aloft.runtime.loading import load
-from aloft.runtime.loading.checking.adjust import adjust
-from aloft.runtime.placement.place import place, spread
+from aloft.runtime.loading.checking.parameters import adjust
+from aloft.runtime.placement.placed import place, spread
 from aloft.runtime.running.executor import run
 from aloft.runtime.testing.spread import run_spread
 from aloft.runtime.transports.hub import Hub

@@ -15,8 +15,7 @@ from aloft.runtime.links.message import (
     spans_of,
 )
 from aloft.runtime.loading import load
-from aloft.runtime.placement.place import place
-from aloft.runtime.placement.placed import Link, PlacedGraph
+from aloft.runtime.placement.placed import Link, PlacedGraph, place
 from aloft.runtime.running.memory import Memory
 
 RUN = b"12345678"

@@ -15,8 +15,7 @@ import pytest
 from aloft.runtime.language.stages import LinkPolicy, MachineSpec
 from aloft.runtime.links.observer import ROW_HEADER, Observer, StatusPublisher, read_row
 from aloft.runtime.links.part import BoundPart, run_part
-from aloft.runtime.placement.place import place
-from aloft.runtime.placement.placed import PlacedGraph
+from aloft.runtime.placement.placed import PlacedGraph, place
 from aloft.runtime.running.run_result import RunResult
 from aloft.runtime.transports.keys import make_keys, secured
 from aloft.runtime.transports.zenoh_transport import ZenohTransport

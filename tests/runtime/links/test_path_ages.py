@@ -16,7 +16,7 @@ from aloft.runtime.language.errors import ExitCode
 from aloft.runtime.language.stages import CheckedGraph, LinkPolicy
 from aloft.runtime.links.path_ages import NAME, check_path_ages, path_sinks, timeline_of
 from aloft.runtime.loading import load_text
-from aloft.runtime.placement.place import place
+from aloft.runtime.placement.placed import place
 from aloft.runtime.running.executor import run
 from aloft.runtime.testing.spread import run_parts_of, run_spread
 from aloft.runtime.transports.hub import Hub

@@ -10,7 +10,7 @@ from aloft import BlockError
 from aloft.runtime.language.errors import ExitCode
 from aloft.runtime.language.stages import CheckedGraph
 from aloft.runtime.links.part import BoundPart, part_graph, run_part
-from aloft.runtime.placement.place import place
+from aloft.runtime.placement.placed import place
 from aloft.runtime.running.run_result import RunResult
 from aloft.runtime.testing.spread import run_spread
 from aloft.runtime.transports.hub import Hub

@@ -17,7 +17,7 @@ from aloft.runtime.live.parameter_endpoint import EndpointError, ask_to_watch
 from aloft.runtime.live.texts import ValueTexts
 from aloft.runtime.live.window import digest
 from aloft.runtime.loading import load_text
-from aloft.runtime.placement.place import place
+from aloft.runtime.placement.placed import place
 from aloft.runtime.running.memory import Memory
 
 from .conftest import Running, start

@@ -20,8 +20,7 @@ from aloft.runtime.live.part_feed import packed
 from aloft.runtime.live.spread_run import SpreadRun
 from aloft.runtime.live.window import Shape
 from aloft.runtime.loading import load
-from aloft.runtime.placement.place import place
-from aloft.runtime.placement.placed import PlacedGraph
+from aloft.runtime.placement.placed import PlacedGraph, place
 
 from ...logs.viewing.browser import PROGRAM, Browser
 from ...waiting import free_port

@@ -8,7 +8,7 @@ import pytest
 from aloft.runtime.language.errors import AloftError
 from aloft.runtime.live.tunables import FIRST_LINE, Tunables, write_overlay
 from aloft.runtime.loading import load, load_text
-from aloft.runtime.loading.checking.adjust import entries
+from aloft.runtime.loading.checking.parameters import entries
 from aloft.runtime.running.memory import BoundGraph
 
 

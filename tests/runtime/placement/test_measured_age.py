@@ -7,8 +7,7 @@ import pytest
 
 from aloft.runtime.language.stages import CheckedGraph
 from aloft.runtime.loading import load_text
-from aloft.runtime.placement.age import worst_age
-from aloft.runtime.placement.measured_age import LinkTimes, Timeline, measured_ages
+from aloft.runtime.placement.age import LinkTimes, Timeline, measured_ages, worst_age
 
 PATH = Path("graph.yaml")
 MS = 1_000_000

@@ -19,7 +19,7 @@ from aloft.runtime.language.kernel_block import KernelBlock
 from aloft.runtime.language.parameters import Parameters, live_parameter, parameter
 from aloft.runtime.language.signals import Field, Signal
 from aloft.runtime.language.stages import ClockSpec
-from aloft.runtime.loading.checking.adjust import adjust
+from aloft.runtime.loading.checking.parameters import adjust
 from aloft.runtime.loading.problems import LoadError
 from aloft.runtime.running.chain import Chain
 from aloft.runtime.running.executor import Executor

@@ -12,7 +12,7 @@ from aloft.runtime.language.block import Block, Output
 from aloft.runtime.language.errors import AloftError, BlockError
 from aloft.runtime.language.parameter_change import ParameterChange
 from aloft.runtime.language.parameters import Parameters, live_parameter, parameter
-from aloft.runtime.loading.checking.adjust import adjust
+from aloft.runtime.loading.checking.parameters import adjust
 from aloft.runtime.running.executor import Executor
 from aloft.runtime.running.live_parameters import LiveParameters
 from aloft.runtime.running.memory import BoundGraph

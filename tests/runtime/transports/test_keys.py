@@ -14,8 +14,7 @@ import pytest
 
 from aloft.runtime.language.errors import AloftError
 from aloft.runtime.language.stages import MachineSpec
-from aloft.runtime.placement.place import place
-from aloft.runtime.placement.placed import PlacedGraph
+from aloft.runtime.placement.placed import PlacedGraph, place
 from aloft.runtime.transports.access import access_control, keys_from, observers_access
 from aloft.runtime.transports.keys import (
     AUTHORITY_KEY,

@@ -1,0 +1,137 @@
+"""Interpolation: linear in tables of one or several dimensions, and polynomials between two states of motion."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .arrays import Array, Indices
+from .kernel import kernel
+
+
+@kernel
+def interval(points: Array, start: int, count: int, at: float) -> int:
+    """The place of the interval, from 0 to count - 2, in which ``at`` lies; the outer ones go on.
+
+    The rising points are ``points[start]`` to ``points[start + count - 1]``, at least two.
+    """
+    low, high = 0, count - 1
+    while high - low > 1:
+        middle = (low + high) // 2
+        if at < float(points[start + middle]):
+            high = middle
+        else:
+            low = middle
+    return low
+
+
+@kernel
+def interpolate(points: Array, values: Array, at: float, clamp: bool) -> float:
+    """The value at ``at`` of the line through (points, values); both (k), points rising, k >= 2.
+
+    Beyond the ends the outer values hold (``clamp``), or the outer lines go on.
+    """
+    k = interval(points, 0, points.shape[0], at)
+    x0, x1 = float(points[k]), float(points[k + 1])
+    share = (at - x0) / (x1 - x0)
+    if clamp:
+        share = min(max(share, 0.0), 1.0)
+    return float(values[k]) * (1.0 - share) + float(values[k + 1]) * share
+
+
+@kernel
+def interpolate_grid(
+    points: Array,
+    counts: Indices,
+    values: Array,
+    at: Array,
+    clamp: bool,
+    places: Indices,
+    shares: Array,
+) -> float:
+    """The multilinear value at ``at`` (d) of a table on a grid of d dimensions.
+
+    ``points`` are the rising points of all axes one behind the other, ``counts`` (d) how many each
+    has, at least two; ``values`` is the table in row-major order, flat. ``places`` (d) and
+    ``shares`` (d) are scratch.
+    """
+    dimensions = counts.shape[0]
+    start = 0
+    for axis in range(dimensions):
+        count = int(counts[axis])
+        k = interval(points, start, count, float(at[axis]))
+        x0, x1 = float(points[start + k]), float(points[start + k + 1])
+        share = (float(at[axis]) - x0) / (x1 - x0)
+        if clamp:
+            share = min(max(share, 0.0), 1.0)
+        places[axis] = k
+        shares[axis] = share
+        start += count
+    total = 0.0
+    for corner in range(2**dimensions):
+        weight = 1.0
+        place = 0
+        for axis in range(dimensions):
+            upper = (corner >> axis) & 1
+            share = float(shares[axis])
+            weight *= share if upper == 1 else 1.0 - share
+            place = place * int(counts[axis]) + int(places[axis]) + upper
+        if weight != 0.0:
+            total += weight * float(values[place])
+    return total
+
+
+@dataclass(frozen=True)
+class Quintic:
+    """A polynomial of degree five in time, lowest coefficient first."""
+
+    coefficients: tuple[float, ...]
+
+    def position(self, time: float) -> float:
+        """The value of the polynomial at ``time``."""
+        a, b, c, d, e, f = self.coefficients
+        return a + time * (b + time * (c + time * (d + time * (e + time * f))))
+
+    def velocity(self, time: float) -> float:
+        """The first derivative at ``time``."""
+        _, b, c, d, e, f = self.coefficients
+        return b + time * (2 * c + time * (3 * d + time * (4 * e + time * 5 * f)))
+
+    def acceleration(self, time: float) -> float:
+        """The second derivative at ``time``."""
+        _, _, c, d, e, f = self.coefficients
+        return 2 * c + time * (6 * d + time * (12 * e + time * 20 * f))
+
+
+def quintic(
+    duration: float, start: tuple[float, float, float], end: tuple[float, float, float]
+) -> Quintic:
+    """The quintic from position, velocity and acceleration at 0 to those at ``duration``."""
+    t = duration
+    matrix = np.array(
+        [
+            [t**3, t**4, t**5],
+            [3 * t**2, 4 * t**3, 5 * t**4],
+            [6 * t, 12 * t**2, 20 * t**3],
+        ]
+    )
+    p, v, a = start
+    right = np.array([end[0] - p - v * t - 0.5 * a * t**2, end[1] - v - a * t, end[2] - a])
+    d, e, f = np.linalg.solve(matrix, right).tolist()
+    return Quintic((p, v, 0.5 * a, d, e, f))
+
+
+@kernel
+def minimum_jerk(share: float) -> tuple[float, float, float]:
+    """The minimum-jerk motion from 0 to 1: its value and two derivatives after a ``share`` u.
+
+    The motion 10 u^3 - 15 u^4 + 6 u^5 begins and ends at rest. A ``share`` outside of 0 to 1 gives
+    the state at the nearer end.
+    """
+    u = min(max(share, 0.0), 1.0)
+    return (
+        u * u * u * (10.0 + u * (-15.0 + 6.0 * u)),
+        30.0 * u * u * (1.0 - u) * (1.0 - u),
+        60.0 * u * (1.0 - u) * (1.0 - 2.0 * u),
+    )

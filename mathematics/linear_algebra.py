@@ -1,0 +1,259 @@
+"""Small dense linear algebra with the same bits on every processor.
+
+Kernels use plain loops, in place and without allocation: products, the Cholesky factor and triangular
+systems, least squares. Matrices are stored by rows, and inner loops run along memory. ``product`` and
+``inverse`` are for tables that are made before a run.
+
+``@`` and ``numpy.linalg`` call BLAS and LAPACK, whose routines are written for each processor and
+round differently. Here are only loops, element-wise operations and sums of NumPy, which IEEE 754 and the
+order of the elements fix.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from .arrays import Array
+from .kernel import kernel
+
+
+@kernel
+def multiply_vector(matrix: Array, vector: Array, out: Array) -> None:
+    """``matrix`` (m, n) times ``vector`` (n) into ``out`` (m), which is another array."""
+    for i in range(matrix.shape[0]):
+        total = 0.0
+        for j in range(matrix.shape[1]):
+            total += float(matrix[i, j]) * float(vector[j])
+        out[i] = total
+
+
+@kernel
+def add_product(matrix: Array, vector: Array, out: Array) -> None:
+    """Add ``matrix`` (m, n) times ``vector`` (n) to ``out`` (m), which is another array."""
+    for i in range(matrix.shape[0]):
+        total = 0.0
+        for j in range(matrix.shape[1]):
+            total += float(matrix[i, j]) * float(vector[j])
+        out[i] = float(out[i]) + total
+
+
+@kernel
+def multiply_matrices(a: Array, b: Array, out: Array) -> None:
+    """``a`` (l, m) times ``b`` (m, n) into ``out`` (l, n), which is another array."""
+    for i in range(a.shape[0]):
+        for j in range(b.shape[1]):
+            total = 0.0
+            for k in range(a.shape[1]):
+                total += float(a[i, k]) * float(b[k, j])
+            out[i, j] = total
+
+
+@kernel
+def multiply_sparse(a: Array, b: Array, out: Array) -> None:
+    """The same for an ``a`` with many zeros, which are left out."""
+    for i in range(a.shape[0]):
+        for j in range(b.shape[1]):
+            out[i, j] = 0.0
+        for k in range(a.shape[1]):
+            factor = float(a[i, k])
+            if factor != 0.0:
+                for j in range(b.shape[1]):
+                    out[i, j] += factor * float(b[k, j])
+
+
+@kernel
+def multiply_transposed(a: Array, b: Array, out: Array) -> None:
+    """``a`` (l, m) times the transpose of ``b`` (n, m), which has many zeros, into ``out`` (l, n)."""
+    for j in range(b.shape[0]):
+        for i in range(a.shape[0]):
+            out[i, j] = 0.0
+        for k in range(b.shape[1]):
+            factor = float(b[j, k])
+            if factor != 0.0:
+                for i in range(a.shape[0]):
+                    out[i, j] += float(a[i, k]) * factor
+
+
+@kernel
+def transpose(matrix: Array) -> None:
+    """Transpose a square matrix in place."""
+    for i in range(matrix.shape[0]):
+        for j in range(i):
+            above = float(matrix[j, i])
+            matrix[j, i] = matrix[i, j]
+            matrix[i, j] = above
+
+
+@kernel
+def make_symmetric(matrix: Array) -> None:
+    """Make a square matrix the mean of itself and its transpose, symmetric to the last bit."""
+    for i in range(matrix.shape[0]):
+        for j in range(i):
+            mean = 0.5 * (float(matrix[i, j]) + float(matrix[j, i]))
+            matrix[i, j] = matrix[j, i] = mean
+
+
+@kernel
+def factorise(matrix: Array, smallest: float) -> bool:
+    """The Cholesky factor U of a matrix U'U, in place; only the upper half is read and written.
+
+    Returns whether all pivots are larger than ``smallest``.
+    """
+    n = matrix.shape[0]
+    for j in range(n):
+        pivot = float(matrix[j, j])
+        if not smallest < pivot < math.inf:
+            return False
+        root = math.sqrt(pivot)
+        for i in range(j, n):
+            matrix[j, i] = float(matrix[j, i]) / root
+        for i in range(j + 1, n):
+            value = float(matrix[j, i])
+            if value != 0.0:
+                for k in range(i, n):
+                    matrix[i, k] = float(matrix[i, k]) - value * float(matrix[j, k])
+    return True
+
+
+@kernel
+def solve_transposed(factor: Array, vector: Array) -> None:
+    """Solve U'x = b in place, with U (n, n) upper triangular."""
+    n = vector.shape[0]
+    for j in range(n):
+        value = float(vector[j]) / float(factor[j, j])
+        vector[j] = value
+        for i in range(j + 1, n):
+            vector[i] = float(vector[i]) - value * float(factor[j, i])
+
+
+@kernel
+def solve_upper(factor: Array, vector: Array) -> None:
+    """Solve U x = b in place, with U (n, n) upper triangular."""
+    n = vector.shape[0]
+    for j in range(n - 1, -1, -1):
+        value = float(vector[j])
+        for i in range(j + 1, n):
+            value -= float(factor[j, i]) * float(vector[i])
+        vector[j] = value / float(factor[j, j])
+
+
+@kernel
+def solve_rows_transposed(factor: Array, columns: int, rows: Array) -> None:
+    """Solve R'X = B in place for the first ``columns`` of the rows of B."""
+    n = factor.shape[0]
+    for j in range(n):
+        pivot = float(factor[j, j])
+        for k in range(columns):
+            rows[j, k] = float(rows[j, k]) / pivot
+        for i in range(j + 1, n):
+            value = float(factor[j, i])
+            for k in range(columns):
+                rows[i, k] = float(rows[i, k]) - value * float(rows[j, k])
+
+
+@kernel
+def solve_damped(rows: Array, damping: float, normal: Array, vector: Array) -> None:
+    """Solve (A'A + damping^2 I) x = A'b in place: ``vector`` is A'b and becomes x.
+
+    Args:
+        rows: A, (m, n), contiguous.
+        damping: greater than zero, in A's unit; it keeps x finite where A is rank deficient.
+        normal: scratch (n, n).
+    """
+    for i in range(normal.shape[0]):
+        for j in range(i + 1):
+            total = 0.0
+            for k in range(rows.shape[0]):
+                total += float(rows[k, i]) * float(rows[k, j])
+            normal[i, j] = normal[j, i] = total
+        normal[i, i] += damping * damping
+    solve_positive(normal, vector)
+
+
+@kernel
+def solve_positive(matrix: Array, vector: Array) -> None:
+    """Solve a symmetric positive definite system in place: ``vector`` becomes the solution.
+
+    The method is an LDL' factorisation, which overwrites ``matrix``. A pivot that is not positive
+    because of rounding is skipped.
+    """
+    factorise_positive(matrix)
+    substitute(matrix, vector)
+
+
+@kernel
+def solve_rows(matrix: Array, rows: Array) -> None:
+    """As ``solve_positive`` for several right-hand sides: each of the ``rows`` (m, n) is one."""
+    factorise_positive(matrix)
+    for row in range(rows.shape[0]):
+        substitute(matrix, rows[row])
+
+
+@kernel
+def factorise_positive(matrix: Array) -> None:
+    """The factors of a symmetric matrix LDL' in place: D on the diagonal, L' above it.
+
+    Only the lower half is read; what is left there is of no use.
+    """
+    n = matrix.shape[0]
+    for j in range(n):
+        pivot = float(matrix[j, j])
+        inverse_pivot = 1.0 / pivot if pivot > 1e-300 else 0.0
+        for i in range(j + 1, n):
+            factor = float(matrix[i, j]) * inverse_pivot
+            if factor != 0.0:
+                for k in range(j + 1, i + 1):
+                    matrix[i, k] -= factor * float(matrix[k, j])
+        for i in range(j + 1, n):
+            matrix[j, i] = float(matrix[i, j]) * inverse_pivot
+
+
+@kernel
+def substitute(factors: Array, vector: Array) -> None:
+    """Solve LDL'x = b in place, with the factors of ``factorise_positive``."""
+    n = vector.shape[0]
+    for j in range(n):
+        value = float(vector[j])
+        for i in range(j + 1, n):
+            vector[i] -= float(factors[j, i]) * value
+        pivot = float(factors[j, j])
+        vector[j] = value * (1.0 / pivot if pivot > 1e-300 else 0.0)
+    for j in range(n - 2, -1, -1):
+        value = float(vector[j])
+        for i in range(j + 1, n):
+            value -= float(factors[j, i]) * float(vector[i])
+        vector[j] = value
+
+
+def product(a: Array, b: Array) -> Array:
+    """The product of matrices or stacks of matrices ``a`` (..., l, m), ``b`` (..., m, n).
+
+    As in NumPy a vector may take the place of either: ``a`` (m,) or ``b`` (m,).
+    """
+    if b.ndim == 1:
+        return np.asarray(np.add.reduce(a * b, axis=-1))
+    if a.ndim == 1:
+        return np.asarray(np.add.reduce(a[:, None] * b, axis=-2))
+    return np.asarray(np.add.reduce(a[..., :, :, None] * b[..., None, :, :], axis=-2))
+
+
+def inverse(matrix: Array) -> Array:
+    """The inverse of a square matrix (n, n) by Gauss-Jordan elimination with row pivoting.
+
+    Raises:
+        ValueError: the matrix has none.
+    """
+    n = len(matrix)
+    rows = np.concatenate([np.array(matrix, dtype=np.float64), np.eye(n)], axis=1)
+    for k in range(n):
+        best = k + int(np.abs(rows[k:, k]).argmax())
+        if rows[best, k] == 0.0:
+            raise ValueError("the matrix is singular, so it has no inverse")
+        rows[[k, best]] = rows[[best, k]]
+        rows[k] /= rows[k, k]
+        factors = rows[:, k].copy()
+        factors[k] = 0.0
+        rows -= factors[:, None] * rows[k]
+    return np.ascontiguousarray(rows[:, n:])

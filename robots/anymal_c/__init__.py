@@ -1,1 +1,0 @@
-"""ANYmal C: what its URDF lacks, as one data file."""

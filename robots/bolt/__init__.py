@@ -1,1 +1,0 @@
-"""Bolt: what its URDF lacks, as one data file."""

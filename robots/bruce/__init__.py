@@ -1,1 +1,0 @@
-"""BRUCE, the biped of the paper: its description as one data file."""

@@ -1,1 +1,0 @@
-"""Unitree G1: what its URDF lacks, as one data file."""

@@ -1,1 +1,0 @@
-"""Unitree Go2: what its URDF lacks, as one data file."""

@@ -1,1 +1,0 @@
-"""HyQ: what its URDF lacks, as one data file."""

@@ -1,1 +1,0 @@
-"""What a recorded run says about a robot: its mass, its torso, its friction, its delay."""

@@ -1,1 +1,0 @@
-"""The simple humanoid: what its URDF lacks, as one data file."""

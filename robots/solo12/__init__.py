@@ -1,1 +1,0 @@
-"""Solo12: what its URDF lacks, as one data file."""

@@ -1,1 +1,0 @@
-"""TALOS: what its URDF lacks, as one data file."""

@@ -1,0 +1,70 @@
+"""Drawings: nothing overlaps, lines have right angles, and every wire arrives at its port."""
+
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from aloft.runtime.drawing.diagram import INTO, OUT, Diagram, diagram
+from aloft.runtime.drawing.layout import Drawing, draw
+from aloft.runtime.loading import load
+
+from .test_layers import NAMES, diagram_of
+
+
+def check_drawing(drawing: Drawing) -> None:
+    boxes = [box for path, box in drawing.boxes.items() if path not in (INTO, OUT)]
+    for number, one in enumerate(boxes):
+        for other in boxes[number + 1 :]:
+            apart = (
+                one.x + one.width < other.x
+                or other.x + other.width < one.x
+                or one.y + one.height < other.y
+                or other.y + other.height < one.y
+            )
+            assert apart, (one.node.path, other.node.path)
+        assert one.x > 0 and one.y > 0
+        assert one.x + one.width < drawing.width and one.y + one.height < drawing.height
+    for line in drawing.lines:
+        for (x0, y0), (x1, y1) in zip(line.points, line.points[1:], strict=False):
+            assert abs(x0 - x1) < 0.5 or abs(y0 - y1) < 0.5, "a line is slanted"
+            for box in boxes:
+                inside = (
+                    min(x0, x1) < box.x + box.width - 1
+                    and max(x0, x1) > box.x + 1
+                    and min(y0, y1) < box.y + box.height - 1
+                    and max(y0, y1) > box.y + 1
+                )
+                assert not inside, f"a line crosses {box.node.path}"
+    for wire in drawing.diagram.wires:
+        target, source = drawing.boxes[wire.target[0]], drawing.boxes[wire.source[0]]
+        end = (target.x, target.y + target.port(wire.target[1], False))
+        start = (source.x + source.width, source.y + source.port(wire.source[1], True))
+        assert any(_near(line.points[-1], end) for line in drawing.lines), wire
+        assert any(_near(line.points[0], start) for line in drawing.lines), wire
+    for box in boxes:
+        if box.inside is not None:
+            check_drawing(box.inside)
+
+
+def _near(a: tuple[float, float], b: tuple[float, float]) -> bool:
+    return abs(a[0] - b[0]) < 1.0 and abs(a[1] - b[1]) < 1.0
+
+
+def drawn(diagram: Diagram) -> Drawing:
+    drawing = draw(diagram)
+    check_drawing(drawing)
+    return drawing
+
+
+@settings(deadline=None, max_examples=60)
+@given(st.lists(st.tuples(NAMES, NAMES), min_size=1, max_size=24))
+def test_any_graph_can_be_drawn(edges: list[tuple[str, str]]) -> None:
+    drawn(diagram_of(edges))
+
+
+def test_the_jump_fits_on_one_screen() -> None:
+    drawing = drawn(diagram(load("aloft:jump")))
+    assert drawing.width < 2100 and drawing.height < 1000  # scaled to 0.92 on a screen of 1920
+
+
+def test_a_graph_of_another_robot_is_drawn() -> None:
+    drawn(diagram(load("aloft:robots/go2_jump")))
