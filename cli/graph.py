@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from ..runtime.language.errors import AloftError
-from .shared.observing import As, Keys, Local
 from .shared.options import CompletedOverrides
 from .shared.output import console, errors_reported, print_json, say, table
+from .shared.running_graphs import As, Keys, Local
 
 if TYPE_CHECKING:
     from rich.console import Console

@@ -11,7 +11,7 @@ import typer
 from ..runtime.language.errors import AloftError, ExitCode
 from .shared.options import AsJson
 from .shared.output import console, errors_reported, number, print_json, print_warning, say, table
-from .shared.recordings import read
+from .shared.viewing import read
 
 if TYPE_CHECKING:
     from ..logs.file.reader import RecordedRun

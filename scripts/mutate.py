@@ -5,7 +5,8 @@
 
 Each change is one token: ``+`` and ``-``, ``*`` and ``/``, ``<`` and ``<=``, ``and`` and ``or``,
 ``min`` and ``max``, the sign of a number, an index. Functions are drawn from the folders in turn, then
-one change of the function. Left out are docstrings, annotations, strings and what is raised.
+one change of the function. Left out are docstrings, annotations, strings, what is raised, and
+``assert``, which the package has for the type checker.
 
 The tests of ``blocks/control/dynamics.py`` are the test file that mirrors it
 (``tests/blocks/control/test_dynamics.py``), then those that import it. Where there is neither, they are
@@ -204,7 +205,7 @@ def executed(function: ast.FunctionDef | ast.AsyncFunctionDef) -> Iterator[tuple
         node, is_index = pending.pop(0)
         children: list[ast.AST]
         match node:
-            case ast.Raise() | ast.JoinedStr():
+            case ast.Raise() | ast.Assert() | ast.JoinedStr():
                 continue
             case ast.BinOp() if any(is_text(each) for each in (node.left, node.right)):
                 continue

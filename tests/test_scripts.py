@@ -26,6 +26,7 @@ def law(x: int | None, gain: float = -2.0) -> float:
     """Minus a * b < c."""
     if x is None and gain < 0:
         raise ValueError("a" + str(1 + 1))
+    assert x is not None and x > 4
     y: list[float] = x[1:, -1]
     text = f"{1 + 2}" + "a"
     return max(

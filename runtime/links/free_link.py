@@ -90,7 +90,7 @@ class LatestReceiver:
         clock: the monotonic time [ns].
 
     Attributes:
-        heard_at: when the newest message came, by ``clock``; zero before the first.
+        received_at: when the newest message came, by ``clock``; zero before the first.
         age: of the message at the last tick of the reader [ns].
         jitter: the mean absolute difference [ns] between the times on the way of a message and of the
             one before it (RFC 3550, section 6.4.1); the clocks' offset drops out.

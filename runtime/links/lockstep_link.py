@@ -93,7 +93,7 @@ class LockstepReceiver:
         damaged: how many messages were thrown away because they were not whole, or of another
             schema or run.
         received: how many were whole.
-        heard_at: when the newest message came, by the monotonic clock [ns]; zero before the first.
+        received_at: when the newest message came, by the monotonic clock [ns]; zero before the first.
     """
 
     def __init__(

@@ -5,9 +5,11 @@ from collections.abc import Iterator
 import pytest
 
 from aloft.hal.bear.bus import BearBus, BusError, NoReplyError, open_port
-from aloft.hal.bear.protocol import Torque
+from aloft.hal.bear.protocol import BROADCAST, CONFIG, Instruction, Torque, frame_bytes
 from aloft.hal.twin.devices import EmulatedActuator, EmulatedBus
 from aloft.hal.twin.server import PseudoTerminal
+
+from .virtual_wire import VirtualWire
 
 
 @pytest.fixture
@@ -91,3 +93,69 @@ def test_a_port_that_is_not_there_or_taken(bus: BearBus) -> None:
         open_port("/dev/nowhere")
     with pytest.raises(BusError, match="another program that uses it"):
         open_port(bus.port.name)  # type: ignore[attr-defined]
+
+
+class Line(VirtualWire):
+    """A line on which somebody else sends a frame every 10 ms, in virtual time."""
+
+    def __init__(self, frame: bytes) -> None:
+        super().__init__(EmulatedBus([EmulatedActuator(1)]))
+        self.frame = frame
+
+    def read(self, size: int = 1) -> bytes:
+        assert self.timeout is not None and size > 0
+        self._now += min(self.timeout, 0.010)
+        return self.frame if self.timeout >= 0.010 - 1e-9 else b""
+
+
+def test_listening_counts_what_somebody_else_sends_meanwhile() -> None:
+    bus = BearBus(Line(frame_bytes(1, Instruction.READ_STATUS, b"\x01")))
+    assert bus.listen(0.055) == 5
+    assert bus.listen(0.025) == 2
+    assert bus.counts.foreign == 7
+    answers = BearBus(Line(frame_bytes(1, 0x80, b"1234")))  # type: ignore[arg-type]
+    assert answers.listen(0.055) == 0
+
+
+READ, WRITE = Instruction.READ_STATUS, Instruction.WRITE_CONFIG
+
+
+@pytest.mark.parametrize(
+    ("device", "code", "size", "sensible"),
+    [
+        (1, Instruction.PING, 1, False), (1, Instruction.SAVE_CONFIG, 5, False),
+        (1, READ, 0, False), (1, READ, 1, True), (1, READ, len(CONFIG), True),
+        (1, Instruction.READ_CONFIG, len(CONFIG) + 1, False), (BROADCAST, READ, 1, False),
+        (1, WRITE, 0, False), (1, WRITE, 4, False), (1, WRITE, 5, True), (1, WRITE, 10, True),
+        (BROADCAST, Instruction.BULK, 2, False), (BROADCAST, Instruction.BULK, 3, True),
+        (1, Instruction.BULK, 3, False), (1, 0x80, 4, False), (1, 0x00, 0, False),
+    ],
+)  # fmt: skip
+def test_only_sensible_instructions_are_somebody_elses(
+    device: int, code: Instruction, size: int, sensible: bool
+) -> None:
+    bus = BearBus(VirtualWire(EmulatedBus([EmulatedActuator(1)])))
+    data = bytes(range(size))
+    bus.overhear(frame_bytes(device, code, data))
+    assert bus.counts.foreign == int(sensible)
+    if size:  # some adapters send back what was sent
+        bus.overhear(frame_bytes(device, code, data), own=data)
+        assert bus.counts.foreign == int(sensible)
+
+
+def test_answers_of_others_are_stray() -> None:
+    emulated = EmulatedBus([EmulatedActuator(1), EmulatedActuator(2)])
+    wire = VirtualWire(emulated)
+    bus = BearBus(wire, reply_time=1e-3)
+    emulated.fault = lambda device, answer: frame_bytes(2, 0x80, answer[5:-1]) + answer  # type: ignore[arg-type]
+    assert bus.ping(1).device == 1
+    assert (bus.counts.stray, bus.counts.silent, bus.counts.damaged) == (1, 0, 0)
+    assert bus.read(1, "input_voltage", "goal_iq") == {
+        "input_voltage": pytest.approx(14.8), "goal_iq": 0.0,
+    }  # fmt: skip
+    emulated.fault = lambda device, answer: b""
+    before = bus.now()
+    with pytest.raises(NoReplyError):
+        bus.ping(1)
+    assert bus.counts.silent == bus.tries
+    assert bus.now() - before == pytest.approx(bus.tries * bus.reply_time)

@@ -93,3 +93,34 @@ def test_silence() -> None:
         BusError, match="the sensor board at /dev/ttyACM0 sent 0 packets instead of"
     ):
         board.require("/dev/ttyACM0")
+
+
+def test_a_poll_takes_all_that_came_and_the_last_counts() -> None:
+    class Full(Nothing):
+        """A port on which more than a second of packets waits."""
+
+        waiting = b"".join(packet((0.0, 0.0, float(k), 0.0, 0.0, 0.0), 0x80) for k in range(80))
+
+        def read(self, size: int = 1) -> bytes:
+            assert size > 0
+            part, self.waiting = self.waiting[:size], self.waiting[size:]
+            return part
+
+    board = SenseBoard(Full())
+    assert board.poll() == 64 and board.specific_force[2] == 63.0
+    assert board.poll() == 16 and board.specific_force[2] == 79.0
+    assert board.poll() == 0 and board.packets == 80
+    assert (board.skipped, board.damaged, board.calibrations) == (0, 0, 0)
+    board.require("here", 80)
+    with pytest.raises(BusError, match="sent 80 packets instead of 81"):
+        board.require("here", 81)
+
+
+def test_what_belongs_to_no_packet_is_counted() -> None:
+    board = SenseBoard(Nothing())
+    assert board.feed(b"\x00\x01\x02" + packet(NUMBERS, 0x80)) == 1
+    assert (board.skipped, board.damaged) == (3, 0)
+    hurt = bytearray(packet(NUMBERS, 0x80))
+    hurt[10] ^= 1
+    assert board.feed(bytes(hurt) + packet(NUMBERS, 0x80)) == 1
+    assert board.damaged == 1 and board.skipped == 3 + PACKET

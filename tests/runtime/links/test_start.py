@@ -114,4 +114,4 @@ def test_the_graph_of_a_part() -> None:
         "robot", "robot~to~near", "last", "~coordinator",
     )  # fmt: skip
     kinds: dict[str, Any] = {spec.path: spec.block_type.__name__ for spec in graph.blocks}
-    assert kinds["robot"] == "ReceivedCounter" and kinds["first"] == "Failing"
+    assert kinds["robot"] == "LinkInputCounter" and kinds["first"] == "Failing"

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from rich.console import Console
 
-from aloft.cli.planning import rehearse as verb
+from aloft.cli.shared import rehearsal as verb
 from aloft.planner.library.library import SHIPPED, PlanLibrary
 from aloft.planner.library.rehearsed import Deviation, Rehearsed
 from aloft.planner.task.read_task import read_task

@@ -1,7 +1,8 @@
-"""``aloft run --local``: runs the parts of all machines as processes here, with one result.
+"""Runs the parts of a graph that is spread over machines, for ``aloft run --machine`` and ``--local``.
 
-Each process is what ``aloft run --machine NAME`` runs on its own machine, with endpoints on the
-loopback. One table, one exit code and one recording come out, as of a run in one process.
+``--machine NAME`` runs the part of one machine, over Zenoh, together with the others. ``--local`` starts such
+a process for each machine here, with endpoints on the loopback. One table, one exit code and one recording come
+out, as of a run in one process.
 """
 
 from __future__ import annotations
@@ -21,14 +22,20 @@ from typing import TYPE_CHECKING, Any
 
 from ...runtime.language.errors import AloftError, ExitCode, RunError
 from ...runtime.language.stages import CheckedGraph
+from ...runtime.links.observer import StatusPublisher
+from ...runtime.links.part import BoundPart, run_part
 from ...runtime.links.path_ages import NAME
+from ...runtime.live.part_feed import PartFeed
 from ...runtime.loading import load
 from ...runtime.placement.placed import PlacedGraph, place
 from ...runtime.running.memory import BoundGraph
+from ...runtime.running.real_time import NO_REAL_TIME, RealTimeOptions
 from ...runtime.running.run_result import RunResult, merge_metrics
+from ...runtime.running.sinks import Sink
 from ...runtime.running.timing import BlockTimes
-from ..shared.local_runs import registered
-from ..shared.output import (
+from ...runtime.transports.keys import check_endpoints, secured
+from ...runtime.transports.zenoh_transport import ZenohTransport
+from .output import (
     number,
     print_error,
     print_json,
@@ -37,10 +44,12 @@ from ..shared.output import (
     say,
     table,
 )
-from .run_output import code_with_recording, print_result, print_verdict
+from .run_graph import code_with_recording, print_result, print_verdict
+from .running_graphs import registered
 
 if TYPE_CHECKING:
     from rich.console import Console
+
 
 GRACE = 15.0
 """Seconds that the other parts have to end after one has ended."""
@@ -74,7 +83,7 @@ def run_local(path: Path, wishes: Wishes, out: Console) -> ExitCode:
     """
     from ...logs.recording.merged_run import merge_recordings, path_metrics, read_parts, run_hash_of
     from ...logs.recording.remedy import cause_of, remedy
-    from ..shared.viewing import how_to_view
+    from .viewing import how_to_view
 
     placed = place(load(path, wishes.settings))
     graph = placed.graph
@@ -327,3 +336,77 @@ def _print_links(out: Console, said: Mapping[str, Mapping[str, Any]]) -> None:
     rows = [tuple(number(link[key]) for key in keys) for link in links]
     if rows:
         out.print(table("links", columns, rows))
+
+
+class Part:
+    """One machine's part, bound and ready to run once.
+
+    Args:
+        graph: the graph.
+        machine: the machine.
+        keys: the folder of ``aloft keys``, for links over TLS.
+
+    Raises:
+        PlacementError: the graph names no such machine.
+        AloftError: endpoints and keys do not fit together.
+        RunError: a block could not be set up.
+    """
+
+    def __init__(self, graph: CheckedGraph, machine: str, keys: Path | None = None) -> None:
+        placed = place(graph)
+        if keys is not None:
+            check_endpoints(placed)
+        elif any(spec.endpoint.startswith("tls/") for spec in placed.machines):
+            raise AloftError(
+                "links over TLS need certificates: `aloft keys GRAPH` makes them, and "
+                "--keys FOLDER takes them"
+            )
+        transport = ZenohTransport(
+            graph.name,
+            placed.machines,
+            wait=graph.links.mode == "lockstep",
+            secured=None if keys is None else secured(placed, keys, machine),
+        )
+        self.bound = BoundPart(placed, machine, transport)
+        self._result: RunResult | None = None
+
+    @property
+    def checked(self) -> CheckedGraph:
+        """The graph of this part."""
+        return self.bound.graph
+
+    def run(
+        self,
+        *,
+        sinks: Sequence[Sink],
+        log: bool,
+        plain: bool = False,
+        fuse: bool = True,
+        real_time: RealTimeOptions = NO_REAL_TIME,
+    ) -> RunResult:
+        """Run the part once."""
+        bound = self.bound
+        showing = StatusPublisher(bound.machine, bound.transport, bound.peers, bound.receivers)
+        feed = PartFeed(bound.machine, bound.transport)
+        self._result = run_part(
+            bound, sinks=[*sinks, showing, feed], log=log, plain=plain, fuse=fuse,
+            real_time=real_time,
+        )  # fmt: skip
+        return self._result
+
+    def about(self) -> Mapping[str, Any]:
+        """The machine, the metrics of each of its blocks, what its links have carried, and the others' clocks."""
+        error = self._result.error if self._result is not None else None
+        metrics = {path: dict(block.metrics()) for path, block in self.bound.blocks.items()}
+        metrics |= {sink.name: dict(sink.metrics()) for sink in self.bound.path_ages}
+        return {
+            "machine": self.bound.machine,
+            "heard": bool(getattr(error, "heard", False)),
+            "metrics_by_block": {path: found for path, found in metrics.items() if found},
+            "links": [receiver.about() for receiver in self.bound.receivers],
+            "clocks": {
+                name: {"offset_s": clock.offset * 1e-9, "uncertainty_s": clock.uncertainty * 1e-9}
+                for name in self.bound.peers.names
+                for clock in (self.bound.peers.clock_of(name),)
+            },
+        }

@@ -11,13 +11,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ...runtime.language.errors import AloftError
-from ..shared.options import AsJson
-from ..shared.output import console, errors_reported, print_json, say, table
+from .options import AsJson
+from .output import console, errors_reported, print_json, say, table
 
 if TYPE_CHECKING:
     from ...hal.bear.bus import BearBus
     from ...hal.bear.configuration import Hardware
     from ...robots.robot_description import RobotDescription
+
 
 HardwareFile = Annotated[Path, typer.Argument(help="The file of the hardware.")]
 

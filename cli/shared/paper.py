@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ...runtime.language.errors import AloftError, ExitCode
-from ..shared.output import plain, print_json, print_warning, say
+from .output import plain, print_json, print_warning, say
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from ...studies.execution import Run
     from ...studies.figures.trace import Trace
     from ...studies.journal import Journal
+
 
 NAME = "paper"
 STUDY = Path(__file__).parents[2] / "graphs" / "studies" / "paper.yaml"
@@ -47,7 +48,7 @@ def draw_paper(
     from ...studies.reading import read_study
     from ...studies.summary import summarise
     from ...studies.table import make_table, write_table
-    from .study_runs import check_cells, make_all, report_stop
+    from .studies import check_cells, make_all, report_stop
 
     found = read_study(study)
     chosen = parse_seeds(seeds) if seeds else list(found.seeds)
@@ -89,7 +90,7 @@ def traced(
     from ...studies.batch.jobs import job_results, processors
     from ...studies.expansion import job
     from ...studies.figures.trace import make_trace
-    from ..shared.progress import progress_bar
+    from .output import progress_bar
 
     shown = [run for run in runs if run.seed == seed]
     jobs = [(run.cell.task, job(run.cell, seed)) for run in shown]

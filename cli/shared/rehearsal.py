@@ -8,8 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ...runtime.language.errors import AloftError
-from ..shared.jump_graphs import graph_of, jump_graphs
-from ..shared.output import say, table
+from .output import say, table
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -17,6 +16,7 @@ if TYPE_CHECKING:
     from ...planner.library.library import PlanLibrary
     from ...planner.library.rehearsed import Rehearsed
     from ...planner.task.task import JumpTask
+
 
 REHEARSE_HELP = (
     "Run the plan in simulation and learn what the controller misses at lift-off: 3 to 9 runs."
@@ -113,3 +113,29 @@ def show(found: Rehearsed, task: JumpTask, screen: Console) -> dict[str, Any]:
     screen.print(table(f"{task.name}: rehearsed", columns, rows))
     say(screen, f"rehearsed in the {found.trial} trial: {found.reason}")
     return {"rehearsal": {**asdict(found), "corrects": found.corrects}}
+
+
+def graph_of(robot: str) -> Path:
+    """The shipped graph in which a robot jumps.
+
+    Raises:
+        AloftError: there is none; the message names the robots that have one.
+    """
+    known = jump_graphs()
+    if robot not in known:
+        raise AloftError(
+            f"--robot {robot}: no shipped graph lets it jump; there is one for "
+            f"{', '.join(sorted(known))}. For another robot give your own: --graph FILE"
+        )
+    return known[robot]
+
+
+def jump_graphs() -> dict[str, Path]:
+    """The shipped graph in which each robot jumps, by the robot's name."""
+    from ...runtime.loading.reading.files import PREFIX, shipped_graphs
+
+    return {
+        name.removeprefix(f"{PREFIX}robots/").removesuffix("_jump"): path
+        for name, path in shipped_graphs().items()
+        if name.endswith("_jump") and name.startswith(f"{PREFIX}robots/")
+    } | {"bruce": shipped_graphs()[f"{PREFIX}jump"]}

@@ -1,0 +1,270 @@
+"""What the tests of a plan measure: every change of a plan is found again at its size and its place."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cache
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from aloft.blocks.signals import Phase
+from aloft.mathematics.constants import GRAVITY
+from aloft.planner.checking.evidence import Evidence
+from aloft.planner.checking.plan_tests import allowed_motor_torque
+from aloft.planner.checking.replay import replay
+from aloft.planner.checking.validity import PlanTest, check_plan
+from aloft.planner.library.library import SHIPPED
+from aloft.planner.models.exact_dynamics import ExactDynamics
+from aloft.planner.task.plan import JumpPlan, read_plan
+from aloft.robots.description import find_robot
+
+ROBOT = find_robot("bruce")
+JOINTS = [joint.name for joint in ROBOT.joints]
+
+
+def found(plan: JumpPlan) -> dict[str, PlanTest]:
+    return {test.name: test for test in check_plan(plan, ROBOT).tests}
+
+
+def shifted(plan: JumpPlan, name: str, amount: float, index: object) -> JumpPlan:
+    array = getattr(plan, name).copy()
+    array[index] += amount
+    return replace(plan, **{name: array})
+
+
+def asked(plan: JumpPlan, **values: object) -> JumpPlan:
+    return replace(plan, task=plan.task.model_copy(update=values))
+
+
+@cache
+def shipped(name: str) -> JumpPlan:
+    (path,) = SHIPPED.glob(f"{name}-*.npz")
+    return read_plan(path)
+
+
+@pytest.fixture(scope="module")
+def evidence(by_hand: JumpPlan) -> Evidence:
+    return Evidence(by_hand, ROBOT, replay(by_hand, ROBOT))
+
+
+@pytest.mark.parametrize(
+    ("name", "array", "amount", "index", "where"),
+    [
+        ("start", "position", 0.01, (0, 8), JOINTS[1]),
+        ("start", "position", -0.02, (0, 16), JOINTS[9]),
+        ("rest_at_start", "velocity", -0.1, (0, 2), ""),
+        ("rest_at_end", "velocity", 0.2, (-1, 10), ""),
+        ("com", "com", -1e-3, (3, 1), ""),
+        ("com_velocity", "com_velocity", 1e-2, (4, 2), ""),
+        ("angular_momentum", "angular_momentum", -2e-3, (5, 0), ""),
+        ("joint_torque", "joint_torque", 0.5, (7, 3), JOINTS[3]),
+    ],
+)
+def test_a_shift_of_the_plan_is_the_error_that_is_found(
+    by_hand: JumpPlan, name: str, array: str, amount: float, index: tuple[int, int], where: str
+) -> None:
+    test = found(shifted(by_hand, array, amount, index))[name]
+    assert test.value == pytest.approx(abs(amount), abs=test.limit / 10.0)
+    assert where in test.where
+
+
+def test_another_task_is_missed_by_the_difference(by_hand: JumpPlan, evidence: Evidence) -> None:
+    flight_time = by_hand.touchdown_time - by_hand.lift_off_time
+    tests = found(asked(by_hand, rise=0.09, distance_x=0.03, twist=0.6, flight_time=0.3))
+    assert tests["rise"].value == pytest.approx(0.005, abs=1e-5)
+    assert tests["landing_place"].value == pytest.approx(0.03, abs=1e-4)
+    assert tests["landing_place"].where == "x"
+    assert tests["twist"].value == pytest.approx(0.6, abs=1e-3)
+    assert tests["whole_turn"].value == pytest.approx(0.6, abs=1e-3)
+    assert tests["flight_time"].value == pytest.approx(abs(flight_time - 0.3), abs=1e-6)
+    assert found(asked(by_hand, distance_y=-0.05))["landing_place"].where == "y"
+    turned = found(asked(by_hand, rotation=6.28))
+    assert turned["rotation"].value == pytest.approx(6.28, abs=0.05) and "whole_turn" not in turned
+    for speed in (1.0, 1.8):
+        tests = found(asked(by_hand, take_off_speed=speed))
+        exact = evidence.replay.com_velocity[evidence.replay.flights[0][0], 2]
+        assert tests["take_off_speed"].value == pytest.approx(abs(exact - speed), abs=1e-9)
+
+
+def test_a_whole_plan_moved_is_as_far_from_the_origin(by_hand: JumpPlan) -> None:
+    for axis, amount in ((0, 0.01), (1, -0.02)):
+        moved = shifted(by_hand, "position", amount, (slice(None), axis))
+        test = found(moved)["origin"]
+        assert test.value == pytest.approx(abs(amount), abs=1e-4)
+    sunk = found(shifted(by_hand, "position", -0.02, (slice(None), 2)))
+    assert sunk["foot_on_ground"].value == pytest.approx(0.02, abs=1e-3)
+    assert sunk["foot_below_ground"].value == pytest.approx(0.02, abs=1e-3)
+
+
+def test_forces_outside_of_their_cone_and_without_contact(by_hand: JumpPlan) -> None:
+    knot, point = 20, 1
+    lift = max(float(by_hand.contact_force[knot, point, 2]), 0.0)
+    sideways = float(by_hand.contact_force[knot, point, 1])
+    forward = float(by_hand.contact_force[knot, point, 0])
+    test = found(shifted(by_hand, "contact_force", 300.0, (knot, point, 1)))["friction"]
+    expected = np.hypot(forward, sideways + 300.0) - by_hand.task.friction * lift
+    assert test.value == pytest.approx(expected, rel=1e-9)
+    assert test.where == f"{ROBOT.contacts[point].name} at {by_hand.time[knot]:.3f} s"
+    test = found(shifted(by_hand, "contact_force", -500.0, (knot, point, 2)))["pull"]
+    assert test.value == pytest.approx(500.0 - by_hand.contact_force[knot, point, 2], rel=1e-9)
+    flying = int(by_hand.knot_at(by_hand.lift_off_time)) + 3
+    test = found(shifted(by_hand, "contact_force", -7.0, (flying, point, 0)))
+    assert test["force_without_contact"].value == pytest.approx(7.0)
+
+
+def test_feet_that_should_arrive_at_rest_have_the_speed_of_the_fall(
+    by_hand: JumpPlan, evidence: Evidence
+) -> None:
+    test = found(asked(by_hand, impact=False))["touchdown_speed"]
+    knot = evidence.replay.flights[0][1]
+    jacobian = ExactDynamics(ROBOT).contact_jacobians(by_hand.position[knot])[1]
+    speeds = np.linalg.norm((jacobian @ by_hand.velocity[knot]).reshape(-1, 3), axis=1)
+    assert test.value == pytest.approx(speeds.max(), rel=1e-6)
+
+
+def test_clearances_grow_with_what_is_asked(by_hand: JumpPlan) -> None:
+    feet = found(asked(by_hand, foot_clearance=0.2))["foot_clearance"].value
+    assert found(asked(by_hand, foot_clearance=0.25))["foot_clearance"].value == pytest.approx(
+        feet + 0.05
+    )
+    # as in standing, the hips' capsules of 30 mm are the nearest, 151.7 mm from axis to axis
+    legs = found(asked(by_hand, leg_clearance=0.09))["leg_clearance"].value
+    assert legs == pytest.approx(0.09 - (0.151711 - 2 * 0.03), abs=1e-3)
+
+
+def test_the_impulse_at_touchdown_leads_to_the_velocities_behind_it() -> None:
+    plan = shipped("in_situ")
+    knot = int(np.flatnonzero(np.diff(plan.time) == 0.0)[0])
+    test = found(plan)["impact"]
+    assert test.passed
+    for column in (1, 4, 9):
+        moved = found(shifted(plan, "velocity", 0.3, (knot + 1, column)))["impact"]
+        assert moved.value == pytest.approx(0.3, abs=2 * test.limit)
+    place = found(shifted(plan, "position", 0.4, (knot + 1, 9)))["impact"]
+    assert place.value == pytest.approx(0.4, abs=2 * test.limit)
+
+
+def test_points_hit_the_ground_as_fast_as_found_by_pinocchio() -> None:
+    plan = shipped("in_situ")
+    assert plan.task.margins is not None
+    knot = int(np.flatnonzero(np.diff(plan.time) == 0.0)[0])
+    dynamics = ExactDynamics(ROBOT)
+    jacobian = dynamics.contact_jacobians(plan.position[knot])[1]
+    speeds = (jacobian @ plan.velocity[knot]).reshape(-1, 3)[plan.contact[knot + 1]]
+    margins = plan.task.margins.model_copy(
+        update={"touchdown_speed": 0.01, "touchdown_slide": 0.01}
+    )
+    tests = found(asked(plan, margins=margins))
+    assert tests["touchdown_speed"].value == pytest.approx(-speeds[:, 2].min(), abs=1e-6)
+    # the feet point ahead, so along and across are x and y
+    slide = np.abs(speeds[:, :2]).max()
+    assert tests["touchdown_slide"].value == pytest.approx(slide, abs=0.02)
+    for name in ("touchdown_speed", "touchdown_slide"):
+        assert tests[name].limit == pytest.approx(0.06)
+
+
+def test_momentum_at_lift_off_and_touchdown_is_compared_with_what_is_allowed() -> None:
+    plan = shipped("in_situ")
+    dynamics = ExactDynamics(ROBOT)
+    ((start, end),) = replay(plan, plan.task.equipped(ROBOT)).flights
+    behind = end + int(plan.time[end + 1] == plan.time[end])
+    assert behind == end + 1, "there is an impact, and what counts is behind it"
+    tests = found(asked(plan, lift_off_momentum=0.001, touchdown_momentum=0.002))
+    for name, knot, limit in (
+        ("lift_off_momentum", start, 0.001), ("touchdown_momentum", behind, 0.002),
+    ):  # fmt: skip
+        momentum = dynamics.centroidal(plan.position[knot], plan.velocity[knot])[2]
+        assert tests[name].value == pytest.approx(np.abs(momentum).max(), abs=1e-9)
+        assert tests[name].limit == pytest.approx(limit + 1e-3)
+    without = found(asked(plan, lift_off_momentum=None, touchdown_momentum=None))
+    assert not {"lift_off_momentum", "touchdown_momentum"} & set(without)
+
+
+def test_a_motors_torque_falls_with_its_speed_only_where_it_drives() -> None:
+    motors = SimpleNamespace(
+        no_load_speed=np.array([30.0]), corner_speed=np.array([10.0]), peak_torque=np.array([8.0])
+    )
+
+    def allowed(torque: float, speed: float, effort: float) -> float:
+        state = SimpleNamespace(
+            motors=motors, motor_torque=np.array([[torque]]), motor_speed=np.array([[speed]])
+        )
+        return float(allowed_motor_torque(state, effort)[0, 0])  # type: ignore[arg-type]
+
+    for sign in (1.0, -1.0):
+        assert allowed(sign, sign * 5.0, 1.0) == 8.0
+        assert allowed(sign, sign * 20.0, 1.0) == pytest.approx(4.0)
+        assert allowed(sign, sign * 25.0, 1.0) == pytest.approx(2.0)
+        assert allowed(sign, sign * 30.0, 1.0) == 0.0
+        assert allowed(sign, sign * 40.0, 1.0) == 0.0
+        assert allowed(sign, -sign * 40.0, 1.0) == 8.0, "braking is not limited"
+        # a share of both torque and speed
+        assert allowed(sign, sign * 10.0, 0.5) == pytest.approx(2.0)
+
+
+def test_motors_do_the_work_of_the_joints(evidence: Evidence) -> None:
+    samples = evidence.replay.samples
+    power = np.einsum("ij,ij->i", samples.torque, samples.velocity[:, 6:])
+    of_motors = np.einsum("ij,ij->i", evidence.motor_torque, evidence.motor_speed)
+    np.testing.assert_allclose(of_motors, power, atol=1e-9)
+
+
+def test_what_the_tests_share(evidence: Evidence, by_hand: JumpPlan) -> None:
+    samples = evidence.replay.samples
+    landed = samples.time > by_hand.touchdown_time + 1e-6
+    assert evidence.progress.min() == 0.0 and evidence.progress.max() == 1.0
+    half = 0.5 * (by_hand.lift_off_time + by_hand.touchdown_time)
+    assert np.interp(half, samples.time, evidence.progress) == pytest.approx(0.5)
+    np.testing.assert_array_equal(evidence.place[landed], 1)
+    np.testing.assert_array_equal(evidence.place[samples.time < by_hand.touchdown_time - 1e-6], 0)
+    middles = samples.time[evidence.middles]
+    lasting = np.diff(by_hand.time) > 0.0
+    expected = (0.5 * (by_hand.time[1:] + by_hand.time[:-1]))[lasting]
+    np.testing.assert_allclose(middles, expected, atol=1e-9)
+    # the apex from lift-off's state is that of the flight's samples
+    dynamics = ExactDynamics(ROBOT)
+    flying = by_hand.phase[samples.knot] == Phase.FLIGHT
+    heights = [
+        dynamics.centroidal(q, v)[0][2]
+        for q, v in zip(samples.position[flying], samples.velocity[flying], strict=True)
+    ]
+    assert evidence.rises[0] == pytest.approx(max(heights) - evidence.replay.com[0, 2], abs=1e-4)
+    assert evidence.weight == pytest.approx(9.81 * ROBOT.total_mass)
+    assert evidence.moment(0) == "at 0.000 s"
+
+
+@pytest.mark.parametrize(("name", "pitch", "yaw"), [
+    ("turn_120deg", 0.0, 120.0), ("somersault", 360.0, 0.0), ("somersault_backward_35cm", -360.0, 0.0),
+])  # fmt: skip
+def test_turns_are_followed_through_whole_circles(name: str, pitch: float, yaw: float) -> None:
+    plan = shipped(name)
+    robot = plan.task.equipped(find_robot(plan.task.robot))
+    turned = np.degrees(Evidence(plan, robot, replay(plan, robot)).turn)
+    assert abs(turned[0] - pitch) < 15.0
+    assert abs(turned[1] - yaw) < 15.0
+
+
+def test_figures_are_those_of_the_replay(by_hand: JumpPlan, evidence: Evidence) -> None:
+    figures = evidence.figures()
+    start, end = evidence.replay.flights[0]
+    assert figures["take_off_speed_m_s"] == pytest.approx(np.sqrt(2 * GRAVITY * 0.085), abs=0.3)
+    assert figures["duration_s"] == pytest.approx(by_hand.time[-1] - by_hand.time[0])
+    assert figures["peak_motor_torque_N_m"] == np.abs(evidence.motor_torque).max()
+    assert figures["peak_motor_speed_rad_s"] == np.abs(evidence.motor_speed).max()
+    lasting = np.diff(by_hand.time) > 0.0
+    forces = by_hand.contact_force[:-1][lasting, :, 2].sum(axis=1)
+    assert figures["peak_vertical_force_N"] == pytest.approx(forces.max())
+    assert figures["pitch_momentum_at_lift_off_N_m_s"] == evidence.replay.angular_momentum[start, 1]
+    assert figures["jumps"] == 1.0 and end > start
+
+
+def change_of_sole(plan: JumpPlan) -> Callable[..., JumpPlan]:
+    return lambda amount: shifted(plan, "position", amount, (20, 1))
+
+
+@pytest.mark.parametrize("amount", [0.004, -0.006])
+def test_a_knot_moved_aside_slips_by_as_much(by_hand: JumpPlan, amount: float) -> None:
+    before = found(by_hand)["foot_slip"].value
+    slip = found(change_of_sole(by_hand)(amount))["foot_slip"].value
+    assert slip == pytest.approx(abs(amount), abs=before + 1e-4)
