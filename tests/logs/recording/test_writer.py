@@ -8,13 +8,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from aloft.logs.file.changed_rows import filled
 from aloft.logs.file.format import RecordedField
 from aloft.logs.file.header import make_header
 from aloft.logs.file.reader import read
-from aloft.logs.recording.finished_run import write_recording
-from aloft.logs.recording.whole_view import write_view
-from aloft.logs.viewing.flights import Flights
+from aloft.logs.recording.drawn_run import write_view
+from aloft.logs.recording.writer import write_recording
+from aloft.logs.viewing.contacts import Flights
 from aloft.logs.viewing.robot_shapes import quaternion_from_z
 from aloft.logs.viewing.scene_ports import scene_ports
 from aloft.logs.viewing.signal_names import element_names
@@ -159,7 +158,8 @@ def test_every_signal_is_drawn_in_every_tick_in_which_it_changes(
         expected = result.signal(name)
         ticks = np.concatenate([batch["tick"].to_numpy() for batch in some])
         flat = np.concatenate([batch["Scalars:scalars"].flatten().to_numpy() for batch in some])
-        values = filled(np.arange(TICKS), ticks, flat.reshape(len(ticks), *expected.shape[1:]))
+        last = np.searchsorted(ticks, np.arange(TICKS), side="right") - 1  # written at or before
+        values = flat.reshape(len(ticks), *expected.shape[1:])[last]
         assert values.astype(expected.dtype).tobytes() == expected.tobytes(), name
         assert {0, TICKS - 1} <= set(ticks.tolist())
         instants = np.concatenate([batch["t"].cast("int64").to_numpy() for batch in some])

@@ -7,7 +7,7 @@ import pytest
 from aloft import load
 from aloft.logs.file.format import Header
 from aloft.logs.file.header import header_of
-from aloft.logs.viewing.layout_file import (
+from aloft.logs.viewing.blueprint import (
     LayoutError,
     blueprint_with,
     layout_beside,

@@ -14,8 +14,7 @@ import pytest
 
 import aloft
 from aloft.logs.recording.recorder import Recorder
-from aloft.logs.replay.opened_run import OpenedRun
-from aloft.logs.replay.tick_values import TickValues
+from aloft.logs.replay.opened_run import OpenedRun, TickValues
 from aloft.runtime.drawing.page import page_server, shown
 from aloft.runtime.running.run_result import RunResult
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from aloft.logs.viewing.foot_forces import LandingPeaks, loads_on_feet, weight_of
+from aloft.logs.viewing.contacts import LandingPeaks, loads_on_feet, weight_of
 from aloft.robots.description import find_robot
 
 BRUCE = find_robot("bruce")
