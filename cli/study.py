@@ -118,12 +118,11 @@ def run_study(
     dry_run: bool = False,
 ) -> ExitCode:
     """Make the study's runs; write and print the results."""
-    from ..studies.charts.plots import write_plots
+    from ..studies.charts import write_plots
     from ..studies.execution import Run
     from ..studies.expansion import cells as expand
     from ..studies.journal import Journal
-    from ..studies.summary import summarise
-    from ..studies.table import make_table, write_table
+    from ..studies.summary import make_table, summarise, write_table
     from ..studies.tuning import extreme_cells, read_tuned, tuned_path, tuning_cells
     from ..studies.worst import write_page
 

@@ -20,9 +20,8 @@ from typing import TYPE_CHECKING, Any
 from ..runtime.language.errors import AloftError
 from .execution import Run
 from .expansion import Cell
-from .ranges import value_at
 from .study import Arm, Range, Study
-from .tuning import Draw, draw_runs, order, scored
+from .tuning import Draw, draw_runs, order, scored, value_at
 
 if TYPE_CHECKING:
     from optuna import Study as OptunaStudy
