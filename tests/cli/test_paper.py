@@ -87,7 +87,7 @@ def test_what_the_command_does_not_take_is_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, call_json: CallJson
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    result = call_json("study", "paper", "--tune", code=2)
+    result = call_json("study", "paper", "--dry-run", code=2)
     assert result["reason"] == "'aloft study paper' takes --out, --seeds, --workers and --json"
 
 
