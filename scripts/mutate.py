@@ -213,6 +213,8 @@ def executed(function: ast.FunctionDef | ast.AsyncFunctionDef) -> Iterator[tuple
                 children = [node.value] if node.value else []
             case ast.FunctionDef() | ast.AsyncFunctionDef():
                 children = [*node.args.defaults, *node.body]
+            case ast.keyword(arg="axis"):
+                continue  # of a matrix the axes 1 and -1 are the same
             case ast.Subscript():
                 pending.append((node.slice, True))
                 children = [node.value]
