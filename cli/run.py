@@ -10,14 +10,13 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from ..runtime.language.errors import AloftError
-from .running.run_many import run_many
-from .running.run_once import Runs, run_once
 from .shared.options import CompletedOverrides, JsonBesideTables, NoRecord, Quiet
 from .shared.output import (
     console,
     errors_reported,
     print_warning,
 )
+from .shared.run_graph import Runs, run_many, run_once
 
 if TYPE_CHECKING:
     from ..logs.viewing.viewer import Viewer
@@ -116,7 +115,7 @@ def run(
         if wishes_of_thread != NO_WISHES and (seeds or local):
             raise AloftError("--cpu, --priority and --lock-memory are for one run, in one process")
         if local:
-            from .running.run_local import Wishes, run_local
+            from .shared.run_machines import Wishes, run_local
 
             place = None if no_record else record
             wishes = Wishes(
@@ -131,7 +130,7 @@ def run(
             loaded: Runs = load(graph, settings)
             name = loaded.checked.name
             if machine:
-                from .running.run_part import Part
+                from .shared.run_machines import Part
 
                 loaded, name = Part(loaded.checked, machine, keys), f"{name}-{machine}"
             default = Path("recordings") / f"{name}.rrd"
@@ -200,12 +199,12 @@ def leave_viewer(viewer: Viewer, *, wait: bool) -> None:
 
 def open_endpoint(graph: Runs, name: str, default: str) -> ParameterEndpoint | None:
     """Open the endpoint at which ``aloft params`` reaches the run. Unless it was asked for, it may fail."""
-    from .shared import endpoints
+    from .shared import running_graphs
 
     if name == "none" or not (name or graph.checked.clock.kind != "free"):
         return None
     try:
-        return endpoints.open_endpoint(name or default)
+        return running_graphs.open_endpoint(name or default)
     except AloftError as error:
         if name:
             raise

@@ -46,7 +46,7 @@ def open_live_run(name: str, elsewhere: Elsewhere | None = None) -> Watched:
         AloftError: no such graph runs.
     """
     from ...runtime.live.live_run import LiveRun
-    from .endpoints import find
+    from .running_graphs import find
 
     try:
         path = find(name or (elsewhere.graph.stem if elsewhere is not None else ""))
@@ -96,7 +96,7 @@ def _spread_elsewhere(elsewhere: Elsewhere) -> SpreadRun | None:
     from ...runtime.loading import load
     from ...runtime.placement.placed import place
     from ...runtime.transports.keys import secured
-    from .local_runs import settings_of
+    from .running_graphs import settings_of
 
     def settings() -> tuple[str, ...]:
         return settings_of(elsewhere.graph, elsewhere.process)
@@ -134,7 +134,7 @@ def _spread_elsewhere(elsewhere: Elsewhere) -> SpreadRun | None:
 def _control(placed: PlacedGraph) -> Path | None:
     """The socket of a part on this machine that takes changes of parameters by its usual name."""
     from ...runtime.live.parameter_endpoint import answers
-    from .endpoints import path_of
+    from .running_graphs import path_of
 
     for spec in placed.machines:
         with suppress(AloftError):  # not every name can be that of a socket
@@ -147,7 +147,7 @@ def _control(placed: PlacedGraph) -> Path | None:
 def serve_live(run: Watched, save: Path | None = None, opened: Opened = "diagram") -> None:
     """Serve the page until Ctrl-C is pressed."""
     from ...runtime.live.live_server import LiveServer
-    from .stopping import stopped_by_signals
+    from .output import stopped_by_signals
     from .viewing import open_page
 
     server = LiveServer(run, save or Path(f"{run.graph.name}-tuned.yaml"), opened)

@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from ...runtime.language.errors import AloftError, ExitCode
+from ...runtime.links.lockstep_link import Received
 from ...runtime.links.part import Whole
 from ...runtime.links.path_ages import LATEST, judged, timeline_of
 from ...runtime.placement.placed import PlacedGraph
@@ -28,7 +29,7 @@ from .writer import RecordingWriter
 
 _OF_ALL = ("life", "parameter")
 """The kinds of notes that every part has; one of them is enough."""
-_STAND_IN = "runtime.links.inbox:Received"
+_STAND_IN = f"{Received.__module__}:{Received.__name__}"
 """What the types of those blocks contain that only stand for a block of another machine."""
 
 

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from aloft.cli.shared.live import Elsewhere, open_live_run
-from aloft.cli.shared.local_runs import local_runs
+from aloft.cli.shared.running_graphs import local_runs
 from aloft.runtime.language.errors import AloftError
 from aloft.runtime.live.live_server import Watched
 from aloft.runtime.live.spread_run import SpreadRun
