@@ -27,8 +27,8 @@ from ...runtime.language.stages import CheckedGraph, ClockSpec
 from ...runtime.loading.checking.parameters import adjust
 from ...runtime.running.differences import Comparison, Difference, Translation
 from ...runtime.running.executor import Executor
-from ...runtime.running.feeding import Fed, Feed, fed_graph
 from ...runtime.running.memory import BoundGraph, Snapshot
+from ...runtime.running.playback import Playback, PlaybackBlock, playback_graph
 from ...runtime.running.run_result import RunResult
 from ...runtime.running.sinks import Sink
 
@@ -251,7 +251,7 @@ def replay(
         raise ReplayError(f"no tick from {start} up to {end} is in the recording")
     _expect_beginning(recorded, start)
     _expect_no_gap(recorded, fed, start, end)
-    bound = BoundGraph(fed_graph(graph, fed))
+    bound = BoundGraph(playback_graph(graph, fed))
     bound.clock.tick = start
     follower = Follower(recorded, bound, start, keep, before_tick)
     result = Executor(
@@ -335,7 +335,7 @@ class Follower:
         self._first, self._keep, self._before_tick = first_tick, keep, before_tick
         memory, order = bound.memory, bound.graph.order
         try:
-            self._feed = Feed(bound, recorded.bus)
+            self._feed = Playback(bound, recorded.bus)
         except KeyError as name:
             raise ReplayError(
                 f"{name.args[0]} is not in the recording, so its block cannot be fed from it"
@@ -410,7 +410,7 @@ class Follower:
         while self._changes and self._changes[0].tick <= tick:
             change = self._changes.pop(0)
             block = self._bound.blocks.get(change.path.partition(".")[0])
-            if block is not None and not isinstance(block, Fed):
+            if block is not None and not isinstance(block, PlaybackBlock):
                 parameters = self._bound.parameters
                 parameters.apply(adjust(self._bound.blocks, {change.path: change.new}), tick)
         if self._feed.paths:

@@ -16,10 +16,10 @@ from .differences import Translation
 from .memory import BoundGraph
 
 
-class Fed(Block):
+class PlaybackBlock(Block):
     """Stands in for a block: it has the same ports and the same kind of machine, but no state.
 
-    Subclasses made by ``fed_block_type`` declare the ports. Whenever the block would have run, its
+    Subclasses made by ``playback_block_type`` declare the ports. Whenever the block would have run, its
     stand-in writes the outputs that were recorded for this tick. It opens no device and moves
     nothing.
     """
@@ -36,14 +36,14 @@ class Fed(Block):
             np.copyto(target, source)
 
 
-class _FedMealy(Fed):
+class _PlaybackMealy(PlaybackBlock):
     """A fed block whose outputs change when it steps."""
 
     def step(self) -> None:
         self.copy()
 
 
-class _FedMoore(Fed):
+class _PlaybackMoore(PlaybackBlock):
     """A fed block whose outputs change when it emits."""
 
     def emit(self) -> None:
@@ -53,35 +53,35 @@ class _FedMoore(Fed):
         pass
 
 
-_TYPES: dict[type[Block], type[Fed]] = {}
+_TYPES: dict[type[Block], type[PlaybackBlock]] = {}
 
 
-def fed_block_type(block_type: type[Block]) -> type[Fed]:
+def playback_block_type(block_type: type[Block]) -> type[PlaybackBlock]:
     """The stand-in for blocks of that type."""
     if block_type in _TYPES:
         return _TYPES[block_type]
-    base = _FedMoore if block_type.is_moore() else _FedMealy
-    body = {"__doc__": Fed.__doc__, "Params": block_type.Params}
-    kind: type[Fed] = type(f"Fed{block_type.__name__}", (base,), body)
+    base = _PlaybackMoore if block_type.is_moore() else _PlaybackMealy
+    body = {"__doc__": PlaybackBlock.__doc__, "Params": block_type.Params}
+    kind: type[PlaybackBlock] = type(f"Playback{block_type.__name__}", (base,), body)
     kind.inputs, kind.outputs = block_type.inputs, block_type.outputs
     _TYPES[block_type] = kind
     return kind
 
 
-def fed_graph(graph: CheckedGraph, paths: Iterable[str]) -> CheckedGraph:
+def playback_graph(graph: CheckedGraph, paths: Iterable[str]) -> CheckedGraph:
     """The same graph with the blocks at ``paths`` replaced by stand-ins.
 
     The bus keeps its layout, and the order of execution stays what it was.
     """
     fed = dict.fromkeys(paths)
     blocks = tuple(
-        replace(spec, block_type=fed_block_type(spec.block_type)) if spec.path in fed else spec
+        replace(spec, block_type=playback_block_type(spec.block_type)) if spec.path in fed else spec
         for spec in graph.blocks
     )
     return replace(graph, blocks=blocks)
 
 
-class Feed:
+class Playback:
     """Gives the stand-ins of a bound graph what to write, row by row.
 
     Args:
@@ -98,7 +98,7 @@ class Feed:
         known = dict.fromkeys(have)
         self.paths: list[str] = []
         for path, block in bound.blocks.items():
-            if not isinstance(block, Fed):
+            if not isinstance(block, PlaybackBlock):
                 continue
             self.paths.append(path)
             pairs = []

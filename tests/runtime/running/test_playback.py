@@ -10,8 +10,13 @@ from aloft.blocks.general.vector import Vector
 from aloft.runtime.language.block import Block, Input, Output
 from aloft.runtime.language.layout import Layout, PortLayout
 from aloft.runtime.running.executor import Executor
-from aloft.runtime.running.feeding import Fed, Feed, fed_block_type, fed_graph
 from aloft.runtime.running.memory import BoundGraph
+from aloft.runtime.running.playback import (
+    Playback,
+    PlaybackBlock,
+    playback_block_type,
+    playback_graph,
+)
 from aloft.runtime.testing import Use, checked_graph
 
 
@@ -40,19 +45,19 @@ GRAPH = checked_graph(
 
 def test_the_stand_in_has_ports_and_machine_but_no_state() -> None:
     for kind in (Fragile, UnitDelay, SineWave):
-        fed = fed_block_type(kind)
-        assert issubclass(fed, Fed) and fed is fed_block_type(kind)
+        fed = playback_block_type(kind)
+        assert issubclass(fed, PlaybackBlock) and fed is playback_block_type(kind)
         assert (fed.inputs, fed.outputs) == (kind.inputs, kind.outputs)
         assert fed.is_moore() == kind.is_moore()
         assert not fed.states
 
 
 def test_what_is_fed_is_computed_with() -> None:
-    bound = BoundGraph(fed_graph(GRAPH, ["robot"]))
+    bound = BoundGraph(playback_graph(GRAPH, ["robot"]))
     layout = Layout.of(
         [PortLayout("other.y", Vector, {"n": 2}), PortLayout("robot.y", Vector, {"n": 1})]
     )
-    feed = Feed(bound, layout)  # a recording with another layout
+    feed = Playback(bound, layout)  # a recording with another layout
 
     class Show:
         def open(self, bound: BoundGraph) -> None:
@@ -77,6 +82,6 @@ def test_what_is_fed_is_computed_with() -> None:
 
 
 def test_a_field_that_was_not_recorded() -> None:
-    bound = BoundGraph(fed_graph(GRAPH, ["robot"]))
+    bound = BoundGraph(playback_graph(GRAPH, ["robot"]))
     with pytest.raises(KeyError, match=r"robot\.y\.value"):
-        Feed(bound, Layout.of([PortLayout("robot.z", Vector, {"n": 1})]))
+        Playback(bound, Layout.of([PortLayout("robot.z", Vector, {"n": 1})]))
