@@ -9,7 +9,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from .logs.recording.finished_run import write_recording
+    from .logs.recording.writer import write_recording
     from .mathematics.arrays import Array1D, Array2D
     from .mathematics.compiling.expressions import cross
     from .mathematics.kernel import kernel
@@ -31,7 +31,7 @@ _HOMES = {
     "kernel": "mathematics.kernel",
     **dict.fromkeys(("Array1D", "Array2D"), "mathematics.arrays"),
     "Clock": "runtime.language.context",
-    "write_recording": "logs.recording.finished_run",
+    "write_recording": "logs.recording.writer",
     **dict.fromkeys(("Block", "Input", "Output", "State"), "runtime.language.block"),
     **dict.fromkeys(("AloftError", "BlockError", "RunError"), "runtime.language.errors"),
     **dict.fromkeys(("Graph", "load"), "runtime.graph"),

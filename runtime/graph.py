@@ -22,7 +22,7 @@ from .loading import load as load_checked
 from .loading import load_text
 from .loading.reading.nodes import text_of
 from .running.executor import Executor
-from .running.real_time import NO_WISHES, RealTime
+from .running.real_time import NO_REAL_TIME, RealTimeOptions
 from .running.run_result import RunResult
 from .running.sinks import Sink
 from .running.stepping import SteppedRun
@@ -56,17 +56,19 @@ class Graph:
         self,
         duration: float | None = None,
         *,
+        seed: int | None = None,
         clock: ClockSpec | None = None,
         sinks: Sequence[Sink] = (),
         log: bool = True,
         plain: bool = False,
         fuse: bool = True,
-        real_time: RealTime = NO_WISHES,
+        real_time: RealTimeOptions = NO_REAL_TIME,
     ) -> RunResult:
         """Run the graph from start to close.
 
         Args:
             duration: how long [s of the graph's time]; by default as the graph says.
+            seed: the value of every parameter called ``seed``; by default as the graph says.
             clock: how to pace it; by default as the graph says.
             sinks: what else records the run.
             log: whether to keep every signal of every tick.
@@ -86,9 +88,10 @@ class Graph:
             ticks = round(duration * self.checked.base_rate)
             if ticks < 1:
                 raise AloftError(f"a run of {duration} s is shorter than one tick")
-        sinks = [*path_sinks(self.checked, clock.kind if clock is not None else ""), *sinks]
+        graph = self.checked if seed is None else self.with_seed(seed).checked
+        sinks = [*path_sinks(graph, clock.kind if clock is not None else ""), *sinks]
         return Executor(
-            self.checked,
+            graph,
             clock=clock,
             sinks=sinks,
             log=log,

@@ -82,7 +82,7 @@ def _draft(flat: FlatBlock, graph: FlatGraph, settings: Settings, problems: Prob
     if draft.params is None:
         return draft
     try:
-        draft.block_type = draft.block_type.fitted(draft.params, flat.folder)
+        draft.block_type = draft.block_type.fitted(draft.params, flat.folder, settings.robot)
     except BlockError as error:
         problems.add(Code.MISFIT, f"{flat.path}: {error}", flat.where, at=flat.path)
         draft.block_type = None
@@ -177,11 +177,12 @@ def _check_dimensions(draft: Draft, settings: Settings, problems: Problems) -> b
             continue  # it would come from the robot, whose problem is reported
         value = draft.dimensions.get(name)
         near = nearest(name, draft.dimensions)
-        fix = f"dimensions: {{{name}: 3}}"
+        size = 3
+        if near:
+            size = draft.dimensions[near[0]]
+        fix = f"for the whole graph, beside 'blocks': dimensions: {{{name}: {size}}}"
         if settings.robot is None and name in find_robot(robot_names()[0]).dimensions:
             fix = fix_without_robot()
-        elif near:
-            fix = f"dimensions: {{{name}: {draft.dimensions[near[0]]}}}"
         problems.add(
             Code.DIMENSION,
             f"{flat.path} ({flat.use}) needs the dimension {name!r}, which nothing gives"
