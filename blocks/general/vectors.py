@@ -6,6 +6,7 @@ from collections.abc import Iterable, Sequence
 from typing import Annotated, Any, ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import AfterValidator, ValidationInfo, field_validator, model_validator
 
 from ...robots.description import RobotDescription
@@ -86,6 +87,10 @@ class InitialValueParameters(VectorParameters):
     initial: ScalarOrVector = parameter(
         0.0, text="the first output: n numbers, or one for all elements"
     )
+
+    def start_value(self) -> NDArray[np.float64]:
+        """``initial`` as an array of n elements."""
+        return np.full(self.n, self.initial)
 
 
 def crossed_bounds(

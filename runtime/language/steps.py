@@ -63,21 +63,23 @@ def declare_steps(cls: type[Any]) -> None:
     Raises:
         DeclarationError: an argument is not declared, or with another type.
     """
-    own = dict(cls.named_steps)
+    own, overridden = dict(cls.named_steps), set(cls.overridden_steps)
     for name in METHODS:
         value = vars(cls).get(name)
         function = value.__func__ if isinstance(value, staticmethod) else value
         if not isinstance(function, FunctionType) or hasattr(function, "binds"):
             continue
-        own.pop(name, None)
         names = arguments_of(function)
+        if name in own:
+            overridden.add(name)  # a step in Python, which may call that of its base
         if is_kernel(function) or isinstance(value, staticmethod) or "self" not in names[:1]:
             function.declared_kinds = {n: _declared(cls, function, n) for n in names}  # type: ignore[attr-defined]
             own[name] = function
+            overridden.discard(name)
             made = step_in_file_of(cls, name, written_code(function))
             made.__doc__, made.binds = function.__doc__, function
             setattr(cls, name, made)
-    cls.named_steps = own
+    cls.named_steps, cls.overridden_steps = own, frozenset(overridden)
 
 
 def _declared(cls: type[Any], function: FunctionType, name: str) -> Kind:
