@@ -118,14 +118,14 @@ def task_changes(lengths: dict[str, str], rise: str, turn: str, path: Path) -> d
             contradict each other.
     """
     found: dict[str, float] = {}
-    said: dict[str, str] = {}
+    option_of: dict[str, str] = {}
     for name, text in lengths.items():
         if not text:
             continue
         field, sign = FIELDS[name]
-        if field in said:
-            raise AloftError(f"--{said[field]} and --{name} contradict each other: give one")
-        said[field] = name
+        if field in option_of:
+            raise AloftError(f"--{option_of[field]} and --{name} contradict each other: give one")
+        option_of[field] = name
         found[field] = sign * quantity(name, text, "m", "20cm")
         check_limits(name, text, field, found[field], "m")
     if turn:
