@@ -8,7 +8,16 @@ from typing import NamedTuple
 import numpy as np
 
 from ...blocks.signals import ImuReading, JointState
-from ...mathematics.arrays import Array, Counts, Flags
+from ...mathematics.arrays import (
+    Array,
+    Array1D,
+    Counts,
+    Flags,
+    Flags1D,
+    Indices0D,
+    Indices1D,
+    Vector3,
+)
 from ...mathematics.compiling.call_sequence import Call
 from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.kernel import kernel
@@ -27,12 +36,12 @@ class ImuErrors(NamedTuple):
     """
 
     present: bool
-    gyro_bias: Array
-    accelerometer_bias: Array
-    gyro_noise: Array
-    accelerometer_noise: Array
-    scale: Array
-    limit: Array
+    gyro_bias: Vector3
+    accelerometer_bias: Vector3
+    gyro_noise: Vector3
+    accelerometer_noise: Vector3
+    scale: Array1D
+    limit: Array1D
 
 
 class JointErrors(NamedTuple):
@@ -40,18 +49,20 @@ class JointErrors(NamedTuple):
     encoders' resolution [rad] and the scale of the velocities' noise [rad/s]; ``noise`` (n_joints,),
     drawn for this sample, of variance one."""
 
-    offset: Array
-    size: Array
-    noise: Array
+    offset: Array1D
+    size: Array1D
+    noise: Array1D
 
 
 @kernel
-def sample(true: Array, bias: Array, noise: Array, scale: float, limit: float, out: Array) -> None:
+def sample(
+    true: Vector3, bias: Vector3, noise: Vector3, scale: float, limit: float, out: Vector3
+) -> None:
     """A reading (3,) with bias, noise and saturation; what is not a number stays so."""
     for axis in range(3):
-        reading = float(true[axis]) + float(bias[axis])
+        reading = true[axis] + bias[axis]
         if scale != 0.0:
-            reading += float(noise[axis]) * scale
+            reading += noise[axis] * scale
         reading = min(reading, limit)
         reading = max(reading, -limit)
         out[axis] = reading
@@ -59,7 +70,7 @@ def sample(true: Array, bias: Array, noise: Array, scale: float, limit: float, o
 
 @kernel
 def sample_imu(
-    rate: Array, force: Array, errors: ImuErrors, read_rate: Array, read_force: Array
+    rate: Vector3, force: Vector3, errors: ImuErrors, read_rate: Vector3, read_force: Vector3
 ) -> None:
     """A sample of the IMU from the true values [rad/s, m/s^2, body]; zero where there is none."""
     if not errors.present:
@@ -76,13 +87,13 @@ def sample_imu(
 
 @kernel
 def sample_joints(
-    position: Array,
-    velocity: Array,
-    torque: Array,
+    position: Array1D,
+    velocity: Array1D,
+    torque: Array1D,
     errors: JointErrors,
-    read_position: Array,
-    read_velocity: Array,
-    read_torque: Array,
+    read_position: Array1D,
+    read_velocity: Array1D,
+    read_torque: Array1D,
 ) -> None:
     """A sample of encoders and currents from the joints' true motion and torques."""
     resolution, scale = float(errors.size[0]), float(errors.size[1])
@@ -99,7 +110,7 @@ def sample_joints(
 
 
 @kernel
-def count_bouncing(step: Counts, bounce_end: Counts, count: Counts) -> None:
+def count_bouncing(step: Indices0D, bounce_end: Indices1D, count: Indices1D) -> None:
     """How many switches chatter in a physics step: ``step`` without a dimension, ``count`` (1,)."""
     count[0] = 0
     for point in range(bounce_end.shape[0]):
@@ -109,7 +120,12 @@ def count_bouncing(step: Counts, bounce_end: Counts, count: Counts) -> None:
 
 @kernel
 def sample_switches(
-    present: bool, step: Counts, pressed: Flags, bounce_end: Counts, draws: Array, closed: Flags
+    present: bool,
+    step: Indices0D,
+    pressed: Flags1D,
+    bounce_end: Indices1D,
+    draws: Array1D,
+    closed: Flags1D,
 ) -> None:
     """A sample of the switches that the robot may have (``present``).
 
