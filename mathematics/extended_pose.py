@@ -102,8 +102,7 @@ def divide(
     multiply(left, spare, orientation)
     for k in range(vectors.shape[0]):
         rotate(orientation, right_vectors[k], vectors[k])
-        for i in range(3):
-            vectors[k, i] = left_vectors[k, i] - vectors[k, i]
+        vectors[k, :] = left_vectors[k] - vectors[k]
 
 
 @kernel
@@ -121,5 +120,4 @@ def retract(
     for k in range(vectors.shape[0]):
         bend(tangent, tangent[3 * k + 3 : 3 * k + 6], spare)
         rotate(turn, vectors[k], vectors[k])
-        for i in range(3):
-            vectors[k, i] += spare[i]
+        vectors[k, :] += spare

@@ -247,8 +247,7 @@ def add_contact(
         for k in range(covariance.shape[0]):
             covariance[first + i, k] = rows[i, k]
     for i in range(3):
-        for k in range(covariance.shape[0]):
-            covariance[k, first + i] = rows[i, k]
+        covariance[:, first + i] = rows[i]
 
 
 @kernel
@@ -259,9 +258,7 @@ def innovation(point: int, world_point: Vector3, vectors: Rows3, residual: Vecto
         world_point: the measurement, from the base to the point, R h [m, world], (3,).
         residual: becomes the innovation.
     """
-    for i in range(3):
-        seen = vectors[1, i] + world_point[i]
-        residual[i] = seen - vectors[2 + point, i]
+    residual[:] = vectors[1] + world_point - vectors[2 + point]
 
 
 @kernel
@@ -286,8 +283,7 @@ def height_row(
         reference: the index of the other point; negative for the height over the world's origin.
         height: the measured height [m].
     """
-    for k in range(sensitivity.shape[1]):
-        sensitivity[row, k] = 0.0
+    sensitivity[row, :] = 0.0
     x, y = vectors[2 + point, 0], vectors[2 + point, 1]
     z = vectors[2 + point, 2]
     sensitivity[row, 9 + 3 * point + 2] = 1.0
@@ -314,8 +310,7 @@ def world_definition_jacobian(levers: Array2D, vectors: Rows3, sensitivity: Arra
     """
     n, total = levers.shape[0], 0.0
     for row in range(3):
-        for k in range(sensitivity.shape[1]):
-            sensitivity[row, k] = 0.0
+        sensitivity[row, :] = 0.0
     for point in range(n):
         ahead, aside = levers[point, 0], levers[point, 1]
         total += ahead * ahead + aside * aside
@@ -390,8 +385,7 @@ def weigh(
     multiply_transposed(covariance, sensitivity, seen)
     multiply_sparse(sensitivity, seen, spare)
     for i in range(3):
-        for k in range(3):
-            spare[i, k] += noise[i, k]
+        spare[i, :] += noise[i]
     invert(spare, inverse)
     total = 0.0
     for i in range(3):
@@ -430,5 +424,4 @@ def add_outer(sign: float, a: Array2D, b: Array2D, out: Array2D) -> None:
     """Add ``sign`` times ``a`` (n, 3) times the transpose of ``b`` (n, 3) to ``out`` (n, n)."""
     for i in range(out.shape[0]):
         x, y, z = sign * a[i, 0], sign * a[i, 1], sign * a[i, 2]
-        for j in range(out.shape[1]):
-            out[i, j] += x * b[j, 0] + y * b[j, 1] + z * b[j, 2]
+        out[i, :] += x * b[:, 0] + y * b[:, 1] + z * b[:, 2]

@@ -120,10 +120,8 @@ def add_friction(
     viscous ``damping`` [N m s/rad]. The first term is zero at rest and has three quarters of its
     full value at ``speed`` [rad/s].
     """
-    for i in range(torque.shape[0]):
-        share = math.tanh(velocity[i] / speed)
-        torque[i] = torque[i] + share * friction[i]
-        torque[i] = torque[i] + velocity[i] * damping[i]
+    torque[:] = torque + math.tanh(velocity / speed) * friction
+    torque[:] = torque + velocity * damping
 
 
 @kernel

@@ -378,5 +378,4 @@ def invert(matrix: Matrix3, out: Matrix3) -> None:
         determinant += matrix[0, j] * out[j, 0]
     scale = 1.0 / determinant if abs(determinant) > 1e-300 else 0.0
     for i in range(3):
-        for j in range(3):
-            out[i, j] *= scale
+        out[i, :] *= scale

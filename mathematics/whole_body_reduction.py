@@ -263,8 +263,7 @@ def reflect(mirror: Array1D, vector: Array1D) -> None:
     total = 0.0
     for i in range(vector.shape[0]):
         total += mirror[i] * vector[i]
-    for i in range(vector.shape[0]):
-        vector[i] = vector[i] - total * mirror[i]
+    vector[:] = vector - total * mirror
 
 
 @kernel

@@ -163,8 +163,7 @@ def see_com_velocity(rigid: Rigid, out: Vector3) -> None:
         total += mass
         for k in range(3):
             out[k] = out[k] + mass * float(velocity[k])
-    for k in range(3):
-        out[k] = out[k] / total
+    out[:] = out / total
 
 
 @kernel

@@ -378,8 +378,7 @@ _JUMP = 0.1
 def pitched_line(rotation: Matrix3, pitch: float, out: Vector3) -> None:
     """The x axis of ``rotation`` (3, 3), turned by ``pitch`` [rad] about its y axis."""
     cosine, sine = math.cos(pitch), math.sin(pitch)
-    for i in range(3):
-        out[i] = cosine * rotation[i, 0] - sine * rotation[i, 2]
+    out[:] = cosine * rotation[:, 0] - sine * rotation[:, 2]
 
 
 @kernel
@@ -454,8 +453,7 @@ def keep_along(axis: Vector3, vector: Vector3) -> None:
     part = 0.0
     for i in range(3):
         part += axis[i] * vector[i]
-    for i in range(3):
-        vector[i] = part * axis[i]
+    vector[:] = part * axis
 
 
 @kernel
@@ -477,9 +475,9 @@ def slow_stretch(
         square += reach * reach
         along += reach * velocity[i]
     scale = (1.0 - share) * along / square
-    for i in range(3):
-        lever = plane[2, 0] * rotation[i, 0] + plane[2, 1] * rotation[i, 2]
-        velocity[i] -= scale * (sole[i] - lever - hip[i])
+    velocity[:] -= scale * (
+        sole - (plane[2, 0] * rotation[:, 0] + plane[2, 1] * rotation[:, 2]) - hip
+    )
 
 
 @kernel

@@ -298,8 +298,7 @@ def middle_point(points: Rows3, out: Vector3) -> None:
     """The mean of points (n, 3)."""
     out[:] = 0.0
     for i in range(points.shape[0]):
-        for k in range(3):
-            out[k] += points[i, k] / points.shape[0]
+        out[:] += points[i] / points.shape[0]
 
 
 @kernel

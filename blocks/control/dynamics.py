@@ -221,8 +221,7 @@ def write_jacobian(
 ) -> None:
     """The Jacobian (3, n_velocities) of a body's point: v + w x r of every generalised velocity."""
     for row in range(3):
-        for column in range(out.shape[1]):
-            out[row, column] = 0.0
+        out[row, :] = 0.0
     x, y, z = place[0], place[1], place[2]
     for k in range(3):
         a, b, c = (
@@ -250,8 +249,7 @@ def lowest_point(centre: Vector3, radius: float, rotation: Matrix3, out: Vector3
         radius: of the ball [m].
         rotation: from the body to the world, (3, 3).
     """
-    for k in range(3):
-        out[k] = centre[k] - radius * rotation[2, k]
+    out[:] = centre - radius * rotation[2]
 
 
 @kernel

@@ -140,8 +140,7 @@ class Estimator(NamedTuple):
 @kernel
 def limit(values: Array1D, largest: float, out: Array1D) -> None:
     """Values within plus and minus ``largest``; what is not a number stays so."""
-    for k in range(out.shape[0]):
-        out[k] = max(min(values[k], largest), -largest)
+    out[:] = max(min(values, largest), -largest)
 
 
 @kernel

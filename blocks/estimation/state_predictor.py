@@ -124,8 +124,7 @@ def remember_command(sent: Sent, acceleration: Array2D, loaded: Flags1D) -> None
     """Put the last command before the others."""
     for i in range(loaded.shape[0] - 1, 0, -1):
         loaded[i] = loaded[i - 1]
-        for k in range(acceleration.shape[1]):
-            acceleration[i, k] = acceleration[i - 1, k]
+        acceleration[i, :] = acceleration[i - 1]
     loaded[0] = False
     for point in range(sent.stance.shape[0]):
         loaded[0] = loaded[0] or bool(sent.stance[point])

@@ -167,7 +167,4 @@ def motor_feedback(
     """Write what drives in direct-force mode ask of their motors to ``out``, each (n_motors,):
     ``torque + P (position_goal - position) + D (velocity_goal - velocity)``. Torques and gains may as
     well be in A, A/rad and A s/rad."""
-    for k in range(out.shape[0]):
-        spring = (position_goal[k] - position[k]) * stiffness[k]
-        damper = (velocity_goal[k] - velocity[k]) * damping[k]
-        out[k] = (spring + torque[k]) + damper
+    out[:] = (position_goal - position) * stiffness + torque + (velocity_goal - velocity) * damping

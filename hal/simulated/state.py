@@ -125,15 +125,13 @@ def clear(
 @kernel
 def mean_over_steps(total: Array1D, steps: Indices0D, mean: Array1D) -> None:
     """The ``mean`` (n,) of what has been summed up over ``steps``, a count without a dimension."""
-    for k in range(mean.shape[0]):
-        mean[k] = total[k] / steps[()]
+    mean[:] = total / steps[()]
 
 
 @kernel
 def read_encoders(position: Array1D, offset: Array1D, reading: Array1D) -> None:
     """What the drives' own encoders read [rad] of the joints' positions, each (n_joints,)."""
-    for joint in range(reading.shape[0]):
-        reading[joint] = position[joint] + offset[joint]
+    reading[:] = position + offset
 
 
 @kernel
