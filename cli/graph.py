@@ -81,8 +81,7 @@ def graph(
             )
         values: Values | None = None
         if graph.suffix == ".rrd":
-            from ..logs.replay.opened_run import OpenedRun
-            from ..logs.replay.tick_values import TickValues
+            from ..logs.replay.opened_run import OpenedRun, TickValues
 
             opened = OpenedRun.of(graph)
             checked = opened.load(overrides or [])

@@ -78,7 +78,7 @@ def export(
 ) -> None:
     """Write the signals of a recording, every number exact, into a file of another format."""
     from ..logs.exporting.export import export as write_export
-    from ..logs.recording.remedy import remedy
+    from ..logs.recording.place import remedy
 
     with errors_reported(as_json):
         kinds = [k for k, on in (("csv", csv), ("parquet", parquet), ("mcap", mcap)) if on]

@@ -97,7 +97,7 @@ def run(
 ) -> None:
     """Run a graph; print its metrics and the time each block took; write a recording."""
     from ..runtime.graph import load
-    from ..runtime.running.real_time import NO_WISHES, RealTime
+    from ..runtime.running.real_time import NO_REAL_TIME, RealTimeOptions
     from ..studies.batch.seeds import parse_seeds
 
     settings = [*(overrides or []), *([f"duration={duration}"] if duration else [])]
@@ -111,8 +111,8 @@ def run(
             raise AloftError("choose one of --machine, --local and --seeds")
         if keys is not None and not (machine or local):
             raise AloftError("--keys is for links between machines: --machine NAME, or --local")
-        wishes_of_thread = RealTime(cpu, priority, lock_memory)
-        if wishes_of_thread != NO_WISHES and (seeds or local):
+        wishes_of_thread = RealTimeOptions(cpu, priority, lock_memory)
+        if wishes_of_thread != NO_REAL_TIME and (seeds or local):
             raise AloftError("--cpu, --priority and --lock-memory are for one run, in one process")
         if local:
             from .shared.run_machines import Wishes, run_local

@@ -138,7 +138,7 @@ def watch(
     overrides: Overrides = None,
 ) -> None:
     """Show a machine's signals live, 50 times a second, until Ctrl-C. Nothing is sent to it."""
-    from ..logs.recording.watched_part import WatchedPart
+    from ..logs.recording.live_feed import WatchedPart
     from ..logs.viewing.viewer import start_viewer
 
     with (

@@ -14,7 +14,7 @@ from ...runtime.language.errors import AloftError
 
 if TYPE_CHECKING:
     from ...runtime.live.live_run import LiveRun
-    from ...runtime.live.live_server import Opened, Watched
+    from ...runtime.live.live_server import Opened, WatchedRun
     from ...runtime.live.spread_run import SpreadRun
     from ...runtime.placement.placed import PlacedGraph
 
@@ -34,7 +34,7 @@ class Elsewhere:
     process: int = 0
 
 
-def open_live_run(name: str, elsewhere: Elsewhere | None = None) -> Watched:
+def open_live_run(name: str, elsewhere: Elsewhere | None = None) -> WatchedRun:
     """The running graph of that name, or the only one there is; all parts of a graph on several
     machines.
 
@@ -59,7 +59,7 @@ def open_live_run(name: str, elsewhere: Elsewhere | None = None) -> Watched:
     return _whole(run, path, elsewhere) if run.machine else run
 
 
-def _whole(run: LiveRun, path: Path, elsewhere: Elsewhere | None) -> Watched:
+def _whole(run: LiveRun, path: Path, elsewhere: Elsewhere | None) -> WatchedRun:
     """The whole of the graph of which ``run`` is the part that answers at ``path``."""
     from ...runtime.live.spread_run import SpreadRun
     from ...runtime.placement.placed import place
@@ -144,7 +144,7 @@ def _control(placed: PlacedGraph) -> Path | None:
     return None
 
 
-def serve_live(run: Watched, save: Path | None = None, opened: Opened = "diagram") -> None:
+def serve_live(run: WatchedRun, save: Path | None = None, opened: Opened = "diagram") -> None:
     """Serve the page until Ctrl-C is pressed."""
     from ...runtime.live.live_server import LiveServer
     from .output import stopped_by_signals

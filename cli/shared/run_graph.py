@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
     from ...logs.viewing.viewer import Viewer
     from ...runtime.language.stages import CheckedGraph
-    from ...runtime.running.real_time import RealTime
+    from ...runtime.running.real_time import RealTimeOptions
     from ...runtime.running.sinks import Sink
     from ...studies.batch.seeds import SeedRow
 
@@ -41,7 +41,13 @@ class Runs(Protocol):
         """The graph that runs."""
 
     def run(
-        self, *, sinks: Sequence[Sink], log: bool, plain: bool, fuse: bool, real_time: RealTime
+        self,
+        *,
+        sinks: Sequence[Sink],
+        log: bool,
+        plain: bool,
+        fuse: bool,
+        real_time: RealTimeOptions,
     ) -> RunResult:
         """Run it once."""
 
@@ -65,14 +71,14 @@ def run_once(
     traceback: bool = False,
     plain: bool = False,
     fuse: bool = True,
-    real_time: RealTime | None = None,
+    real_time: RealTimeOptions | None = None,
 ) -> ExitCode:
     """Run the graph, record and show it, and print the result; ``said`` are warnings so far,
     ``also`` is what else the JSON object has, and ``times`` says whether those of blocks are
     printed."""
     from ...logs.recording.recorder import Recorder
     from ...runtime.running.freeze_guard import FreezeGuard
-    from ...runtime.running.real_time import NO_WISHES
+    from ...runtime.running.real_time import NO_REAL_TIME
     from .output import TickCounter, compiling_shown, progress_bar
     from .viewing import how_to_view
 
@@ -91,7 +97,7 @@ def run_once(
         with FreezeGuard(graph.checked, as_json=as_json) as guard:
             result = graph.run(
                 sinks=[*recorders, counter, last_words, *sinks, guard], log=False, plain=plain,
-                fuse=fuse, real_time=real_time or NO_WISHES,
+                fuse=fuse, real_time=real_time or NO_REAL_TIME,
             )  # fmt: skip
     recording = recorder.recording if recorder is not None else None
     problem = recorder.problem if recorder is not None and record is not None else ""

@@ -22,14 +22,14 @@ from typing import TYPE_CHECKING, Any
 
 from ...runtime.language.errors import AloftError, ExitCode, RunError
 from ...runtime.language.stages import CheckedGraph
-from ...runtime.links.observer import Showing
+from ...runtime.links.observer import StatusPublisher
 from ...runtime.links.part import BoundPart, run_part
 from ...runtime.links.path_ages import NAME
 from ...runtime.live.part_feed import PartFeed
 from ...runtime.loading import load
 from ...runtime.placement.placed import PlacedGraph, place
 from ...runtime.running.memory import BoundGraph
-from ...runtime.running.real_time import NO_WISHES, RealTime
+from ...runtime.running.real_time import NO_REAL_TIME, RealTimeOptions
 from ...runtime.running.run_result import RunResult, merge_metrics
 from ...runtime.running.sinks import Sink
 from ...runtime.running.timing import BlockTimes
@@ -82,7 +82,7 @@ def run_local(path: Path, wishes: Wishes, out: Console) -> ExitCode:
         AloftError: a part said nothing when it ended.
     """
     from ...logs.recording.merged_run import merge_recordings, path_metrics, read_parts, run_hash_of
-    from ...logs.recording.remedy import cause_of, remedy
+    from ...logs.recording.place import cause_of, remedy
     from .viewing import how_to_view
 
     placed = place(load(path, wishes.settings))
@@ -382,11 +382,11 @@ class Part:
         log: bool,
         plain: bool = False,
         fuse: bool = True,
-        real_time: RealTime = NO_WISHES,
+        real_time: RealTimeOptions = NO_REAL_TIME,
     ) -> RunResult:
         """Run the part once."""
         bound = self.bound
-        showing = Showing(bound.machine, bound.transport, bound.others, bound.inboxes)
+        showing = StatusPublisher(bound.machine, bound.transport, bound.peers, bound.receivers)
         feed = PartFeed(bound.machine, bound.transport)
         self._result = run_part(
             bound, sinks=[*sinks, showing, feed], log=log, plain=plain, fuse=fuse,
@@ -403,10 +403,10 @@ class Part:
             "machine": self.bound.machine,
             "heard": bool(getattr(error, "heard", False)),
             "metrics_by_block": {path: found for path, found in metrics.items() if found},
-            "links": [inbox.about() for inbox in self.bound.inboxes],
+            "links": [receiver.about() for receiver in self.bound.receivers],
             "clocks": {
                 name: {"offset_s": clock.offset * 1e-9, "uncertainty_s": clock.uncertainty * 1e-9}
-                for name in self.bound.others.names
-                for clock in (self.bound.others.clock_of(name),)
+                for name in self.bound.peers.names
+                for clock in (self.bound.peers.clock_of(name),)
             },
         }

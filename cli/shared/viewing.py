@@ -26,11 +26,11 @@ def draw(recording: Path, layout: Path | None, path: Path) -> Path:
     What is no recording of a run, such as the motion of a plan or a comparison that was kept, is
     shown as it is.
     """
-    from ...logs.file.contents import NoRunError
+    from ...logs.file.messages import NoRunError
     from ...logs.file.reader import read
-    from ...logs.recording.whole_view import write_view
-    from ...logs.viewing.layout_file import blueprint_with, layout_beside, read_layout
-    from ...logs.viewing.robot_meshes import missing_meshes
+    from ...logs.recording.drawn_run import write_view
+    from ...logs.viewing.blueprint import blueprint_with, layout_beside, read_layout
+    from ...logs.viewing.robot_shapes import missing_meshes
 
     try:
         run = read(recording)

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from aloft.cli.shared.running_graphs import local_runs, registered, settings_of
-from aloft.logs.recording.watched_part import WatchedPart
+from aloft.logs.recording.live_feed import WatchedPart
 from aloft.logs.viewing.viewer import ViewerError, start_viewer
 from aloft.runtime.language.errors import AloftError
 from aloft.runtime.links.observer import Observer
