@@ -165,7 +165,7 @@ def usual_rise(path: Path) -> float | None:
 def settings_for(asked: dict[str, float], trial: str) -> list[str]:
     """The overrides of a graph for what was asked."""
     from ..runtime.loading.reading.nodes import text_of
-    from ..studies.trials import trial_settings
+    from ..studies.rehearsal import trial_settings
 
     return [
         *(f"{key}={text_of(value)}" for key, value in trial_settings(trial).items()),

@@ -197,7 +197,9 @@ def _print_robot(out: Console, about: dict[str, Any]) -> None:
         out.print(table("feet", ("foot", "kind", "link", "contact points"), feet))
     sensors = about["sensors"]
     imu = "an IMU" if sensors["imu"] else "no IMU"
-    say(out, f"sensors: {sensors['encoders']} encoders, {imu}, {sensors['switches']} switches")
+    mounted = "".join(f", {name} ({what})" for name, what in sensors["mounted"].items())
+    counted = f"{sensors['encoders']} encoders, {imu}, {sensors['switches']} switches{mounted}"
+    say(out, f"sensors: {counted}")
     if about["points"]:
         say(out, f"points to push at: {', '.join(about['points'])}")
     for note in about["missing"]:

@@ -2,8 +2,9 @@
 
 A stretch of the recording is in memory at a time. An MCAP file has, beside every signal, channels
 that Foxglove, PlotJuggler and ROS 2's tools know by their type. These show the robot in 3D (``/tf``,
-``/scene``), its joints by name (``/joint_states``), the sensor (``/imu``), the force on each foot
-(``/wrench/FOOT``) and what happened (``/log``), without a click.
+``/scene``), its joints by name (``/joint_states``), the sensor (``/imu``), the sensors that its
+description mounts (``/NAME``), the force on each foot (``/wrench/FOOT``) and what happened (``/log``),
+without a click.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from typing import Any
 
 import numpy as np
 
+from ...hal.sensors.sensor import RosMessage
 from ...robots.description import RobotDescription
 from ...robots.kinematics import quaternions_of_matrices
 from ...runtime.language.errors import AloftError
@@ -28,6 +30,7 @@ from ..file.table import chosen
 from ..viewing.drawing import Moments
 from ..viewing.robot_shapes import quaternion_from_z, shapes_of
 from ..viewing.scene_ports import IMU, JOINTS, ScenePorts, port_of, ports_of, scene_ports
+from ..viewing.scene_sensors import sensor_ports
 from .cdr import DEFINITIONS, imu, joint_state, transforms, wrench
 from .named_columns import NamedColumn, NamedColumns
 
@@ -35,6 +38,11 @@ PICTURE_RATE = 100.0
 """Poses a second in ``/tf`` [Hz]: more than an eye sees."""
 WORLD = "world"
 GREY, GROUND = (0.56, 0.64, 0.68, 1.0), (0.55, 0.57, 0.6, 1.0)
+SENSOR_MESSAGES: Mapping[str, tuple[Callable[..., bytes], tuple[str, ...]]] = {
+    "sensor_msgs/msg/Imu": (imu, ("angular_velocity", "linear_acceleration")),
+    "geometry_msgs/msg/WrenchStamped": (wrench, ("wrench.force", "wrench.torque")),
+}
+"""How the message of a mounted sensor is written: the function, and the numbers that it takes."""
 LEVELS = {"INFO": 2, "WARN": 3, "ERROR": 4}
 """The levels of ``foxglove.Log``."""
 
@@ -75,6 +83,11 @@ def known_channels(run: RecordedRun) -> list[Channel]:
         )
     if sensor is not None:
         channels.append(_ros("/imu", "sensor_msgs/msg/Imu", partial(_imu, sensor, robot.base)))
+    for port, mounted in sensor_ports(robot, ports).items():
+        message = mounted.ros2
+        if message is not None and message.type in SENSOR_MESSAGES:
+            messages = partial(_sensor, port, mounted.link, message)
+            channels.append(_ros(f"/{mounted.name}", message.type, messages))
     drawn = scene_ports(run.header)
     if drawn is not None:
         channels.append(_ros("/tf", "tf2_msgs/msg/TFMessage", partial(_poses, drawn, robot)))
@@ -117,6 +130,15 @@ def _imu(port: str, frame: str, batch: RecordedRows) -> Iterator[Timed]:
     force = batch.signal(f"{port}.specific_force").tolist()
     for instant, *values in zip(_instants(batch), turn, force, strict=True):
         yield instant, imu(instant, frame, *values)
+
+
+def _sensor(port: str, frame: str, message: RosMessage, batch: RecordedRows) -> Iterator[Timed]:
+    """The messages of a mounted sensor; its numbers are in the axes of its link."""
+    write, paths = SENSOR_MESSAGES[message.type]
+    fields = {path: field for field, path in message.fields.items()}
+    lists = [batch.signal(f"{port}.{fields[path]}").tolist() for path in paths]
+    for instant, *values in zip(_instants(batch), *lists, strict=True):
+        yield instant, write(instant, frame, *values)
 
 
 def _wrench(ports: ScenePorts, on_foot: list[bool], batch: RecordedRows) -> Iterator[Timed]:

@@ -28,6 +28,7 @@ from .contacts import (
 from .drawing import Colors, Detail, Moments, ScenePart
 from .robot_shapes import capsules, drawn_link, eye_height, read_meshes, shapes_of
 from .scene_ports import PoseSource, ScenePorts
+from .scene_sensors import SensorPart
 
 EYE = "eye"
 """The entity below ``world`` that the camera follows."""
@@ -311,7 +312,16 @@ class TerrainPart(ScenePart):
         """Nothing: the ground does not move."""
 
 
-PARTS = (TerrainPart, RobotPart, ContactPart, MassCentrePart, PlanPart, FootTargetPart, PushPart)
+PARTS = (
+    TerrainPart,
+    RobotPart,
+    ContactPart,
+    MassCentrePart,
+    PlanPart,
+    FootTargetPart,
+    PushPart,
+    SensorPart,
+)
 
 
 class Scene:

@@ -237,8 +237,11 @@ class Block:
         return {n: v for n, v in values.items() if isinstance(v, int) and not isinstance(v, bool)}
 
     @classmethod
-    def fitted(cls, params: Parameters, folder: Path) -> type[Block]:
-        """The class whose ports are those that the parameters ask for; by default the class itself.
+    def fitted(
+        cls, params: Parameters, folder: Path, robot: RobotDescription | None = None
+    ) -> type[Block]:
+        """The class whose ports are those that the parameters, or the graph's robot, ask for; by default
+        the class itself.
 
         Another class has the name of this one. Files that parameters name are relative to
         ``folder``. A ``BlockError`` that this raises should be a misfit of ``requires`` as well.

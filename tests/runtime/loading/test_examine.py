@@ -51,6 +51,13 @@ def test_clock() -> None:
     assert graph_of(CONSTANT, head).clock == ClockSpec("paced", "stop", 3)
 
 
+@pytest.mark.parametrize("value", ["0", "-1", "true", "1.5", "three", "[1]"])
+def test_overruns_in_a_row_are_a_whole_number_from_one(value: str) -> None:
+    (problem,) = problems_of(CONSTANT, f"rate: 1\nclock: {{stop_after: {value}}}")
+    assert problem.startswith("bad-value: clock.stop_after cannot be")
+    assert graph_of(CONSTANT, "rate: 1\nclock: {stop_after: 1}").clock.stop_after == 1
+
+
 @pytest.mark.parametrize(
     ("rate", "offset", "period"), [("100", 0, 1), ("50 Hz", 1, 2), ("33.3333333333 Hz", 2, 3)]
 )

@@ -7,15 +7,17 @@ they were. Streams depend on the seed and the purpose's number only.
 from __future__ import annotations
 
 import ctypes
+import zlib
+from collections.abc import Mapping
 from enum import IntEnum
 from functools import cache, partial
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...mathematics.arrays import Array, Counts
-from ...mathematics.compiling.library_call import LibraryCall, address_of
-from ...runtime.language.random_stream import load_generator, save_generator
+from ..mathematics.arrays import Array, Counts
+from ..mathematics.compiling.library_call import LibraryCall, address_of
+from ..runtime.language.random_stream import load_generator, save_generator
 
 
 class Purpose(IntEnum):
@@ -42,8 +44,8 @@ RUNNING = (
     Purpose.GYRO, Purpose.ACCELEROMETER, Purpose.JOINT_VELOCITY, Purpose.JITTER, Purpose.BOUNCE,
 )  # fmt: skip
 """The streams that are drawn from during a run; the others are drawn once, before it."""
-WORDS = 3 * len(RUNNING)
-"""The number of integers in the state of the running streams."""
+_MOUNTED = 100
+"""Takes the place of a purpose in the streams of mounted sensors."""
 
 
 def stream(seed: int, purpose: Purpose) -> np.random.Generator:
@@ -52,17 +54,39 @@ def stream(seed: int, purpose: Purpose) -> np.random.Generator:
     return np.random.Generator(np.random.PCG64(sequence))
 
 
-class RandomStreams:
-    """The streams of a run, whose state can be saved as integers and restored exactly."""
+def sensor_stream(seed: int, sensor: str, number: int) -> np.random.Generator:
+    """A new stream for one of the errors of a sensor that a robot's description mounts."""
+    key = (_MOUNTED, zlib.crc32(sensor.encode()), number)
+    return np.random.Generator(np.random.PCG64(np.random.SeedSequence(seed, spawn_key=key)))
 
-    def __init__(self, seed: int) -> None:
-        self._streams = {purpose: stream(seed, purpose) for purpose in RUNNING}
+
+class RandomStreams:
+    """The streams of a run, whose state can be saved as integers and restored exactly.
+
+    Args:
+        seed: of all of them.
+        fields: how many fields each mounted sensor has, by its name; each has a stream of noise.
+    """
+
+    def __init__(self, seed: int, fields: Mapping[str, int] | None = None) -> None:
+        self._streams: dict[Purpose | tuple[str, int], np.random.Generator] = {
+            purpose: stream(seed, purpose) for purpose in RUNNING
+        }
+        for name, count in (fields or {}).items():
+            for k in range(count):
+                self._streams[name, k] = sensor_stream(seed, name, 2 * k + 1)
+        self.words = 3 * len(self._streams)
+        """The number of integers in their state."""
 
     def __getitem__(self, purpose: Purpose) -> np.random.Generator:
         return self._streams[purpose]
 
+    def of_field(self, sensor: str, number: int) -> np.random.Generator:
+        """The noise of a field of a mounted sensor, by its number in the signal."""
+        return self._streams[sensor, number]
+
     def save(self, out: NDArray[np.int64]) -> None:
-        """Write the state of all streams into ``WORDS`` integers."""
+        """Write the state of all streams into ``words`` integers."""
         for k, generator in enumerate(self._streams.values()):
             save_generator(generator.bit_generator, out[3 * k : 3 * k + 3])
 

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from aloft.hal.simulated.random_streams import RUNNING, WORDS, Purpose, RandomStreams, stream
+from aloft.hal.random_streams import RUNNING, Purpose, RandomStreams, stream
 
 
 def test_streams_of_one_seed_differ_and_are_repeatable() -> None:
@@ -16,7 +16,7 @@ def test_a_restored_stream_goes_on_where_it_was() -> None:
     streams = RandomStreams(3)
     for purpose in RUNNING:
         streams[purpose].standard_normal(7)
-    words = np.zeros(WORDS, np.int64)
+    words = np.zeros(streams.words, np.int64)
     streams.save(words)
     after = [streams[purpose].standard_normal(5).tolist() for purpose in RUNNING]
     other = RandomStreams(3)

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from aloft.hal.simulated import random_streams
-from aloft.hal.simulated.random_streams import Purpose, normal_call, stream, uniform_call
+from aloft.hal import random_streams
+from aloft.hal.random_streams import Purpose, normal_call, stream, uniform_call
 from aloft.mathematics.compiling.call_sequence import CallSequence
 
 
