@@ -51,7 +51,7 @@ def test_a_graph_of_one_process_is_not_looked_for_elsewhere(here: Path) -> None:
 
 
 def test_parts_that_nobody_hears_are_named(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("aloft.cli.shared.live.PATIENCE", 0.2)
+    monkeypatch.setattr("aloft.cli.shared.live.TIMEOUT", 0.2)
     with pytest.raises(AloftError, match=r"nothing was heard of near, far for 0\.2 s: do they run"):
         open_live_run("", RemoteRunAddress(here, ["machines.near=tcp/127.0.0.1:9"]))
 

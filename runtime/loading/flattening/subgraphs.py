@@ -97,7 +97,8 @@ class Resolver:
         """The wire that a link stands for, ``UNWIRED``, or ``None`` after a problem."""
         if link is None:
             return None
-        start, seen = link, {}  # type: Link, dict[str, None]
+        start = link
+        seen: dict[str, None] = {}
         total = FlatWire("", start.where)
         selection = WHOLE
         while True:
