@@ -38,7 +38,7 @@ class CoSimulation(UnitBlock):
     """
 
     @classmethod
-    def fitted(cls, params: Parameters, folder: Path) -> type[Block]:
+    def fitted(cls, params: Parameters, folder: Path, graph_folder: Path) -> type[Block]:
         """The class with the ports of the FMU."""
         assert isinstance(params, FmuParameters)
         found = describe(params.file, folder, params.outputs)

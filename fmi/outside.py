@@ -55,7 +55,7 @@ class Outside(Block):
     params: OutsideParameters
 
     @classmethod
-    def fitted(cls, params: Parameters, folder: Path) -> type[Block]:
+    def fitted(cls, params: Parameters, folder: Path, graph_folder: Path) -> type[Block]:
         """The class with these outputs."""
         assert isinstance(params, OutsideParameters)
         body: dict[str, Any] = {"__doc__": cls.__doc__, "__module__": cls.__module__}

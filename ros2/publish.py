@@ -55,7 +55,7 @@ class Publish(Ros2Block):
     message: Signal
 
     @classmethod
-    def fitted(cls, params: Parameters, folder: Path) -> type[Block]:
+    def fitted(cls, params: Parameters, folder: Path, graph_folder: Path) -> type[Block]:
         """The class whose input has the fields of the message type."""
         assert isinstance(params, PublishParameters)
         return _class_for(message_type(params).signal)

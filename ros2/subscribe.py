@@ -61,7 +61,7 @@ class Subscribe(Ros2Block):
     health = Output(TopicHealth, text="ages and counts")
 
     @classmethod
-    def fitted(cls, params: Parameters, folder: Path) -> type[Block]:
+    def fitted(cls, params: Parameters, folder: Path, graph_folder: Path) -> type[Block]:
         """The class whose output has the fields of the message type."""
         assert isinstance(params, SubscribeParameters)
         return _class_for(message_type(params).signal)

@@ -354,7 +354,7 @@ def check_block(
     """
     given = block_type.example_parameters() if params is None else params
     subject = Subject(
-        block_type.fitted(block_type.Params.model_validate(dict(given)), Path()),
+        block_type.fitted(block_type.Params.model_validate(dict(given)), Path(), Path()),
         given,
         robot,
         rate,

@@ -82,7 +82,7 @@ def _draft(flat: FlatBlock, graph: FlatGraph, settings: Settings, problems: Prob
     if draft.params is None:
         return draft
     try:
-        draft.block_type = draft.block_type.fitted(draft.params, flat.folder)
+        draft.block_type = draft.block_type.fitted(draft.params, flat.folder, graph.folder)
     except BlockError as error:
         problems.add(Code.MISFIT, f"{flat.path}: {error}", flat.where, at=flat.path)
         draft.block_type = None
