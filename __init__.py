@@ -9,7 +9,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from .logs.recording.finished_run import write_recording
+    from .logs.recording.writer import write_recording
     from .mathematics.arrays import Array1D, Array2D
     from .mathematics.compiling.expressions import cross
     from .mathematics.kernel import kernel

@@ -1,5 +1,6 @@
 """The command line, ``aloft VERB``. Every verb has a file here, and ``app`` puts them together; what they
-need lies in folders. Heavy imports are inside functions only."""
+need lies in ``shared``. Heavy imports are inside functions only.
+"""
 
 from __future__ import annotations
 

@@ -35,6 +35,9 @@ VERBS = (
 """All verbs, in the order of the help. The file of each has its name, and so has what it offers:
 a command, or a group of commands."""
 
+IN_FILE_OF = {"graphs": "check", "doctor": "check", "watch": "top"}
+"""Short verbs that stand in the file of another."""
+
 
 ONLY_READ = ("check", "graph", "graphs", "blocks")
 """The verbs that leave nothing to be closed at the end of the process."""
@@ -51,7 +54,7 @@ def make_app(verbs: Iterable[str] = VERBS) -> typer.Typer:
         rich_markup_mode=None,
     )
     for verb in verbs:
-        offered = getattr(import_module(f".{verb}", __package__), verb)
+        offered = getattr(import_module(f".{IN_FILE_OF.get(verb, verb)}", __package__), verb)
         if isinstance(offered, typer.Typer):
             app.add_typer(offered)
         else:

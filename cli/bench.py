@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..runtime.language.errors import AloftError, ExitCode
-from .shared.completion import benchmark_names
-from .shared.options import JsonBesideTables
+from .shared.options import JsonBesideTables, benchmark_names
 from .shared.output import console, errors_reported, number, print_json, say, table
 
 if TYPE_CHECKING:

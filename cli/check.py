@@ -1,4 +1,4 @@
-"""``aloft check``: whether a graph may run, and everything that is wrong if it may not."""
+"""``aloft check``, ``aloft graphs`` and ``aloft doctor``: is a graph right, which are there, can they run here."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from .shared.options import AsJson, CompletedOverrides
-from .shared.output import errors_reported, print_json
+from .shared.output import console, errors_reported, print_json, say, table
 
 
 def check(
@@ -40,3 +40,39 @@ def check(
         count, machines = len(checked.blocks), len(checked.machines)
         spread = f" on {machines} machine{'s' if machines > 1 else ''}" if machines else ""
         typer.echo(f"{graph}: no problems; {count} blocks at {checked.base_rate:g} Hz{spread}")
+
+
+def graphs(
+    as_json: AsJson = False,
+) -> None:
+    """List the shipped graphs by the addresses that every verb takes: aloft run aloft:jump."""
+    from ..runtime.loading.reading.files import shipped_graphs, summary
+
+    found = [(address, str(path), summary(path)) for address, path in shipped_graphs().items()]
+    if as_json:
+        keys = ("graph", "file", "summary")
+        print_json({"graphs": [dict(zip(keys, row, strict=True)) for row in found]})
+        return
+    out = console()
+    out.print(table("", ("graph", "what it does"), [(row[0], row[2]) for row in found]))
+    say(out, "aloft run aloft:jump runs one; aloft graph aloft:jump --flat prints it whole")
+
+
+def doctor(
+    as_json: AsJson = False,
+) -> None:
+    """Say whether all libraries load, what this machine allows a control loop in real time, and what
+    to change; nothing is changed."""
+    from ..runtime.running.machine_check import examine_libraries, examine_machine
+
+    findings = [examine_libraries(), *examine_machine()]
+    if as_json:
+        ready = all(finding.good for finding in findings)
+        print_json({"ready": ready, "findings": [finding.as_json() for finding in findings]})
+        return
+    out = console()
+    rows = [(f.name, "good" if f.good else "not yet", f.found) for f in findings]
+    out.print(table("", ("what", "is", "found"), rows))
+    for finding in findings:
+        if finding.change:
+            say(out, f"{finding.name}: {finding.change}")

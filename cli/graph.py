@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from ..runtime.language.errors import AloftError
-from .shared.observing import As, Keys, Local
 from .shared.options import CompletedOverrides
 from .shared.output import console, errors_reported, print_json, say, table
+from .shared.running_graphs import As, Keys, Local
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -81,8 +81,7 @@ def graph(
             )
         values: Values | None = None
         if graph.suffix == ".rrd":
-            from ..logs.replay.opened_run import OpenedRun
-            from ..logs.replay.tick_values import TickValues
+            from ..logs.replay.opened_run import OpenedRun, TickValues
 
             opened = OpenedRun.of(graph)
             checked = opened.load(overrides or [])

@@ -8,12 +8,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..runtime.language.errors import AloftError, ExitCode, UnitError
-from .planning.rehearse import REHEARSE_HELP, rehearsal
-from .running.run_many import run_many
-from .running.run_once import run_once
-from .shared.jump_graphs import graph_of
 from .shared.options import JsonBesideTables, NoRecord, Overrides, Quiet
 from .shared.output import console, errors_reported, print_json, say
+from .shared.rehearsal import REHEARSE_HELP, graph_of, rehearsal
+from .shared.run_graph import run_many, run_once
 
 if TYPE_CHECKING:
     from rich.console import Console

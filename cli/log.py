@@ -11,7 +11,7 @@ import typer
 from ..runtime.language.errors import AloftError, ExitCode
 from .shared.options import AsJson
 from .shared.output import console, errors_reported, number, print_json, print_warning, say, table
-from .shared.recordings import read
+from .shared.viewing import read
 
 if TYPE_CHECKING:
     from ..logs.file.reader import RecordedRun
@@ -78,7 +78,7 @@ def export(
 ) -> None:
     """Write the signals of a recording, every number exact, into a file of another format."""
     from ..logs.exporting.export import export as write_export
-    from ..logs.recording.remedy import remedy
+    from ..logs.recording.place import remedy
 
     with errors_reported(as_json):
         kinds = [k for k, on in (("csv", csv), ("parquet", parquet), ("mcap", mcap)) if on]

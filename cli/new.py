@@ -11,8 +11,8 @@ from typing import Annotated
 import typer
 
 from ..runtime.language.errors import AloftError
+from .shared import templates
 from .shared.output import errors_reported
-from .writing import templates
 
 new = typer.Typer(
     name="new",

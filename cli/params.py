@@ -73,7 +73,7 @@ def set_(
 ) -> None:
     """Change parameters, all in the same tick. If one of them is wrong, none is changed."""
     from ..runtime.live.parameter_endpoint import set_parameters
-    from .shared.endpoints import find
+    from .shared.running_graphs import find
 
     with errors_reported(as_json):
         changes = set_parameters(find(run), settings)
@@ -103,7 +103,7 @@ def web(
 def ask_list(run: str) -> tuple[str, list[dict[str, Any]]]:
     """The graph's name and all its parameters. Raises ``AloftError``."""
     from ..runtime.live.parameter_endpoint import ask
-    from .shared.endpoints import find
+    from .shared.running_graphs import find
 
     answer = ask(find(run), {"verb": "list"})
     return answer["graph"], answer["parameters"]

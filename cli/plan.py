@@ -8,20 +8,20 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..runtime.language.errors import ExitCode
-from .planning.plan_grid import plan_grid
-from .planning.plan_output import (
+from .shared.options import JsonBesideTables
+from .shared.output import console, errors_reported, print_error, print_json, say
+from .shared.planning import (
     failure,
     listed_row,
     listing,
     nearest_json,
+    plan_grid,
     plan_json,
     print_plan,
     recorded_motion,
     summary,
 )
-from .planning.rehearse import LANDING_HELP, REHEARSE_HELP, rehearsal_of_file
-from .shared.options import JsonBesideTables
-from .shared.output import console, errors_reported, print_error, print_json, say
+from .shared.rehearsal import LANDING_HELP, REHEARSE_HELP, rehearsal_of_file
 from .shared.viewing import how_to_view
 
 if TYPE_CHECKING:

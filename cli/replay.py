@@ -140,7 +140,7 @@ def execute(
 ) -> Replayed:
     """Replay, with a progress bar. Raises ``AloftError``."""
     from ..logs.replay.replay import replay as replay_run
-    from .shared.progress import TickCounter, progress_bar
+    from .shared.output import TickCounter, progress_bar
 
     if first is not None and until is not None and until <= first:
         raise AloftError(

@@ -10,14 +10,13 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from ..runtime.language.errors import AloftError
-from .running.run_many import run_many
-from .running.run_once import Runs, run_once
 from .shared.options import CompletedOverrides, JsonBesideTables, NoRecord, Quiet
 from .shared.output import (
     console,
     errors_reported,
     print_warning,
 )
+from .shared.run_graph import Runs, run_many, run_once
 
 if TYPE_CHECKING:
     from ..logs.viewing.viewer import Viewer
@@ -98,7 +97,7 @@ def run(
 ) -> None:
     """Run a graph; print its metrics and the time each block took; write a recording."""
     from ..runtime.graph import load
-    from ..runtime.running.real_time import NO_WISHES, RealTime
+    from ..runtime.running.real_time import NO_REAL_TIME, RealTimeOptions
     from ..studies.batch.seeds import parse_seeds
 
     settings = [*(overrides or []), *([f"duration={duration}"] if duration else [])]
@@ -112,11 +111,11 @@ def run(
             raise AloftError("choose one of --machine, --local and --seeds")
         if keys is not None and not (machine or local):
             raise AloftError("--keys is for links between machines: --machine NAME, or --local")
-        wishes_of_thread = RealTime(cpu, priority, lock_memory)
-        if wishes_of_thread != NO_WISHES and (seeds or local):
+        wishes_of_thread = RealTimeOptions(cpu, priority, lock_memory)
+        if wishes_of_thread != NO_REAL_TIME and (seeds or local):
             raise AloftError("--cpu, --priority and --lock-memory are for one run, in one process")
         if local:
-            from .running.run_local import Wishes, run_local
+            from .shared.run_machines import Wishes, run_local
 
             place = None if no_record else record
             wishes = Wishes(
@@ -131,7 +130,7 @@ def run(
             loaded: Runs = load(graph, settings)
             name = loaded.checked.name
             if machine:
-                from .running.run_part import Part
+                from .shared.run_machines import Part
 
                 loaded, name = Part(loaded.checked, machine, keys), f"{name}-{machine}"
             default = Path("recordings") / f"{name}.rrd"
@@ -200,12 +199,12 @@ def leave_viewer(viewer: Viewer, *, wait: bool) -> None:
 
 def open_endpoint(graph: Runs, name: str, default: str) -> ParameterEndpoint | None:
     """Open the endpoint at which ``aloft params`` reaches the run. Unless it was asked for, it may fail."""
-    from .shared import endpoints
+    from .shared import running_graphs
 
     if name == "none" or not (name or graph.checked.clock.kind != "free"):
         return None
     try:
-        return endpoints.open_endpoint(name or default)
+        return running_graphs.open_endpoint(name or default)
     except AloftError as error:
         if name:
             raise

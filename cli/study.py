@@ -11,8 +11,15 @@ import typer
 from ..runtime.language.errors import AloftError, ExitCode
 from .shared.options import Cluster, JsonBesideTables, Workers
 from .shared.output import console, errors_reported, print_json, print_warning, say
-from .studying.study_output import print_rows, print_tuned, study_json, tuned_json
-from .studying.study_runs import check_cells, make_all, report_stop
+from .shared.studies import (
+    check_cells,
+    make_all,
+    print_rows,
+    print_tuned,
+    report_stop,
+    study_json,
+    tuned_json,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -63,7 +70,7 @@ def study(
     """
     from ..studies.batch.seeds import parse_seeds
     from ..studies.reading import part_of, read_study
-    from .studying.paper import NAME, draw_paper
+    from .shared.paper import NAME, draw_paper
 
     screen = console(to_stderr=as_json)
     with errors_reported(as_json):
@@ -87,7 +94,7 @@ def study(
         else:
             part = part_of(found, where or [])
             if number:
-                from .studying.study_open import open_run
+                from .shared.studies import open_run
 
                 raise typer.Exit(
                     open_run(found, part, chosen, folder, number, screen, as_json, show=not no_show)

@@ -1,4 +1,4 @@
-"""``aloft top``: shows the machines of a graph that runs: rates, ages, losses, overruns."""
+"""``aloft top`` and ``aloft watch``: what the machines of a running graph do, as a table or in the viewer."""
 
 from __future__ import annotations
 
@@ -10,14 +10,15 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..runtime.language.errors import AloftError, ExitCode
-from .shared.observing import As, Keys, Local, observer_of
 from .shared.options import Overrides
 from .shared.output import console, errors_reported, print_json, table
+from .shared.running_graphs import As, Keys, Local, observer_of
 
 if TYPE_CHECKING:
     from rich.console import Group
 
     from ..runtime.links.observer import Observer
+
 
 PERIOD = 0.5
 
@@ -125,3 +126,41 @@ def _tables(observer: Observer) -> Group:
                    ">twice or late")  # fmt: skip
         parts.append(table("", columns, links))
     return Group(*parts)
+
+
+def watch(
+    graph: Annotated[Path, typer.Argument(help="The graph file that the machines run.")],
+    machine: Annotated[str, typer.Argument(help="The machine whose signals are shown.")],
+    web: Annotated[bool, typer.Option("--web", help="In a browser.")] = False,
+    keys: Keys = None,
+    name: As = "viewer",
+    local: Local = 0,
+    overrides: Overrides = None,
+) -> None:
+    """Show a machine's signals live, 50 times a second, until Ctrl-C. Nothing is sent to it."""
+    from ..logs.recording.live_feed import WatchedPart
+    from ..logs.viewing.viewer import start_viewer
+
+    with (
+        errors_reported(False),
+        observer_of(graph, overrides or [], keys, name, local) as observer,
+    ):
+        observer.placed.machine(machine)
+        if observer.wait_for((machine,), 10.0):
+            raise AloftError(f"nothing was heard of {machine!r} for 10 s: does it run?")
+        if observer.state_of(machine) == "another graph":
+            raise AloftError(f"{machine!r} runs another graph than {graph}")
+        viewer = start_viewer("web" if web else "window")
+        try:
+            typer.echo(
+                f"live view: {viewer.page}" if web else "live view: Ctrl-C ends it", err=True
+            )
+            shown = WatchedPart(observer, machine, viewer.source)
+            with suppress(KeyboardInterrupt):
+                while viewer.lives() and not shown.problem:
+                    time.sleep(0.1)
+            shown.close()
+            if shown.problem:
+                raise AloftError(shown.problem)
+        finally:
+            viewer.stop()

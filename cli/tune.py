@@ -12,8 +12,7 @@ import typer
 from ..runtime.language.errors import AloftError, ExitCode
 from .shared.options import Cluster, JsonBesideTables, Workers
 from .shared.output import console, errors_reported, print_json, say
-from .studying.study_output import print_tuned, tuned_json
-from .studying.study_runs import check_cells, make_all, report_stop
+from .shared.studies import check_cells, make_all, print_tuned, report_stop, tuned_json
 
 if TYPE_CHECKING:
     from ..studies.execution import Run

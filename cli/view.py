@@ -59,7 +59,7 @@ def view(
 def compare(first: Path, second: Path, path: Path) -> None:
     """Write both runs into one file for the viewer."""
     from ..logs.file.reader import read
-    from ..logs.recording.comparison import write_comparison
+    from ..logs.recording.drawn_run import write_comparison
 
     try:
         write_comparison(path, read(first), read(second))

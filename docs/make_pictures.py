@@ -18,12 +18,12 @@ from pathlib import Path
 from rich.console import Console
 
 from aloft import LoadError, load
-from aloft.cli.running.run_output import print_result
-from aloft.cli.shared.endpoints import path_of
 from aloft.cli.shared.output import say
+from aloft.cli.shared.run_graph import print_result
+from aloft.cli.shared.running_graphs import path_of
 from aloft.logs.file.reader import read
+from aloft.logs.recording.drawn_run import write_view
 from aloft.logs.recording.recorder import Recorder
-from aloft.logs.recording.whole_view import write_view
 from aloft.logs.viewing.viewer import ViewerError, start_viewer
 from aloft.runtime.drawing.diagram import diagram
 from aloft.runtime.drawing.layout import draw

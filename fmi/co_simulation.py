@@ -6,6 +6,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
+from ..robots.description import RobotDescription
 from ..runtime.language.block import Block, Input, Output
 from ..runtime.language.parameters import Parameters
 from .description import Description, Variable, describe, signals
@@ -38,7 +39,13 @@ class CoSimulation(UnitBlock):
     """
 
     @classmethod
-    def fitted(cls, params: Parameters, folder: Path, graph_folder: Path) -> type[Block]:
+    def fitted(
+        cls,
+        params: Parameters,
+        folder: Path,
+        robot: RobotDescription | None = None,
+        graph_folder: Path | None = None,
+    ) -> type[Block]:
         """The class with the ports of the FMU."""
         assert isinstance(params, FmuParameters)
         found = describe(params.file, folder, params.outputs)

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from pydantic import field_validator
 
+from ..robots.description import RobotDescription
 from ..runtime.language.block import Block, Output, State
 from ..runtime.language.errors import UnitError
 from ..runtime.language.parameters import Parameters, parameter
@@ -55,7 +56,13 @@ class Outside(Block):
     params: OutsideParameters
 
     @classmethod
-    def fitted(cls, params: Parameters, folder: Path, graph_folder: Path) -> type[Block]:
+    def fitted(
+        cls,
+        params: Parameters,
+        folder: Path,
+        robot: RobotDescription | None = None,
+        graph_folder: Path | None = None,
+    ) -> type[Block]:
         """The class with these outputs."""
         assert isinstance(params, OutsideParameters)
         body: dict[str, Any] = {"__doc__": cls.__doc__, "__module__": cls.__module__}

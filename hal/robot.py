@@ -5,6 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from functools import cached_property
+from pathlib import Path
 from typing import Any, ClassVar, Literal, NamedTuple
 
 from ..blocks.signals import (
@@ -20,8 +21,11 @@ from ..mathematics.arrays import Array, Counts, Flags
 from ..mathematics.compiling.kernel_call import KernelCall
 from ..mathematics.kernel import kernel
 from ..robots.description import RobotDescription
-from ..runtime.language.block import Block, Context, Input, Output
+from ..runtime.language.block import Block, Context, Input, Output, Port
+from ..runtime.language.errors import BlockError
 from ..runtime.language.parameters import Parameters
+from ..runtime.language.signals import Signal
+from .sensors.sensor import MountedSensor, mounted_sensors
 
 _DRIVING = int(DrivePhase.DRIVING)
 
@@ -57,11 +61,15 @@ def report_healthy(tick: Counts, base_period: float, health: HealthFields) -> No
     health.joints_valid[()] = health.imu_valid[()] = health.contacts_valid[()] = True
 
 
+_CLASSES: dict[tuple[Any, ...], type[Block]] = {}
+"""Robots with outputs for mounted sensors, by class and sensors."""
+
+
 class Robot(Block, ABC):
     """The base of every block that drives a robot, simulated or real.
 
-    All robots have the same ports, so a graph runs unchanged on any of them. A robot is a Moore
-    block. In tick ``n`` of the control clock it first publishes the sensors as they were at the
+    All robots have the same ports, so a graph runs unchanged on any of them, and one output more for
+    each sensor that the robot's description mounts on a link (``sensors/``). A robot is a Moore block. In tick ``n`` of the control clock it first publishes the sensors as they were at the
     instant ``t_n`` (``emit``). The controller runs. Then the robot takes the command and its time
     goes on to ``t_{n+1}`` (``update``).
 
@@ -70,7 +78,8 @@ class Robot(Block, ABC):
     control thread once in every tick, so they must not allocate arrays, must not wait without a
     time-out, and must not raise because a single packet is bad:
 
-    * ``read`` writes the latest sensor sample into ``imu``, ``joints`` and ``contacts``.
+    * ``read`` writes the latest sensor sample into ``imu``, ``joints``, ``contacts`` and the outputs of
+      mounted sensors.
     * ``report`` writes into ``health`` how the drives and the sensors are. What ``Robot`` has says
       that all is well, at the tick's own time.
     * ``write`` sends ``command`` to the drives.
@@ -104,6 +113,46 @@ class Robot(Block, ABC):
     contacts = Output(ContactSwitches, text="tactile switches, at the same instant")
     health = Output(RobotHealth, text="voltages, temperatures, currents, conditions and ages")
     command = Input(JointCommand, text="what the drives are to do")
+
+    @classmethod
+    def fitted(
+        cls,
+        params: Parameters,
+        folder: Path,
+        robot: RobotDescription | None = None,
+        graph_folder: Path | None = None,
+    ) -> type[Block]:
+        """The class with an output for every sensor that the robot's description mounts."""
+        sensors = mounted_sensors(robot, folder)
+        key = (cls, *((sensor.name, type(sensor)) for sensor in sensors))
+        if not sensors or all(sensor.name in cls.outputs for sensor in sensors):
+            return cls
+        if key not in _CLASSES:
+            ports = cls.ports_of(sensors)
+            for name in ports:
+                if hasattr(cls, name) or not name.isidentifier():
+                    raise BlockError(
+                        f"sensor {name}: the output of a robot cannot be called {name!r}; give it "
+                        "another name in the robot's description"
+                    )
+            body = {"__doc__": cls.__doc__, "__module__": cls.__module__, **ports}
+            _CLASSES[key] = type(cls.__name__, (cls,), body)
+        return _CLASSES[key]
+
+    @classmethod
+    def ports_of(cls, sensors: tuple[MountedSensor, ...]) -> dict[str, Port[Any]]:
+        """The ports for mounted sensors, by name."""
+        return {
+            sensor.name: Output(
+                sensor.signal,
+                text=f"{sensor.kind or 'sensor'} on {sensor.link}, at the same instant",
+            )
+            for sensor in sensors
+        }
+
+    def mounted(self) -> dict[str, Signal]:
+        """The outputs of the mounted sensors, by name."""
+        return {name: getattr(self, name) for name in self.robot.sensors.mounted}
 
     @classmethod
     def absent_outputs(

@@ -70,6 +70,9 @@ def report(read: ReadRobot) -> dict[str, Any]:
             "encoders": len(robot.joints),
             "imu": robot.sensors.imu,
             "switches": len(robot.contacts) if robot.sensors.switches else 0,
+            "mounted": {
+                name: f"{part.kind} on {part.link}" for name, part in robot.sensors.mounted.items()
+            },
         },
         "points": list(robot.points),
         "missing": missing(read),

@@ -204,12 +204,41 @@ class Transmission(Part):
     joint_to_motor: tuple[tuple[float, ...], ...]
 
 
+class MountedSensorPart(Part):
+    """A sensor mounted on a ``link`` at ``position`` [m, link frame], its axes parallel to the link's.
+
+    ``kind`` names what it is, or a class as ``module:Class``; that class knows the further settings.
+    """
+
+    model_config = ConfigDict(extra="allow")
+
+    later = ("position",)
+
+    kind: str
+    link: str
+    position: Vector3 = (0.0, 0.0, 0.0)
+
+
 class Sensors(Part):
-    """Which sensors the robot has besides its joint encoders: an ``imu`` at the base's origin,
-    parallel to the base, and a tactile switch at every contact point."""
+    """The sensors that the robot has besides its joint encoders: an ``imu`` at the base's origin,
+    parallel to the base, a tactile switch at every contact point, and further ones by name."""
+
+    model_config = ConfigDict(extra="allow")
+
+    __pydantic_extra__: dict[str, MountedSensorPart]
 
     imu: bool = True
     switches: bool = True
+
+    @property
+    def mounted(self) -> Mapping[str, MountedSensorPart]:
+        """The further sensors by name, in the order of the description."""
+        return self.__pydantic_extra__ or {}
+
+    @property
+    def built_in(self) -> Sensors:
+        """The sensors without those that are mounted on links."""
+        return Sensors(imu=self.imu, switches=self.switches)
 
 
 BASE_VELOCITIES = {"floating": 6, "planar": 3, "fixed": 0}

@@ -10,6 +10,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from ..robots.description import RobotDescription
 from ..runtime.language.block import Block, Input, Metric
 from ..runtime.language.parameters import Parameters, parameter
 from ..runtime.language.signals import Signal
@@ -55,7 +56,13 @@ class Publish(Ros2Block):
     message: Signal
 
     @classmethod
-    def fitted(cls, params: Parameters, folder: Path, graph_folder: Path) -> type[Block]:
+    def fitted(
+        cls,
+        params: Parameters,
+        folder: Path,
+        robot: RobotDescription | None = None,
+        graph_folder: Path | None = None,
+    ) -> type[Block]:
         """The class whose input has the fields of the message type."""
         assert isinstance(params, PublishParameters)
         return _class_for(message_type(params).signal)

@@ -9,6 +9,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from ..robots.description import RobotDescription
 from ..runtime.language.block import Block, Metric, Output
 from ..runtime.language.parameters import Parameters, parameter
 from ..runtime.language.signals import Field, Signal
@@ -61,7 +62,13 @@ class Subscribe(Ros2Block):
     health = Output(TopicHealth, text="ages and counts")
 
     @classmethod
-    def fitted(cls, params: Parameters, folder: Path, graph_folder: Path) -> type[Block]:
+    def fitted(
+        cls,
+        params: Parameters,
+        folder: Path,
+        robot: RobotDescription | None = None,
+        graph_folder: Path | None = None,
+    ) -> type[Block]:
         """The class whose output has the fields of the message type."""
         assert isinstance(params, SubscribeParameters)
         return _class_for(message_type(params).signal)

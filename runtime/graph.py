@@ -22,7 +22,7 @@ from .loading import load as load_checked
 from .loading import load_text
 from .loading.reading.nodes import text_of
 from .running.executor import Executor
-from .running.real_time import NO_WISHES, RealTime
+from .running.real_time import NO_REAL_TIME, RealTimeOptions
 from .running.run_result import RunResult
 from .running.sinks import Sink
 from .running.stepping import SteppedRun
@@ -61,7 +61,7 @@ class Graph:
         log: bool = True,
         plain: bool = False,
         fuse: bool = True,
-        real_time: RealTime = NO_WISHES,
+        real_time: RealTimeOptions = NO_REAL_TIME,
     ) -> RunResult:
         """Run the graph from start to close.
 

@@ -80,14 +80,14 @@ ALLOWED: dict[str, tuple[str, ...]] = {
     "fmi": ("robots", "runtime/language"),
     "fmi/exporting": ("fmi", "robots", "runtime", "logs/file"),
     "logs/file": ("robots", "runtime/language", "runtime/running"),
-    "logs/viewing": ("logs/file", "mathematics/arrays", "robots", "runtime/language"),
+    "logs/viewing": ("logs/file", "hal/sensors", "mathematics/arrays", "robots", "runtime/language"),
     "logs/recording": (
         "logs/file", "logs/viewing", "mathematics/arrays", "robots", "runtime/language", "runtime/running",
         "runtime/placement", "runtime/links",
     ),
     "logs/replay": ("logs/file", "logs/viewing", "robots", "runtime"),
     "logs/exporting": (
-        "logs/file", "logs/viewing", "mathematics/arrays", "robots", "runtime/language",
+        "logs/file", "hal/sensors", "logs/viewing", "mathematics/arrays", "robots", "runtime/language",
     ),
     "logs": ("logs/file",),
     "studies": ("mathematics", "robots", "runtime", "planner", "blocks", "hal", "logs"),

@@ -9,8 +9,7 @@ from typing import Any
 import pytest
 
 import aloft
-from aloft.cli.blocks import all_references
-from aloft.cli.writing.markdown import reference_page
+from aloft.cli.blocks import all_references, reference_page
 from aloft.robots.description import find_robot
 from aloft.runtime.loading import LoadError
 

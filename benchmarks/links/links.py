@@ -23,8 +23,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...runtime.language.stages import LinkPolicy
-from ...runtime.links.free_link import LatestInbox, LinkHealth
-from ...runtime.links.lockstep_link import Inbox
+from ...runtime.links.free_link import LatestReceiver, LinkHealth
+from ...runtime.links.lockstep_link import LockstepReceiver
 from ...runtime.links.message import HEADER, MessageReader, MessageWriter
 from ...runtime.links.peers import ClockOffset
 from ...runtime.loading import load_text
@@ -99,10 +99,12 @@ class _End:
     def reader(self, link: Link) -> MessageReader:
         return MessageReader(link, self.memory.bus.layout, self.memory.bus.buffer.data)
 
-    def inbox(self, link: Link) -> Inbox:
-        inbox = Inbox(link, self.reader(link), _Known(), PATIENCE)  # type: ignore[arg-type]  # stands in for the peers
-        self.transport.subscribe(data_key(link.sender, link.receiver, link.source), inbox.hear)
-        return inbox
+    def receiver(self, link: Link) -> LockstepReceiver:
+        receiver = LockstepReceiver(link, self.reader(link), _Known(), PATIENCE)  # type: ignore[arg-type]  # stands in for the peers
+        self.transport.subscribe(
+            data_key(link.sender, link.receiver, link.source), receiver.on_message
+        )
+        return receiver
 
 
 def _links(placed: PlacedGraph) -> tuple[list[Link], Link]:
@@ -142,7 +144,7 @@ def _round_trips(placed: PlacedGraph, rounds: int, repetitions: int) -> list[Row
     end = _End(placed, "a", wait=True)
     try:
         writer, put = end.sender(there[0])
-        inbox = end.inbox(back)
+        receiver = end.receiver(back)
         bare, answers = end.transport.publisher("bare/there"), SimpleQueue[bytes]()
         end.transport.subscribe("bare/back", answers.put)
         data = bytes(HEADER + there[0].payload)
@@ -157,7 +159,7 @@ def _round_trips(placed: PlacedGraph, rounds: int, repetitions: int) -> list[Row
                 began = time.perf_counter_ns()
                 put(writer.write(tick, time.monotonic_ns()))
                 sending.append(time.perf_counter_ns() - began)
-                inbox.show(tick)
+                receiver.write_outputs(tick)
                 tick += 1
 
         def through_zenoh(count: int) -> None:
@@ -241,7 +243,7 @@ def answer(ports: tuple[int, int]) -> None:
     placed = graph(ports)
     there, back = _links(placed)
     end = _End(placed, "b", wait=True)
-    inbox = end.inbox(there[0])
+    receiver = end.receiver(there[0])
     writer, put = end.sender(back)
     questions, bare = SimpleQueue[bytes](), end.transport.publisher("bare/back")
     end.transport.subscribe("bare/there", questions.put)
@@ -253,7 +255,7 @@ def answer(ports: tuple[int, int]) -> None:
     def answer_links() -> None:
         tick = 0
         while True:
-            inbox.show(tick)
+            receiver.write_outputs(tick)
             put(writer.write(tick, time.monotonic_ns()))
             tick += 1
 
@@ -271,11 +273,11 @@ def answer(ports: tuple[int, int]) -> None:
         questions, bare = SimpleQueue[bytes](), end.transport.publisher("bare/back")
         end.transport.subscribe("bare/there", questions.put)
         for link in there:
-            counter = LatestInbox(
+            counter = LatestReceiver(
                 link, end.reader(link), _Known(),  # type: ignore[arg-type]  # stands in for the peers
                 LinkPolicy(), LinkHealth.allocate(), lambda reason: None,
             )  # fmt: skip
-            end.transport.subscribe(data_key("a", "b", link.source), counter.hear)
+            end.transport.subscribe(data_key("a", "b", link.source), counter.on_message)
             counters.append(counter)
         print(json.dumps("ready"), flush=True)
         threading.Thread(target=answer_bare, daemon=True).start()

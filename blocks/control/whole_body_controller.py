@@ -245,11 +245,17 @@ class WholeBodyController(KernelBlock):
             yield Misfit(str(error), parameter="tasks")
 
     @classmethod
-    def fitted(cls, params: Parameters, folder: Path, graph_folder: Path) -> type[Block]:
+    def fitted(
+        cls,
+        params: Parameters,
+        folder: Path,
+        robot: RobotDescription | None = None,
+        graph_folder: Path | None = None,
+    ) -> type[Block]:
         """The class with the inputs of the tasks; a list that cannot be used is reported later."""
         assert isinstance(params, cls.Params)
         try:
-            chosen = choose_tasks(params.tasks, (graph_folder, folder))
+            chosen = choose_tasks(params.tasks, (graph_folder or folder, folder))
         except TaskChoiceError:
             return cls
         inputs = [(each.kind, own, name) for each in chosen for own, name in each.inputs.items()]

@@ -1,1 +1,1 @@
-"""What several verbs need: printing, options, completion, progress, and where graphs run."""
+"""What the verbs need: printing, options, progress, running graphs, and how runs, plans and studies are made and shown."""

@@ -14,7 +14,7 @@ from ...runtime.language.errors import AloftError
 
 if TYPE_CHECKING:
     from ...runtime.live.live_run import LiveRun
-    from ...runtime.live.live_server import Opened, Watched
+    from ...runtime.live.live_server import Opened, WatchedRun
     from ...runtime.live.spread_run import SpreadRun
     from ...runtime.placement.placed import PlacedGraph
 
@@ -34,7 +34,7 @@ class Elsewhere:
     process: int = 0
 
 
-def open_live_run(name: str, elsewhere: Elsewhere | None = None) -> Watched:
+def open_live_run(name: str, elsewhere: Elsewhere | None = None) -> WatchedRun:
     """The running graph of that name, or the only one there is; all parts of a graph on several
     machines.
 
@@ -46,7 +46,7 @@ def open_live_run(name: str, elsewhere: Elsewhere | None = None) -> Watched:
         AloftError: no such graph runs.
     """
     from ...runtime.live.live_run import LiveRun
-    from .endpoints import find
+    from .running_graphs import find
 
     try:
         path = find(name or (elsewhere.graph.stem if elsewhere is not None else ""))
@@ -59,7 +59,7 @@ def open_live_run(name: str, elsewhere: Elsewhere | None = None) -> Watched:
     return _whole(run, path, elsewhere) if run.machine else run
 
 
-def _whole(run: LiveRun, path: Path, elsewhere: Elsewhere | None) -> Watched:
+def _whole(run: LiveRun, path: Path, elsewhere: Elsewhere | None) -> WatchedRun:
     """The whole of the graph of which ``run`` is the part that answers at ``path``."""
     from ...runtime.live.spread_run import SpreadRun
     from ...runtime.placement.placed import place
@@ -96,7 +96,7 @@ def _spread_elsewhere(elsewhere: Elsewhere) -> SpreadRun | None:
     from ...runtime.loading import load
     from ...runtime.placement.placed import place
     from ...runtime.transports.keys import secured
-    from .local_runs import settings_of
+    from .running_graphs import settings_of
 
     def settings() -> tuple[str, ...]:
         return settings_of(elsewhere.graph, elsewhere.process)
@@ -134,7 +134,7 @@ def _spread_elsewhere(elsewhere: Elsewhere) -> SpreadRun | None:
 def _control(placed: PlacedGraph) -> Path | None:
     """The socket of a part on this machine that takes changes of parameters by its usual name."""
     from ...runtime.live.parameter_endpoint import answers
-    from .endpoints import path_of
+    from .running_graphs import path_of
 
     for spec in placed.machines:
         with suppress(AloftError):  # not every name can be that of a socket
@@ -144,10 +144,10 @@ def _control(placed: PlacedGraph) -> Path | None:
     return None
 
 
-def serve_live(run: Watched, save: Path | None = None, opened: Opened = "diagram") -> None:
+def serve_live(run: WatchedRun, save: Path | None = None, opened: Opened = "diagram") -> None:
     """Serve the page until Ctrl-C is pressed."""
     from ...runtime.live.live_server import LiveServer
-    from .stopping import stopped_by_signals
+    from .output import stopped_by_signals
     from .viewing import open_page
 
     server = LiveServer(run, save or Path(f"{run.graph.name}-tuned.yaml"), opened)

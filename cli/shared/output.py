@@ -1,9 +1,10 @@
-"""Prints what the verbs have to say: tables for people, one JSON object for programs, and errors."""
+"""Prints what the verbs have to say: tables for people, one JSON object for programs, progress, and errors."""
 
 from __future__ import annotations
 
 import json
 import math
+import signal
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -16,7 +17,10 @@ from ...runtime.loading.problems import LoadError
 
 if TYPE_CHECKING:
     from rich.console import Console
+    from rich.progress import Progress, TaskID
     from rich.table import Table
+
+    from ...runtime.running.memory import BoundGraph
 
 
 SET_HELP = "Set a parameter: block.parameter=value. Repeatable."
@@ -126,3 +130,85 @@ def errors_reported(as_json: bool, *, traceback: bool = False) -> Iterator[None]
             if traceback and isinstance(error, RunError):
                 print_place(error, traceback=True)
         raise typer.Exit(code) from error
+
+
+TICKS_A_STEP = 100
+"""Ticks between two updates of the bar: the control thread pays microseconds for each."""
+
+
+class TickCounter:
+    """A sink that moves a progress bar."""
+
+    def __init__(self, progress: Progress, task: TaskID) -> None:
+        self._progress = progress
+        self._task = task
+
+    def open(self, bound: BoundGraph) -> None:
+        """No-op: there is nothing to prepare."""
+
+    def record(self, tick: int) -> None:
+        """Move the bar now and then."""
+        if tick % TICKS_A_STEP == 0:
+            self._progress.update(self._task, completed=tick)
+
+    def close(self) -> None:
+        """No-op: there is nothing to finish."""
+
+
+@contextmanager
+def progress_bar(out: Console, text: str, total: int | None) -> Iterator[tuple[Progress, TaskID]]:
+    """A progress bar that disappears at the end. It is not drawn if the output is no terminal."""
+    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
+
+    columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn())
+    with Progress(
+        *columns,
+        TimeElapsedColumn(),
+        console=out,
+        transient=True,
+        disable=not out.is_terminal,
+        refresh_per_second=5,
+    ) as progress:
+        yield progress, progress.add_task(text, total=total)
+
+
+@contextmanager
+def compiling_shown(progress: Progress) -> Iterator[None]:
+    """Show a second bar while kernels are compiled, which only the first run on a machine does."""
+    from ...mathematics.compiling.compile_calls import watchers
+
+    bars: list[TaskID] = []
+
+    def watch(done: int, total: int) -> None:
+        if not bars:
+            bars.append(progress.add_task("compiling, on the first run only", total=total))
+        progress.update(bars[0], completed=done, visible=done < total)
+
+    watchers.append(watch)
+    try:
+        yield
+    finally:
+        watchers.remove(watch)
+
+
+@contextmanager
+def stopped_by_signals() -> Iterator[list[signal.Signals]]:
+    """Leave the block at the first SIGINT or SIGTERM; the list then holds that signal.
+
+    Within the block it is a ``KeyboardInterrupt``, so what is under way can clean up.
+    """
+    received: list[signal.Signals] = []
+
+    def stop(number: int, _: object) -> None:
+        received.append(signal.Signals(number))
+        raise KeyboardInterrupt
+
+    before = {number: signal.signal(number, stop) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield received
+    except KeyboardInterrupt:
+        if not received:
+            raise
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)

@@ -1,4 +1,4 @@
-"""Shows recordings, pages and the viewer, and says which command would show one."""
+"""Reads recordings, shows them, pages and the viewer, and says which command would show one."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from ...logs.file.reader import RecordedRun
     from ...logs.viewing.viewer import Viewer
 
+
 MANY_TICKS = 20_000
 """Ticks that take some seconds to draw."""
 
@@ -25,11 +26,11 @@ def draw(recording: Path, layout: Path | None, path: Path) -> Path:
     What is no recording of a run, such as the motion of a plan or a comparison that was kept, is
     shown as it is.
     """
-    from ...logs.file.contents import NoRunError
+    from ...logs.file.messages import NoRunError
     from ...logs.file.reader import read
-    from ...logs.recording.whole_view import write_view
-    from ...logs.viewing.layout_file import blueprint_with, layout_beside, read_layout
-    from ...logs.viewing.robot_meshes import missing_meshes
+    from ...logs.recording.drawn_run import write_view
+    from ...logs.viewing.blueprint import blueprint_with, layout_beside, read_layout
+    from ...logs.viewing.robot_shapes import missing_meshes
 
     try:
         run = read(recording)
@@ -76,7 +77,7 @@ def show(file: Path, *, web: bool) -> None:
 
 def keep_open(viewer: Viewer) -> None:
     """Wait until the window is closed, or for Ctrl-C; then end the viewer."""
-    from .stopping import stopped_by_signals
+    from .output import stopped_by_signals
 
     try:
         if viewer.kind == "web":
@@ -102,3 +103,18 @@ def how_to_view(recording: Path) -> str:
     here = Path.cwd()
     name = program.relative_to(here) if program.is_relative_to(here) else program
     return f"{name if program.name == 'aloft' else 'aloft'} view {recording}"
+
+
+def read(file: Path, *, damaged: bool = False) -> RecordedRun:
+    """The recording. Raises ``AloftError`` if it cannot be read."""
+    from ...logs.file import reader
+    from ...logs.recording.place import part_of
+
+    try:
+        return reader.read(file, damaged=damaged)
+    except FileNotFoundError:
+        part = part_of(file)
+        also = f"; {part} is there: it is being written, or was cut off" if part.exists() else ""
+        raise AloftError(f"{file} cannot be read: there is no such file{also}") from None
+    except OSError as error:
+        raise AloftError(f"{file} cannot be read: {error.strerror or error}") from None

@@ -13,7 +13,7 @@ from ...runtime.language.parameters import Parameters, parameter
 from ..drive_control import joint_gains
 from .bus import BusError, open_port
 from .configuration import Hardware, HardwareError
-from .driven_robot import DrivenRobot, DriveParameters, read_hardware
+from .driven_robot import DrivenRobot, DriveParameters, missing_sensors, read_hardware
 from .driver import DriveLaw, Driver
 from .motor_loop import CommandQueue, MotorThread
 from .watchdog import AlwaysHeld, DeadMansSwitch, Watchdog, open_switch, wait_until_held
@@ -82,6 +82,7 @@ class BearRobot(DrivenRobot):
         except HardwareError as error:
             yield Misfit(str(error), parameter="hardware", found=params.hardware)
             return
+        yield from missing_sensors(hardware, context.robot)
         ratio = context.period / hardware.bus.period
         if abs(ratio - round(ratio)) > 1e-6 or round(ratio) < 1:
             yield Misfit(

@@ -16,6 +16,7 @@ from ...robots.robot_description import RobotDescription
 from ...robots.validation.faults import RobotError, nearest
 from ...runtime.language.errors import AloftError
 from ...runtime.language.parameters import Parameters, parameter
+from ..sensors.sensor import MountedSensor, mounted_sensors
 from .bus import BAUDRATE
 from .protocol import LAST_DEVICE
 from .sense_board import SWITCHES
@@ -56,6 +57,10 @@ class BoardSettings(Parameters):
     switches: list[str] = parameter(
         list(SWITCHES), max_length=7, text="the contact point of each bit of the switches' byte"
     )
+    sensors: list[str] = parameter(
+        [],
+        text="the robot's mounted sensors in a packet, behind the switches' byte, in their order",
+    )
     lost_cycles: int = parameter(
         10, ge=1, le=1000, text="exchanges without a packet before all drives are damped"
     )
@@ -68,6 +73,11 @@ class BoardSettings(Parameters):
     saturated_packets: int = parameter(
         100, ge=1, le=10000, text="packets in a row at the gyroscope's range before all are damped"
     )
+
+    def mounted(self, robot: RobotDescription) -> tuple[MountedSensor, ...]:
+        """The mounted sensors in a packet, in their order."""
+        known = {sensor.name: sensor for sensor in mounted_sensors(robot)}
+        return tuple(known[name] for name in self.sensors)
 
 
 class DriveSettings(Parameters):
@@ -227,6 +237,11 @@ class Hardware(Parameters):
             if name not in points:
                 text = f"{robot.name} has no contact point {name!r}: {', '.join(points)}"
                 found.append((("board", "switches", k), text))
+        mounted = robot.sensors.mounted
+        for k, name in enumerate(self.board.sensors):
+            if name not in mounted:
+                text = f"{robot.name} mounts no sensor {name!r}: {', '.join(mounted) or 'none'}"
+                found.append((("board", "sensors", k), text))
         return found
 
     @classmethod
@@ -241,6 +256,7 @@ class Hardware(Parameters):
                     "port": "twin",
                     "switches": [contact.name for contact in robot.contacts][:7],
                     "gyro_range": 35.0,
+                    "sensors": list(robot.sensors.mounted),
                 },
                 "drives": {
                     "torque_constant": float(robot.motors.peak_torque.max()) / 30.0,

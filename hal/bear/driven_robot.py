@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
 from ...robots.description import RobotDescription
@@ -44,6 +44,7 @@ class DrivenRobot(Robot):
         loop = self._driver.loop
         with loop.lock:
             loop.measured.publish(self.imu, self.joints, self.contacts)
+            loop.measured.publish_mounted(self.mounted())
             loop.report(self.health)
             loop.measured.next_tick()
 
@@ -94,3 +95,14 @@ def read_hardware(name: str, context: Context, robot: RobotDescription) -> Hardw
             f"{', '.join(dict.fromkeys(str(place) for place in places))}"
         )
     return Hardware.read(file, robot)
+
+
+def missing_sensors(hardware: Hardware, robot: RobotDescription) -> Iterator[Misfit]:
+    """Report sensors of the description that the board's packets do not carry."""
+    for name in robot.sensors.mounted:
+        if name not in hardware.board.sensors:
+            yield Misfit(
+                f"the packets of the sensor board do not carry {robot.name}'s sensor {name!r}",
+                parameter="hardware",
+                fix=f"board: {{sensors: [{', '.join(robot.sensors.mounted)}]}} in the hardware's file",
+            )

@@ -240,7 +240,7 @@ class Driver:
         names = self._names = robot.transmission.motors
         self.hardware = hardware
         self.bus = BearBus(bus_port, reply_time=hardware.bus.reply_time)
-        self.board = SenseBoard(board_port)
+        self.board = SenseBoard(board_port, hardware.board.mounted(robot))
         self._gains = (
             dict(zip(names, law.motor_stiffness.tolist(), strict=True)),
             dict(zip(names, law.motor_damping.tolist(), strict=True)),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -9,6 +11,7 @@ from ...blocks.signals import ContactSwitches, ImuReading, JointState
 from ...blocks.signals.drive_conditions import describe, is_critical
 from ...robots.robot_description import RobotDescription
 from ...robots.transmission import Transmission
+from ...runtime.language.signals import Signal
 from .bulk import BulkExchange
 from .configuration import Hardware
 from .sense_board import SenseBoard
@@ -41,6 +44,7 @@ class Measurement:
             delay of the commands would seem up to half a tick too short.
         specific_force: the mean over the packets since ``next_tick`` [m/s^2], (3,).
         angular_velocity: of the newest packet [rad/s], (3,).
+        samples: of every mounted sensor in a packet, by name; means where the sensor says so.
         closed: the switches in the order of the robot's contact points, (n_contacts,).
     """
 
@@ -61,6 +65,9 @@ class Measurement:
         self.current_sum, self.exchanges = np.zeros(n), 0
         points = [contact.name for contact in robot.contacts]
         self._switches = [points.index(name) for name in hardware.board.switches]
+        self._mounted = hardware.board.mounted(robot)
+        self.samples = {sensor.name: sensor.signal.allocate() for sensor in self._mounted}
+        self._totals = {sensor.name: sensor.signal.allocate() for sensor in self._mounted}
 
     def take_drives(self, bulk: BulkExchange) -> None:
         """Take over the values of an exchange that reads ``READ``."""
@@ -99,10 +106,46 @@ class Measurement:
         if self.count == 0:
             self.sum.fill(0.0)
         np.add(self.sum, board.specific_force, out=self.sum)
+        self._take_mounted(board)
         self.count += 1
         np.divide(self.sum, self.count, out=self.specific_force)
         for bit, point in enumerate(self._switches):
             self.closed[point] = board.closed[bit]
+
+    def _take_mounted(self, board: SenseBoard) -> None:
+        """Take over the mounted sensors: the newest values, or their means since ``next_tick``."""
+        for sensor in self._mounted:
+            newest, sample = board.samples[sensor.name], self.samples[sensor.name]
+            total = self._totals[sensor.name]
+            for name, values in newest:
+                out, added = getattr(sample, name), getattr(total, name)
+                if name not in sensor.averaged:
+                    out[...] = values
+                    continue
+                if self.count == 0:
+                    added.fill(0.0)
+                np.add(added, values, out=added)
+                np.divide(added, self.count + 1, out=out)
+
+    def publish_mounted(self, outputs: Mapping[str, Signal]) -> None:
+        """Write the mounted sensors to a robot's ports, which have their names."""
+        for name, sample in self.samples.items():
+            for field, values in sample:
+                getattr(outputs[name], field)[...] = values
+
+    def parts(self) -> list[tuple[object, tuple[str, ...]]]:
+        """What changes in a run: objects, and the names of their attributes."""
+        names = (
+            "sum",
+            "count",
+            "current_sum",
+            "exchanges",
+            "specific_force",
+            "angular_velocity",
+            "closed",
+        )
+        signals = [*self.samples.values(), *self._totals.values()]
+        return [(self, names), *((signal, tuple(signal.views())) for signal in signals)]
 
     def next_tick(self) -> None:
         """The means of specific force and torques begin anew with what comes next."""

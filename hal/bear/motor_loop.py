@@ -190,9 +190,9 @@ class MotorLoop:
                     "link_lost", "stamp", "exchange_in_use")),
             (self.supervision, ("low", "hot", "still", "last", "moved", "numbers", "frozen",
                                 "saturated", "imu_silent", "imu_valid")),
-            (self.measured, ("sum", "count", "current_sum", "exchanges", "specific_force",
-                             "angular_velocity", "closed")),
+            *self.measured.parts(),
             (self.board, ("specific_force", "angular_velocity", "closed", "packets")),
+            *((sample, tuple(sample.views())) for sample in self.board.samples.values()),
             (self.command, tuple(self.command.views())),
         ]  # fmt: skip
         exchanges = (self._watch, self._drive, self._damp)

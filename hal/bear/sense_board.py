@@ -1,23 +1,30 @@
 """BRUCE's sensor board: accelerometer, gyroscope and four foot switches, a packet a millisecond.
 
 The board sends ``FF | 1B | acceleration 3 f32 m/s^2 | angular velocity 3 f32 rad/s | switches |
-checksum | FE``, 29 bytes, and takes ``FF | 03 | cooling << 2 | mode | checksum | FE``.
+checksum | FE``, 29 bytes, and takes ``FF | 03 | cooling << 2 | mode | checksum | FE``. A board with
+further sensors sends their numbers behind the switches, and its packets and their length are longer.
 The checksum is 255 less the sum of the bytes from the length to the last before it, modulo 256.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from enum import IntEnum
 
 import numpy as np
 
+from ..sensors.sensor import MountedSensor
 from .bus import BusError, SerialPort
 from .protocol import checksum
 
 START, END = 0xFF, 0xFE
 LENGTH = 0x1B
 PACKET = 29
-"""Bytes of a packet."""
+"""Bytes of a packet without mounted sensors."""
+LONGEST = 250
+"""The most that a packet's length may say: 0xFE and 0xFF end and begin packets."""
+_SENSORS = 27
+"""Where the numbers of mounted sensors begin in a packet."""
 CALIBRATION = 0xFF
 """The switches' byte of a packet that tells of a calibration."""
 SWITCHES = ("right_toe", "right_heel", "left_toe", "left_heel")
@@ -53,7 +60,12 @@ class SenseBoard:
 
     Bytes that belong to no packet are skipped one by one until the next good packet.
 
+    Args:
+        port: where the board is.
+        sensors: the mounted sensors in a packet, in their order.
+
     Attributes:
+        samples: the newest sample of each mounted sensor, by its name.
         specific_force: of the newest packet [m/s^2], (3,), in the board's frame.
         angular_velocity: of the newest packet [rad/s], (3,).
         closed: which switches are closed in the newest packet, (4,), as in ``SWITCHES``.
@@ -63,14 +75,20 @@ class SenseBoard:
         damaged: how many packets had a wrong checksum.
     """
 
-    def __init__(self, port: SerialPort) -> None:
+    def __init__(self, port: SerialPort, sensors: Sequence[MountedSensor] = ()) -> None:
         self.port = port
+        self._sensors = tuple(sensors)
+        self.samples = {sensor.name: sensor.signal.allocate() for sensor in sensors}
+        further = sum(sensor.packet_size() for sensor in sensors)
+        if LENGTH + further > LONGEST:
+            raise BusError(f"a packet with {further} bytes of mounted sensors is too long")
+        self._length, self._size = LENGTH + further, PACKET + further
         self.specific_force = np.zeros(3)
         self.angular_velocity = np.zeros(3)
         self.closed = np.zeros(4, dtype=bool)
         self.packets = self.calibrations = self.skipped = self.damaged = 0
         self._pending = bytearray()
-        self._packet = bytearray(PACKET)
+        self._packet = bytearray(self._size)
         self._numbers = np.frombuffer(self._packet, "<f4", 6, 2)
         port.timeout = 0.0
 
@@ -80,7 +98,7 @@ class SenseBoard:
 
     def poll(self) -> int:
         """Take over what has come since; gives the number of new measurements, 0 for none."""
-        received = self.port.read(64 * PACKET)
+        received = self.port.read(64 * self._size)
         return self.feed(received) if received else 0
 
     def feed(self, received: bytes) -> int:
@@ -88,12 +106,12 @@ class SenseBoard:
         pending = self._pending
         pending += received
         start = new = 0
-        while len(pending) - start >= PACKET:
-            if pending[start] != START or pending[start + 1] != LENGTH:
+        while len(pending) - start >= self._size:
+            if pending[start] != START or pending[start + 1] != self._length:
                 start += 1
                 self.skipped += 1
                 continue
-            end = start + PACKET
+            end = start + self._size
             packet = memoryview(pending)[start:end]
             good = packet[-1] == END and checksum(packet[1:-2]) == packet[-2]
             if good:
@@ -119,6 +137,11 @@ class SenseBoard:
         self.angular_velocity[:] = self._numbers[3:]
         for bit in range(4):
             self.closed[bit] = bool(switches & 1 << bit)
+        start = _SENSORS
+        for sensor in self._sensors:
+            end = start + sensor.packet_size()
+            sensor.from_packet(self._packet[start:end], self.samples[sensor.name])
+            start = end
         return 1
 
     def require(self, port_name: str, packets: int = 1) -> None:

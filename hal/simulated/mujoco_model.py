@@ -19,7 +19,8 @@ point is a geom and a site; if it is a foot's only point the site is at the cent
 link called ``world`` is the body ``link/world``. Motors are ``motor/<joint>``, named points are
 sites ``point/<name>``, and the sensors are ``com``, ``com_velocity``,
 ``angular_momentum``, ``accelerometer``, ``contacts`` (how many contacts there are at all),
-``load/<contact point>`` (how many with the ground, and their net force on it).
+``load/<contact point>`` (how many with the ground, and their net force on it). A sensor that the
+description mounts has a site ``sensor/<name>``.
 """
 
 from __future__ import annotations
@@ -35,8 +36,9 @@ from ...mathematics.arrays import Array
 from ...mathematics.constants import GRAVITY
 from ...robots.description import RobotDescription
 from ...robots.kinematics import ball_feet, contact_centres, joints_above
+from ..random_streams import Purpose, stream
+from ..sensors.sensor import mounted_sensors
 from .base import BASES
-from .random_streams import Purpose, stream
 from .scenes import Scene
 from .simulated_robot import SimulatorParameters
 
@@ -117,6 +119,7 @@ def mujoco_spec(
     spec.option.impratio = 10.0
     _add_ground(spec, scene or Scene(), variation)
     _add_robot(spec, robot, variation)
+    _add_mounted_sensors(spec, robot)
     _add_sensors(spec, robot)
     return spec
 
@@ -253,6 +256,14 @@ def _add_robot(spec: MjSpec, robot: RobotDescription, variation: Variation) -> N
         )
         motor.set_to_motor()
     add_rotors(spec, robot)
+
+
+def _add_mounted_sensors(spec: MjSpec, robot: RobotDescription) -> None:
+    """A site for every sensor that the description mounts on a link, and what gives its true values."""
+    for sensor in mounted_sensors(robot):
+        body = body_name(sensor.link)
+        spec.body(body).add_site(name=sensor.site, pos=sensor.position)
+        sensor.add_to_model(spec, body)
 
 
 def _add_sensors(spec: MjSpec, robot: RobotDescription) -> None:

@@ -155,13 +155,16 @@ class MujocoRobot(SimulatedRobot):
 
     def setup(self) -> None:
         """Draw the world from the seed and build it."""
+        from ..random_streams import Purpose, uniform_call
         from .drives import CommandLatency, Drives
         from .plant import Plant
-        from .random_streams import Purpose, uniform_call
         from .stance import RELEASED
 
         robot, params = self.robot, self.params
-        plant = self.plant = Plant(robot, params, self.period, self.physics, self.record)
+        plant = self.plant = Plant(
+            robot, params, self.period, self.physics, self.record,
+            getattr(self, "sensor_memory", None),
+        )  # fmt: skip
         steps = round(self.period / params.timestep)
         damping = RELEASED * plant.damping
         if params.drive_damping is not None:
@@ -174,6 +177,7 @@ class MujocoRobot(SimulatedRobot):
         self._reading = CallSequence([
             *plant.reading(self.imu, self.joints),
             *plant.sensors.reading_switches(self.physics.step, self.record, self.contacts.closed),
+            *plant.sensors.reading_mounted(self.mounted()),
             *plant.truth.reporting(self.truth), self.reporting(),
         ])  # fmt: skip
         latency = self._latency = CommandLatency(

@@ -23,10 +23,11 @@ from ...mathematics.compiling.library_call import LibraryCall, address_of
 from ...mathematics.kernel import kernel
 from ...robots.description import RobotDescription
 from ...runtime.language.block import Metric
+from ..random_streams import Purpose, RandomStreams, stream
+from ..sensors.sensor import mounted_sensors
 from .base import BASES
 from .mujoco_model import Variation, body_name, build_world, draw_variation
-from .random_streams import WORDS, Purpose, RandomStreams, stream
-from .sensors import Sensors
+from .sensors import SimulatedSensors
 from .simulated_robot import SimulatorParameters
 from .stance import (
     StartCheck,
@@ -39,6 +40,7 @@ from .stance import (
 from .state import (
     PhysicsState,
     RecordTotals,
+    SensorMemory,
     StepRecord,
     StepSensors,
     TickRecord,
@@ -188,6 +190,8 @@ class Plant:
         period: the control period [s]; the start phase is drawn within it.
         physics: the simulator's state, as ``save`` writes it, and the count of physics steps.
         record: sums and extremes since the last ``clear_record``.
+        sensed: memory of the sensors that the description mounts; by default it is allocated.
+        samples_per_tick: how many samples they take in a control period.
 
     Attributes:
         model, data: the simulator's.
@@ -208,6 +212,8 @@ class Plant:
         period: float,
         physics: PhysicsState,
         record: TickRecord,
+        sensed: SensorMemory | None = None,
+        samples_per_tick: float = 1.0,
     ) -> None:
         import mujoco
 
@@ -215,8 +221,9 @@ class Plant:
         self.variation = draw_variation(params)
         self.model = build_world(params, robot, self.variation)
         self._robot, self._params, self._period = robot, params, period
-        self.streams = RandomStreams(params.seed)
-        self.sensors = Sensors(robot, params, self.streams)
+        self.streams = RandomStreams(params.seed, _noisy_fields(robot))
+        self.sensors = SimulatedSensors(robot, params, self.streams, sensed)
+        self._samples_per_tick = samples_per_tick
         self.stiffness, self.damping = holding_gains(self.model, robot)
         self._passive = passive_joints(robot)
         self._limits = (robot.joint_limits[:, 0].copy(), robot.joint_limits[:, 1].copy())
@@ -235,7 +242,11 @@ class Plant:
 
         model = build_world(params, robot, Variation())
         everything = mujoco.mjtState.mjSTATE_INTEGRATION
-        return {"n_integration": mujoco.mj_stateSize(model, everything), "n_random": WORDS}
+        return {
+            "n_integration": mujoco.mj_stateSize(model, everything),
+            "n_random": RandomStreams(params.seed, _noisy_fields(robot)).words,
+            **SimulatedSensors.dimensions(params, mounted_sensors(robot)),
+        }
 
     def _attach(self, data: MjData) -> None:
         """Make the views into the simulator's memory, once."""
@@ -244,6 +255,8 @@ class Plant:
         base = self._base = BASES[self._robot.base_joint](data)
         self.position, self.velocity = data.qpos[base.positions :], data.qvel[base.velocities :]
         self._sampled = (data.sensor("accelerometer").data, data.sensor("contacts").data)
+        period = self._period / self._samples_per_tick
+        self.sensors.attach(model, data, period, self._samples_per_tick)
         # The sensors of the contact points are the model's last.
         first = model.nsensordata - 4 * len(self._robot.contacts)
         load = data.sensordata[first:].reshape(-1, 4)
@@ -302,6 +315,8 @@ class Plant:
         self.record.bounce_end.fill(-steps)
         self._step1.run()
         self.clear_record()
+        for sensor in self.sensors.mounted:
+            sensor.reset()
         self._settle(step, steps)
 
     def _settle(self, step: CallSequence, steps: int) -> None:
@@ -325,7 +340,7 @@ class Plant:
             self._encoding,
             drives.torque_call(self.physics.step, self._encoder, self.velocity, self.data.ctrl),
             *([] if push is None else [self.forces.pushing(push)]),
-            self._step2, self._note, self._step1,
+            self._step2, self._note, *self.sensors.after_step(), self._step1,
         ]  # fmt: skip
         return CallSequence([self.forces.releasing(), *(one * steps)])
 
@@ -383,3 +398,8 @@ class Plant:
             "robot_mass_kg": float(self._robot.total_mass * self.variation.mass),
             "robot_contact_stiffness": float(self.variation.contact_stiffness),
         }
+
+
+def _noisy_fields(robot: RobotDescription) -> dict[str, int]:
+    """How many fields with noise every mounted sensor has."""
+    return {sensor.name: len(sensor.signal.fields) for sensor in mounted_sensors(robot)}

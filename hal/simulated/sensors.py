@@ -1,9 +1,10 @@
-"""The sensors of a simulated robot, with noise, bias, offset, rounding, saturation and bounce."""
+"""The sensors of a simulated robot: samples of true values, with the errors that were drawn for them."""
 
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -13,209 +14,243 @@ from ...mathematics.compiling.call_sequence import Call
 from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.kernel import kernel
 from ...robots.description import RobotDescription
-from .random_streams import Purpose, RandomStreams, normal_call, stream, uniform_call
+from ...runtime.language.signals import Signal
+from ..random_streams import Purpose, RandomStreams, sensor_stream, stream
+from ..sensors.noise import DelayLine, FieldErrors, NoiseModel, delay_sample
+from ..sensors.sensor import MountedSensor, mounted_sensors
+from ..sensors.switches import Switches
 from .simulated_robot import SimulatorParameters
-from .state import TickRecord
+from .state import SensorMemory, TickRecord
 
-
-class ImuErrors(NamedTuple):
-    """The errors of an IMU, which the robot may not have (``present``).
-
-    ``gyro_bias`` [rad/s] and ``accelerometer_bias`` [m/s^2], (3,); ``gyro_noise`` and
-    ``accelerometer_noise`` (3,), drawn for this sample, of variance one; ``scale`` (2,) of both noises;
-    ``limit`` (2,), the ranges of gyroscope and accelerometer.
-    """
-
-    present: bool
-    gyro_bias: Array
-    accelerometer_bias: Array
-    gyro_noise: Array
-    accelerometer_noise: Array
-    scale: Array
-    limit: Array
-
-
-class JointErrors(NamedTuple):
-    """The errors of the joints' sensors: ``offset`` (n_joints,) [rad] of the encoders; ``size`` (2,), the
-    encoders' resolution [rad] and the scale of the velocities' noise [rad/s]; ``noise`` (n_joints,),
-    drawn for this sample, of variance one."""
-
-    offset: Array
-    size: Array
-    noise: Array
+if TYPE_CHECKING:
+    from mujoco import MjData, MjModel
 
 
 @kernel
-def sample(true: Array, bias: Array, noise: Array, scale: float, limit: float, out: Array) -> None:
-    """A reading (3,) with bias, noise and saturation; what is not a number stays so."""
+def accumulate(now: Array, averaged: Flags, total: Array, steps: Counts) -> None:
+    """Add the true values of a physics step, (n,), where they are ``averaged``; else keep them."""
+    for k in range(now.shape[0]):
+        if averaged[k] and steps[0] > 0:
+            total[k] += now[k]
+        else:
+            total[k] = now[k]
+    steps[0] += 1
+
+
+@kernel
+def take_sample(averaged: Flags, total: Array, steps: Counts, true: Array) -> None:
+    """Write the true values (n,) of a sample, and begin the next one."""
+    for k in range(true.shape[0]):
+        true[k] = float(total[k]) / max(1, int(steps[0])) if averaged[k] else float(total[k])
+        total[k] = true[k]
+    steps[0] = 0
+
+
+@kernel
+def copy_numbers(numbers: Array, out: Array) -> None:
+    """Copy numbers, (n,)."""
+    for k in range(out.shape[0]):
+        out[k] = numbers[k]
+
+
+@kernel
+def read_nothing(first: Array, second: Array) -> None:
+    """Zeros, (3,), for an IMU that the robot does not have."""
     for axis in range(3):
-        reading = float(true[axis]) + float(bias[axis])
-        if scale != 0.0:
-            reading += float(noise[axis]) * scale
-        reading = min(reading, limit)
-        reading = max(reading, -limit)
-        out[axis] = reading
+        first[axis] = second[axis] = 0.0
 
 
-@kernel
-def sample_imu(
-    rate: Array, force: Array, errors: ImuErrors, read_rate: Array, read_force: Array
-) -> None:
-    """A sample of the IMU from the true values [rad/s, m/s^2, body]; zero where there is none."""
-    if not errors.present:
-        for axis in range(3):
-            read_rate[axis] = read_force[axis] = 0.0
-        return
-    scale, limit = errors.scale, errors.limit
-    sample(rate, errors.gyro_bias, errors.gyro_noise, float(scale[0]), float(limit[0]), read_rate)
-    sample(
-        force, errors.accelerometer_bias, errors.accelerometer_noise, float(scale[1]),
-        float(limit[1]), read_force,
-    )  # fmt: skip
-
-
-@kernel
-def sample_joints(
-    position: Array,
-    velocity: Array,
-    torque: Array,
-    errors: JointErrors,
-    read_position: Array,
-    read_velocity: Array,
-    read_torque: Array,
-) -> None:
-    """A sample of encoders and currents from the joints' true motion and torques."""
-    resolution, scale = float(errors.size[0]), float(errors.size[1])
-    np.add(position, errors.offset, read_position)
-    if resolution != 0.0:
-        np.divide(read_position, resolution, read_position)
-        np.rint(read_position, read_position)
-        np.multiply(read_position, resolution, read_position)
-    for joint in range(velocity.shape[0]):
-        read_velocity[joint] = velocity[joint]
-        if scale != 0.0:
-            read_velocity[joint] += float(errors.noise[joint]) * scale
-        read_torque[joint] = torque[joint]
-
-
-@kernel
-def count_bouncing(step: Counts, bounce_end: Counts, count: Counts) -> None:
-    """How many switches chatter in a physics step: ``step`` without a dimension, ``count`` (1,)."""
-    count[0] = 0
-    for point in range(bounce_end.shape[0]):
-        if step[()] < bounce_end[point]:
-            count[0] += 1
-
-
-@kernel
-def sample_switches(
-    present: bool, step: Counts, pressed: Flags, bounce_end: Counts, draws: Array, closed: Flags
-) -> None:
-    """A sample of the switches that the robot may have (``present``).
+class SimulatedSensor:
+    """One sensor that the description mounts on a link, in a simulation.
 
     Args:
-        step, bounce_end: as for ``count_bouncing``.
-        pressed: the switches before bounce, (n_contacts,).
-        draws: a random number between zero and one for each switch that chatters, in their order.
-        closed: what the switches read, (n_contacts,).
+        sensor: the sensor.
+        model, data: of the simulator.
+        params: the seed and the factor on the errors.
+        streams: the random streams of the run.
+        period: from sample to sample [s].
+        samples_per_tick: how many samples a control tick has; the noise of a field that is averaged
+            is that of the mean over a tick, so that of a sample is larger.
+        memory: its numbers in ``SensorMemory``: total, steps, samples, count.
     """
-    drawn = 0
-    for point in range(closed.shape[0]):
-        closed[point] = present and bool(pressed[point])
-        if present and step[()] < bounce_end[point]:
-            closed[point] = draws[drawn] < 0.5
-            drawn += 1
-
-
-class Sensors:
-    """Makes readings of true quantities. Biases, offsets and switch thresholds are drawn once from
-    the seed; noise and bounce come from the running ``streams``."""
 
     def __init__(
-        self, robot: RobotDescription, params: SimulatorParameters, streams: RandomStreams
-    ) -> None:
-        n, n_contacts = len(robot.joints), len(robot.contacts)
-        self._params = params
-        self._has_switches = robot.sensors.switches
-        self._gyro = streams[Purpose.GYRO]
-        self._accelerometer = streams[Purpose.ACCELEROMETER]
-        self._velocity = streams[Purpose.JOINT_VELOCITY]
-        self._bounce = streams[Purpose.BOUNCE]
-        self.bounce_steps = math.ceil(params.switch_bounce / params.timestep - 1e-9)
+        self, sensor: MountedSensor, model: MjModel, data: MjData, params: SimulatorParameters,
+        streams: RandomStreams, period: float, samples_per_tick: float,
+        memory: tuple[Array, Counts, Array, Counts],
+    ) -> None:  # fmt: skip
+        self.sensor = sensor
+        total, steps, samples, count = memory
+        size = len(total)
+        self._total, self._steps = total, steps
+        now, self._true, self._erred = np.zeros(size), np.zeros(size), np.zeros(size)
+        self._averaged = np.zeros(size, np.bool_)
+        delay = np.zeros(size, np.int64)
+        self._errors: list[tuple[slice, FieldErrors]] = []
+        true_values, start = {}, 0
+        for k, (name, field) in enumerate(sensor.signal.fields.items()):
+            part = slice(start, start + sensor.sizes[name])
+            start = part.stop
+            true_values[name] = now[part].reshape(field.resolve({}))
+            self._averaged[part] = name in sensor.averaged
+            noise = sensor.noise(name).scaled(params.sensor_errors)
+            if name in sensor.averaged:
+                noise = noise.model_copy(
+                    update={"noise": noise.noise * math.sqrt(samples_per_tick)}
+                )
+            delay[part] = math.ceil(noise.delay / period - 1e-9)
+            bias = sensor_stream(params.seed, sensor.name, 2 * k)
+            errors = FieldErrors(noise, sensor.sizes[name], bias, streams.of_field(sensor.name, k))
+            self._errors.append((part, errors))
+        self._line = DelayLine(samples.reshape(-1, size), count, delay)
+        self.after_step: list[Call] = [
+            *sensor.from_mujoco(model, data, true_values),
+            KernelCall(accumulate, now, self._averaged, total, steps),
+        ]
+        """The calls after every physics step."""
 
-        def spread(purpose: Purpose, half_width: float, size: int) -> Array:
-            return stream(params.seed, purpose).uniform(-1.0, 1.0, size) * half_width
+    def bias(self, field: str) -> Array:
+        """The bias of a field that was drawn from the seed."""
+        return self._errors[list(self.sensor.signal.fields).index(field)][1].bias
 
-        self.gyro_bias = spread(Purpose.GYRO_BIAS, params.gyro_bias, 3)
-        """The gyroscope's bias [rad/s]."""
-        self.accelerometer_bias = spread(Purpose.ACCELEROMETER_BIAS, params.accelerometer_bias, 3)
-        """The accelerometer's bias [m/s^2]."""
-        self.encoder_offset = spread(Purpose.ENCODER_OFFSET, params.encoder_offset, n)
+    def reset(self) -> None:
+        """Begin a new sample."""
+        self._steps[0] = 0
+
+    def reading(self, out: Signal) -> list[Call]:
+        """Write a sample, and begin the next one."""
+        calls: list[Call] = [
+            KernelCall(take_sample, self._averaged, self._total, self._steps, self._true)
+        ]
+        for part, errors in self._errors:
+            calls += errors.calls(self._true[part], self._erred[part])
+        late = np.zeros(len(self._erred))
+        calls.append(KernelCall(delay_sample, self._erred, self._line, late))
+        for (part, _), (_, view) in zip(self._errors, out, strict=True):
+            calls.append(KernelCall(copy_numbers, late[part], view.reshape(-1)))
+        return calls
+
+
+class SimulatedSensors:
+    """The sensors of a simulated robot: IMU, joints, switches, and what the description mounts.
+
+    Biases, offsets and switch thresholds are drawn once from the seed; noise and bounce come from the
+    running ``streams``.
+
+    Args:
+        robot: the description.
+        params: the errors, and the seed.
+        streams: the random streams of the run.
+        memory: of the mounted sensors; by default it is allocated.
+    """
+
+    def __init__(
+        self, robot: RobotDescription, params: SimulatorParameters, streams: RandomStreams,
+        memory: SensorMemory | None = None,
+    ) -> None:  # fmt: skip
+        n, seed = len(robot.joints), params.seed
+        self._robot, self._params, self._streams = robot, params, streams
+        self._has_imu, self._has_switches = robot.sensors.imu, robot.sensors.switches
+        self._gyroscope = FieldErrors(
+            NoiseModel(noise=params.gyro_noise, bias=params.gyro_bias, range=params.gyro_range), 3,
+            stream(seed, Purpose.GYRO_BIAS), streams[Purpose.GYRO],
+        )  # fmt: skip
+        self._accelerometer = FieldErrors(
+            NoiseModel(
+                noise=params.accelerometer_noise, bias=params.accelerometer_bias,
+                range=params.accelerometer_range,
+            ),
+            3, stream(seed, Purpose.ACCELEROMETER_BIAS), streams[Purpose.ACCELEROMETER],
+        )  # fmt: skip
+        encoders = NoiseModel(bias=params.encoder_offset, resolution=params.encoder_resolution)
+        self._position = FieldErrors(encoders, n, stream(seed, Purpose.ENCODER_OFFSET), None)
+        velocity = NoiseModel(noise=params.joint_velocity_noise)
+        self._velocity = FieldErrors(
+            velocity, n, None, streams[Purpose.JOINT_VELOCITY], biased=False
+        )
+        self.gyro_bias, self.accelerometer_bias = self._gyroscope.bias, self._accelerometer.bias
+        """The biases of the robot's own IMU [rad/s, m/s^2]."""
+        self.encoder_offset = self._position.bias
         """The offset of every joint encoder: its reading minus the true angle [rad]."""
-        self._imu_errors = ImuErrors(
-            robot.sensors.imu, self.gyro_bias, self.accelerometer_bias, np.zeros(3), np.zeros(3),
-            np.array([params.gyro_noise, params.accelerometer_noise]),
-            np.array([_limit(params.gyro_range), _limit(params.accelerometer_range)]),
-        )  # fmt: skip
-        self._joint_errors = JointErrors(
-            self.encoder_offset, np.array([params.encoder_resolution, params.joint_velocity_noise]),
-            np.zeros(n),
-        )  # fmt: skip
-        low, high = params.switch_threshold
-        draws = stream(params.seed, Purpose.SWITCH_THRESHOLD).random(n_contacts)
-        self.switch_threshold = low + (high - low) * draws
+        self.switch_threshold = Switches.draw_thresholds(
+            params.switch_threshold, len(robot.contacts), stream(seed, Purpose.SWITCH_THRESHOLD)
+        )
         """The force that closes every switch [N]."""
         self.ground_force = -self.switch_threshold
         """The vertical force on the ground up to which every switch is closed [N]."""
+        self.bounce_steps = math.ceil(params.switch_bounce / params.timestep - 1e-9)
+        self._kinds = mounted_sensors(robot)
+        self.memory = memory or SensorMemory.allocate(self.dimensions(params, self._kinds))
+        self.mounted: tuple[SimulatedSensor, ...] = ()
+        """The sensors that the description mounts, after ``attach``."""
+
+    @staticmethod
+    def dimensions(
+        params: SimulatorParameters, sensors: Sequence[MountedSensor]
+    ) -> Mapping[str, int]:
+        """The sizes of ``SensorMemory``."""
+        numbers = [sum(sensor.sizes.values()) for sensor in sensors]
+        samples = [n * _slots(s, params) for n, s in zip(numbers, sensors, strict=True)]
+        return {
+            "n_sensed": sum(numbers), "n_mounted": len(numbers), "n_sensor_samples": sum(samples)
+        }  # fmt: skip
+
+    def attach(
+        self, model: MjModel, data: MjData, period: float, samples_per_tick: float = 1.0
+    ) -> None:
+        """Make views into the simulator's memory. A sample is taken once every ``period`` [s]."""
+        memory, found, start, first = self.memory, [], 0, 0
+        for k, sensor in enumerate(self._kinds):
+            size, slots = sum(sensor.sizes.values()), _slots(sensor, self._params)
+            own = (
+                memory.total[start : start + size], memory.steps[k : k + 1],
+                memory.samples[first : first + slots * size], memory.count[k : k + 1],
+            )  # fmt: skip
+            found.append(
+                SimulatedSensor(
+                    sensor, model, data, self._params, self._streams, period, samples_per_tick, own
+                )
+            )
+            start, first = start + size, first + slots * size
+        self.mounted = tuple(found)
 
     def reading_imu(self, rate: Array, force: Array, out: ImuReading) -> list[Call]:
         """Write a sample of the IMU from the true values [rad/s, m/s^2, body]; zero without IMU."""
-        errors, params = self._imu_errors, self._params
-        calls: list[Call] = []
-        if params.gyro_noise:
-            calls.append(normal_call(self._gyro, errors.gyro_noise))
-        if params.accelerometer_noise:
-            calls.append(normal_call(self._accelerometer, errors.accelerometer_noise))
+        if not self._has_imu:
+            return [KernelCall(read_nothing, out.angular_velocity, out.specific_force)]
         return [
-            *calls,
-            KernelCall(sample_imu, rate, force, errors, out.angular_velocity, out.specific_force),
+            *self._gyroscope.calls(rate, out.angular_velocity),
+            *self._accelerometer.calls(force, out.specific_force),
         ]
 
     def reading_joints(
         self, position: Array, velocity: Array, torque: Array, out: JointState
     ) -> list[Call]:
         """Write a sample of encoders and currents from the joints' true motion and torques."""
-        errors = self._joint_errors
-        calls: list[Call] = []
-        if self._params.joint_velocity_noise:
-            calls.append(normal_call(self._velocity, errors.noise))
-        sampling = KernelCall(
-            sample_joints,
-            position,
-            velocity,
-            torque,
-            errors,
-            out.position,
-            out.velocity,
-            out.torque,
-        )
-        return [*calls, sampling]
+        return [
+            *self._position.calls(position, out.position),
+            *self._velocity.calls(velocity, out.velocity),
+            KernelCall(copy_numbers, torque, out.torque),
+        ]
 
     def reading_switches(self, step: Counts, record: TickRecord, closed: Flags) -> list[Call]:
-        """Write a sample of the switches, (n_contacts,); a switch that has just changed reads either
-        way at random. Without switches none is closed. ``step`` is a count without a dimension."""
-        draws = np.zeros(len(closed))
-        drawing, count = uniform_call(self._bounce, draws)
-        return [
-            KernelCall(count_bouncing, step, record.bounce_end, count),
-            *([drawing] if self.bounce_steps else []),
-            KernelCall(
-                sample_switches, self._has_switches, step, record.closed, record.bounce_end,
-                draws, closed,
-            ),
-        ]  # fmt: skip
+        """Write a sample of the switches, (n_contacts,); without switches none is closed. ``step`` is a
+        count without a dimension."""
+        return Switches.calls(
+            self._has_switches, bool(self.bounce_steps), step, record.closed, record.bounce_end,
+            self._streams[Purpose.BOUNCE], closed,
+        )  # fmt: skip
+
+    def reading_mounted(self, outputs: Mapping[str, Any]) -> list[Call]:
+        """Write a sample of every mounted sensor to the signal that has its name."""
+        return [call for each in self.mounted for call in each.reading(outputs[each.sensor.name])]
+
+    def after_step(self) -> list[Call]:
+        """What the mounted sensors do after every physics step."""
+        return [call for each in self.mounted for call in each.after_step]
 
 
-def _limit(limit: float | None) -> float:
-    """The range of a sensor, infinite where it has none."""
-    return math.inf if limit is None else limit
+def _slots(sensor: MountedSensor, params: SimulatorParameters) -> int:
+    """How many samples a sensor keeps; a sample is at least a physics step."""
+    late = max(sensor.noise(name).delay for name in sensor.signal.fields)
+    return math.ceil(late / params.timestep - 1e-9) + 1

@@ -4,19 +4,20 @@ from __future__ import annotations
 
 from abc import ABC
 from collections.abc import Mapping
-from typing import Literal, Self
+from typing import Any, Literal, Self
 
 from pydantic import model_validator
 
 from ...blocks.signals import ExternalForce, RobotTruth
 from ...robots.description import RobotDescription
-from ...runtime.language.block import Input, Output, State
+from ...runtime.language.block import Input, Output, Port, State
 from ...runtime.language.parameters import Parameters, parameter
 from ...runtime.language.terrain import Terrain
 from ..drive_control import DriveGains
 from ..robot import Robot
+from ..sensors.sensor import MountedSensor
 from . import scenes
-from .state import PhysicsState
+from .state import PhysicsState, SensorMemory
 
 
 class SimulatorParameters(DriveGains):
@@ -122,6 +123,12 @@ class SimulatorParameters(DriveGains):
         0.0, unit="s", ge=0, le=0.1, text="for how long a switch chatters after each change"
     )
 
+    sensor_errors: float = parameter(
+        1.0, ge=0,
+        text="factor on noise and bias of the sensors that the robot's description mounts; 0: they "
+        "have no errors",
+    )  # fmt: skip
+
     drive_damping: float | None = parameter(
         None, unit="N m s/rad", ge=0,
         text="joint damping of a drive in its damping mode; none: a third of the damping that "
@@ -157,6 +164,12 @@ class SimulatedRobot(Robot, ABC):
     push = Input(ExternalForce, default={}, text="a force from outside, held for the tick")
     truth = Output(RobotTruth, truth=True, text="what only a simulator knows")
     physics = State(PhysicsState, text="the simulator's state, written for a snapshot")
+
+    @classmethod
+    def ports_of(cls, sensors: tuple[MountedSensor, ...]) -> dict[str, Port[Any]]:
+        """The outputs of mounted sensors, and the memory that their simulation needs."""
+        memory = State(SensorMemory, text="what the simulation of mounted sensors keeps")
+        return {**super().ports_of(sensors), "sensor_memory": memory}
 
     @classmethod
     def terrain(cls, params: Parameters) -> Terrain | None:

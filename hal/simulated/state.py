@@ -57,6 +57,15 @@ class TickRecord(Signal):
     bounce_end = Field("n_contacts", dtype="int64", text="physics step up to which it chatters")
 
 
+class SensorMemory(Signal):
+    """What the sensors that the description mounts keep from tick to tick."""
+
+    total = Field("n_sensed", text="sums over the physics steps since the last sample")
+    steps = Field("n_mounted", dtype="int64", text="physics steps since the last sample")
+    samples = Field("n_sensor_samples", text="past samples, for readings that are late")
+    count = Field("n_mounted", dtype="int64", text="samples so far")
+
+
 class StepSensors(NamedTuple):
     """What the simulator knows after a physics step.
 

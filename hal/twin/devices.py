@@ -11,6 +11,7 @@ import numpy as np
 
 from ...blocks.signals import ImuReading
 from ...blocks.signals.drive_conditions import HEALTHY
+from ...robots.robot_description import MountedSensorPart
 from ..bear.protocol import (
     BROADCAST,
     CONFIG,
@@ -25,6 +26,7 @@ from ..bear.protocol import (
     frame_bytes,
 )
 from ..bear.sense_board import END, LENGTH, START, BoardMode
+from ..sensors.imu import Imu
 
 CORRUPT, HOT, ENCODER, WATCHDOG, LIMIT, HARDWARE, FLASH = range(7)
 """The bits of the error byte."""
@@ -308,6 +310,7 @@ class EmulatedBoard:
     def __init__(self) -> None:
         self.mode = BoardMode.NOMINAL
         self.cooling = 0
+        self._imu = Imu("imu", MountedSensorPart(kind="imu", link=""))
         self._pending = bytearray()
         self._calibrating = False
 
@@ -325,14 +328,14 @@ class EmulatedBoard:
             else:
                 del pending[:1]
 
-    def packet(self, imu: ImuReading, closed: np.ndarray) -> bytes:
-        """The next packet; empty while the board does not stream."""
+    def packet(self, imu: ImuReading, closed: np.ndarray, mounted: bytes = b"") -> bytes:
+        """The next packet, with the bytes of mounted sensors; empty while the board does not stream."""
         if self._calibrating:
             self._calibrating, self.mode, contacts = False, BoardMode.NOMINAL, 0xFF
         elif self.mode is not BoardMode.NOMINAL:
             return b""
         else:
             contacts = 0x80 | sum(1 << bit for bit, each in enumerate(closed.tolist()) if each)
-        numbers = struct.pack("<6f", *imu.specific_force.tolist(), *imu.angular_velocity.tolist())
-        body = bytes((LENGTH,)) + numbers + bytes((contacts,))
+        numbers = self._imu.to_packet(imu)
+        body = bytes((LENGTH + len(mounted),)) + numbers + bytes((contacts,)) + mounted
         return bytes((START,)) + body + bytes((checksum(body), END))

@@ -13,11 +13,12 @@ from ...mathematics.compiling.library_call import LibraryCall
 from ...robots.robot_description import RobotDescription
 from ..bear.configuration import Hardware
 from ..bear.protocol import BROADCAST, Instruction, frame_bytes
+from ..random_streams import Purpose
+from ..sensors.sensor import mounted_sensors
 from ..simulated.drives import Drives
 from ..simulated.plant import Plant
-from ..simulated.random_streams import Purpose
 from ..simulated.simulated_robot import SimulatorParameters
-from ..simulated.state import DriveState, PhysicsState, TickRecord
+from ..simulated.state import DriveState, PhysicsState, SensorMemory, TickRecord
 from .devices import EmulatedActuator, EmulatedBoard, EmulatedBus
 from .drives import EmulatedDrives
 from .faults import ANSWERS, Fault, Faults, apply_fault, corrupt_byte
@@ -55,15 +56,19 @@ class Twin:
         tick: the control period [s].
         physics, record, gantry: memory of the plant and of the gantry.
         faults: what goes wrong.
+        sensed: memory of the sensors that the description mounts; by default it is allocated.
     """
 
     def __init__(
         self, robot: RobotDescription, params: SimulatorParameters, hardware: Hardware, tick: float,
         physics: PhysicsState, record: TickRecord, gantry: DriveState, faults: tuple[Fault, ...] = (),
+        sensed: SensorMemory | None = None,
     ) -> None:  # fmt: skip
         period = hardware.bus.period
         finer = {"accelerometer_noise": params.accelerometer_noise * math.sqrt(tick / period)}
-        self.plant = Plant(robot, params.model_copy(update=finer), tick, physics, record)
+        self.plant = Plant(
+            robot, params.model_copy(update=finer), tick, physics, record, sensed, tick / period
+        )
         self._names = robot.transmission.motors
         self.actuators = [EmulatedActuator(hardware.motors[name].id) for name in self._names]
         self._by_device = {actuator.device: k for k, actuator in enumerate(self.actuators)}
@@ -105,6 +110,12 @@ class Twin:
         self._reading_switches = CallSequence(
             sensors.reading_switches(physics.step, record, self.closed)
         )
+        self._samples = {
+            sensor.name: sensor.signal.allocate(robot.dimensions)
+            for sensor in mounted_sensors(robot)
+        }
+        self._reading_mounted = CallSequence(sensors.reading_mounted(self._samples))
+        self._on_board = hardware.board.mounted(robot)
         self._packet = b""
         self._to_board = b""
         self._late = b""
@@ -243,6 +254,8 @@ class Twin:
             status["present_iq"] = self._current.item(k)
 
     def _begin_packet(self) -> None:
+        for sensor in self.plant.sensors.mounted:
+            sensor.reset()
         self.before[:] = self._record.accelerometer
         self.counted = int(self._record.steps)
 
@@ -251,6 +264,8 @@ class Twin:
         record = self._record
         np.subtract(record.accelerometer, self.before, out=self._force)
         np.divide(self._force, int(record.steps) - self.counted, out=self._force)
+        self._reading_mounted.run()
+        mounted = b"".join(each.to_packet(self._samples[each.name]) for each in self._on_board)
         self._begin_packet()
         imu = self._imu
         self._reading_imu.run()
@@ -261,7 +276,7 @@ class Twin:
         if self.faults.active("saturated_gyro"):
             imu.angular_velocity[0] = self._hardware.board.gyro_range
         if not self.faults.active("silent_board"):
-            self._to_board += self.board.packet(imu, self._packet_closed)
+            self._to_board += self.board.packet(imu, self._packet_closed, mounted)
 
     def _read_switches(self) -> None:
         closed = self.closed

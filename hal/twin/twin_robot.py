@@ -10,7 +10,7 @@ from ...runtime.language.block import Context, Metric, Misfit, State
 from ...runtime.language.parameters import Parameters, parameter
 from ...runtime.language.signals import Field, Signal
 from ..bear.configuration import Hardware
-from ..bear.driven_robot import DrivenRobot, DriveParameters, read_hardware
+from ..bear.driven_robot import DrivenRobot, DriveParameters, missing_sensors, read_hardware
 from ..bear.driver import DriveLaw, Driver
 from ..bear.motor_loop import CommandQueue
 from ..drive_control import joint_gains
@@ -149,7 +149,9 @@ class TwinRobot(SimulatedRobot, DrivenRobot):
         period = 0.001
         if params.hardware:
             try:
-                period = read_hardware(params.hardware, context, context.robot).bus.period
+                hardware = read_hardware(params.hardware, context, context.robot)
+                period = hardware.bus.period
+                yield from missing_sensors(hardware, context.robot)
             except Exception as error:  # noqa: BLE001  # said in the load report
                 yield Misfit(str(error), parameter="hardware", found=params.hardware)
         for what, longer, shorter in (
@@ -190,7 +192,7 @@ class TwinRobot(SimulatedRobot, DrivenRobot):
             hardware = Hardware.for_twin(robot)
         self.twin = Twin(
             robot, params, hardware, self.period, self.physics, self.record, self.gantry,
-            tuple(params.faults),
+            tuple(params.faults), getattr(self, "sensor_memory", None),
         )  # fmt: skip
         self.twin.set_push(self.push)
         self._reporting = self.twin.plant.truth.reporting(self.truth)

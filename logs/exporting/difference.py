@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ...runtime.language.errors import AloftError
 from ..file.reader import RecordedRun
-from ..viewing.flights import LIFT_OFF, SHORTEST_FLIGHT, Flights
+from ..viewing.contacts import LIFT_OFF, SHORTEST_FLIGHT, Flights
 from ..viewing.scene_ports import scene_ports
 from ..viewing.signal_names import unit_of_element
 from .named_columns import element_labels

@@ -1,6 +1,10 @@
 """Recordings for other programs: CSV, Parquet and MCAP, with every number exact.
 
-A stretch of the recording is in memory at a time.
+A stretch of the recording is in memory at a time. An MCAP file has, beside every signal, channels
+that Foxglove, PlotJuggler and ROS 2's tools know by their type. These show the robot in 3D (``/tf``,
+``/scene``), its joints by name (``/joint_states``), the sensor (``/imu``), the sensors that its
+description mounts (``/NAME``), the force on each foot (``/wrench/FOOT``) and what happened (``/log``),
+without a click.
 """
 
 from __future__ import annotations
@@ -9,18 +13,230 @@ import csv
 import json
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from ...hal.sensors.sensor import RosMessage
+from ...robots.description import RobotDescription
+from ...robots.kinematics import quaternions_of_matrices
 from ...runtime.language.errors import AloftError
 from ..file.format import RecordedField, RecordedRows, nanoseconds
 from ..file.reader import RecordedRun
 from ..file.table import chosen
-from .known_channels import Timed, known_channels
+from ..viewing.drawing import Moments
+from ..viewing.robot_shapes import quaternion_from_z, shapes_of
+from ..viewing.scene_ports import IMU, JOINTS, ScenePorts, port_of, ports_of, scene_ports
+from ..viewing.scene_sensors import sensor_ports
+from .cdr import DEFINITIONS, imu, joint_state, transforms, wrench
 from .named_columns import NamedColumn, NamedColumns
+
+PICTURE_RATE = 100.0
+"""Poses a second in ``/tf`` [Hz]: more than an eye sees."""
+WORLD = "world"
+GREY, GROUND = (0.56, 0.64, 0.68, 1.0), (0.55, 0.57, 0.6, 1.0)
+SENSOR_MESSAGES: Mapping[str, tuple[Callable[..., bytes], tuple[str, ...]]] = {
+    "sensor_msgs/msg/Imu": (imu, ("angular_velocity", "linear_acceleration")),
+    "geometry_msgs/msg/WrenchStamped": (wrench, ("wrench.force", "wrench.torque")),
+}
+"""How the message of a mounted sensor is written: the function, and the numbers that it takes."""
+LEVELS = {"INFO": 2, "WARN": 3, "ERROR": 4}
+"""The levels of ``foxglove.Log``."""
+
+
+Timed = tuple[int, bytes]
+Messages = Callable[[RecordedRows], Iterator[Timed]]
+
+
+@dataclass(frozen=True)
+class Channel:
+    """A channel; a message is its time [ns] and its bytes.
+
+    Attributes:
+        once: messages of the whole run.
+        messages: gives those of a batch of ticks, in order of time.
+    """
+
+    topic: str
+    type: str
+    encoding: str
+    schema_encoding: str
+    schema: str
+    once: tuple[Timed, ...]
+    messages: Messages
+
+
+def known_channels(run: RecordedRun) -> list[Channel]:
+    """The channels for which the recording has signals. Without a robot there is only ``/log``."""
+    channels = [_json("/log", "foxglove.Log", tuple(_notes(run)))]
+    robot = run.header.robot
+    if robot is None:
+        return channels
+    ports = ports_of(run.header)
+    joints, sensor = port_of(ports, JOINTS), port_of(ports, IMU)
+    if joints is not None:
+        channels.append(
+            _ros("/joint_states", "sensor_msgs/msg/JointState", partial(_joints, joints, robot))
+        )
+    if sensor is not None:
+        channels.append(_ros("/imu", "sensor_msgs/msg/Imu", partial(_imu, sensor, robot.base)))
+    for port, mounted in sensor_ports(robot, ports).items():
+        message = mounted.ros2
+        if message is not None and message.type in SENSOR_MESSAGES:
+            messages = partial(_sensor, port, mounted.link, message)
+            channels.append(_ros(f"/{mounted.name}", message.type, messages))
+    drawn = scene_ports(run.header)
+    if drawn is not None:
+        channels.append(_ros("/tf", "tf2_msgs/msg/TFMessage", partial(_poses, drawn, robot)))
+        start = int(nanoseconds(run.header.base_rate, run.ticks[:1]).sum())
+        update = (start, json.dumps(scene_update(run, robot, start)).encode())
+        channels.append(_json("/scene", "foxglove.SceneUpdate", (update,)))
+        if drawn.contact_force is not None and drawn.contact_position is not None:
+            for k, foot in enumerate(robot.feet):
+                messages = partial(_wrench, drawn, [i == k for i in robot.foot_of_contact()])
+                name = "geometry_msgs/msg/WrenchStamped"
+                channels.append(_ros(f"/wrench/{foot.name}", name, messages))
+    return channels
+
+
+def _ros(topic: str, name: str, messages: Messages) -> Channel:
+    return Channel(topic, name, "cdr", "ros2msg", DEFINITIONS[name], (), messages)
+
+
+def _json(topic: str, name: str, once: tuple[Timed, ...]) -> Channel:
+    # these readers know the content by the schema's name
+    schema = json.dumps({"title": name, "type": "object"})
+    return Channel(topic, name, "json", "jsonschema", schema, once, lambda batch: iter(()))
+
+
+def _instants(batch: RecordedRows) -> list[int]:
+    found: list[int] = nanoseconds(batch.header.base_rate, batch.ticks).tolist()
+    return found
+
+
+def _joints(port: str, robot: RobotDescription, batch: RecordedRows) -> Iterator[Timed]:
+    names = [joint.name for joint in robot.joints]
+    fields = ("position", "velocity", "torque")
+    lists = [batch.signal(f"{port}.{field}").tolist() for field in fields]
+    for instant, *values in zip(_instants(batch), *lists, strict=True):
+        yield instant, joint_state(instant, names, *values)
+
+
+def _imu(port: str, frame: str, batch: RecordedRows) -> Iterator[Timed]:
+    turn = batch.signal(f"{port}.angular_velocity").tolist()
+    force = batch.signal(f"{port}.specific_force").tolist()
+    for instant, *values in zip(_instants(batch), turn, force, strict=True):
+        yield instant, imu(instant, frame, *values)
+
+
+def _sensor(port: str, frame: str, message: RosMessage, batch: RecordedRows) -> Iterator[Timed]:
+    """The messages of a mounted sensor; its numbers are in the axes of its link."""
+    write, paths = SENSOR_MESSAGES[message.type]
+    fields = {path: field for field, path in message.fields.items()}
+    lists = [batch.signal(f"{port}.{fields[path]}").tolist() for path in paths]
+    for instant, *values in zip(_instants(batch), *lists, strict=True):
+        yield instant, write(instant, frame, *values)
+
+
+def _wrench(ports: ScenePorts, on_foot: list[bool], batch: RecordedRows) -> Iterator[Timed]:
+    """The force on a foot and its torque about the middle of the foot's contact points."""
+    assert ports.contact_force is not None and ports.contact_position is not None
+    force = batch.signal(ports.contact_force)[:, on_foot]
+    place = batch.signal(ports.contact_position)[:, on_foot]
+    arm = place - place.mean(axis=1, keepdims=True)
+    torques = np.cross(arm, force).sum(axis=1).tolist()
+    lists = zip(_instants(batch), force.sum(axis=1).tolist(), torques, strict=True)
+    for instant, total, torque in lists:
+        yield instant, wrench(instant, WORLD, total, torque)
+
+
+def _poses(ports: ScenePorts, robot: RobotDescription, batch: RecordedRows) -> Iterator[Timed]:
+    every = max(1, round(batch.header.base_rate / PICTURE_RATE))
+    due = np.flatnonzero(batch.ticks % every == 0)
+    poses = Moments(batch, due, []).poses(robot, ports.pose)
+    instants = nanoseconds(batch.header.base_rate, batch.ticks[due]).tolist()
+    places = poses.position.tolist()
+    turns = quaternions_of_matrices(poses.rotation).tolist()
+    for k, instant in enumerate(instants):
+        listed = zip(poses.names, places[k], turns[k], strict=True)
+        yield instant, transforms(instant, WORLD, listed)
+
+
+def scene_update(run: RecordedRun, robot: RobotDescription, instant: int) -> dict[str, Any]:
+    """A ``foxglove.SceneUpdate``: the links' shapes, each fixed to its link's frame, and the ground."""
+    entities = []
+    for link in robot.links:
+        cylinders, spheres = [], []
+        for shape in shapes_of(robot, link):
+            start, end = np.array(shape.start), np.array(shape.end)
+            length = float(np.linalg.norm(end - start))
+            thickness = 2.0 * shape.radius
+            if length > 0.0:
+                size = (thickness, thickness, length)
+                look = {"bottom_scale": 1.0, "top_scale": 1.0}
+                turn = quaternion_from_z(end - start)
+                cylinders.append(_solid(0.5 * (start + end), turn, size, GREY) | look)
+            for point in (start, end):
+                size = (thickness, thickness, thickness)
+                spheres.append(_solid(point, (0.0, 0.0, 0.0, 1.0), size, GREY))
+        shown = {"cylinders": cylinders, "spheres": spheres}
+        entities.append(_entity(link.name, link.name, instant, shown))
+    terrain = run.header.terrain
+    if terrain is not None and terrain.blocks:
+        cubes = []
+        for block in terrain.blocks:
+            least, most = np.array(block.least), np.array(block.most)
+            middle = 0.5 * (least + most)
+            cubes.append(_solid(middle, (0.0, 0.0, 0.0, 1.0), tuple(most - least), GROUND))
+        entities.append(_entity("ground", WORLD, instant, {"cubes": cubes}))
+    return {"deletions": [], "entities": entities}
+
+
+_KINDS = (
+    "arrows", "cubes", "spheres", "cylinders", "lines", "triangles", "texts", "models", "metadata",
+)  # fmt: skip
+
+
+def _entity(name: str, frame: str, instant: int, shown: Mapping[str, Any]) -> dict[str, Any]:
+    seconds, rest = divmod(instant, 1_000_000_000)
+    return {
+        "timestamp": {"sec": seconds, "nsec": rest},
+        "frame_id": frame,
+        "id": name,
+        "lifetime": {"sec": 0, "nsec": 0},
+        "frame_locked": True,
+        **{kind: shown.get(kind, []) for kind in _KINDS},
+    }
+
+
+def _solid(place: Any, turn: Any, size: Any, color: Any) -> dict[str, Any]:
+    return {
+        "pose": {
+            "position": dict(zip("xyz", map(float, place), strict=True)),
+            "orientation": dict(zip("xyzw", map(float, turn), strict=True)),
+        },
+        "size": dict(zip("xyz", map(float, size), strict=True)),
+        "color": dict(zip("rgba", color, strict=True)),
+    }
+
+
+def _notes(run: RecordedRun) -> Iterator[Timed]:
+    for note in sorted(run.notes, key=lambda note: note.tick):
+        instant = int(nanoseconds(run.header.base_rate, np.array([note.tick]))[0])
+        seconds, rest = divmod(instant, 1_000_000_000)
+        message = {
+            "timestamp": {"sec": seconds, "nsec": rest},
+            "level": LEVELS.get(note.level, 0),
+            "message": note.text,
+            "name": note.kind,
+            "file": "",
+            "line": 0,
+        }
+        yield instant, json.dumps(message).encode()
+
 
 ROW_GROUP = 8192
 """Ticks in a row group of a Parquet file, which is in memory as a whole."""

@@ -13,7 +13,7 @@ output and a field. All but the static ones are on the timelines ``t`` (exact na
 ``rows``             ``aloft:packed``: the bytes of the bus after each of some ticks without a
                      gap, at most half a second of them; see ``row_codec``
 ``signals/B/P/F``    the curve of a field as ``Scalars``, for the viewer: of those in the plots that
-                     it shows first, and of as many ticks as the curve needs; see ``thinned_rows``
+                     it shows first, and of as many ticks as the curve needs; see ``drawing``
 ``keyframes``        ``aloft:bus`` and ``aloft:state`` at tick k: the bytes of both buffers before
                      tick k ran, from which a run can go on
 ``notes``            ``aloft:note``: JSON of a ``Note``: life cycle, overruns, faults, parameter
@@ -21,29 +21,22 @@ output and a field. All but the static ones are on the timelines ``t`` (exact na
 ``states/NAME``      each change of a number whose values have names, and of a truth value, for
                      the viewer; ``state_lanes.all_lanes`` chooses the short names
 ``limits/B/P/F``     the limits of a field by the robot's description, for the viewer
-``plots``            what is computed for plots only, for the viewer: see ``foot_forces``
+``plots``            what is computed for plots only, for the viewer: see ``contacts``
 ``events``           notes, changes of state, lift-off and touchdown as text, for the viewer
 ``world``            the robot in 3D, for the viewer; see ``scene``
 ``times``            the time each block took, as text, for the viewer; written last
 ===================  ===============================================================================
 
 Row k is the bus after all outputs of tick k were written. Every message of the file has a checksum:
-see ``messages``. ``viewing.detail`` says how much is drawn into a recording. The other curves, and
+see ``messages``. ``viewing.drawing`` says how much is drawn into a recording. The other curves, and
 the rest of the scene, are drawn from the rows when ``aloft view`` shows it.
-
-Format 3 had the curves of all fields, and packed its rows in another way.
-
-Recordings of versions before 0.2 have format 2. They have no ``rows`` and no checksums. Their
-``signals`` hold every field exactly (int64 fields as component ``aloft:exact``), and ``recorded``
-(``aloft:span``) holds first and last of ticks without a gap whose signals are all there. Unwired
-inputs are in ``Header.bus_start``, over which the signals of a tick are laid.
 """
 
 from __future__ import annotations
 
 import json
 from base64 import b64decode, b64encode
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from hashlib import blake2b
 from typing import Any, Self
@@ -57,14 +50,12 @@ from ...runtime.language.signals import Slot
 from ...runtime.language.terrain import Ground, Terrain
 
 FORMAT = 4
-"""The number of this format."""
-READABLE = (2, 3, 4)
-"""The formats that can be read."""
+"""The number of this format, the only one that is read."""
 SIGNALS, STATES, KEYFRAMES, NOTES, EVENTS = "signals", "states", "keyframes", "notes", "events"
 LIMITS, TIMES, WORLD, GRAPH, DIAGRAM = "limits", "times", "world", "graph", "diagram"
 PLOTS = "plots"
-RECORDED, ROWS = "recorded", "rows"
-EXACT, BUS, STATE, NOTE, SPAN, PACKED = "exact", "bus", "state", "note", "span", "packed"
+ROWS = "rows"
+BUS, STATE, NOTE, PACKED = "bus", "state", "note", "packed"
 
 
 @dataclass(frozen=True)
@@ -80,8 +71,7 @@ class RecordedField:
         unit, frame, text: as declared.
         values: the names of the numbers of an int64 field.
         constant: whether it belongs to an unwired input.
-        signals: the name of the signal's class, and those of the signals that it derives from;
-            empty in recordings of versions before 0.2.
+        signals: the name of the signal's class, and those of the signals that it derives from.
     """
 
     name: str
@@ -105,8 +95,7 @@ class RecordedField:
     def from_json(cls, data: Mapping[str, Any]) -> Self:
         """The field from the plain data that ``dataclasses.asdict`` made."""
         values = {int(number): name for number, name in data["values"].items()}
-        lists = ("shape", "dimensions", "signals")
-        tuples = {name: tuple(data[name]) for name in lists if name in data}
+        tuples = {name: tuple(data[name]) for name in ("shape", "dimensions", "signals")}
         return cls(**{**data, "values": values, **tuples})
 
 
@@ -231,12 +220,12 @@ class Header:
         data["bus_start"] = b64decode(data["bus_start"])
         data["blocks"] = tuple(RecordedBlock(**block) for block in data["blocks"])
         data["order"] = tuple(data["order"])
-        data["terrain"] = _terrain(data.get("terrain"))
+        data["terrain"] = _terrain(data["terrain"])
         return cls(**data)
 
 
 def _terrain(data: Mapping[str, Any] | None) -> Terrain | None:
-    """Back from plain data; recordings before version 0.2 have none."""
+    """The terrain from plain data; a run without a simulated world has none."""
     if data is None:
         return None
     blocks = tuple(Ground(tuple(b["least"]), tuple(b["most"])) for b in data["blocks"])
@@ -277,3 +266,17 @@ def spans(ticks: NDArray[np.int64]) -> NDArray[np.int64]:
     ends = np.flatnonzero(np.diff(ticks) != 1)
     first = np.concatenate([ticks[:1], ticks[ends + 1]])
     return np.stack([first, np.concatenate([ticks[ends], ticks[-1:]])], axis=1)
+
+
+def time_columns(header: Header, ticks: NDArray[np.int64]) -> list[Any]:
+    """The timelines ``t`` and ``tick`` at some ticks (n,)."""
+    import rerun as rr
+
+    instants = nanoseconds(header.base_rate, ticks).astype("timedelta64[ns]")
+    return [rr.TimeColumn("t", duration=instants), rr.TimeColumn("tick", sequence=ticks)]
+
+
+def timed(header: Header, ticks: NDArray[np.int64], texts: Sequence[str]) -> list[str]:
+    """Texts with the time before each, as the viewer's own column of times is too narrow for them."""
+    times = (ticks / header.base_rate).tolist()
+    return [f"{time:.3f} s  {text}" for time, text in zip(times, texts, strict=True)]

@@ -13,8 +13,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from ...runtime.language.errors import AloftError
-from .contents import scanned
-from .messages import CLOSING, Damage, renumbered
+from .messages import CLOSING, Damage, renumbered, scanned
 
 
 class RepairError(AloftError):

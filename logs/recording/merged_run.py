@@ -17,8 +17,9 @@ from typing import Any
 import numpy as np
 
 from ...runtime.language.errors import AloftError, ExitCode
-from ...runtime.links.part import Whole
-from ...runtime.links.path_ages import LATEST, judged, timeline_of
+from ...runtime.links.lockstep_link import LinkInput
+from ...runtime.links.part import MergedLayout
+from ...runtime.links.path_ages import MAX_TICKS, check_path_ages, timeline_of
 from ...runtime.placement.placed import PlacedGraph
 from ...runtime.running.memory import BoundGraph, Memory, Snapshot
 from ...runtime.running.sinks import Note
@@ -28,7 +29,7 @@ from .writer import RecordingWriter
 
 _OF_ALL = ("life", "parameter")
 """The kinds of notes that every part has; one of them is enough."""
-_STAND_IN = "runtime.links.inbox:Received"
+_STAND_IN = f"{LinkInput.__module__}:{LinkInput.__name__}"
 """What the types of those blocks contain that only stand for a block of another machine."""
 
 
@@ -92,7 +93,7 @@ def path_metrics(placed: PlacedGraph, parts: Mapping[str, RecordedRun]) -> dict[
         ticks, rows = part.window(*_latest(part))
         layout = part.header.bus.layout()
         timelines[machine] = timeline_of(placed, machine, ticks, partial(layout.view, rows))
-    return judged(graph, timelines)
+    return check_path_ages(graph, timelines)
 
 
 def _latest(part: RecordedRun) -> tuple[int, int]:
@@ -100,7 +101,7 @@ def _latest(part: RecordedRun) -> tuple[int, int]:
     if not len(part.ticks):
         return 0, 0
     end = int(part.ticks[-1]) + 1
-    return max(int(part.ticks[0]), end - LATEST), end
+    return max(int(part.ticks[0]), end - MAX_TICKS), end
 
 
 def read_parts(
@@ -124,10 +125,10 @@ def read_parts(
     return parts
 
 
-def _whole_bus(placed: PlacedGraph, parts: Mapping[str, RecordedRun]) -> Whole:
+def _whole_bus(placed: PlacedGraph, parts: Mapping[str, RecordedRun]) -> MergedLayout:
     """What takes the bus of the whole from those of the parts, which may hold more."""
     layout = Memory(placed.graph.blocks, placed.graph.robot).bus.layout
-    return Whole(placed, layout, {m: part.header.bus.layout() for m, part in parts.items()})
+    return MergedLayout(placed, layout, {m: part.header.bus.layout() for m, part in parts.items()})
 
 
 def run_hash_of(placed: PlacedGraph, parts: Mapping[str, RecordedRun]) -> tuple[str, int]:
@@ -199,7 +200,7 @@ def _keyframes(
 ) -> Sequence[Snapshot]:
     """The keyframes of the whole, before those ticks for which every part has one."""
     bus = _whole_bus(placed, parts)
-    state = Whole(
+    state = MergedLayout(
         placed, bound.memory.state.layout, {m: p.header.state.layout() for m, p in parts.items()}
     )
     first, *others = (part.keyframes for part in parts.values())

@@ -16,10 +16,9 @@ import numpy as np
 from ...mathematics.arrays import Array
 from ...robots.description import RobotDescription
 from ...robots.kinematics import link_poses
-from ..viewing.robot_meshes import drawn_link, read_meshes
-from ..viewing.robot_shapes import eye_controls, scale_of
-from ..viewing.scene_contacts import ARROW_RADIUS, force_arrows
-from ..viewing.scene_part import Colors
+from ..viewing.contacts import ARROW_RADIUS, force_arrows
+from ..viewing.drawing import Colors
+from ..viewing.robot_shapes import drawn_link, eye_controls, read_meshes, scale_of
 
 COLORS = Colors()
 

@@ -28,8 +28,7 @@ from ...runtime.running.memory import Snapshot
 from ...runtime.running.sinks import Note
 from ..file.format import Header
 from .live_feed import LiveFeed
-from .place import Place, split_name, take_place
-from .remedy import cause_of
+from .place import Place, cause_of, split_name, take_place
 from .ring import Record, RingReader
 from .writer import RecordingWriter, warm_up
 

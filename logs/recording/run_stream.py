@@ -23,18 +23,16 @@ from ..file.format import (
     RecordedField,
     RecordedRows,
     entity_of,
+    time_columns,
+    timed,
 )
-from ..file.time_columns import time_columns, timed
-from ..viewing.block_times import times_table
 from ..viewing.blueprint import is_main
-from ..viewing.detail import WHOLE, Detail
-from ..viewing.limits import limits_of
-from ..viewing.plot_views import EVERY_VALUE, main_fields
+from ..viewing.drawing import WHOLE, Colors, Detail
+from ..viewing.plot_views import EVERY_VALUE, limits_of, main_fields
 from ..viewing.scene import Scene
-from ..viewing.scene_part import Colors
 from ..viewing.scene_ports import scene_ports
 from ..viewing.signal_names import axis_colors, element_names
-from ..viewing.state_lanes import LaneReader, all_lanes
+from ..viewing.state_lanes import LaneReader, all_lanes, times_table
 
 LIMIT_COLOR = 0x9E9E9EB0
 

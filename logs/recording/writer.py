@@ -10,8 +10,9 @@ from __future__ import annotations
 
 import json
 import os
+import time
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -21,13 +22,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...runtime.running.memory import Snapshot
-from ...runtime.running.sinks import Note
-from ..file.format import BUS, KEYFRAMES, NOTE, PACKED, ROWS, STATE, Header, spans
+from ...runtime.running.run_result import RunResult
+from ...runtime.running.sinks import Note, parameter_note
+from ..file.format import BUS, KEYFRAMES, NOTE, PACKED, ROWS, STATE, Header, spans, time_columns
+from ..file.header import make_header
 from ..file.messages import ARROW, CLOSING, FILE_HEAD, HEAD, Content, Message, sealed, split
 from ..file.row_codec import pack
-from ..file.time_columns import time_columns
 from ..viewing.blueprint import recording_blueprint
-from ..viewing.detail import RECORDED
+from ..viewing.drawing import RECORDED
 from .place import Place, take_place
 from .run_stream import RunStream
 
@@ -271,3 +273,41 @@ def warm_up() -> None:
     ):
         stream.send_columns("warm-up", times, columns)
     stream.disconnect()
+
+
+@dataclass(frozen=True)
+class Recording:
+    """A recording that was written: its path, its size and how long the writing took [s]."""
+
+    path: Path
+    size: int
+    seconds: float
+
+
+def write_recording(path: str | PathLike[str], result: RunResult) -> Recording:
+    """Write a whole run, also one that failed, to ``path``, replacing what is there.
+
+    It holds no keyframes; a ``Recorder`` writes those, while the run goes on.
+
+    Raises:
+        ImportError: Rerun is not installed.
+        OSError: the file cannot be written.
+        RuntimeError: the run kept no log.
+    """
+    began = time.perf_counter()
+    log = result.log
+    if result.graph is None or log is None or log.layout is None:
+        raise RuntimeError("this run kept no log; run it with log=True")
+    ticks, rows = np.array(log.ticks, np.int64), log.rows()
+    start = rows[0].tobytes() if len(rows) else bytes(log.layout.size)
+    first = log.ticks[0] if log.ticks else 0
+    header = make_header(result.graph, log.layout, start, first_tick=first)
+    writer = RecordingWriter(path, header, result.run_hash)
+    try:
+        writer.write_rows(ticks, rows)
+        changes = [parameter_note(change) for change in result.parameter_changes]
+        writer.write_notes(sorted([*log.notes, *changes], key=lambda note: note.tick))
+        writer.write_outcome(result.to_json())
+    finally:
+        writer.close()
+    return Recording(writer.path, writer.path.stat().st_size, time.perf_counter() - began)

@@ -1,32 +1,125 @@
 """Opens a recording so that it can be replayed: the graph is loaded from the text in the recording.
 
-Files that the graph names, such as tasks and plans, and the robot's description are those that the
-recording carries, where the present ones are others; see ``carried_files``.
+A recording carries the files that parameters named and that blocks found, such as tasks and plans,
+and the robot's description. Where the present ones are the same they are used. Else the recorded
+ones are written to a folder of their own and the graph is made to name those.
 """
 
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+import re
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from hashlib import sha256
 from os import PathLike
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
+import yaml
 from numpy.typing import NDArray
 
+from ...robots.description import RobotDescription, RobotError, find_robot
+from ...runtime.drawing.page import shown
 from ...runtime.language.errors import AloftError, ExitCode
 from ...runtime.language.layout import Layout
 from ...runtime.language.parameter_change import ParameterChange
 from ...runtime.language.stages import CheckedGraph
 from ...runtime.loading import load_text
 from ...runtime.running.memory import BoundGraph, Snapshot
+from ..file.format import Header
 from ..file.header import machine, versions
 from ..file.reader import RecordedRun, read
-from ..file.surroundings import digests, files_read, other_files
-from .carried_files import Restored, restored
+from ..file.surroundings import digests, files_read, named_file, other_files, unpacked
+
+_ENTRY = re.compile(r"(?P<block>[^:/]+)\.(?P<parameter>\w+)(?P<kind>: |/)(?P<name>.*)", re.DOTALL)
+_ROBOT = re.compile(r"^robot: .*$", re.MULTILINE)
+
+
+@dataclass(frozen=True)
+class Restored:
+    """What was restored.
+
+    Attributes:
+        text: the graph's text, which names the restored description of the robot.
+        overrides: by ``block.parameter``, the restored file or folder.
+        said: what was restored and why, each in one sentence.
+        entries: the entries of the restored files in ``Header.files``.
+    """
+
+    text: str
+    overrides: Mapping[str, str]
+    said: tuple[str, ...]
+    entries: frozenset[str]
+
+
+def restored(header: Header, text: str, graph_folder: Path, folder: Path) -> Restored:
+    """Write the files that are other than they were, or are not there any more, to ``folder``.
+
+    Args:
+        header: the recording's header.
+        text: the graph's text.
+        graph_folder: the folder of the graph file, to which names are relative.
+        folder: an empty folder.
+    """
+    overrides: dict[str, str] = {}
+    said, entries = [], set()
+    for entry, block, parameter, kind, name in _entries(header):
+        content = unpacked(header.contents[header.files[entry]])
+        found_in_folder = kind == "/"
+        now = named_file(name, graph_folder)
+        if now is not None and sha256(now.read_bytes()).hexdigest() == header.files[entry]:
+            continue
+        place = folder / f"{block}.{parameter}"
+        _write(place / Path(name).name, content)
+        overrides[f"{block}.{parameter}"] = str(
+            place if found_in_folder else place / Path(name).name
+        )
+        entries.add(entry)
+        if found_in_folder:
+            said.append(f"the file {name} of {block} is taken from the recording")
+            continue
+        why = "is not there any more" if now is None else "has other content now"
+        said.append(f"the file of {entry} {why}; the recorded one is used")
+    robot = header.robot
+    if robot is not None and _ROBOT.search(text) and not _is_present(robot, text, graph_folder):
+        place = folder / f"{robot.name}.yaml"
+        _write(place, yaml.safe_dump(robot.model_dump(mode="json"), sort_keys=False).encode())
+        text = _ROBOT.sub(lambda _: f"robot: {place}", text, count=1)
+        said.append(
+            f"the description of the robot {robot.name} is not the recorded one any more, or is "
+            "not there; the recorded one is used"
+        )
+    return Restored(text, overrides, tuple(said), frozenset(entries))
+
+
+def _entries(header: Header) -> Iterator[tuple[str, str, str, str, str]]:
+    """Entry, block, parameter, kind and name of each file that the recording carries."""
+    for entry, digest in header.files.items():
+        match = _ENTRY.fullmatch(entry)
+        if match is not None and digest in header.contents:
+            yield entry, match["block"], match["parameter"], match["kind"], match["name"]
+
+
+def _write(path: Path, content: bytes) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_bytes(content)
+
+
+def _is_present(robot: RobotDescription, text: str, folder: Path) -> bool:
+    """Whether the robot that the graph's text names is, in every value, the recorded one."""
+    found = _ROBOT.search(text)
+    assert found is not None
+    name = str(yaml.safe_load(found[0])["robot"])
+    try:
+        now = find_robot(name, folder)
+    except (LookupError, RobotError, OSError):
+        return False
+    if robot.profile in now.profiles:
+        now = now.with_profile(robot.profile)
+    return now.model_dump(mode="json") == robot.model_dump(mode="json")
 
 
 @dataclass(frozen=True)
@@ -67,10 +160,9 @@ class OpenedRun:
     def restored(self) -> Restored:
         """The graph's text, and the files that were taken from the recording."""
         header = self.file.header
-        text = header.graph
         if not self.restore:
-            return Restored(text, {}, (), frozenset())
-        return restored(header, text, self.folder, Path(self._place.name))
+            return Restored(header.graph, {}, (), frozenset())
+        return restored(header, header.graph, self.folder, Path(self._place.name))
 
     def load(self, overrides: Sequence[str] = ()) -> CheckedGraph:
         """The recorded graph with further overrides. Raises ``LoadError``."""
@@ -153,3 +245,36 @@ def _folder(recording: Path, source: Path) -> Path:
     places = (Path(), recording.parent, recording.parent.parent)
     found = (place / source for place in places if (place / source).is_file())
     return next(found, source).parent
+
+
+class TickValues:
+    """See ``runtime.drawing.values.Values``.
+
+    Args:
+        run: a recording with one tick or more.
+    """
+
+    def __init__(self, run: RecordedRun) -> None:
+        self._run = run
+        self._layout = run.header.bus.layout()
+        self._signals = run.signals()
+        self.ticks = (int(run.ticks[0]), int(run.ticks[-1]))
+        self.period = 1.0 / run.header.base_rate
+        blocks = (run.outcome or {}).get("blocks", {})
+        self.times: Mapping[str, str] = {
+            path: f"{t['calls']} runs, median {t['p50_us']:.1f} us, 99 % {t['p99_us']:.1f} us, "
+            f"longest {t['max_us']:.1f} us, {t['overruns']} deadlines missed"
+            for path, t in blocks.items()
+        }
+
+    def at(self, tick: int) -> Mapping[str, str]:
+        """The values of the last recorded tick up to this one."""
+        first, last = self.ticks
+        tick = min(max(tick, first), last)
+        known = self._run.ticks
+        row = int(known.searchsorted(tick, side="right")) - 1
+        _, rows = self._run.window(int(known[row]), int(known[row]) + 1)
+        return {
+            name: shown(self._layout.view(rows, name)[0], signal.unit or "")
+            for name, signal in self._signals.items()
+        }

@@ -21,8 +21,7 @@ from ...runtime.loading.checking.parameters import plain_parameters
 from ...runtime.running.differences import Difference
 from ...runtime.running.memory import BoundGraph
 from ...runtime.testing.stretch import Setting, Stretch
-from .replay import ReplayError, replay
-from .replayable import Replayable
+from .replay import Replayable, ReplayError, replay
 
 _OURS = __name__.rpartition(".logs.")[0]
 

@@ -13,12 +13,10 @@ from typing import Any
 
 import numpy as np
 
-from ..file.format import Header, RecordedField, entity_of
+from ..file.format import Header, RecordedField, entity_of, time_columns
 from ..file.header import make_header
-from ..file.time_columns import time_columns
 from ..viewing.signal_names import element_names
-from .replay import Replayed, ReplayError
-from .replayable import Replayable
+from .replay import Replayable, Replayed, ReplayError
 
 RECORDED, REPLAYED = "recorded", "replayed"
 MOST_PLOTS = 6

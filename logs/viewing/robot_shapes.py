@@ -1,15 +1,23 @@
-"""The links of a robot as Rerun draws them: solid capsules, or outlines for a second robot."""
+"""The links of a robot as Rerun draws them: meshes, solid capsules, or outlines of a second robot.
+
+Meshes are simplified until they are small enough to be kept in every recording.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...mathematics.arrays import Array
-from ...robots.description import Link, RobotDescription, Shape
-from ...robots.kinematics import link_poses
+from ...robots.description import Link, Look, Mesh, RobotDescription, Shape
+from ...robots.importing.meshes import mesh_triangles, simplified
+from ...robots.importing.urdf_text import find_file
+from ...robots.kinematics import link_poses, matrices_of_quaternions
 
 USUAL_REACH = 0.4
 """The reach [m] of the robot that the sizes of marks and lines are given for."""
@@ -101,3 +109,128 @@ def quaternion_from_z(direction: Array) -> Array:
         return np.array([1.0, 0.0, 0.0, 0.0])  # straight down: any half turn will do
     quaternion = np.array([-y, x, 0.0, 1.0 + z])
     return quaternion / float(np.linalg.norm(quaternion))
+
+
+MOST_TRIANGLES = 24_000
+"""Of a whole robot. Such a robot takes half a megabyte in a recording."""
+BESIDE = "beside"
+"""The entity below a link of the simple shapes that are drawn beside its meshes."""
+
+
+@dataclass(frozen=True)
+class Surface:
+    """Corners (n, 3) [m, link frame] and the triangles (m, 3) between them."""
+
+    corners: Array
+    triangles: NDArray[np.int64]
+
+
+@dataclass
+class RobotMeshes:
+    """The surface of each link whose meshes could all be read, and a sentence for each that could
+    not: such a link is drawn as its collision shapes."""
+
+    surfaces: dict[str, Surface] = field(default_factory=dict)
+    problems: list[str] = field(default_factory=list)
+
+
+def missing_meshes(robot: RobotDescription) -> list[str]:
+    """A sentence for each link of which a mesh is not there; no mesh is read."""
+    return [
+        _absent(link, mesh)
+        for link, look in robot.looks.items()
+        for mesh in look.meshes
+        if _path(mesh) is None
+    ]
+
+
+def read_meshes(robot: RobotDescription) -> RobotMeshes:
+    """Read all meshes of a robot, each made coarser where that is needed to have at most
+    ``MOST_TRIANGLES`` in all. Files that serve several links are read once."""
+    result = RobotMeshes()
+    count = sum(len(look.meshes) for look in robot.looks.values())
+    most = MOST_TRIANGLES // max(1, count)
+    known: dict[Path, Surface] = {}
+    for link, look in robot.looks.items():
+        try:
+            result.surfaces[link] = _joined(link, look, most, known)
+        except (OSError, ValueError) as error:
+            result.problems.append(str(error))
+    return result
+
+
+def _joined(link: str, look: Look, most: int, known: dict[Path, Surface]) -> Surface:
+    """All meshes of a link as one. Raises ``OSError`` or ``ValueError`` with the sentence to tell."""
+    corners: list[Array] = []
+    triangles: list[NDArray[np.int64]] = []
+    start = 0
+    for mesh in look.meshes:
+        path = _path(mesh)
+        if path is None:
+            raise ValueError(_absent(link, mesh))
+        if path not in known:
+            try:
+                known[path] = Surface(*simplified(mesh_triangles(path), most))
+            except (OSError, ValueError) as error:
+                raise ValueError(
+                    f"link {link} is drawn as its collision shapes: the mesh cannot be read ({error})"
+                ) from error
+        placed = known[path].corners * np.array(mesh.scale) @ _rotation(mesh).T
+        corners.append(placed + np.array(mesh.position))
+        triangles.append(known[path].triangles + start)
+        start += len(placed)
+    return Surface(np.concatenate(corners), np.concatenate(triangles))
+
+
+def _path(mesh: Mesh) -> Path | None:
+    return find_file(mesh.file, Path())
+
+
+def _absent(link: str, mesh: Mesh) -> str:
+    return f"link {link} is drawn as its collision shapes: there is no mesh {mesh.file}"
+
+
+def _rotation(mesh: Mesh) -> Array:
+    matrix: Array = matrices_of_quaternions(np.array([mesh.orientation]))[0]
+    return matrix
+
+
+def drawn_link(
+    robot: RobotDescription,
+    link: Link,
+    meshes: RobotMeshes,
+    color: int,
+    line_radius: float = 0.0006,
+) -> dict[str, Any]:
+    """What Rerun draws for a link in one colour (0xRRGGBBAA), by what follows the link's entity: its
+    meshes and what belongs to them, or its shapes, or nothing."""
+    import rerun as rr
+
+    surface = meshes.surfaces.get(link.name)
+    if surface is None:
+        shapes = shapes_of(robot, link)
+        return {"": capsules(shapes, color, line_radius=line_radius)} if shapes else {}
+    drawn: dict[str, Any] = {
+        "": rr.Mesh3D(
+            vertex_positions=surface.corners.astype(np.float32),
+            # without normals the viewer shows a mesh as if it gave light itself: a mere outline
+            vertex_normals=normals(surface).astype(np.float32),
+            triangle_indices=surface.triangles.astype(np.uint32),
+            albedo_factor=color,
+        )
+    }
+    if beside := robot.looks[link.name].shapes:
+        drawn[f"/{BESIDE}"] = capsules(beside, color, line_radius=line_radius)
+    return drawn
+
+
+def normals(surface: Surface) -> Array:
+    """The unit normal at each corner, (n, 3): the mean of those of its triangles by their areas."""
+    a, b, c = (surface.corners[surface.triangles[:, k]] for k in range(3))
+    each = np.cross(b - a, c - a)
+    found = np.zeros_like(surface.corners)
+    for k in range(3):
+        np.add.at(found, surface.triangles[:, k], each)
+    length = np.linalg.norm(found, axis=1, keepdims=True)
+    result: Array = np.where(length > 0.0, found / np.maximum(length, 1e-300), (0.0, 0.0, 1.0))
+    return result

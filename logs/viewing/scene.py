@@ -1,4 +1,8 @@
-"""Draws the robot in 3D with its contacts, its motion and its plan."""
+"""Draws the robot in 3D: the robot itself, contacts, motion, plan, push and ground.
+
+The true robot is solid, as meshes where its description has them. The estimated one is drawn as wires
+around it, which are those of the collision shapes.
+"""
 
 from __future__ import annotations
 
@@ -6,20 +10,318 @@ from typing import Any
 
 import numpy as np
 
-from ..file.format import EVENTS, Header, RecordedRows
-from ..file.time_columns import time_columns, timed
-from .detail import Detail
-from .flights import SHORTEST_FLIGHT, TOUCHDOWN, Flights
-from .foot_forces import AFTER_TOUCHDOWN, FootForces, LandingPeaks
-from .scene_contacts import ContactPart
-from .scene_motion import FootTargetPart, MassCentrePart, PlanPart
-from .scene_part import Colors, Moments
-from .scene_ports import ScenePorts
-from .scene_push import PushPart
-from .scene_robot import RobotPart
-from .scene_terrain import TerrainPart
+from ...mathematics.arrays import Array
+from ...robots.kinematics import quaternions_of_matrices
+from ..file.format import EVENTS, WORLD, Header, RecordedRows, time_columns, timed
+from .contacts import (
+    ABOVE_GROUND,
+    AFTER_TOUCHDOWN,
+    ARROW_RADIUS,
+    SHORTEST_FLIGHT,
+    TOUCHDOWN,
+    ContactPart,
+    Flights,
+    FootForces,
+    LandingPeaks,
+    force_arrows,
+)
+from .drawing import Colors, Detail, Moments, ScenePart
+from .robot_shapes import capsules, drawn_link, eye_height, read_meshes, shapes_of
+from .scene_ports import PoseSource, ScenePorts
+from .scene_sensors import SensorPart
 
-PARTS = (TerrainPart, RobotPart, ContactPart, MassCentrePart, PlanPart, FootTargetPart, PushPart)
+EYE = "eye"
+"""The entity below ``world`` that the camera follows."""
+
+
+class RobotPart(ScenePart):
+    """``robot/<link>`` and ``estimate/<link>``: the shapes once, then one pose for each instant.
+
+    The shapes come after the first poses, because a viewer that is still loading would else show
+    all links at the origin. ``eye`` is a point that goes along with the base, which the camera
+    follows; it does not rise, so that a jump is seen as one.
+    """
+
+    _shown = False
+
+    def write(self, moments: Moments) -> None:
+        """Write where the links are, and in the first call their shapes, too."""
+        import rerun as rr
+
+        for name, source, _ in self._robots():
+            poses = moments.poses(self.robot, source)
+            for link in self.robot.links:
+                position, rotation = poses.of(link.name)
+                turn = quaternions_of_matrices(rotation)
+                transforms = rr.Transform3D.columns(translation=position, quaternion=turn)
+                self.send(f"{name}/{link.name}", moments, transforms)
+            if name == "robot":
+                beside = poses.of(self.robot.base)[0].copy()
+                beside[:, 2] = eye_height(self.robot)
+                self.send(EYE, moments, rr.Transform3D.columns(translation=beside))
+        if not self._shown:
+            self._shown = True
+            self._write_shapes(moments)
+
+    def _write_shapes(self, moments: Moments) -> None:
+        import rerun as rr
+
+        meshes = read_meshes(self.robot)
+
+        self.log(EYE, rr.Points3D([[0.0, 0.0, 0.0]], radii=[0.0], colors=[0x00000000]))
+        width = 0.0006 * self.scale
+        for name, _, color in self._robots():
+            for link in self.robot.links:
+                entity = f"{name}/{link.name}"
+                if name == "estimate":
+                    shapes = shapes_of(self.robot, link)
+                    self.log(entity, capsules(shapes, color, wires=True, line_radius=width))
+                    continue
+                for below, drawn in drawn_link(self.robot, link, meshes, color, width).items():
+                    self.log(f"{entity}{below}", drawn)
+        if meshes.problems:
+            texts = rr.TextLog.columns(text=meshes.problems, level=["WARN"] * len(meshes.problems))
+            ticks = np.full(len(meshes.problems), moments.batch.ticks[moments.due[0]])
+            root = self.world.removesuffix(WORLD)
+            self.stream.send_columns(f"{root}{EVENTS}", time_columns(self.header, ticks), texts)
+
+    def _robots(self) -> list[tuple[str, PoseSource, int]]:
+        robots = [("robot", self.ports.pose, self.colors.robot)]
+        if self.ports.estimate is not None and self.detail.extras:
+            robots.append(("estimate", self.ports.estimate, self.colors.estimate))
+        return robots
+
+
+class MassCentrePart(ScenePart):
+    """``com``: a ball; ``com_projection``: the plumb line to the ground below it."""
+
+    def write_static(self) -> None:
+        """Write colours and sizes."""
+        import rerun as rr
+
+        if self.ports.com is not None:
+            ball = rr.Points3D.from_fields(colors=[self.colors.com], radii=[0.012 * self.scale])
+            self.log("com", ball)
+            line = rr.LineStrips3D.from_fields(
+                colors=[self.colors.com], radii=[0.0015 * self.scale]
+            )
+            self.log("com_projection", line)
+
+    def write(self, moments: Moments) -> None:
+        """Write where the centre of mass is."""
+        import rerun as rr
+
+        if self.ports.com is None:
+            return
+        com = moments[self.ports.com]
+        self.send("com", moments, rr.Points3D.columns(positions=com))
+        foot = com.copy()
+        foot[:, 2] = ABOVE_GROUND
+        if self.ports.ground_height is not None and self.robot.contacts:
+            foot[:, 2] += moments[self.ports.ground_height].min(axis=1)
+        # a small cross on the ground at the end of the line
+        ways = [[0, 0, 0], [1, 0, 0], [-1, 0, 0], [0, 0, 0], [0, 1, 0], [0, -1, 0]]
+        arm = 0.02 * self.scale * np.array(ways)
+        lines = np.concatenate([com[:, None], foot[:, None] + arm], axis=1)
+        columns = rr.LineStrips3D.columns(strips=list(lines))
+        self.send("com_projection", moments, columns)
+
+
+class PlanPart(ScenePart):
+    """``plan/com`` and ``plan/<foot>``: the planned motion, placed where the robot stood at first.
+
+    The positions of a plan are relative to where the robot stands before. Here that is the middle
+    of its contact points in the first tick that is written.
+    """
+
+    _start: Array | None = None
+
+    def write_static(self) -> None:
+        """Write the feet's outlines."""
+        import rerun as rr
+
+        if self.ports.plan is None:
+            return
+        ball = rr.Points3D.from_fields(colors=[self.colors.plan], radii=[0.009 * self.scale])
+        self.log("plan/com", ball)
+        for k, foot in enumerate(self.robot.feet):
+            self.log(f"plan/{foot.name}", foot_outline(self, k, self.colors.plan))
+
+    def write(self, moments: Moments) -> None:
+        """Write where the plan is at these instants."""
+        import rerun as rr
+
+        plan = self.ports.plan
+        if plan is None:
+            return
+        com, feet = moments[f"{plan}.com"], moments[f"{plan}.foot_position"]
+        start = self._stood(moments)
+        self.send("plan/com", moments, rr.Points3D.columns(positions=com + start))
+        yaw = moments[f"{plan}.foot_yaw"]
+        for k, foot in enumerate(self.robot.feet):
+            some = self.changing(f"plan/{foot.name}", moments, feet[:, k], yaw[:, k])
+            if not len(some):
+                continue
+            half, nothing = 0.5 * some[f"{plan}.foot_yaw"][:, k], np.zeros(len(some))
+            turn = np.column_stack([nothing, nothing, np.sin(half), np.cos(half)])
+            places = some[f"{plan}.foot_position"][:, k] + start
+            poses = rr.Transform3D.columns(translation=places, quaternion=turn)
+            self.send(f"plan/{foot.name}", some, poses)
+
+    def _stood(self, moments: Moments) -> Array:
+        if self._start is None:
+            self._start = np.zeros(3)
+            if self.ports.contact_position is not None:
+                contacts = moments.batch.signal(self.ports.contact_position)[0]
+                planned = moments.batch.signal(f"{self.ports.plan}.foot_position")[0]
+                feet = self.robot.foot_of_contact()
+                middles = [
+                    contacts[[foot == k for foot in feet]].mean(axis=0) for k in sorted({*feet})
+                ]
+                self._start = np.mean(middles, axis=0) - planned.mean(axis=0)
+        return self._start
+
+
+class FootTargetPart(ScenePart):
+    """``foot_targets/<foot>``: where the controller wants the feet, seen from the base it knows."""
+
+    def write_static(self) -> None:
+        """Write the feet's outlines."""
+        if self.ports.feet is not None:
+            for k, foot in enumerate(self.robot.feet):
+                self.log(f"foot_targets/{foot.name}", foot_outline(self, k, self.colors.target))
+
+    def write(self, moments: Moments) -> None:
+        """Write where the controller wants the feet."""
+        import rerun as rr
+
+        if self.ports.feet is None:
+            return
+        source = self.ports.estimate or self.ports.pose
+        base, turn = moments.poses(self.robot, source).of(self.robot.base)
+        position = moments[f"{self.ports.feet}.position"]
+        rotation = moments[f"{self.ports.feet}.rotation"]
+        for k, foot in enumerate(self.robot.feet):
+            there = base + np.einsum("nij,nj->ni", turn, position[:, k])
+            way = quaternions_of_matrices(turn @ rotation[:, k])
+            columns = rr.Transform3D.columns(translation=there, quaternion=way)
+            self.send(f"foot_targets/{foot.name}", moments, columns)
+
+
+def foot_outline(part: ScenePart, foot: int, color: int) -> object:
+    """The outline of a sole in its own frame: a box around its contact points and their radius.
+
+    The outline of a point foot is a square as wide as the foot.
+    """
+    import rerun as rr
+
+    robot = part.robot
+    contacts = [c for c in robot.contacts if c.foot == robot.feet[foot].name]
+    points = np.array([c.position for c in contacts]).reshape(-1, 3) - robot.feet[foot].sole
+    radius = max([c.radius for c in contacts], default=0.01)
+    low = points.min(axis=0, initial=0.0) - np.array([radius, radius, 0.0])
+    high = points.max(axis=0, initial=0.0) + np.array([radius, radius, 0.0])
+    corners = [(low[0], low[1]), (high[0], low[1]), (high[0], high[1]), (low[0], high[1])]
+    strip = [(x, y, ABOVE_GROUND) for x, y in [*corners, corners[0]]]
+    return rr.LineStrips3D([strip], colors=[color], radii=[0.0015 * part.scale])
+
+
+class PushPart(ScenePart):
+    """``push``: an arrow at the robot's named point, of length zero except during the push."""
+
+    def write_static(self) -> None:
+        """Write the colour."""
+        import rerun as rr
+
+        if self.ports.push is not None:
+            width = 1.5 * ARROW_RADIUS * self.scale
+            self.log("push", rr.Arrows3D.from_fields(colors=[self.colors.push], radii=[width]))
+
+    def write(self, moments: Moments) -> None:
+        """Write the force where it acts."""
+        import rerun as rr
+
+        names = list(self.robot.points)
+        if self.ports.push is None or not names:
+            return
+        moments = self._acting(moments)
+        if not len(moments):
+            return
+        force = force_arrows(self.robot, moments[f"{self.ports.push}.force"])
+        point = np.clip(moments[f"{self.ports.push}.point"], 0, len(names) - 1)
+        poses = moments.poses(self.robot, self.ports.pose)
+        ends = np.zeros((len(names), len(moments), 3))
+        for k, (link, place) in enumerate(self.robot.points.values()):
+            position, rotation = poses.of(link)
+            ends[k] = position + rotation @ np.array(place)
+        there = ends[point, np.arange(len(moments))]
+        arrows = rr.Arrows3D.columns(origins=there - force, vectors=force)
+        self.send("push", moments, arrows)
+
+    def _acting(self, moments: Moments) -> Moments:
+        """The instants at which it acts, and the first one and those at which it has just ended."""
+        acts = (moments[f"{self.ports.push}.force"] != 0.0).any(axis=1)
+        return self.changing("push", moments, acts * moments.batch.ticks[moments.due])
+
+
+COLOR = 0x8D9299FF
+EDGES = 0xCFD8DCFF
+"""The edges of the boxes: all their sides have one colour, so a step would not be seen without."""
+FLOOR_SIZE = 4.0
+"""Length and width of the piece of floor that is drawn [m]."""
+FLOOR_THICKNESS = 0.02
+DEEPEST_FLOOR = -10.0
+"""A floor below this height [m] is out of reach, and so not drawn."""
+
+
+class TerrainPart(ScenePart):
+    """``ground``: the boxes of the scene with their edges, drawn once. A level floor at height zero is not drawn,
+    as the viewer has a grid there."""
+
+    def write_static(self) -> None:
+        """Write the boxes."""
+        import rerun as rr
+
+        terrain = self.header.terrain
+        if terrain is None:
+            return
+        corners = [(block.least, block.most) for block in terrain.blocks]
+        if DEEPEST_FLOOR < terrain.floor < 0.0:
+            half = 0.5 * FLOOR_SIZE
+            corners.append(
+                ((-half, -half, terrain.floor - FLOOR_THICKNESS), (half, half, terrain.floor))
+            )
+        if not corners:
+            return
+        places = np.array(corners)
+        centers, half_sizes = places.mean(axis=1), 0.5 * (places[:, 1] - places[:, 0])
+        for name, color, mode in (
+            ("ground", COLOR, "solid"),
+            ("ground/edges", EDGES, "majorwireframe"),
+        ):
+            boxes = rr.Boxes3D(
+                centers=centers,
+                half_sizes=half_sizes,
+                colors=np.full(len(places), color, np.uint32),
+                radii=np.full(len(places), 0.003 * self.scale),
+                fill_mode=mode,
+            )
+            self.log(name, boxes)
+
+    def write(self, moments: Moments) -> None:
+        """Nothing: the ground does not move."""
+
+
+PARTS = (
+    TerrainPart,
+    RobotPart,
+    ContactPart,
+    MassCentrePart,
+    PlanPart,
+    FootTargetPart,
+    PushPart,
+    SensorPart,
+)
 
 
 class Scene:

@@ -2,8 +2,7 @@
 
 A port is drawn by the type of its signal: a ``RobotTruth`` poses the solid robot, an
 ``ExternalForce`` is an arrow, and so on. A signal of a project's own is drawn too if it derives
-from one of these types, or if it has the same fields. Recordings of versions before 0.2 keep no
-types, so all their ports are found by their fields.
+from one of these types, or if it has the same fields.
 """
 
 from __future__ import annotations

@@ -1,12 +1,14 @@
-"""The lanes of the viewer's state timeline: phases, contacts, whether a problem was solved.
+"""The lanes of the viewer's state timeline, and the table of the blocks' times.
 
-A lane shows when a field with few values changed."""
+A lane shows when a field with few values changed: phases, contacts, whether a problem was solved.
+"""
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -119,3 +121,27 @@ class LaneReader:
             if len(changed):
                 labels = [lane.labels.get(int(n), str(n)) for n in numbers[changed]]
                 yield Changes(lane, batch.ticks[changed], labels)
+
+
+COLUMNS = (
+    ("runs", "calls", "d"),
+    ("mean [us]", "mean_us", ".1f"),
+    ("median [us]", "p50_us", ".1f"),
+    ("99 % [us]", "p99_us", ".1f"),
+    ("longest [us]", "max_us", ".1f"),
+    ("overruns", "overruns", "d"),
+)
+
+
+def times_table(outcome: Mapping[str, Any]) -> str:
+    """The table as Markdown, made from an outcome (``RunResult.to_json``), in the order of execution."""
+    blocks: Mapping[str, Mapping[str, Any]] = outcome.get("blocks", {})
+    lines = ["| block | " + " | ".join(title for title, *_ in COLUMNS) + " |"]
+    lines.append("|---|" + "---:|" * len(COLUMNS))
+    for path, times in blocks.items():
+        cells = [format(times[key], form) for _, key, form in COLUMNS]
+        lines.append(f"| {path} | " + " | ".join(cells) + " |")
+    total = sum(float(times["mean_us"]) for times in blocks.values())
+    ticks, wall = outcome.get("ticks", 0), float(outcome.get("wall_time_s") or 0.0)
+    lines += ["", f"{ticks} ticks in {wall:.2f} s; all blocks together {total:.0f} us on average."]
+    return "\n".join(lines)

@@ -307,8 +307,11 @@ class JumpTask(FreeTimes):
         whole = {
             "format": PLAN_FORMAT,
             "task": self.resolved(robot).content(),
-            # The task says itself which actuators it is planned for.
-            "robot": robot.changed(profile="").model_dump(mode="json"),
+            # The task says itself which actuators it is planned for; no plan depends on sensors that
+            # are mounted on links.
+            "robot": robot.changed(profile="", sensors=robot.sensors.built_in).model_dump(
+                mode="json"
+            ),
         }
         text = json.dumps(whole, sort_keys=True, separators=(",", ":"))
         return hashlib.sha256(text.encode()).hexdigest()[:20]

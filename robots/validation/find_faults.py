@@ -57,6 +57,12 @@ def _report(
             path, f"{owner} has no key {key!r}", listing(legal, 20), repr(key),
             f"{right}: {shown(value)}" if right else "",
         )  # fmt: skip
+    elif code == "model_type" and path[:-1] == ("sensors",):
+        right = nearest(str(key), ("imu", "switches"))
+        draft.add(
+            path, f"{owner} has no key {key!r}", "imu, switches, or a sensor with its kind and link",
+            repr(key), f"{right}: {shown(value)}" if right else "",
+        )  # fmt: skip
     elif code == "missing":
         if isinstance(key, int):
             draft.add(path[:-1], f"{owner}: too few values", f"at least {key + 1}", f"{key}")

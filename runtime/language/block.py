@@ -237,11 +237,18 @@ class Block:
         return {n: v for n, v in values.items() if isinstance(v, int) and not isinstance(v, bool)}
 
     @classmethod
-    def fitted(cls, params: Parameters, folder: Path, graph_folder: Path) -> type[Block]:
-        """The class whose ports are those that the parameters ask for; by default the class itself.
+    def fitted(
+        cls,
+        params: Parameters,
+        folder: Path,
+        robot: RobotDescription | None = None,
+        graph_folder: Path | None = None,
+    ) -> type[Block]:
+        """The class whose ports are those that the parameters, or the graph's robot, ask for; by default
+        the class itself.
 
         Another class has the name of this one. Files that parameters name are relative to
-        ``folder``; users keep their modules beside the loaded graph, in ``graph_folder``. A ``BlockError`` that this raises should be a misfit of ``requires`` as well.
+        ``folder``; beside the loaded graph, in ``graph_folder``, users keep their modules. A ``BlockError`` that this raises should be a misfit of ``requires`` as well.
         """
         return cls
 

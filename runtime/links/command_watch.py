@@ -15,11 +15,11 @@ from typing import Protocol
 from ..placement.placed import Link, PlacedGraph, command_sources, silence_limit
 
 
-class Hears(Protocol):
+class WatchedLink(Protocol):
     """The receiving end of a link, as the watch needs it."""
 
     link: Link
-    heard_at: int
+    received_at: int
 
 
 class CommandWatch:
@@ -30,7 +30,7 @@ class CommandWatch:
     Args:
         placed: the graph.
         machine: the machine with the actuators.
-        inboxes: the receiving ends of all its links.
+        receivers: the receiving ends of all its links.
         clock: the monotonic time [ns].
     """
 
@@ -38,13 +38,13 @@ class CommandWatch:
         self,
         placed: PlacedGraph,
         machine: str,
-        inboxes: Sequence[Hears],
+        receivers: Sequence[WatchedLink],
         clock: Callable[[], int] = time.monotonic_ns,
     ) -> None:
         limit = silence_limit(placed.graph, machine)
         sources = () if limit is None else command_sources(placed.graph, machine)
         self.limit = limit or 0.0
-        self._watched = tuple(box for box in inboxes if box.link.source in sources)
+        self._watched = tuple(box for box in receivers if box.link.source in sources)
         self._clock = clock
         self._since = 0
 
@@ -61,7 +61,7 @@ class CommandWatch:
             self._since = self._clock()
         oldest = self._clock()
         for box in self._watched:
-            oldest = min(oldest, max(box.heard_at, self._since))
+            oldest = min(oldest, max(box.received_at, self._since))
         return oldest
 
     def complaint(self) -> str:
@@ -71,7 +71,7 @@ class CommandWatch:
         silence = (self._clock() - self.heard()) * 1e-9
         if silence <= self.limit:
             return ""
-        worst = min(self._watched, key=lambda box: box.heard_at)
+        worst = min(self._watched, key=lambda box: box.received_at)
         return (
             f"link {worst.link.name} brings commands and was silent for {silence * 1e3:.1f} ms, at "
             f"most {self.limit * 1e3:g} ms are allowed (links.watchdog)"

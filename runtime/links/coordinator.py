@@ -24,25 +24,25 @@ from ..running.failures import describe
 from ..running.live_parameters import LiveParameters
 from ..running.memory import BoundGraph
 from ..running.sinks import Note
-from ..transports.transport import Take, Transport, tick_key
+from ..transports.transport import MessageCallback, Transport, tick_key
 from .command_watch import CommandWatch
-from .free_link import LatestInbox
-from .lockstep_link import Inbox, Mailbox, MailTimeoutError, Send
-from .peers import Others, PeerError, Phase
+from .free_link import LatestReceiver
+from .lockstep_link import LinkOutput, LockstepReceiver, Mailbox, MailTimeoutError
+from .peers import PeerError, PeerStates, Phase
 
 
 class PartClock(Clock):
     """A clock that ends the run only when all parts have agreed to end after the same tick.
 
-    A block or a signal asks for the end as ever, by ``stop_reason`` and ``stopped_by``. The wish of
-    whoever asks first is kept in ``wish``, and the conductor tells it to the others. A signal may
+    A block or a signal asks for the end as ever, by ``stop_reason`` and ``stopped_by``. The request of
+    whoever asks first is kept in ``stop_request``, and the coordinator tells it to the others. A signal may
     come at any time, so without this a part could end a tick before the others.
     """
 
     def __init__(self, base_period: float) -> None:
-        self.wish: tuple[str, str] | None = None
+        self.stop_request: tuple[str, str] | None = None
         self._agreed: tuple[str, str] | None = None
-        self._heeded = False
+        self._is_first_request = False
         self.heard: Callable[[], int] | None = None
         """What says when commands were last heard; see ``CommandWatch.heard``."""
         super().__init__(base_period)
@@ -63,10 +63,10 @@ class PartClock(Clock):
     @stop_reason.setter
     def stop_reason(self, reason: str | None) -> None:
         if reason is None:
-            self.wish = self._agreed = None
-        self._heeded = reason is not None and self.wish is None
-        if reason is not None and self._heeded:
-            self.wish = (reason, "")
+            self.stop_request = self._agreed = None
+        self._is_first_request = reason is not None and self.stop_request is None
+        if reason is not None and self._is_first_request:
+            self.stop_request = (reason, "")
 
     @property
     def stopped_by(self) -> str:
@@ -75,11 +75,11 @@ class PartClock(Clock):
 
     @stopped_by.setter
     def stopped_by(self, block: str) -> None:
-        if self._heeded and self.wish is not None:
-            self.wish = (self.wish[0], block)
+        if self._is_first_request and self.stop_request is not None:
+            self.stop_request = (self.stop_request[0], block)
 
 
-class SpreadParameters(LiveParameters):
+class DistributedParameters(LiveParameters):
     """The parameters of one part, and of what stands for the other parts' blocks.
 
     An adjustment that is handed in here waits until the tick ends. Then all parts get it as a
@@ -137,11 +137,11 @@ class SpreadParameters(LiveParameters):
 _HEAD = Struct("<8sqB")
 _ROUNDS = 16
 """The most messages that a part sends to another about one tick."""
-REST_TIME = 2.0
+REST_TIMEOUT = 2.0
 """Seconds that a part waits at its end until the actuators of the others are in damping."""
 
 
-class Kind(IntEnum):
+class TickMessageKind(IntEnum):
     """What a part says about a tick."""
 
     DONE = 0
@@ -159,14 +159,14 @@ class Kind(IntEnum):
 
 
 @dataclass(frozen=True)
-class Word:
+class TickMessage:
     """What another part said about a tick."""
 
-    kind: Kind
+    kind: TickMessageKind
     data: Mapping[str, Any] = field(default_factory=dict)
 
 
-class Conductor(Block):
+class LockstepCoordinator(Block):
     """The block of the runtime that starts first and ends each tick last.
 
     ``start`` waits until every part runs the same graph and a message has come through every link
@@ -179,16 +179,16 @@ class Conductor(Block):
 
     def connect(
         self,
-        others: Others,
+        peers: PeerStates,
         transport: Transport,
-        inboxes: Sequence[Inbox | LatestInbox],
-        senders: Mapping[str, Send],
-        parameters: SpreadParameters,
+        receivers: Sequence[LockstepReceiver | LatestReceiver],
+        senders: Mapping[str, LinkOutput],
+        parameters: DistributedParameters,
         *,
         clock: PartClock,
         on_open: Callable[[], None],
-        patience: float,
-        connect_time: float,
+        timeout: float,
+        connect_timeout: float,
         watch: CommandWatch,
         moves: bool = False,
         elsewhere: Mapping[str, str] | None = None,
@@ -197,7 +197,7 @@ class Conductor(Block):
 
         Args:
             on_open: declares the links; it is called once the transport is open.
-            patience: the seconds to wait for a message.
+            timeout: the seconds to wait for a message.
             connect_time: the seconds to wait for the other parts to start.
             watch: watches the links that bring commands.
             moves: whether this part has actuators.
@@ -205,55 +205,53 @@ class Conductor(Block):
         """
         self.moves, self.elsewhere = moves, elsewhere or {}
         self._watch = watch
-        self.others = others
+        self.peers = peers
         self._transport = transport
-        self._inboxes = inboxes
+        self._receivers = receivers
         self._senders = senders
         self._parameters = parameters
         self._clock = clock
         self._on_open = on_open
-        self._patience, self._connect_time = patience, connect_time
-        self._tell: dict[str, Take] = {}
-        self._mail: dict[str, Mailbox[Word]] = {}
+        self._timeout, self._connect_timeout = timeout, connect_timeout
+        self._publishers: dict[str, MessageCallback] = {}
+        self._mail: dict[str, Mailbox[TickMessage]] = {}
         self._tick = 0
-        self._opened = self._told = False
+        self._opened = self._fault_reported = False
 
     # -- before the first tick ---------------------------------------------------------------------
 
     def start(self) -> None:
         """Connect, compare graphs, and try every link both ways."""
         self._opened = True
-        self.others.open()
+        self.peers.open()
         self.listen()
         self._on_open()
-        self.others.reach(Phase.HELLO, self._connect_time)
-        self.others.reach(Phase.LINKED, self._connect_time, before=self._all_links_work)
+        self.peers.reach_phase(Phase.HELLO, self._connect_timeout)
+        self.peers.reach_phase(Phase.LINKED, self._connect_timeout, before=self._all_links_work)
 
     def listen(self) -> None:
         """Listen to what the others say of each tick."""
-        for name in self.others.names:
-            box: Mailbox[Word] = Mailbox(lambda: self.others.check(self._tick))
+        for name in self.peers.names:
+            box: Mailbox[TickMessage] = Mailbox(lambda: self.peers.check(self._tick))
             self._mail[name] = box
-            self.others.mailboxes.append(box.wake)
-            self._tell[name] = self._transport.publisher(tick_key(self.others.machine, name))
-            self._transport.subscribe(
-                tick_key(name, self.others.machine), self._listener(name, box)
-            )
+            self.peers.mailboxes.append(box.wake)
+            self._publishers[name] = self._transport.publisher(tick_key(self.peers.machine, name))
+            self._transport.subscribe(tick_key(name, self.peers.machine), self._listener(name, box))
 
     def _all_links_work(self) -> bool:
         """Send a message through each link that has not been heard; whether all were, both ways."""
         waiting = [
             sender
             for link, sender in self._senders.items()
-            if not any(self.others.has_checked(name, link) for name in self.others.names)
+            if not any(self.peers.has_checked(name, link) for name in self.peers.names)
         ]
         for sender in waiting:
             sender.probe()
-        return not waiting and all(self.others.checked(box.link.name) for box in self._inboxes)
+        return not waiting and all(self.peers.checked(box.link.name) for box in self._receivers)
 
-    def reach(self, phase: Phase) -> None:
+    def reach_phase(self, phase: Phase) -> None:
         """Wait until all parts have started those blocks that ``phase`` says."""
-        self.others.reach(phase, self._connect_time)
+        self.peers.reach_phase(phase, self._connect_timeout)
 
     # -- at the end of each tick -------------------------------------------------------------------
 
@@ -270,42 +268,51 @@ class Conductor(Block):
         clock = self._clock
         tick = self._tick = clock.tick
         own: Adjustment | None = None
-        wish = clock.wish
-        if wish is not None:
-            self._say(tick, 0, Kind.STOP, {"reason": wish[0], "block": wish[1]})
+        stop_request = clock.stop_request
+        if stop_request is not None:
+            self._send(
+                tick, 0, TickMessageKind.STOP, {"reason": stop_request[0], "block": stop_request[1]}
+            )
         elif self._parameters.handed_in and (own := self._parameters.proposal()) is not None:
             settings = {path: new for path, _, new in own.values}
-            self._say(tick, 0, Kind.PROPOSE, {"settings": settings})
+            self._send(tick, 0, TickMessageKind.PROPOSE, {"settings": settings})
         else:
-            self._say(tick, 0, Kind.DONE)
-        words = {name: self._hear(name, tick, 0) for name in self.others.names}
-        for name, word in words.items():
-            if word.kind in (Kind.FAULT, Kind.WRONG_VALUE):
-                raise self._error(name, word)
-        wishes = {self.others.machine: wish} if wish is not None else {}
-        for name, word in words.items():
-            if word.kind is Kind.STOP:
-                wishes[name] = (str(word.data["reason"]), str(word.data["block"]))
-        if wishes:
-            clock.agree(*wishes[min(wishes)])  # of several wishes all take the same one
-        if own is not None or any(word.kind is Kind.PROPOSE for word in words.values()):
-            self._agree(tick, own, words)
+            self._send(tick, 0, TickMessageKind.DONE)
+        messages = {name: self._receive(name, tick, 0) for name in self.peers.names}
+        for name, message in messages.items():
+            if message.kind in (TickMessageKind.FAULT, TickMessageKind.WRONG_VALUE):
+                raise self._error(name, message)
+        stop_requests = {self.peers.machine: stop_request} if stop_request is not None else {}
+        for name, message in messages.items():
+            if message.kind is TickMessageKind.STOP:
+                stop_requests[name] = (str(message.data["reason"]), str(message.data["block"]))
+        if stop_requests:
+            # of several requests all parts take the same one
+            clock.agree(*stop_requests[min(stop_requests)])
+        if own is not None or any(
+            message.kind is TickMessageKind.PROPOSE for message in messages.values()
+        ):
+            self._agree(tick, own, messages)
 
-    def _agree(self, tick: int, own: Adjustment | None, words: Mapping[str, Word]) -> None:
+    def _agree(
+        self, tick: int, own: Adjustment | None, messages: Mapping[str, TickMessage]
+    ) -> None:
         """Try all proposals, one after the other, and keep those that every part can take over."""
         ended = self._clock.stop_reason is not None
-        for number, name in enumerate(sorted([self.others.machine, *self.others.names])):
-            mine = name == self.others.machine
-            if (mine and own is None) or (not mine and words[name].kind is not Kind.PROPOSE):
+        for number, name in enumerate(sorted([self.peers.machine, *self.peers.names])):
+            mine = name == self.peers.machine
+            if (mine and own is None) or (
+                not mine and messages[name].kind is not TickMessageKind.PROPOSE
+            ):
                 continue
             if ended:
                 refusal = "the run has ended"
             elif mine and own is not None:
                 refusal = self._parameters.try_out(own)
             else:
-                refusal = self._parameters.try_settings(words[name].data["settings"])
-            self._say(tick, number + 1, Kind.ANSWER, {"refusal": refusal})
-            answers = [self._hear(n, tick, number + 1).data["refusal"] for n in self.others.names]
+                refusal = self._parameters.try_settings(messages[name].data["settings"])
+            self._send(tick, number + 1, TickMessageKind.ANSWER, {"refusal": refusal})
+            answers = [self._receive(n, tick, number + 1).data["refusal"] for n in self.peers.names]
             refusals = [text for text in (refusal, *answers) if text]
             if not refusals:
                 self._parameters.keep(tick + 1)
@@ -315,87 +322,93 @@ class Conductor(Block):
                 own.error = refusals[0] if refusals else ""
                 own.answered = True
 
-    def _say(
-        self, tick: int, round_: int, kind: Kind, data: Mapping[str, Any] | None = None
+    def _send(
+        self, tick: int, round_: int, kind: TickMessageKind, data: Mapping[str, Any] | None = None
     ) -> None:
-        head = _HEAD.pack(self.others.run, tick * _ROUNDS + round_, kind)
+        head = _HEAD.pack(self.peers.run, tick * _ROUNDS + round_, kind)
         message = head + json.dumps(data).encode() if data is not None else head
-        for tell in self._tell.values():
+        for tell in self._publishers.values():
             tell(message)
 
-    def _hear(self, name: str, tick: int, round_: int) -> Word:
+    def _receive(self, name: str, tick: int, round_: int) -> TickMessage:
         try:
             # longer than for a message, so that who misses one can say which
-            return self._mail[name].take(tick * _ROUNDS + round_, 2.0 * self._patience)
+            return self._mail[name].take(tick * _ROUNDS + round_, 2.0 * self._timeout)
         except MailTimeoutError:
-            text = f"machine {name!r} has not ended tick {tick} in {2.0 * self._patience:g} s"
+            text = f"machine {name!r} has not ended tick {tick} in {2.0 * self._timeout:g} s"
             raise RunError(text, tick=tick) from None
 
-    def _listener(self, name: str, box: Mailbox[Word]) -> Callable[[bytes], None]:
-        def hear(data: bytes) -> None:
+    def _listener(self, name: str, box: Mailbox[TickMessage]) -> Callable[[bytes], None]:
+        def on_message(data: bytes) -> None:
             try:
                 run, number, kind = _HEAD.unpack_from(data)
-                if run != self.others.run_of(name):
+                if run != self.peers.run_of(name):
                     return
-                word = Word(
-                    Kind(kind), json.loads(data[_HEAD.size :]) if data[_HEAD.size :] else {}
+                message = TickMessage(
+                    TickMessageKind(kind),
+                    json.loads(data[_HEAD.size :]) if data[_HEAD.size :] else {},
                 )
-                if not isinstance(word.data, dict):
+                if not isinstance(message.data, dict):
                     return
             except Exception:  # noqa: BLE001  # damaged; the tick's end is waited for in vain
                 return
-            if word.kind in (Kind.FAULT, Kind.WRONG_VALUE):
-                error = self._error(name, word)
+            if message.kind in (TickMessageKind.FAULT, TickMessageKind.WRONG_VALUE):
+                error = self._error(name, message)
                 at = number // _ROUNDS
-                self.others.fail(name, at + (word.kind is Kind.WRONG_VALUE), error)
-            box.put(number, word)
+                self.peers.fail(name, at + (message.kind is TickMessageKind.WRONG_VALUE), error)
+            box.put(number, message)
 
-        return hear
+        return on_message
 
     @staticmethod
-    def _error(name: str, word: Word) -> PeerError:
-        data = word.data
+    def _error(name: str, message: TickMessage) -> PeerError:
+        data = message.data
         error = PeerError(
             f"machine {name!r}: {data.get('message', 'failed')}",
             block=str(data.get("block", "")),
             tick=int(data.get("tick", -1)),
         )
         error.heard = True
-        error.record_tick = word.kind is Kind.WRONG_VALUE
+        error.record_tick = message.kind is TickMessageKind.WRONG_VALUE
         error.where, error.traceback = str(data.get("where", "")), str(data.get("traceback", ""))
         return error
 
     # -- at the end of the run ---------------------------------------------------------------------
 
-    def tell_fault(self, note: Note, last_recorded: int) -> None:
-        """Tell the others of a fault here, once, unless they told of it."""
-        if not self._opened or self._told:
+    def report_fault(self, note: Note, last_recorded: int) -> None:
+        """Report a fault of this part to the others, once, unless they reported one first."""
+        if not self._opened or self._fault_reported:
             return
         data = {"message": note.text, **note.data, "traceback": ""}
-        if not self.others.started:  # all hear why, from whomever they hear it first
-            self._told = True
-            self.others.say(str(data["message"]))
+        if not self.peers.started:  # all hear why, from whomever they hear it first
+            self._fault_reported = True
+            self.peers.send_beacon(str(data["message"]))
             return
-        if self.others.heard_fault:
+        if self.peers.fault_received:
             return
-        self._told = True
+        self._fault_reported = True
         tick = self.context.clock.tick
-        self._say(tick, 0, Kind.WRONG_VALUE if last_recorded == tick else Kind.FAULT, data)
+        self._send(
+            tick,
+            0,
+            TickMessageKind.WRONG_VALUE if last_recorded == tick else TickMessageKind.FAULT,
+            data,
+        )
 
     def close(self) -> None:
         """Say that the actuators here are in damping, wait until the others' are, and disconnect."""
         if self._opened:
             try:
-                self.others.rest(REST_TIME, self.context.clock.tick)
+                self.peers.wait_for_rest(REST_TIMEOUT, self.context.clock.tick)
             finally:
                 self._transport.close()
 
 
-class FaultTeller:
-    """The sink through which a conductor hears of faults in its own part."""
+class FaultReporter:
+    """The sink through which a coordinator receives faults in its own part."""
 
-    def __init__(self, conductor: Conductor) -> None:
-        self._conductor = conductor
+    def __init__(self, coordinator: LockstepCoordinator) -> None:
+        self._coordinator = coordinator
         self._last = -1
 
     def open(self, bound: BoundGraph) -> None:
@@ -408,24 +421,24 @@ class FaultTeller:
     def note(self, note: Note) -> None:
         """Pass on a fault."""
         if note.kind == "fault":
-            self._conductor.tell_fault(note, self._last)
+            self._coordinator.report_fault(note, self._last)
 
     def close(self) -> None:
         """Nothing to do."""
 
 
-class Gate(Block):
+class StartBarrier(Block):
     """A block of the runtime whose ``start`` waits until all parts have come as far as this one."""
 
     waits_for_others = True
 
-    def connect(self, conductor: Conductor, phase: Phase) -> None:
+    def connect(self, coordinator: LockstepCoordinator, phase: Phase) -> None:
         """Take what it waits with, and how far all must be."""
-        self._conductor, self._phase = conductor, phase
+        self._coordinator, self._phase = coordinator, phase
 
     def start(self) -> None:
         """Wait for the others."""
-        self._conductor.reach(self._phase)
+        self._coordinator.reach_phase(self._phase)
 
     def step(self) -> None:
         """Never called: a gate is not in the order of execution."""
@@ -435,7 +448,7 @@ BEACON_PERIOD = 0.5
 """Seconds between two beacons during the run, from which clock offsets are estimated."""
 
 
-class FreeConductor(Conductor):
+class FreeRunningCoordinator(LockstepCoordinator):
     """Starts the parts together, as in lockstep, and then lets each keep its own time.
 
     A tick waits for nobody. A part whose run ends in order ends the others too, and so does a
@@ -448,25 +461,25 @@ class FreeConductor(Conductor):
     def listen(self) -> None:
         """Nothing to listen to: a tick ends when it ends here."""
 
-    def reach(self, phase: Phase) -> None:
+    def reach_phase(self, phase: Phase) -> None:
         """Wait for the others; a part that moves actuators does not join a run that goes on.
 
         Raises:
             AloftError: the others are running, and this part has actuators.
         """
-        if phase is Phase.PREPARED and self.moves and self.others.are_running():
+        if phase is Phase.PREPARED and self.moves and self.peers.are_running():
             raise AloftError(
                 "the other machines are running already, and this part moves actuators, which it "
                 "never enables by itself. Stop the run everywhere and start it again"
             )
-        super().reach(phase)
+        super().reach_phase(phase)
         if phase is Phase.STARTED:
             self._quiet = threading.Event()
             threading.Thread(target=self._repeat, args=(self._quiet,), daemon=True).start()
 
     def _repeat(self, quiet: threading.Event) -> None:
         while not quiet.wait(BEACON_PERIOD):
-            self.others.say()
+            self.peers.send_beacon()
 
     def update(self) -> None:
         """Look whether another part has ended or failed and whether commands still come, and take
@@ -476,11 +489,11 @@ class FreeConductor(Conductor):
             PeerError: another part failed.
         """
         clock = self._clock
-        ended = self.others.ended() or self._watch.complaint()
+        ended = self.peers.ended() or self._watch.complaint()
         if ended:
             clock.stop_reason = ended
-        if clock.wish is not None:
-            clock.agree(*clock.wish)
+        if clock.stop_request is not None:
+            clock.agree(*clock.stop_request)
         if self._parameters.handed_in:
             self._change(clock.tick)
 
@@ -500,12 +513,12 @@ class FreeConductor(Conductor):
                 self._parameters.keep(tick + 1)
         adjustment.answered = True
 
-    def tell_fault(self, note: Note, last_recorded: int) -> None:
+    def report_fault(self, note: Note, last_recorded: int) -> None:
         """Tell the others of a fault here, by a beacon."""
-        known = self.others.started and self.others.heard_fault
-        if self._opened and not self._told and not known:
-            self._told = True
-            self.others.say(str(note.data.get("message", note.text)))
+        known = self.peers.started and self.peers.fault_received
+        if self._opened and not self._fault_reported and not known:
+            self._fault_reported = True
+            self.peers.send_beacon(str(note.data.get("message", note.text)))
 
     def close(self) -> None:
         """Stop the beacons, and disconnect as in lockstep."""

@@ -15,7 +15,7 @@ from ..language.stages import LinkPolicy
 from ..placement.placed import Link
 from .lockstep_link import PROBE
 from .message import DamagedMessageError, Message, MessageReader
-from .peers import Others
+from .peers import PeerStates
 
 TICK_TIME = "~tick"
 """The path of the block that keeps when ticks began."""
@@ -44,7 +44,7 @@ class LinkHealth(Signal):
     damaged = Field(dtype="int64", text="messages that were thrown away")
 
 
-class TickBegan(Signal):
+class TickStart(Signal):
     """When a tick of a part that runs free began."""
 
     time = Field(dtype="int64", text="by the monotonic clock of its machine [ns]")
@@ -53,7 +53,7 @@ class TickBegan(Signal):
 class TickTime(Block):
     """Keeps when each tick began, so that ages on paths through several machines can be measured."""
 
-    began = Output(TickBegan)
+    began = Output(TickStart)
     now: Callable[[], int] = staticmethod(time.monotonic_ns)
 
     def step(self) -> None:
@@ -61,7 +61,7 @@ class TickTime(Block):
         self.began.time[()] = self.now()
 
 
-class Health(Block):
+class LinkMonitor(Block):
     """Holds the health of a link, so that it is recorded and shown; the link writes it."""
 
     health = Output(LinkHealth)
@@ -75,7 +75,7 @@ def health_path(link: Link) -> str:
     return f"{link.source}~from~{link.sender}"
 
 
-class LatestInbox:
+class LatestReceiver:
     """Keeps the latest message of a link, and gives it to the stand-in of its source.
 
     A message older than one that has come is thrown away. Nothing here waits.
@@ -90,7 +90,7 @@ class LatestInbox:
         clock: the monotonic time [ns].
 
     Attributes:
-        heard_at: when the newest message came, by ``clock``; zero before the first.
+        received_at: when the newest message came, by ``clock``; zero before the first.
         age: of the message at the last tick of the reader [ns].
         jitter: the mean absolute difference [ns] between the times on the way of a message and of the
             one before it (RFC 3550, section 6.4.1); the clocks' offset drops out.
@@ -100,7 +100,7 @@ class LatestInbox:
         self,
         link: Link,
         reader: MessageReader,
-        others: Others,
+        peers: PeerStates,
         policy: LinkPolicy,
         health: LinkHealth,
         stop: Callable[[str], None],
@@ -109,11 +109,11 @@ class LatestInbox:
         self.link = link
         self.policy = policy
         self.received = self.lost = self.surplus = self.damaged = self.late_ticks = 0
-        self.heard_at = self.age = 0
+        self.received_at = self.age = 0
         self.jitter = 0.0
         self._transit: int | None = None
         self._reader = reader
-        self._others = others
+        self._peers = peers
         self._health = health
         self._stop = stop
         self._clock = clock
@@ -127,9 +127,9 @@ class LatestInbox:
         self._ages: NDArray[np.int64] = np.zeros(KEPT, np.int64)
         self._count = 0
 
-    def hear(self, data: bytes) -> None:
+    def on_message(self, data: bytes) -> None:
         """Take a message; a thread of the network calls this."""
-        run = self._others.run_of(self.link.sender)
+        run = self._peers.run_of(self.link.sender)
         if run is None:
             return
         self._reader.run = run
@@ -138,7 +138,7 @@ class LatestInbox:
         except DamagedMessageError:
             self.damaged += 1
             return
-        self._others.note_checked(self.link.name)
+        self._peers.note_checked(self.link.name)
         if run != self._run:  # the first message of a part that was started, perhaps again
             self._run, self._sequence = run, message.sequence - 1
             self._transit = None
@@ -151,13 +151,13 @@ class LatestInbox:
             return
         self.lost += gap
         self.received += 1
-        self.heard_at = self._clock()
-        transit = self.heard_at - message.time
+        self.received_at = self._clock()
+        transit = self.received_at - message.time
         if self._transit is not None:
             self.jitter += JITTER_SHARE * (abs(transit - self._transit) - self.jitter)
         self._transit, self._latest = transit, message
 
-    def show(self, tick: int) -> None:
+    def write_outputs(self, tick: int) -> None:
         """Write the latest fields into the bus, or what the policy says where they are too old."""
         now = self._clock()
         message = self._latest
@@ -166,12 +166,12 @@ class LatestInbox:
         if message is None:
             age = now - self._since
         else:
-            age = now + self._others.clock_of(self.link.sender).offset - message.time
+            age = now + self._peers.clock_of(self.link.sender).offset - message.time
         late = self._limit is not None and age > self._limit
         if late:
             self.late_ticks += 1
             if self.policy.late == "safe":
-                self._reader.show(self._zeros)
+                self._reader.write_outputs(self._zeros)
                 self._shown = None  # once it is in time again, it is written again
             elif self.policy.late == "stop":
                 self._stop(
@@ -180,7 +180,7 @@ class LatestInbox:
                 )
         safe = late and self.policy.late == "safe"
         if message is not None and message is not self._shown and not safe:
-            self._reader.show(message.payload)
+            self._reader.write_outputs(message.payload)
             self._shown = message
         self.age = self._ages[self._count % KEPT] = age
         self._count += 1
@@ -191,7 +191,7 @@ class LatestInbox:
         health.tick[()] = -1 if message is None else message.tick
         health.sent[()] = 0 if message is None else message.time
         health.read[()] = now
-        clock = self._others.clock_of(self.link.sender)
+        clock = self._peers.clock_of(self.link.sender)
         health.age[()] = age * 1e-9
         health.jitter[()] = self.jitter * 1e-9
         health.clock_offset[()] = clock.offset * 1e-9

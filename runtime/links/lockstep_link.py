@@ -13,9 +13,9 @@ from typing import Any, Generic, Protocol, TypeVar
 from ..language.block import Block
 from ..language.errors import RunError
 from ..placement.placed import Link
-from ..transports.transport import Take
+from ..transports.transport import MessageCallback
 from .message import DamagedMessageError, MessageReader, MessageWriter
-from .peers import Others
+from .peers import PeerStates
 
 T = TypeVar("T")
 SLICE = 0.05
@@ -50,13 +50,13 @@ class Mailbox(Generic[T]):
         """Make a reader that waits look at once whether waiting still helps."""
         self._queue.put(None)
 
-    def take(self, number: int, patience: float) -> T:
+    def take(self, number: int, timeout: float) -> T:
         """The item with that number; waits for it.
 
         ``check`` is called whenever nothing has come for a while, and ends the wait by raising.
 
         Raises:
-            MailTimeoutError: it has not come within ``patience`` seconds.
+            MailTimeoutError: it has not come within ``timeout`` seconds.
         """
         if number in self._early:
             return self._early.pop(number)
@@ -70,7 +70,7 @@ class Mailbox(Generic[T]):
                 if self._queue.empty():
                     self._check()
                 now = time.monotonic()
-                end = now + patience - SLICE if end is None else end
+                end = now + timeout - SLICE if end is None else end
                 if now > end:
                     raise MailTimeoutError
                 continue
@@ -86,29 +86,31 @@ PROBE = -1
 """The tick of a message that only shows that the link works."""
 
 
-class Inbox:
+class LockstepReceiver:
     """Checks messages as they come, and waits for the one that is needed.
 
     Attributes:
         damaged: how many messages were thrown away because they were not whole, or of another
             schema or run.
         received: how many were whole.
-        heard_at: when the newest message came, by the monotonic clock [ns]; zero before the first.
+        received_at: when the newest message came, by the monotonic clock [ns]; zero before the first.
     """
 
-    def __init__(self, link: Link, reader: MessageReader, others: Others, patience: float) -> None:
+    def __init__(
+        self, link: Link, reader: MessageReader, peers: PeerStates, timeout: float
+    ) -> None:
         self.link = link
         self.damaged = 0
         self.received = 0
-        self.heard_at = 0
+        self.received_at = 0
         self._newest = -1
         self._reason = ""
         self._reader = reader
-        self._others = others
-        self._patience = patience
+        self._peers = peers
+        self._timeout = timeout
         self._mailbox: Mailbox[memoryview] = Mailbox(self._check)
         self._tick = 0
-        others.mailboxes.append(self._mailbox.wake)
+        peers.mailboxes.append(self._mailbox.wake)
 
     @property
     def surplus(self) -> int:
@@ -125,9 +127,9 @@ class Inbox:
             "surplus": self.surplus,
         }
 
-    def hear(self, data: bytes) -> None:
+    def on_message(self, data: bytes) -> None:
         """Take a message; a thread of the network calls this."""
-        run = self._others.run_of(self.link.sender)
+        run = self._peers.run_of(self.link.sender)
         if run is None:
             return  # it has not said hello yet
         self._reader.run = run
@@ -138,14 +140,14 @@ class Inbox:
             self._reason = str(error)
             return
         if message.tick == PROBE:
-            self._others.note_checked(self.link.name)
+            self._peers.note_checked(self.link.name)
             return
         self.received += 1
         if message.tick > self._newest:  # one that comes again is no sign of life
-            self._newest, self.heard_at = message.tick, time.monotonic_ns()
+            self._newest, self.received_at = message.tick, time.monotonic_ns()
         self._mailbox.put(message.tick, message.payload)
 
-    def show(self, tick: int) -> None:
+    def write_outputs(self, tick: int) -> None:
         """Write the fields of ``tick`` into the bus; waits for them.
 
         Raises:
@@ -154,66 +156,69 @@ class Inbox:
         """
         self._tick = tick
         try:
-            payload = self._mailbox.take(tick, self._patience)
+            payload = self._mailbox.take(tick, self._timeout)
         except MailTimeoutError:
             damaged = f"; {self.damaged} were damaged, the last: {self._reason}"
             raise RunError(
                 f"link {self.link.name}: the message of tick {tick} has not come in "
-                f"{self._patience:g} s. {self.received} came before"
+                f"{self._timeout:g} s. {self.received} came before"
                 + (damaged if self.damaged else ""),
                 block=self.link.source,
                 tick=tick,
             ) from None
-        self._reader.show(payload)
+        self._reader.write_outputs(payload)
 
     def _check(self) -> None:
-        self._others.check(self._tick)
+        self._peers.check(self._tick)
 
 
-class Shows(Protocol):
+class OutputWriter(Protocol):
     """The receiving end of a link, as a stand-in needs it."""
 
-    def show(self, tick: int) -> None:
+    def write_outputs(self, tick: int) -> None:
         """Write what was received for this tick into the bus."""
 
 
-class Received(Block):
+class LinkInput(Block):
     """Stands for a block of another machine: it has its outputs, and writes what was received.
 
-    Subclasses made by ``received_block_type`` declare the ports.
+    Subclasses made by ``link_input_type`` declare the ports.
     """
 
     waits_for_others = True
 
-    inbox: Shows | None = None
+    receiver: OutputWriter | None = None
 
     def step(self) -> None:
         """Take the outputs of this tick."""
-        assert self.inbox is not None
-        self.inbox.show(self.context.clock.tick)
+        assert self.receiver is not None
+        self.receiver.write_outputs(self.context.clock.tick)
 
 
-_TYPES: dict[type[Block], type[Received]] = {}
+_TYPES: dict[type[Block], type[LinkInput]] = {}
 
 
-def received_block_type(block_type: type[Block]) -> type[Received]:
+def link_input_type(block_type: type[Block]) -> type[LinkInput]:
     """The stand-in for blocks of that type on other machines."""
     if block_type not in _TYPES:
-        body: dict[str, Any] = {"__doc__": Received.__doc__, "Params": block_type.Params}
-        kind: type[Received] = type(f"Received{block_type.__name__}", (Received,), body)
+        body: dict[str, Any] = {"__doc__": LinkInput.__doc__, "Params": block_type.Params}
+        kind: type[LinkInput] = type(f"LinkInput{block_type.__name__}", (LinkInput,), body)
         kind.inputs, kind.outputs = block_type.inputs, block_type.outputs
         _TYPES[block_type] = kind
     return _TYPES[block_type]
 
 
-class Send(Block):
+class LinkOutput(Block):
     """Sends what another machine reads of a block's outputs, each time that block has run."""
 
     writer: MessageWriter | None = None
-    put: Take | None = None
+    put: MessageCallback | None = None
 
     def connect(
-        self, writer: MessageWriter, put: Take, clock: Callable[[], int] = time.monotonic_ns
+        self,
+        writer: MessageWriter,
+        put: MessageCallback,
+        clock: Callable[[], int] = time.monotonic_ns,
     ) -> None:
         """Take what makes the messages, what sends them, and the time [ns]."""
         self.writer, self.put, self.now = writer, put, clock

@@ -142,7 +142,7 @@ class MessageReader:
             raise DamagedMessageError(f"it is of run {run.hex()}, expected {self.run.hex()}")
         return Message(sequence, tick, time, view[HEADER:])
 
-    def show(self, payload: memoryview) -> None:
+    def write_outputs(self, payload: memoryview) -> None:
         """Write a payload into the bus."""
         for target, first, last in self._spans:
             target[:] = payload[first:last]

@@ -21,12 +21,12 @@ from ..language.errors import AloftError
 from ..placement.placed import PlacedGraph
 from ..running.memory import BoundGraph
 from ..running.sinks import Note
-from ..transports.transport import Take, Transport, rows_key, status_key, window_key
+from ..transports.transport import MessageCallback, Transport, rows_key, status_key, window_key
 from ..transports.zenoh_transport import as_chunk, prefix_of, session_config
-from .free_link import LatestInbox
+from .free_link import LatestReceiver
 from .identity import Identity
-from .lockstep_link import Inbox
-from .peers import Others
+from .lockstep_link import LockstepReceiver
+from .peers import PeerStates
 
 ROWS = 50.0
 """How often the bus is shown, at most [Hz]."""
@@ -36,22 +36,22 @@ _HEAD = Struct("<I8sq")
 ROW_HEADER = _HEAD.size
 
 
-class Showing:
+class StatusPublisher:
     """The sink that shows one part.
 
     Args:
         machine: of the part.
         transport: the part's own; it is open once the part has started.
         others: the other parts, and the numbers by which the graph and the run are known.
-        inboxes: the receiving ends of its links.
+        receivers: the receiving ends of its links.
     """
 
     def __init__(
-        self, machine: str, transport: Transport, others: Others,
-        inboxes: Sequence[Inbox | LatestInbox],
+        self, machine: str, transport: Transport, peers: PeerStates,
+        receivers: Sequence[LockstepReceiver | LatestReceiver],
     ) -> None:  # fmt: skip
-        self._machine, self._transport, self._others = machine, transport, others
-        self._inboxes = inboxes
+        self._machine, self._transport, self._peers = machine, transport, peers
+        self._receivers = receivers
         self._ended = threading.Event()
         self._tick = -1
         self._overruns = self._skipped = 0
@@ -91,37 +91,37 @@ class Showing:
 
     def status(self, rate: float) -> dict[str, Any]:
         """The status of the part; ``rate`` is how many ticks a second it makes at present."""
-        others = self._others
+        peers = self._peers
         return {
             "machine": self._machine,
-            "hash": others.graph_hash,
+            "hash": peers.graph_hash,
             "tick": self._tick,
             "rate_hz": rate,
             "base_rate_hz": self._rate,
             "overruns": self._overruns,
             "skipped_periods": self._skipped,
-            "phase": others.phase.name.lower(),
-            "links": [link_status(box) for box in self._inboxes],
+            "phase": peers.phase.name.lower(),
+            "links": [link_status(box) for box in self._receivers],
             "clocks": {
                 name: {
-                    "offset_s": others.clock_of(name).offset * 1e-9,
-                    "uncertainty_s": others.clock_of(name).uncertainty * 1e-9,
+                    "offset_s": peers.clock_of(name).offset * 1e-9,
+                    "uncertainty_s": peers.clock_of(name).uncertainty * 1e-9,
                 }
-                for name in others.names
+                for name in peers.names
             },
         }
 
     def _run(self) -> None:
-        status: Take | None = None
-        rows: Take | None = None
+        status: MessageCallback | None = None
+        rows: MessageCallback | None = None
         said, tick = time.monotonic(), self._tick
         while not self._ended.wait(1.0 / ROWS):
             with suppress(Exception):  # whatever a network does, the run goes on
                 if status is None or rows is None:
                     if not self._transport.is_open:
                         continue
-                    status = self._transport.shower(status_key(self._machine))
-                    rows = self._transport.shower(rows_key(self._machine))
+                    status = self._transport.background_publisher(status_key(self._machine))
+                    rows = self._transport.background_publisher(rows_key(self._machine))
                 if self._fresh:
                     self._fresh = False
                     rows(self._row(self._shown))
@@ -133,10 +133,10 @@ class Showing:
 
     def _row(self, slot: int) -> bytes:
         data = bytes(self._slots[slot])
-        return _HEAD.pack(crc32(data), self._others.run, self._ticks[slot]) + data
+        return _HEAD.pack(crc32(data), self._peers.run, self._ticks[slot]) + data
 
 
-def link_status(box: Inbox | LatestInbox) -> dict[str, Any]:
+def link_status(box: LockstepReceiver | LatestReceiver) -> dict[str, Any]:
     """How a link does, without what takes long to compute."""
     found: dict[str, Any] = {
         "name": box.link.name,
@@ -145,7 +145,7 @@ def link_status(box: Inbox | LatestInbox) -> dict[str, Any]:
         "damaged": box.damaged,
         "surplus": box.surplus,
     }
-    if isinstance(box, LatestInbox):
+    if isinstance(box, LatestReceiver):
         found |= {"lost": box.lost, "late_ticks": box.late_ticks, "age_ms": box.age * 1e-6,
                   "jitter_ms": box.jitter * 1e-6}  # fmt: skip
     return found
@@ -178,7 +178,7 @@ class Observer:
     def __init__(self, placed: PlacedGraph, secured: Mapping[str, Any] | None = None) -> None:
         self.placed = placed
         self.statuses: dict[str, dict[str, Any]] = {}
-        self._heard: dict[str, float] = {}
+        self._received_at: dict[str, float] = {}
         self._hash = Identity.of(placed).graph_hash
         self._secured = secured
         self._prefix = prefix_of(placed.graph.name)
@@ -225,7 +225,7 @@ class Observer:
 
     def seconds_since(self, machine: str) -> float | None:
         """How long ago a machine was heard [s]; ``None`` if it never was."""
-        heard = self._heard.get(machine)
+        heard = self._received_at.get(machine)
         return None if heard is None else time.monotonic() - heard
 
     def wait_for(self, machines: tuple[str, ...], seconds: float) -> tuple[str, ...]:
@@ -254,7 +254,7 @@ class Observer:
             if name in [spec.name for spec in self.placed.machines]:
                 float(status["rate_hz"]), int(status["tick"]), status["hash"] + status["phase"]
                 self.statuses[name] = status
-                self._heard[name] = time.monotonic()
+                self._received_at[name] = time.monotonic()
 
     def _subscribe(self, key: str, take: Callable[[bytes], None]) -> None:
         import zenoh

@@ -26,18 +26,25 @@ from ..running.run_result import RunResult
 from ..running.sinks import Sink
 from ..transports.transport import Transport, data_key
 from .command_watch import CommandWatch
-from .coordinator import Conductor, FaultTeller, FreeConductor, Gate, PartClock, SpreadParameters
-from .free_link import TICK_TIME, Health, LatestInbox, TickTime, health_path
-from .lockstep_link import Inbox, Received, Send, received_block_type
+from .coordinator import (
+    DistributedParameters,
+    FaultReporter,
+    FreeRunningCoordinator,
+    LockstepCoordinator,
+    PartClock,
+    StartBarrier,
+)
+from .free_link import TICK_TIME, LatestReceiver, LinkMonitor, TickTime, health_path
+from .lockstep_link import LinkInput, LinkOutput, LockstepReceiver, link_input_type
 from .message import MessageReader, MessageWriter
 from .path_ages import PathAges, path_sinks
-from .peers import Others, Phase
+from .peers import PeerStates, Phase
 
-PATIENCE = 30.0
+MESSAGE_TIMEOUT = 30.0
 """Seconds that a part in lockstep waits for a message before it gives up."""
-CONNECT_TIME = 180.0
+CONNECT_TIMEOUT = 180.0
 """Seconds that a part waits at its start for the others, which may compile their kernels first."""
-CONDUCTOR, PREPARED, STARTED = "~conductor", "~prepared", "~started"
+COORDINATOR, PREPARED, STARTED = "~coordinator", "~prepared", "~started"
 
 
 def sender_path(link: Link) -> str:
@@ -61,7 +68,7 @@ def part_graph(placed: PlacedGraph, machine: str) -> CheckedGraph:
     for link in placed.sent_by(machine):
         source = graph.block(link.source)
         sends.setdefault(link.source, []).append(
-            replace(_own(sender_path(link), Send, machine), period_ticks=source.period_ticks,
+            replace(_own(sender_path(link), LinkOutput, machine), period_ticks=source.period_ticks,
                     offset_ticks=source.offset_ticks)
         )  # fmt: skip
     received = dict.fromkeys(link.source for link in placed.received_by(machine))
@@ -80,18 +87,22 @@ def part_graph(placed: PlacedGraph, machine: str) -> CheckedGraph:
     blocks = [
         spec
         if spec.machine == machine
-        else replace(spec, block_type=received_block_type(spec.block_type))
+        else replace(spec, block_type=link_input_type(spec.block_type))
         for spec in graph.blocks
     ]
     blocks += [send for of_block in sends.values() for send in of_block]
-    blocks += [_own(PREPARED, Gate, machine), _own(STARTED, Gate, machine)]
+    blocks += [_own(PREPARED, StartBarrier, machine), _own(STARTED, StartBarrier, machine)]
     free = graph.links.mode == "free"
     if free:
-        blocks += [_own(health_path(link), Health, machine) for link in placed.received_by(machine)]
+        blocks += [
+            _own(health_path(link), LinkMonitor, machine) for link in placed.received_by(machine)
+        ]
         blocks.append(_own(TICK_TIME, TickTime, machine))
         order.insert(0, TICK_TIME)
-    blocks.append(_own(CONDUCTOR, FreeConductor if free else Conductor, machine))
-    return replace(graph, blocks=tuple(blocks), order=(*order, *received, CONDUCTOR))
+    blocks.append(
+        _own(COORDINATOR, FreeRunningCoordinator if free else LockstepCoordinator, machine)
+    )
+    return replace(graph, blocks=tuple(blocks), order=(*order, *received, COORDINATOR))
 
 
 def _own(path: str, block_type: type[Block], machine: str) -> BlockSpec:
@@ -106,7 +117,7 @@ class BoundPart(BoundGraph):
         placed: the graph.
         machine: the machine.
         transport: what carries messages; the part opens it when it starts.
-        patience: the seconds to wait for a message.
+        timeout: the seconds to wait for a message.
         connect_time: the seconds to wait for the others at the start.
         clock: the time [ns] by which free-running links and the watch of commands go.
 
@@ -123,8 +134,8 @@ class BoundPart(BoundGraph):
         machine: str,
         transport: Transport,
         *,
-        patience: float = PATIENCE,
-        connect_time: float = CONNECT_TIME,
+        timeout: float = MESSAGE_TIMEOUT,
+        connect_timeout: float = CONNECT_TIMEOUT,
         clock: Callable[[], int] = time.monotonic_ns,
     ) -> None:
         self._now = clock
@@ -133,32 +144,32 @@ class BoundPart(BoundGraph):
         own_clock = self.clock
         self.placed = placed
         self.machine = machine
-        self.parameters = SpreadParameters(self.blocks)
-        self.others = Others(
+        self.parameters = DistributedParameters(self.blocks)
+        self.peers = PeerStates(
             placed,
             machine,
             transport,
-            lambda: own_clock.wish and own_clock.wish[0],
+            lambda: own_clock.stop_request and own_clock.stop_request[0],
             free=self.is_free,
         )
-        self.inboxes: list[Inbox | LatestInbox] = []
+        self.receivers: list[LockstepReceiver | LatestReceiver] = []
         self.path_ages: list[PathAges] = []
         self.transport = transport
-        conductor = self._block(CONDUCTOR, Conductor)
+        coordinator = self._block(COORDINATOR, LockstepCoordinator)
         for path, phase in ((PREPARED, Phase.PREPARED), (STARTED, Phase.STARTED)):
-            self._block(path, Gate).connect(conductor, phase)
-        self._make_inboxes(patience)
-        self.watch = CommandWatch(placed, machine, self.inboxes, clock)
+            self._block(path, StartBarrier).connect(coordinator, phase)
+        self._make_receivers(timeout)
+        self.watch = CommandWatch(placed, machine, self.receivers, clock)
         if self.watch.links:
             own_clock.heard, own_clock.command_limit = self.watch.heard, self.watch.limit
-        conductor.connect(
-            self.others, transport, self.inboxes,
-            {link.name: self._block(sender_path(link), Send) for link in placed.sent_by(machine)},
-            self.parameters, clock=own_clock, on_open=self.open_links, patience=patience,
-            connect_time=connect_time, moves=bool(self._moving()), watch=self.watch,
+        coordinator.connect(
+            self.peers, transport, self.receivers,
+            {link.name: self._block(sender_path(link), LinkOutput) for link in placed.sent_by(machine)},
+            self.parameters, clock=own_clock, on_open=self.open_links, timeout=timeout,
+            connect_timeout=connect_timeout, moves=bool(self._moving()), watch=self.watch,
             elsewhere={s.path: s.machine for s in placed.graph.blocks if s.machine != machine},
         )  # fmt: skip
-        self.conductor = conductor
+        self.coordinator = coordinator
         self.blocks = self._in_order_of_start()
 
     def _block(self, path: str, kind: type[Any]) -> Any:
@@ -166,23 +177,23 @@ class BoundPart(BoundGraph):
         assert isinstance(block, kind)
         return block
 
-    def _make_inboxes(self, patience: float) -> None:
+    def _make_receivers(self, timeout: float) -> None:
         if self.is_free:
             self._block(TICK_TIME, TickTime).now = self._now
         bus, layout = self.memory.bus.buffer.data, self.memory.bus.layout
         for link in self.placed.received_by(self.machine):
             reader = MessageReader(link, layout, bus)
-            inbox: Inbox | LatestInbox
+            receiver: LockstepReceiver | LatestReceiver
             if self.is_free:
                 policy = self.placed.graph.links.policy_of(link.source)
-                health = self._block(health_path(link), Health).health
-                inbox = LatestInbox(
-                    link, reader, self.others, policy, health, self._ask_to_stop, self._now
+                health = self._block(health_path(link), LinkMonitor).health
+                receiver = LatestReceiver(
+                    link, reader, self.peers, policy, health, self._ask_to_stop, self._now
                 )
             else:
-                inbox = Inbox(link, reader, self.others, patience)
-            self._block(link.source, Received).inbox = inbox
-            self.inboxes.append(inbox)
+                receiver = LockstepReceiver(link, reader, self.peers, timeout)
+            self._block(link.source, LinkInput).receiver = receiver
+            self.receivers.append(receiver)
 
     @property
     def is_free(self) -> bool:
@@ -200,14 +211,14 @@ class BoundPart(BoundGraph):
     def open_links(self) -> None:
         """Declare all links; the transport is open."""
         bus, layout = self.memory.bus.buffer.data, self.memory.bus.layout
-        for inbox in self.inboxes:
-            link = inbox.link
+        for receiver in self.receivers:
+            link = receiver.link
             key = data_key(link.sender, link.receiver, link.source)
-            self.transport.subscribe(key, inbox.hear)
+            self.transport.subscribe(key, receiver.on_message)
         for link in self.placed.sent_by(self.machine):
-            writer = MessageWriter(link, layout, bus, self.others.run)
+            writer = MessageWriter(link, layout, bus, self.peers.run)
             put = self.transport.publisher(data_key(link.sender, link.receiver, link.source))
-            self._block(sender_path(link), Send).connect(writer, put, self._now)
+            self._block(sender_path(link), LinkOutput).connect(writer, put, self._now)
 
     def _in_order_of_start(self) -> dict[str, Block]:
         """The blocks in the order in which they start: those that move actuators come last.
@@ -215,10 +226,10 @@ class BoundPart(BoundGraph):
         Between the two stands a gate, so that nothing moves before all parts have come that far.
         """
         moving = self._moving()
-        runtime = (CONDUCTOR, PREPARED, STARTED)
+        runtime = (COORDINATOR, PREPARED, STARTED)
         still = {p: b for p, b in self.blocks.items() if p not in moving and p not in runtime}
         return {
-            CONDUCTOR: self.blocks[CONDUCTOR],
+            COORDINATOR: self.blocks[COORDINATOR],
             **still,
             PREPARED: self.blocks[PREPARED],
             **moving,
@@ -247,7 +258,7 @@ def run_part(
     bound: BoundPart, ticks: int | None = None, *, sinks: Sequence[Sink] = (), **options: Any
 ) -> RunResult:
     """Run one part from start to close, together with the others; the options are the executor's."""
-    teller = FaultTeller(bound.conductor)
+    teller = FaultReporter(bound.coordinator)
     clock = options.pop("clock", None) or part_clock(bound)
     if not bound.is_free:
         bound.path_ages = path_sinks(bound.placed.graph, clock.kind)
@@ -255,7 +266,7 @@ def run_part(
     return Executor(bound, clock=clock, sinks=sinks, **options).run(ticks)
 
 
-class Whole:
+class MergedLayout:
     """Takes from each part's bytes what that part has computed.
 
     Args:

@@ -16,9 +16,9 @@ from ..placement.placed import PlacedGraph
 from ..running.memory import BoundGraph
 from .free_link import TICK_TIME, health_path
 
-LATEST = 20_000
+MAX_TICKS = 20_000
 """The last ticks of a run that are looked at."""
-GRANTED = 0.05
+JITTER_ALLOWANCE = 0.05
 """What is granted to the jitter of clocks, in base periods."""
 NAME = "links.paths"
 """What the check is called among the blocks that give metrics."""
@@ -42,8 +42,8 @@ class PathAges:
 
     def __init__(self, graph: CheckedGraph) -> None:
         self._graph = graph
-        self._began: NDArray[np.int64] = np.zeros(LATEST, np.int64)
-        self._ticks: NDArray[np.int64] = np.zeros(LATEST, np.int64)
+        self._began: NDArray[np.int64] = np.zeros(MAX_TICKS, np.int64)
+        self._ticks: NDArray[np.int64] = np.zeros(MAX_TICKS, np.int64)
         self._count = 0
 
     def open(self, bound: BoundGraph) -> None:
@@ -53,7 +53,7 @@ class PathAges:
 
     def record(self, tick: int) -> None:
         """Keep when the tick began."""
-        place = self._count % LATEST
+        place = self._count % MAX_TICKS
         self._ticks[place], self._began[place] = tick, self._clock.began or time.perf_counter_ns()
         self._count += 1
 
@@ -62,13 +62,13 @@ class PathAges:
 
     def metrics(self) -> Mapping[str, Metric]:
         """The ages, and whether they were allowed."""
-        kept = min(self._count, LATEST)
+        kept = min(self._count, MAX_TICKS)
         order = np.argsort(self._ticks[:kept])
         line = Timeline(self._ticks[:kept][order].tolist(), self._began[:kept][order].tolist())
-        return judged(self._graph, {"": line})
+        return check_path_ages(self._graph, {"": line})
 
 
-def judged(graph: CheckedGraph, timelines: Mapping[str, Timeline]) -> dict[str, Metric]:
+def check_path_ages(graph: CheckedGraph, timelines: Mapping[str, Timeline]) -> dict[str, Metric]:
     """For each path the median and the longest age [ms]; and no success where one is too long."""
     found: dict[str, Metric] = {}
     complaints = []
@@ -80,7 +80,7 @@ def judged(graph: CheckedGraph, timelines: Mapping[str, Timeline]) -> dict[str, 
             continue
         found[f"age_p50_ms {path}"] = float(np.median(ages))
         found[f"age_max_ms {path}"] = float(ages.max())
-        allowed = (limit + GRANTED * graph.base_period) * 1e3
+        allowed = (limit + JITTER_ALLOWANCE * graph.base_period) * 1e3
         late = int(np.count_nonzero(ages > allowed))
         if late:
             complaints.append(

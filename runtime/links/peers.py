@@ -20,7 +20,7 @@ from typing import Any
 
 from ..language.errors import RunError
 from ..placement.placed import PlacedGraph
-from ..transports.transport import Take, Transport, beacon_key
+from ..transports.transport import MessageCallback, Transport, beacon_key
 from .identity import Identity
 
 KEPT = 20
@@ -51,7 +51,7 @@ class ClockOffset:
         """What a beacon that leaves now carries: its time, and the latest beacon that has come."""
         return [now, self._theirs, self._arrived]
 
-    def hear(self, stamp: Sequence[int], now: int) -> None:
+    def update(self, stamp: Sequence[int], now: int) -> None:
         """Take the stamp of a beacon that has arrived now."""
         left_there, left_here, arrived_there = (int(value) for value in stamp)
         self._theirs, self._arrived = left_there, now
@@ -91,7 +91,7 @@ class PeerError(RunError):
     heard = False
 
 
-class Others:
+class PeerStates:
     """The other parts of a graph, as one part sees them.
 
     Args:
@@ -111,7 +111,7 @@ class Others:
         placed: PlacedGraph,
         machine: str,
         transport: Transport,
-        wanted: Callable[[], str | None],
+        stop_reason: Callable[[], str | None],
         *,
         free: bool = False,
     ) -> None:
@@ -125,39 +125,39 @@ class Others:
         self._senders = {link.name: link.sender for link in placed.links}
         self._free = free
         self._clocks = {name: ClockOffset() for name in self.names}
-        self._wanted = wanted
+        self._stop_reason = stop_reason
         self._phase = Phase.HELLO
         self._problem = ""
         self._ended = -1
         self._checked: dict[str, None] = {}
-        self._heard: dict[str, Mapping[str, Any]] = {}
+        self._states: dict[str, Mapping[str, Any]] = {}
         self._failed: dict[str, tuple[int, PeerError]] = {}
         self._gone: dict[str, None] = {}
-        self._news = threading.Event()
+        self._changed_event = threading.Event()
         self._transport = transport
-        self._tell: dict[str, Take] = {}
+        self._publishers: dict[str, MessageCallback] = {}
 
     def open(self) -> None:
         """Connect, and begin to listen to the others' beacons."""
-        self._transport.open(self.machine, self._lose)
+        self._transport.open(self.machine, self._on_lost)
         for name in self.names:
-            self._tell[name] = self._transport.publisher(beacon_key(self.machine, name))
-            self._transport.subscribe(beacon_key(name, self.machine), self._hear)
+            self._publishers[name] = self._transport.publisher(beacon_key(self.machine, name))
+            self._transport.subscribe(beacon_key(name, self.machine), self._on_beacon)
 
     def run_of(self, name: str) -> bytes | None:
         """The number of the present run of another part; ``None`` before it was heard."""
-        return bytes.fromhex(self._heard[name]["run"]) if name in self._heard else None
+        return bytes.fromhex(self._states[name]["run"]) if name in self._states else None
 
     def assume_started(self, name: str, run: bytes) -> None:
         """Take another part for started without having heard it: for runs in virtual time."""
         state = {"run": run.hex(), "phase": int(Phase.STARTED), "checked": [], "ended": -1}
-        self._heard[name] = state
+        self._states[name] = state
 
     def note_checked(self, link: str) -> None:
         """A message has come through this link; any thread may say so."""
         if link not in self._checked:
             self._checked[link] = None
-            self._news.set()
+            self._changed_event.set()
 
     def checked(self, link: str) -> bool:
         """Whether a message has come through this link here."""
@@ -180,7 +180,7 @@ class Others:
 
     def are_running(self) -> bool:
         """Whether some other part is past its start."""
-        return any(heard["phase"] >= Phase.STARTED for heard in tuple(self._heard.values()))
+        return any(heard["phase"] >= Phase.STARTED for heard in tuple(self._states.values()))
 
     def ended(self) -> str:
         """Why this part is to end, where another has ended in order; else empty.
@@ -203,18 +203,18 @@ class Others:
         return self._clocks[name]
 
     @property
-    def heard_fault(self) -> bool:
+    def fault_received(self) -> bool:
         """Whether another part has said that it failed."""
         return any(error.heard for _, error in self._failures())
 
     def has_checked(self, name: str, link: str) -> bool:
         """Whether another part has received a message through this link."""
-        return link in self._heard.get(name, {}).get("checked", ())
+        return link in self._states.get(name, {}).get("checked", ())
 
     def fail(self, name: str, tick: int, error: PeerError) -> None:
         """Another part failed at ``tick``; whoever waits for it looks up."""
         self._failed.setdefault(name, (tick, error))
-        self._news.set()
+        self._changed_event.set()
         for wake in self.mailboxes:
             wake()
 
@@ -228,10 +228,10 @@ class Others:
             if tick is None or at <= tick:
                 raise error
 
-    def reach(
+    def reach_phase(
         self,
         phase: Phase,
-        patience: float,
+        timeout: float,
         *,
         before: Callable[[], bool] | None = None,
         names: Iterable[str] | None = None,
@@ -240,7 +240,7 @@ class Others:
 
         Args:
             phase: the phase.
-            patience: the seconds to wait for the others.
+            timeout: the seconds to wait for the others.
             before: called every ``REPEAT`` seconds; this part enters the phase when it returns true.
             names: the parts to wait for; by default all others.
 
@@ -250,7 +250,7 @@ class Others:
         """
         expected = tuple(self.names if names is None else names)
         now = time.monotonic()
-        end, next_time = now + patience, now
+        end, next_time = now + timeout, now
         while True:
             self.check()
             self._compare()
@@ -258,51 +258,51 @@ class Others:
             if now >= next_time:  # not on all news, or two parts would answer each other for ever
                 if self._phase < phase and (before is None or before()):
                     self._phase = phase
-                self.say()
+                self.send_beacon()
                 next_time = now + REPEAT
-            missing = [n for n in expected if self._heard.get(n, {}).get("phase", -1) < phase]
+            missing = [n for n in expected if self._states.get(n, {}).get("phase", -1) < phase]
             if self._phase >= phase and not missing:
                 return
-            reason = self._wanted()
+            reason = self._stop_reason()
             if reason:
                 raise RunError(f"stopped while waiting for {self._listed(missing)}: {reason}")
             if now > end:
-                raise RunError(self._absence(missing, phase, patience))
-            self._news.wait(max(0.0, next_time - now))
-            self._news.clear()
+                raise RunError(self._missing_text(missing, phase, timeout))
+            self._changed_event.wait(max(0.0, next_time - now))
+            self._changed_event.clear()
 
-    def rest(self, patience: float, tick: int) -> None:
+    def wait_for_rest(self, timeout: float, tick: int) -> None:
         """Say that the actuators here are in damping, and wait until the others have said so.
 
         It never raises, and does not wait for a part that is gone. Where this part could not start,
         it says why until all have heard it. ``tick`` is the first that this part will not run.
         """
-        end = time.monotonic() + patience
+        end = time.monotonic() + timeout
         self._phase, self._ended = Phase.RESTING, tick
         next_time = 0.0
         while (now := time.monotonic()) < end:
             if now >= next_time:
-                self.say()
+                self.send_beacon()
                 next_time = now + REPEAT
             waiting = [
                 name
                 for name in self.names
                 if name not in self._gone
-                and (self._problem or name in self._heard)
-                and self._heard.get(name, {}).get("phase", -1) < Phase.RESTING
+                and (self._problem or name in self._states)
+                and self._states.get(name, {}).get("phase", -1) < Phase.RESTING
             ]
             if not waiting:
                 return
-            self._news.wait(max(0.0, next_time - now))
-            self._news.clear()
+            self._changed_event.wait(max(0.0, next_time - now))
+            self._changed_event.clear()
 
-    def say(self, problem: str = "") -> None:
+    def send_beacon(self, problem: str = "") -> None:
         """Tell all others how far this part is, and what keeps it from going on."""
         self._problem = self._problem or problem
         for name in self.names:
-            self._say_to(name)
+            self._send_beacon_to(name)
 
-    def _say_to(self, name: str) -> None:
+    def _send_beacon_to(self, name: str) -> None:
         state: dict[str, Any] = {
             "machine": self.machine,
             "run": self.run.hex(),
@@ -312,15 +312,15 @@ class Others:
             "hashes": self._hashes,
             "clock": self._clocks[name].stamp(time.monotonic_ns()),
             "checked": list(self._checked),
-            "heard": self._heard.get(name, {}).get("phase", -1),
+            "heard": self._states.get(name, {}).get("phase", -1),
         }
         if self._phase is Phase.HELLO:
             state["graph"] = self._identity.graph
             state["schema"] = self._identity.schema
-        if name in self._tell:
-            self._tell[name](json.dumps(state).encode())
+        if name in self._publishers:
+            self._publishers[name](json.dumps(state).encode())
 
-    def _hear(self, data: bytes) -> None:
+    def _on_beacon(self, data: bytes) -> None:
         """Keep a beacon; whatever is none is thrown away."""
         with suppress(Exception):  # whatever bytes do, a thread of the network goes on
             state = json.loads(data)
@@ -328,16 +328,16 @@ class Others:
             if name not in self.names or len(bytes.fromhex(state["run"])) != len(self.run):
                 return
             now = time.monotonic_ns()
-            before = self._heard.get(name, {})
+            before = self._states.get(name, {})
             if before and before["run"] != state["run"]:
                 self._forget(name)
                 before = {}
-            self._clocks[name].hear(state["clock"], now)
+            self._clocks[name].update(state["clock"], now)
             if before.get("run") == state["run"]:
                 # beacons may come in another order
                 phase = max(phase, before["phase"])
                 checked = list(dict.fromkeys([*before["checked"], *checked]))
-            self._heard[name] = {**before, **state, "phase": phase, "checked": checked}
+            self._states[name] = {**before, **state, "phase": phase, "checked": checked}
             if state["problem"]:
                 what = "does not start" if phase < Phase.STARTED else "failed"
                 error = PeerError(f"machine {name!r} {what}: {state['problem']}")
@@ -346,12 +346,12 @@ class Others:
             elif phase >= Phase.RESTING:
                 error = PeerError(f"machine {name!r} has ended its run")
                 self.fail(name, int(state["ended"]), error)
-            self._news.set()
+            self._changed_event.set()
             if int(state["heard"]) < self._phase:
-                self._say_to(name)
+                self._send_beacon_to(name)
 
-    def _lose(self, name: str) -> None:
-        heard = self._heard.get(name)
+    def _on_lost(self, name: str) -> None:
+        heard = self._states.get(name)
         if heard is None or heard["phase"] >= Phase.RESTING:
             return  # it was not there yet, or has ended in good order
         self._gone[name] = None
@@ -376,7 +376,7 @@ class Others:
         if self._phase > Phase.HELLO:
             return
         for name in self.names:
-            heard = self._heard.get(name, {})
+            heard = self._states.get(name, {})
             if "graph" not in heard:
                 if heard and heard["hashes"] != self._hashes:
                     raise PeerError(
@@ -389,22 +389,22 @@ class Others:
             difference = self._identity.difference(other, self.machine, name)
             if difference:
                 error = PeerError(f"{self.machine} and {name} do not fit together: {difference}")
-                self.say(str(error))
+                self.send_beacon(str(error))
                 raise error
 
-    def _absence(self, missing: list[str], phase: Phase, patience: float) -> str:
-        silent = [name for name in missing if name not in self._heard]
+    def _missing_text(self, missing: list[str], phase: Phase, timeout: float) -> str:
+        silent = [name for name in missing if name not in self._states]
         if silent:
             return (
-                f"nothing was heard of {self._listed(silent)} for {patience:g} s. Start each part "
+                f"nothing was heard of {self._listed(silent)} for {timeout:g} s. Start each part "
                 "with 'aloft run GRAPH --machine NAME', and see that its endpoint can be reached"
             )
         if missing:
             return (
-                f"{self._listed(missing)} did not become {phase.name.lower()} in {patience:g} s; "
+                f"{self._listed(missing)} did not become {phase.name.lower()} in {timeout:g} s; "
                 "see what is printed there"
             )
-        return f"this machine did not become {phase.name.lower()} in {patience:g} s"
+        return f"this machine did not become {phase.name.lower()} in {timeout:g} s"
 
     def _listed(self, names: Iterable[str]) -> str:
         return ", ".join(f"{name} ({self._endpoints[name]})" for name in names) or "the others"

@@ -16,9 +16,9 @@ from ..loading import LoadError, load, load_text
 from ..running.memory import Memory
 from .parameter_endpoint import EndpointError, answers, ask, ask_to_watch, set_parameters
 from .texts import ValueTexts, tick_text, time_texts
-from .window import ENDED, RATE, STARTING, Look, Shape, WindowReader, digest
+from .window import ENDED, RATE, STARTING, Shape, WindowContents, WindowReader, digest
 
-STILL = 1.0
+STALLED_AFTER = 1.0
 """Seconds without a new tick after which it is said that the graph stands still."""
 
 
@@ -89,7 +89,7 @@ class LiveRun:
             assert self._reader is not None
             look = self._reader.look()
             state, said = self._state(look)
-            if state in ("ended", "gone") and time.monotonic() - self._tried > STILL:
+            if state in ("ended", "gone") and time.monotonic() - self._tried > STALLED_AFTER:
                 self._tried = time.monotonic()
                 other = self._other()
                 if other is not None:
@@ -102,7 +102,7 @@ class LiveRun:
                 return {"state": state, "said": said}
             return {"state": state, "said": said, **self._moment(look)}
 
-    def _moment(self, look: Look) -> dict[str, Any]:
+    def _moment(self, look: WindowContents) -> dict[str, Any]:
         assert self._reader is not None
         period = self.graph.base_period
         lines = [f"the part on {self.machine}"] if self.machine else []
@@ -128,7 +128,7 @@ class LiveRun:
             "changes": look.changes,
         }
 
-    def _state(self, look: Look | None) -> tuple[str, str]:
+    def _state(self, look: WindowContents | None) -> tuple[str, str]:
         """What the run is doing, and what is said of it."""
         if look is None:
             return "gone", "the process was stopped in the midst of a tick"
@@ -138,7 +138,7 @@ class LiveRun:
             self._seen, self._since = look.tick, time.monotonic()
         silent = time.monotonic() - self._since
         # a window is renewed RATE times a second of the graph's time, or with every tick
-        if silent > max(STILL, 3.0 * max(self.graph.base_period, 1.0 / RATE)):
+        if silent > max(STALLED_AFTER, 3.0 * max(self.graph.base_period, 1.0 / RATE)):
             if not answers(self._path):
                 return "gone", "the process has gone, and did not say why"
             return "still", f"no tick has come for {silent:.1f} s"

@@ -71,11 +71,11 @@ def _script() -> str:
 
 LONGEST_BODY = 1 << 16
 """Bytes of one request."""
-PATIENCE = 10.0
+REQUEST_TIMEOUT = 10.0
 """Seconds that a browser may take to send what it has announced."""
 
 
-class Watched(Protocol):
+class WatchedRun(Protocol):
     """A running graph that the page shows; see ``LiveRun`` and ``SpreadRun``."""
 
     graph: CheckedGraph
@@ -118,7 +118,9 @@ class LiveServer(ThreadingHTTPServer):
 
     daemon_threads = True
 
-    def __init__(self, run: Watched, save: Path, opened: Opened = "diagram", port: int = 0) -> None:
+    def __init__(
+        self, run: WatchedRun, save: Path, opened: Opened = "diagram", port: int = 0
+    ) -> None:
         super().__init__((ADDRESS, port), _Handler)
         self.run, self.save, self.opened = run, save, opened
         self.token = secrets.token_urlsafe(24)
@@ -139,7 +141,7 @@ class LiveServer(ThreadingHTTPServer):
 
 class _Handler(LoopbackHandler):
     content_policy = live_policy()
-    timeout = PATIENCE
+    timeout = REQUEST_TIMEOUT
     server: LiveServer
 
     def do_GET(self) -> None:

@@ -36,7 +36,7 @@ from .window import Window, digest
 
 LONGEST_REQUEST = 1 << 16
 """Bytes of one request."""
-PATIENCE = 5.0
+REQUEST_TIMEOUT = 5.0
 """The time that either side waits for the other [s]."""
 START_TIME = 60.0
 """The time that somebody who watches waits for a run to start [s]."""
@@ -103,7 +103,7 @@ class ParameterEndpoint:
             self._socket.shutdown(socket.SHUT_RDWR)  # wakes the thread
         self._socket.close()
         if self._thread is not None:
-            self._thread.join(PATIENCE)
+            self._thread.join(REQUEST_TIMEOUT)
 
     def finish(self, result: RunResult) -> list[str]:
         """Tell those who watch why the run has ended."""
@@ -116,7 +116,7 @@ class ParameterEndpoint:
             except OSError:
                 return
             with connection, suppress(OSError):  # the client may have closed the connection
-                connection.settimeout(PATIENCE)
+                connection.settimeout(REQUEST_TIMEOUT)
                 request = _read_line(connection)
                 answer = _answer(request, parameters, graph, self._watch)
                 if "shape" in answer:
@@ -226,7 +226,7 @@ def _exchange(path: Path, request: Mapping[str, Any]) -> tuple[dict[str, Any], l
     descriptors: list[int] = []
     try:
         with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as connection:
-            connection.settimeout(PATIENCE)
+            connection.settimeout(REQUEST_TIMEOUT)
             connection.connect(str(path))
             connection.sendall(json.dumps(request).encode() + b"\n")
             begun, descriptors, _, _ = socket.recv_fds(connection, 4096, 1)
@@ -246,7 +246,7 @@ def answers(path: Path) -> bool:
     """Whether some run listens at ``path``."""
     try:
         with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as connection:
-            connection.settimeout(PATIENCE)
+            connection.settimeout(REQUEST_TIMEOUT)
             connection.connect(str(path))
     except OSError:
         return False

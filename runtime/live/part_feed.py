@@ -21,8 +21,8 @@ from ..running.memory import BoundGraph
 from ..running.run_result import RunResult
 from ..running.sinks import Note
 from ..running.ticker import Ticker
-from ..transports.transport import Take, Transport, window_key
-from .window import Look, Shape, Window, WindowReader, digest, look_of
+from ..transports.transport import MessageCallback, Transport, window_key
+from .window import Shape, Window, WindowContents, WindowReader, digest, parse_window
 
 RATE = 5.0
 """How often the window is sent [Hz]."""
@@ -47,7 +47,7 @@ class PartFeed:
         self._reader: WindowReader | None = None
         self._thread: threading.Thread | None = None
         self._ended = threading.Event()
-        self._put: Take | None = None
+        self._put: MessageCallback | None = None
         self._fault = ""
         self._about: dict[str, Any] = {}
 
@@ -95,7 +95,7 @@ class PartFeed:
         while not self._ended.wait(1.0 / RATE):
             with suppress(Exception):  # whatever a network does, the run goes on
                 if self._put is None and self._transport.is_open:
-                    self._put = self._transport.shower(window_key(self._machine))
+                    self._put = self._transport.background_publisher(window_key(self._machine))
                     self._transport.before_close(self._say_farewell)
                 self._send()
 
@@ -112,7 +112,7 @@ class PartFeed:
 
 
 @dataclass(frozen=True)
-class PartLook:
+class PartWindow:
     """What a part showed at one moment.
 
     Attributes:
@@ -125,7 +125,7 @@ class PartLook:
     digest: str
     ended: str | None
     shape: Shape
-    look: Look
+    look: WindowContents
 
 
 def packed(about: dict[str, Any], copy: bytes) -> bytes:
@@ -134,7 +134,7 @@ def packed(about: dict[str, Any], copy: bytes) -> bytes:
     return _HEAD.pack(crc32(copy, crc32(said)), len(said)) + said + copy
 
 
-def read_part(data: bytes) -> PartLook | None:
+def read_part(data: bytes) -> PartWindow | None:
     """What a message says; ``None`` where it is not whole or not of this version."""
     if not _HEAD.size <= len(data) <= LONGEST:
         return None
@@ -147,5 +147,5 @@ def read_part(data: bytes) -> PartLook | None:
         if len(copy) == shape.size:
             ended = about["ended"]
             text = None if ended is None else str(ended)
-            return PartLook(str(about["digest"]), text, shape, look_of(copy, shape))
+            return PartWindow(str(about["digest"]), text, shape, parse_window(copy, shape))
     return None

@@ -14,9 +14,9 @@ from ..links.observer import STALE, Observer
 from ..links.part import part_graph
 from ..placement.placed import PlacedGraph
 from ..running.memory import Memory
-from .live_run import STILL
+from .live_run import STALLED_AFTER
 from .parameter_endpoint import EndpointError, ask, set_parameters
-from .part_feed import PartLook, read_part
+from .part_feed import PartWindow, read_part
 from .texts import ValueTexts, tick_text, time_texts
 from .window import RATE, STARTING, digest
 
@@ -156,7 +156,7 @@ class _Part:
         self._period = graph.base_period
         self._texts = ValueTexts(placed.graph, layout, self.own)
         self._digest = digest(layout, graph)
-        self._last: _Moment | None = None
+        self._last: _LastMessage | None = None
 
     def take(self, data: bytes) -> None:
         """Keep a message; on a thread of the network."""
@@ -173,7 +173,7 @@ class _Part:
             if found is not None:
                 new = self._last is None or self._last.tick != found.look.tick
                 since = moment if new or self._last is None else self._last.since
-                self._last = _Moment(data, found.look.tick, since, found)
+                self._last = _LastMessage(data, found.look.tick, since, found)
         if self._last is None:
             return {"state": "unheard", "said": "says what cannot be read: is it of this version?"}
         about = self._last.about
@@ -182,7 +182,7 @@ class _Part:
         state, said = self._state(about, moment)
         return {"state": state, "said": said, **self._shown(about)}
 
-    def _state(self, about: PartLook, moment: float) -> tuple[str, str]:
+    def _state(self, about: PartWindow, moment: float) -> tuple[str, str]:
         assert self._last is not None
         silent, still = moment - self._heard, moment - self._last.since
         if about.ended is not None:
@@ -191,11 +191,11 @@ class _Part:
             return "gone", f"has not been heard for {silent:.1f} s: {LOST}"
         if about.look.state == STARTING:
             return "starting", "starts its blocks"
-        if still > max(STILL, 3.0 * max(self._period, 1.0 / RATE)):
+        if still > max(STALLED_AFTER, 3.0 * max(self._period, 1.0 / RATE)):
             return "still", f"has made no tick for {still:.1f} s"
         return "running", ""
 
-    def _shown(self, about: PartLook) -> dict[str, Any]:
+    def _shown(self, about: PartWindow) -> dict[str, Any]:
         look = about.look
         lines = [f"tick {look.tick}, {look.tick * self._period:.3f} s"]
         lines.append(tick_text(look.stamps, self._period))
@@ -214,10 +214,10 @@ class _Part:
 
 
 @dataclass(frozen=True)
-class _Moment:
+class _LastMessage:
     """A message that was read: its bytes, its tick, and since when no other tick has come [s]."""
 
     data: bytes
     tick: int
     since: float
-    about: PartLook
+    about: PartWindow

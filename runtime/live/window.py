@@ -195,7 +195,7 @@ TRIES = 50
 
 
 @dataclass(frozen=True)
-class Look:
+class WindowContents:
     """What a window showed at one moment.
 
     Attributes:
@@ -232,10 +232,10 @@ class WindowReader:
             os.close(descriptor)
         self._fence = Lock()
 
-    def look(self) -> Look | None:
+    def look(self) -> WindowContents | None:
         """What the window shows now; ``None`` where its writer was stopped while it wrote."""
         copy = self.copy()
-        return None if copy is None else look_of(copy, self.shape)
+        return None if copy is None else parse_window(copy, self.shape)
 
     def copy(self) -> bytes | None:
         """The window's bytes as they are now; ``None`` as for ``look``."""
@@ -259,12 +259,12 @@ class WindowReader:
         return int.from_bytes(self._map[8 * SEQUENCE : 8 * SEQUENCE + 8], "little", signed=True)
 
 
-def look_of(copy: bytes, shape: Shape) -> Look:
+def parse_window(copy: bytes, shape: Shape) -> WindowContents:
     """What the bytes of a window say, which must be as many as its shape has."""
     words = np.frombuffer(copy, np.int64, shape.text_start // 8)
     length = min(int(words[SAID]), TEXT)
     said = copy[shape.text_start : shape.text_start + length].decode(errors="replace")
-    return Look(
+    return WindowContents(
         tick=int(words[TICK]),
         state=int(words[STATE]),
         overruns=int(words[OVERRUNS]),

@@ -22,10 +22,10 @@ from .failures import describe, locate
 from .life_cycle import LifeCycle, LifeState
 from .memory import BoundGraph
 from .pacing import TimeSource, WallTime
-from .real_time import NO_WISHES, RealTime
-from .run_result import RunResult, TakesAbandoned, TakesResult, merge_metrics
-from .sinks import GivesMetrics, MemoryLog, Note, RunHash, Sink, TakesNotes
-from .ticker import TakesTicker, Ticker, hang_text
+from .real_time import NO_REAL_TIME, RealTimeOptions
+from .run_result import RunResult, SupportsAbandoned, SupportsResult, merge_metrics
+from .sinks import MemoryLog, Note, RunHash, Sink, SupportsMetrics, SupportsNotes
+from .ticker import SupportsTicker, Ticker, hang_text
 from .timing import block_times
 from .watchdog import Interrupts, Watchdog
 
@@ -68,7 +68,7 @@ class Executor:
         on_ready: Callable[[], None] | None = None,
         plain: bool = False,
         fuse: bool = True,
-        real_time: RealTime = NO_WISHES,
+        real_time: RealTimeOptions = NO_REAL_TIME,
     ) -> None:
         real_time.check()
         self._real_time = real_time
@@ -121,7 +121,7 @@ class Executor:
                 self.ticker, self.life, interrupts, self._spec.hangs_after,
                 lambda block, place, stack: self._abandon(block, place, stack, interrupts),
             ) as watchdog,
-            _quiet_collector(collect=self.ticker.pacer is not None),
+            _collector_paused(collect=self.ticker.pacer is not None),
         ):  # fmt: skip
             try:
                 try:
@@ -183,7 +183,7 @@ class Executor:
         result = replace(result, warnings=tuple(self._finish_sinks(result)))
         os.write(2, f"\n{error}\n  it is at {place}\n".encode())
         for sink in self._opened:
-            if isinstance(sink, TakesAbandoned):
+            if isinstance(sink, SupportsAbandoned):
                 sink.abandoned(result)
         if not interactive:
             os._exit(int(ExitCode.RUN_FAILED))
@@ -206,12 +206,12 @@ class Executor:
             self._opened.append(sink)  # before the call, as a failed open may have opened a file
             sink.open(self.bound)
             self.ticker.records.append(sink.record)
-            if isinstance(sink, TakesNotes):
+            if isinstance(sink, SupportsNotes):
                 self.ticker.notes.append(sink.note)
         if self._fuse:  # once the freeze guard has said where the block that runs is written
             self.ticker.fuse()
         for sink in self._sinks:
-            if isinstance(sink, TakesTicker):
+            if isinstance(sink, SupportsTicker):
                 sink.watch_ticker(self.ticker)
 
     def _close_sinks(self) -> list[str]:
@@ -226,7 +226,7 @@ class Executor:
     def _finish_sinks(self, result: RunResult) -> list[str]:
         warnings = []
         for sink in self._opened:
-            if isinstance(sink, TakesResult):
+            if isinstance(sink, SupportsResult):
                 try:
                     warnings += sink.finish(result)
                 except Exception as error:  # noqa: BLE001  # the next sink must be finished too
@@ -269,8 +269,8 @@ class Executor:
         if error is None:
             self._add_cautions()
         by_block: dict[str, dict[str, Metric]] = {}
-        giving: dict[str, Block | GivesMetrics] = {**self.bound.blocks}
-        giving |= {sink.name: sink for sink in self._opened if isinstance(sink, GivesMetrics)}
+        giving: dict[str, Block | SupportsMetrics] = {**self.bound.blocks}
+        giving |= {sink.name: sink for sink in self._opened if isinstance(sink, SupportsMetrics)}
         for path, block in giving.items():
             try:
                 by_block[path] = dict(block.metrics())
@@ -338,7 +338,7 @@ class Executor:
 
 
 @contextmanager
-def _quiet_collector(*, collect: bool) -> Iterator[None]:
+def _collector_paused(*, collect: bool) -> Iterator[None]:
     """Switch the garbage collector off within, and exempt all existing objects from collections that
     are asked for, so that no collection interrupts a tick.
 

@@ -68,7 +68,7 @@ class FreezeGuard:
         self._running[:] = bound.running
         bound.running = self._running
         with suppress(OSError):  # it could not start; the run goes on without it
-            self._pipe.write(json.dumps(_told(self._graph)).encode() + b"\n")
+            self._pipe.write(json.dumps(_describe_graph(self._graph)).encode() + b"\n")
             self._pipe.flush()
         self._beats.start()
 
@@ -100,7 +100,7 @@ def _shared_number() -> tuple[int, NDArray[np.int64]]:
         return -1, np.full(1, -1)
 
 
-def _told(graph: CheckedGraph) -> dict[str, object]:
+def _describe_graph(graph: CheckedGraph) -> dict[str, object]:
     """What names a block: the file and the class of each, for stacks, and their order."""
     blocks = []
     for spec in graph.blocks:

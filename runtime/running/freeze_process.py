@@ -44,7 +44,7 @@ def main() -> int:
         if not letter:
             return 0
         head += letter
-    told = json.loads(head)
+    description = json.loads(head)
     silent = 0
     while True:
         piece = _read(limit / LOOKS)
@@ -58,7 +58,7 @@ def main() -> int:
             silent = 0
             stacks = _stacks(pid)
             if stacks:
-                _say(told, stacks, limit, as_json)
+                _report(description, stacks, limit, as_json)
                 with suppress(ProcessLookupError):
                     os.kill(pid, signal.SIGKILL)
                 return 3
@@ -81,12 +81,12 @@ def _stacks(pid: int) -> str:
     return found if "(most recent call first)" in found and not found.endswith(".") else ""
 
 
-def _say(told: dict[str, object], stacks: str, limit: float, as_json: bool) -> None:
+def _report(description: dict[str, object], stacks: str, limit: float, as_json: bool) -> None:
     """Print which block hangs and where."""
     frames = _run_frames(stacks)
-    own = [f for f in frames if not _is_installed(f[0], told)]
+    own = [f for f in frames if not _is_installed(f[0], description)]
     file, line, _ = (own or frames or [("", 0, "")])[0]
-    blocks = _blocks(told, frames) or _in_chain(told, frames)
+    blocks = _blocks(description, frames) or _in_chain(description, frames)
     who = "block " + " or ".join(f"'{path}'" for path in blocks) if blocks else "the run"
     reason = (
         f"{who} hangs in compiled code that lets nothing else run: no sign of life for {limit:g} s "
@@ -97,7 +97,12 @@ def _say(told: dict[str, object], stacks: str, limit: float, as_json: bool) -> N
     if as_json:
         block = blocks[0] if len(blocks) == 1 else ""
         error = {"message": reason, "block": block, "tick": -1, "where": place, "traceback": stacks}
-        outcome = {"graph": told["graph"], "success": False, "reason": reason, "error": error}
+        outcome = {
+            "graph": description["graph"],
+            "success": False,
+            "reason": reason,
+            "error": error,
+        }
         print(json.dumps({**outcome, "exit_code": 128 + signal.SIGKILL}), flush=True)
 
 
@@ -112,15 +117,15 @@ def _run_frames(stacks: str) -> list[tuple[str, int, str]]:
     return []
 
 
-def _is_installed(file: str, told: dict[str, object]) -> bool:
-    prefixes = told["installed"]
+def _is_installed(file: str, description: dict[str, object]) -> bool:
+    prefixes = description["installed"]
     assert isinstance(prefixes, list)
     return file.startswith(tuple(prefixes)) or "site-packages" in file
 
 
-def _blocks(told: dict[str, object], frames: list[tuple[str, int, str]]) -> list[str]:
+def _blocks(description: dict[str, object], frames: list[tuple[str, int, str]]) -> list[str]:
     """The paths of the blocks whose class has the outermost frame that belongs to a block."""
-    known = told["blocks"]
+    known = description["blocks"]
     assert isinstance(known, list)
     for file, line, _ in reversed(frames):
         inside = _class_at(file, line) if any(of == file for _, of, _ in known) else ""
@@ -130,9 +135,9 @@ def _blocks(told: dict[str, object], frames: list[tuple[str, int, str]]) -> list
     return []
 
 
-def _in_chain(told: dict[str, object], frames: list[tuple[str, int, str]]) -> list[str]:
+def _in_chain(description: dict[str, object], frames: list[tuple[str, int, str]]) -> list[str]:
     """The path of the block that a chain runs, if the innermost frame is a chain's."""
-    order, shared = told["order"], int(sys.argv[4])
+    order, shared = description["order"], int(sys.argv[4])
     assert isinstance(order, list)
     if shared < 0 or not frames or frames[0][2] != "run" or "chain.py" not in frames[0][0]:
         return []

@@ -13,7 +13,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from .real_time import RealTime, RealTimeError
+from .real_time import RealTimeError, RealTimeOptions
 
 SYSTEM = Path("/")
 
@@ -95,7 +95,7 @@ def _governor(system: Path) -> Finding:
 
 def _priority(system: Path) -> Finding:
     try:
-        RealTime(priority=1).check()
+        RealTimeOptions(priority=1).check()
     except RealTimeError:
         return Finding(
             "real-time priority", False, "this user may not use SCHED_FIFO",
@@ -120,7 +120,7 @@ def _throttling(system: Path) -> Finding:
 
 def _memory(system: Path) -> Finding:
     try:
-        RealTime(lock_memory=True).check()
+        RealTimeOptions(lock_memory=True).check()
     except RealTimeError:
         soft = resource.getrlimit(resource.RLIMIT_MEMLOCK)[0]
         return Finding(

@@ -26,8 +26,8 @@ class RealTimeError(AloftError):
 
 
 @dataclass(frozen=True)
-class RealTime:
-    """The wishes of a run.
+class RealTimeOptions:
+    """What a run asks for.
 
     Attributes:
         cpu: the only processor that the control thread may use; none: any.
@@ -50,7 +50,7 @@ class RealTime:
 
     @contextmanager
     def granted(self) -> Iterator[None]:
-        """Have the wishes within.
+        """Apply the options within.
 
         Raises:
             RealTimeError: as for ``check``.
@@ -75,7 +75,7 @@ class RealTime:
             yield
 
 
-NO_WISHES = RealTime()
+NO_REAL_TIME = RealTimeOptions()
 """A run that asks for nothing."""
 
 

@@ -205,7 +205,7 @@ def merge_metrics(
 
 
 @runtime_checkable
-class TakesResult(Protocol):
+class SupportsResult(Protocol):
     """The method that a sink has, beside ``record``, if it wants the result of the run."""
 
     def finish(self, result: RunResult) -> list[str]:
@@ -213,8 +213,8 @@ class TakesResult(Protocol):
 
 
 @runtime_checkable
-class TakesAbandoned(Protocol):
-    """The method that a sink has, beside ``record``, if it is told of a run that is abandoned."""
+class SupportsAbandoned(Protocol):
+    """The method that a sink has, beside ``record``, if it wants to know of a run that is abandoned."""
 
     def abandoned(self, result: RunResult) -> None:
         """Take the result of a run that hangs; when all sinks have it, the process ends."""

@@ -39,7 +39,7 @@ class Note:
 
 
 @runtime_checkable
-class TakesNotes(Protocol):
+class SupportsNotes(Protocol):
     """The method that a sink has, beside ``record``, if it wants to receive notes."""
 
     def note(self, note: Note) -> None:
@@ -70,7 +70,7 @@ class Sink(Protocol):
 
 
 @runtime_checkable
-class GivesMetrics(Protocol):
+class SupportsMetrics(Protocol):
     """A sink that has a word in the result, as a block has: ``Block.metrics`` by ``name``."""
 
     name: str

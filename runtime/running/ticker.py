@@ -269,7 +269,7 @@ def owner_of(call: Callable[..., Any] | None) -> object:
 
 
 @runtime_checkable
-class TakesTicker(Protocol):
+class SupportsTicker(Protocol):
     """The method that a sink has, beside ``record``, if it shows the times of blocks."""
 
     def watch_ticker(self, ticker: Ticker) -> None:

@@ -32,7 +32,9 @@ from .life_cycle import STOP_CYCLES, LifeCycle, LifeState
 from .pacing import Paced
 from .ticker import Ticker, hang_text, owner_of
 
-_SAID = b"\nstopping after this tick, the robot in damping; Ctrl-C again ends a block that hangs\n"
+_STOP_NOTICE = (
+    b"\nstopping after this tick, the robot in damping; Ctrl-C again ends a block that hangs\n"
+)
 
 
 class Interrupts:
@@ -89,7 +91,7 @@ class Interrupts:
                 self._clock.stop_reason = f"stopped by {self.received.name}"
             if self.received is signal.SIGINT:
                 with suppress(OSError, ValueError):
-                    os.write(2, _SAID)
+                    os.write(2, _STOP_NOTICE)
         elif self.armed or self._life.guarding:
             self.armed = self._life.guarding = False
             raise KeyboardInterrupt
@@ -99,7 +101,7 @@ LOOKS = 8
 """How often the watchdog looks at the run in every limit of time."""
 TRIES = 3
 """How often it interrupts a call before the run is abandoned: a block may catch what it gets."""
-_PATIENT = ("numba.", "importlib.", "bdb", "pdb", "pydevd", "_pydevd_bundle")
+_SLOW_MODULES = ("numba.", "importlib.", "bdb", "pdb", "pydevd", "_pydevd_bundle")
 """Modules in which a call may stay for long: a compiler, an import, a debugger."""
 
 
@@ -153,10 +155,10 @@ class Watchdog:
                 before, looks, tries = call, 0, 0
                 continue
             looks += 1
-            patience = LOOKS if tries == 0 else 2
+            allowed_looks = LOOKS if tries == 0 else 2
             if self._life.state is LifeState.STOPPING:
-                patience = min(patience, max(2, LOOKS // STOP_CYCLES))
-            if looks < patience:
+                allowed_looks = min(allowed_looks, max(2, LOOKS // STOP_CYCLES))
+            if looks < allowed_looks:
                 continue
             if tries == TRIES:
                 self._give_up(call)
@@ -184,7 +186,7 @@ class Watchdog:
         code = LifeCycle._guard.__code__ if stopping else Ticker.advance.__code__
         frame = sys._current_frames().get(self._watched)
         while frame is not None and frame.f_code is not code:
-            if frame.f_trace is not None or _is_patient(frame):
+            if frame.f_trace is not None or _may_take_long(frame):
                 return None
             frame = frame.f_back
         if frame is None:
@@ -217,5 +219,5 @@ class Watchdog:
         self._abandon(call[1], place, "".join(traceback.format_list(stack)))
 
 
-def _is_patient(frame: FrameType) -> bool:
-    return str(frame.f_globals.get("__name__", "")).startswith(_PATIENT)
+def _may_take_long(frame: FrameType) -> bool:
+    return str(frame.f_globals.get("__name__", "")).startswith(_SLOW_MODULES)

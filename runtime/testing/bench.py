@@ -68,7 +68,7 @@ class BlockBench(Generic[B]):
         description = find_robot(robot) if isinstance(robot, str) else robot
         if not isinstance(params, Parameters):
             params = block_type.Params.model_validate(dict(params or {}))
-        block_type = cast("type[B]", block_type.fitted(params, folder or Path(), folder or Path()))
+        block_type = cast("type[B]", block_type.fitted(params, folder or Path(), description))
         sizes = {
             **(description.dimensions if description else {}),
             **(dimensions or {}),

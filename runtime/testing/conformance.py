@@ -17,6 +17,7 @@ that these do not give are random, finite and of order one.
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -119,8 +120,9 @@ def _names(code: CodeType) -> Iterator[str]:
 def _ports_used(subject: Subject) -> None:
     """Every declared port is named somewhere in the code of the class."""
     kind = subject.block_type
-    if kind.fitted.__func__ is not Block.fitted.__func__:  # type: ignore[attr-defined]  # a class method
-        return  # its ports follow from its parameters, so no code can name them
+    fits = kind.fitted.__func__ is not Block.fitted.__func__  # type: ignore[attr-defined]  # a class method
+    if fits and getattr(sys.modules[kind.__module__], kind.__name__, None) is not kind:
+        return  # `fitted` has made it: its ports follow from what it is given, so no code names them
     used: dict[str, None] = {}
     for owner in kind.__mro__:
         for value in vars(owner).values() if issubclass(owner, Block) else ():
@@ -353,8 +355,9 @@ def check_block(
         ConformanceError: the block breaks a promise.
     """
     given = block_type.example_parameters() if params is None else params
+    description = find_robot(robot) if isinstance(robot, str) else robot
     subject = Subject(
-        block_type.fitted(block_type.Params.model_validate(dict(given)), Path(), Path()),
+        block_type.fitted(block_type.Params.model_validate(dict(given)), Path(), description),
         given,
         robot,
         rate,

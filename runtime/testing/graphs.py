@@ -76,7 +76,7 @@ def _spec(
     dimensions: Mapping[str, int] | None,
 ) -> BlockSpec:
     params = use.block_type.Params.model_validate(dict(use.params))
-    use = replace(use, block_type=use.block_type.fitted(params, Path(), Path()))
+    use = replace(use, block_type=use.block_type.fitted(params, Path(), robot))
     sizes = {
         **(robot.dimensions if robot else {}),
         **(dimensions or {}),

@@ -21,13 +21,13 @@ from ...mathematics.compiling.compile_calls import compile_calls
 from ..language.block import Metric
 from ..language.errors import AloftError
 from ..language.stages import CheckedGraph, ClockSpec
-from ..links.part import CONDUCTOR, PREPARED, STARTED, BoundPart, Whole, hash_of, run_part
+from ..links.part import COORDINATOR, PREPARED, STARTED, BoundPart, MergedLayout, hash_of, run_part
 from ..placement.placed import PlacedGraph, place
 from ..running.run_result import RunResult, merge_metrics
 from ..running.sinks import Sink
 from ..running.ticker import Ticker
 from ..transports.hub import Hub
-from ..transports.transport import Take
+from ..transports.transport import MessageCallback
 
 Interfere = Callable[[str, bytes], Iterable[bytes]]
 
@@ -54,7 +54,7 @@ class SpreadRun:
         layouts = {machine: part.memory.bus.layout for machine, part in self.parts.items()}
         layout = next(iter(layouts.values()))
         rows = {machine: log.rows()[: self.ticks] for machine, log in self._logs().items()}
-        return Whole(self.placed, layout, layouts).rows(rows)
+        return MergedLayout(self.placed, layout, layouts).rows(rows)
 
     @property
     def run_hash(self) -> str:
@@ -71,7 +71,7 @@ def run_spread(
     *,
     interfere: Interfere | None = None,
     prepare: Callable[[Mapping[str, BoundPart], Hub], None] | None = None,
-    patience: float = 5.0,
+    timeout: float = 5.0,
     wall_time: float = 60.0,
     **options: Any,
 ) -> SpreadRun:
@@ -82,7 +82,7 @@ def run_spread(
         ticks: how many ticks; by default the graph's duration.
         interfere: what happens to messages on their way; see ``Hub``.
         prepare: called with all parts and the hub before they start.
-        patience: the seconds that parts wait for one another.
+        timeout: the seconds that parts wait for one another.
         wall_time: the seconds after which it is an error that they still run.
         options: of the executor.
 
@@ -92,7 +92,7 @@ def run_spread(
     hub = Hub()
     hub.interfere = interfere
     return run_parts_of(
-        place(graph), hub, ticks=ticks, prepare=prepare, patience=patience, wall_time=wall_time,
+        place(graph), hub, ticks=ticks, prepare=prepare, timeout=timeout, wall_time=wall_time,
         **options,
     )  # fmt: skip
 
@@ -104,14 +104,14 @@ def run_parts_of(
     *,
     ticks: int | None = None,
     prepare: Callable[[Mapping[str, BoundPart], Hub], None] | None = None,
-    patience: float = 5.0,
+    timeout: float = 5.0,
     wall_time: float = 60.0,
     **options: Any,
 ) -> SpreadRun:
     """As ``run_spread``, with a hub and with sinks for each machine."""
     parts = {
         machine.name: BoundPart(
-            placed, machine.name, hub.transport(), patience=patience, connect_time=patience
+            placed, machine.name, hub.transport(), timeout=timeout, connect_timeout=timeout
         )
         for machine in placed.machines
     }
@@ -141,7 +141,7 @@ def run_parts_of(
 
 Travel = Callable[[str, int], int | None]
 """Gives how long a message takes [ns], by the key of its link and the time; ``None`` if it is lost."""
-_RUNTIME = (CONDUCTOR, PREPARED, STARTED)
+_RUNTIME = (COORDINATOR, PREPARED, STARTED)
 
 
 @dataclass(frozen=True)
@@ -173,7 +173,7 @@ class _Network:
 
     def __init__(self, time: _Time, travel: Travel) -> None:
         self.time, self.travel = time, travel
-        self.takers: dict[str, Take] = {}
+        self.takers: dict[str, MessageCallback] = {}
         self.waiting: list[tuple[int, int, str, bytes]] = []
         self._count = 0
 
@@ -203,16 +203,16 @@ class _VirtualTransport:
     def open(self, machine: str, lost: Callable[[str], None]) -> None:
         """Nothing to do."""
 
-    def publisher(self, key: str) -> Take:
+    def publisher(self, key: str) -> MessageCallback:
         return lambda data: self._network.send(key, data)
 
-    def shower(self, key: str) -> Take:
+    def background_publisher(self, key: str) -> MessageCallback:
         return self.publisher(key)
 
     def before_close(self, call: Callable[[], None]) -> None:
         """Nothing to do: it does not close."""
 
-    def subscribe(self, key: str, take: Take) -> None:
+    def subscribe(self, key: str, take: MessageCallback) -> None:
         self._network.takers[key] = take
 
     def close(self) -> None:
@@ -245,8 +245,8 @@ def run_virtual(
         for machine in placed.machines
     }
     for name, part in parts.items():
-        for other in part.others.names:
-            part.others.assume_started(other, parts[other].others.run)
+        for other in part.peers.names:
+            part.peers.assume_started(other, parts[other].peers.run)
         part.open_links()
         if not plain:
             compile_calls(part.kernel_calls)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable, Iterable
 
-from .transport import Take
+from .transport import MessageCallback
 
 
 class Hub:
@@ -17,7 +17,7 @@ class Hub:
 
     def __init__(self) -> None:
         self.interfere: Callable[[str, bytes], Iterable[bytes]] | None = None
-        self._takers: dict[str, list[Take]] = {}
+        self._takers: dict[str, list[MessageCallback]] = {}
         self._present: dict[str, Callable[[str], None]] = {}
         self._lock = threading.Lock()
 
@@ -34,11 +34,11 @@ class Hub:
         """A machine has closed its transport, or is made to look as if its process had ended."""
         with self._lock:
             self._present.pop(machine, None)
-            others = list(self._present.values())
-        for lost in others:
+            peers = list(self._present.values())
+        for lost in peers:
             lost(machine)
 
-    def add(self, key: str, take: Take) -> None:
+    def add(self, key: str, take: MessageCallback) -> None:
         """Another subscriber."""
         with self._lock:
             self._takers.setdefault(key, []).append(take)
@@ -64,7 +64,7 @@ class HubTransport:
         self.machine = machine
         self.hub.enter(machine, lost)
 
-    def publisher(self, key: str) -> Take:
+    def publisher(self, key: str) -> MessageCallback:
         """What sends under ``key``; a machine that has left sends nothing."""
 
         def send(data: bytes) -> None:
@@ -78,7 +78,7 @@ class HubTransport:
         """Whether it has entered the hub."""
         return bool(self.machine)
 
-    def shower(self, key: str) -> Take:
+    def background_publisher(self, key: str) -> MessageCallback:
         """What shows something to observers: a hub has no priorities."""
         return self.publisher(key)
 
@@ -86,7 +86,7 @@ class HubTransport:
         """Have this called before it leaves the hub."""
         self._farewells.append(call)
 
-    def subscribe(self, key: str, take: Take) -> None:
+    def subscribe(self, key: str, take: MessageCallback) -> None:
         """Have messages taken until this end is closed."""
 
         def take_while_here(data: bytes) -> None:

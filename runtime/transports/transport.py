@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Protocol
 
-Take = Callable[[bytes], None]
+MessageCallback = Callable[[bytes], None]
 """Takes a message. It is called on a thread of the network, so it must copy and return."""
 
 
@@ -20,21 +20,21 @@ class Transport(Protocol):
             AloftError: the machine's endpoint cannot be used.
         """
 
-    def publisher(self, key: str) -> Take:
+    def publisher(self, key: str) -> MessageCallback:
         """What sends a message under ``key`` to whoever subscribes to it."""
 
     @property
     def is_open(self) -> bool:
         """Whether it is connected."""
 
-    def shower(self, key: str) -> Take:
+    def background_publisher(self, key: str) -> MessageCallback:
         """What shows something under ``key`` to observers: at the lowest priority, and dropped where
         a queue is full."""
 
     def before_close(self, call: Callable[[], None]) -> None:
         """Have this called when it is about to disconnect, while everything can still be sent."""
 
-    def subscribe(self, key: str, take: Take) -> None:
+    def subscribe(self, key: str, take: MessageCallback) -> None:
         """Have every message under ``key`` taken."""
 
     def close(self) -> None:

@@ -17,7 +17,7 @@ from typing import Any
 
 from ..language.errors import AloftError
 from ..language.stages import MachineSpec
-from .transport import Take
+from .transport import MessageCallback
 
 LEASE = 500
 """Milliseconds after which a peer that says nothing is taken for lost."""
@@ -26,7 +26,7 @@ ROOT = "aloft"
 
 
 def session_settings(listen: Sequence[str], connect: Sequence[str]) -> dict[str, Any]:
-    """The settings of a peer that listens and connects only where it is told to, by their paths in
+    """The settings of a peer that listens and connects only at these endpoints, by their paths in
     Zenoh's configuration."""
     return {
         "mode": "peer",
@@ -139,7 +139,7 @@ class ZenohTransport:
         """Whether it is connected."""
         return self._session is not None
 
-    def shower(self, key: str) -> Take:
+    def background_publisher(self, key: str) -> MessageCallback:
         """A publisher that never delays any other."""
         import zenoh
 
@@ -151,14 +151,14 @@ class ZenohTransport:
             reliability=zenoh.Reliability.BEST_EFFORT,
         )
         self._keep(publisher)
-        put: Take = publisher.put
+        put: MessageCallback = publisher.put
         return put
 
     def before_close(self, call: Callable[[], None]) -> None:
         """Have this called before the session is closed."""
         self._farewells.append(call)
 
-    def publisher(self, key: str) -> Take:
+    def publisher(self, key: str) -> MessageCallback:
         """A publisher whose messages go out at once."""
         import zenoh
 
@@ -173,10 +173,10 @@ class ZenohTransport:
             reliability=zenoh.Reliability.RELIABLE,
         )
         self._keep(publisher)
-        put: Take = publisher.put
+        put: MessageCallback = publisher.put
         return put
 
-    def subscribe(self, key: str, take: Take) -> None:
+    def subscribe(self, key: str, take: MessageCallback) -> None:
         """A subscriber that is called on a thread of Zenoh."""
         import zenoh
 

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from aloft.cli.jump import load_jump, settings_for, task_changes, task_of
-from aloft.cli.shared.jump_graphs import graph_of
+from aloft.cli.shared.rehearsal import graph_of
 from aloft.planner.library import library
 from aloft.runtime.language.errors import AloftError
 from aloft.studies.trials import trial_settings

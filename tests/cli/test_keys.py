@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from .conftest import run_for_json, run_here
-from .test_run_local import BLOCKS, GRAPH
+from .test_run_machines import BLOCKS, GRAPH
 
 pytest.importorskip("cryptography")
 

@@ -9,9 +9,9 @@ from typing import Any
 import pytest
 
 from aloft.cli.shared.live import Elsewhere, open_live_run
-from aloft.cli.shared.local_runs import local_runs
+from aloft.cli.shared.running_graphs import local_runs
 from aloft.runtime.language.errors import AloftError
-from aloft.runtime.live.live_server import Watched
+from aloft.runtime.live.live_server import WatchedRun
 from aloft.runtime.live.spread_run import SpreadRun
 
 from .conftest import run_elsewhere
@@ -36,7 +36,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return Path("waves.yaml")
 
 
-def wait_for(run: Watched, holds: Callable[[dict[str, Any]], bool]) -> dict[str, Any]:
+def wait_for(run: WatchedRun, holds: Callable[[dict[str, Any]], bool]) -> dict[str, Any]:
     end = time.monotonic() + 120.0
     while not holds(found := run.now()):
         assert time.monotonic() < end, found

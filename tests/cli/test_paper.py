@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from aloft.cli.studying import paper
+from aloft.cli.shared import paper
 from aloft.studies.figures import offscreen
 from aloft.studies.figures.page import page
 from aloft.studies.reading import read_study

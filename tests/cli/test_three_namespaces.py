@@ -17,7 +17,7 @@ from typing import Any
 import pytest
 
 from .conftest import run_for_json
-from .test_run_local import BLOCKS, GRAPH
+from .test_run_machines import BLOCKS, GRAPH
 
 MACHINES = {"onboard": "10.77.61.1", "ground": "10.77.61.2", "viewer": "10.77.61.3"}
 pytestmark = pytest.mark.long

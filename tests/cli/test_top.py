@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from aloft.cli.shared.local_runs import local_runs, registered, settings_of
-from aloft.logs.recording.watched_part import WatchedPart
+from aloft.cli.shared.running_graphs import local_runs, registered, settings_of
+from aloft.logs.recording.live_feed import WatchedPart
 from aloft.logs.viewing.viewer import ViewerError, start_viewer
 from aloft.runtime.language.errors import AloftError
 from aloft.runtime.links.observer import Observer
@@ -19,7 +19,7 @@ from aloft.runtime.placement.placed import place
 
 from ..waiting import wait_for
 from .conftest import run_elsewhere, run_for_json, run_here
-from .test_run_local import BLOCKS, GRAPH, free_port
+from .test_run_machines import BLOCKS, GRAPH, free_port
 
 
 def write_graph(folder: Path) -> None:
@@ -121,7 +121,7 @@ def test_local_runs_end_with_their_process(tmp_path: Path, monkeypatch: pytest.M
         assert settings_of(graph, os.getpid()) == ("a.b=1",)
         assert local_runs(Path("other.yaml")) == []
         code = (
-            "import os, signal\nfrom pathlib import Path\nfrom aloft.cli.shared.local_runs import *\n"
+            "import os, signal\nfrom pathlib import Path\nfrom aloft.cli.shared.running_graphs import *\n"
             "with registered(Path('graph.yaml'), ['a.b=2']):\n"
             "    print(flush=True)\n    input()\n    os.kill(os.getpid(), signal.SIGKILL)\n"
         )

@@ -11,8 +11,7 @@ from pathlib import Path
 import pytest
 
 import aloft
-from aloft.logs.replay.replay import replay
-from aloft.logs.replay.replayable import KeptRun, Keyframes
+from aloft.logs.replay.replay import KeptRun, Keyframes, replay
 from aloft.runtime.running.executor import Executor
 
 GRAPHS = Path(aloft.__file__).parent / "graphs"

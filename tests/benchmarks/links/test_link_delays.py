@@ -3,7 +3,7 @@
 import pytest
 
 from aloft.benchmarks.links.link_delays import jump, link_delays, told, travel
-from aloft.runtime.links.free_link import LatestInbox
+from aloft.runtime.links.free_link import LatestReceiver
 
 from ...cli.conftest import run_for_json
 
@@ -33,9 +33,9 @@ def test_a_jump_with_jitter_and_loss() -> None:
     assert row.name == "jumps that fail, links of 1 to 1.5 ms each way, 2 % lost"
     assert row.note.startswith("1 of 1 succeed, told 6.5 ms")
     run = jump(1e-3, 9100, 0.5e-3, 0.02)
-    boxes = [box for part in run.parts.values() for box in part.inboxes]
-    lost = sum(box.lost for box in boxes if isinstance(box, LatestInbox))
-    came = sum(box.received for box in boxes if isinstance(box, LatestInbox))
+    boxes = [box for part in run.parts.values() for box in part.receivers]
+    lost = sum(box.lost for box in boxes if isinstance(box, LatestReceiver))
+    came = sum(box.received for box in boxes if isinstance(box, LatestReceiver))
     assert 0.01 < lost / (lost + came) < 0.03
 
 
@@ -58,7 +58,7 @@ def test_a_jump_with_short_links() -> None:
     assert row.value == 0.0 and row.met and row.note == "1 of 1 succeed, told 4.4 ms"
     run = jump(0.2e-3, 1000)
     assert run.success and float(run.metrics["apex_above_standing_m"]) > 0.1  # type: ignore[arg-type]
-    boxes = [box for part in run.parts.values() for box in part.inboxes]
-    assert all(isinstance(box, LatestInbox) and box.lost == 0 for box in boxes)
+    boxes = [box for part in run.parts.values() for box in part.receivers]
+    assert all(isinstance(box, LatestReceiver) and box.lost == 0 for box in boxes)
     ages = [float(box.about()["age_p50_ms"]) for box in boxes]
     assert all(0.2 <= age <= 2.2 for age in ages)

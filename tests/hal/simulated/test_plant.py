@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from aloft.hal.random_streams import Purpose
 from aloft.hal.simulated import plant
 from aloft.hal.simulated.mujoco_robot import MujocoRobot
 from aloft.hal.simulated.plant import Plant
-from aloft.hal.simulated.random_streams import Purpose
 from aloft.hal.simulated.simulated_robot import SimulatorParameters
 from aloft.hal.simulated.state import PhysicsState, TickRecord
 from aloft.mathematics.arrays import Array, Indices

@@ -13,8 +13,7 @@ from pyarrow import parquet
 from aloft import load
 from aloft.logs.exporting.difference import ComparisonError, compare_runs, lift_off_tick
 from aloft.logs.exporting.export import EXPORTS, export_mcap, export_parquet
-from aloft.logs.file.reader import READ_ALONE, RecordedRun, read
-from aloft.logs.file.row_sources import PackedRows
+from aloft.logs.file.reader import READ_ALONE, PackedRows, RecordedRun, read
 from aloft.logs.recording.recorder import Recorder
 from aloft.robots.kinematics import link_poses, matrices_of_quaternions, quaternions_of_matrices
 from aloft.robots.robot_description import RobotDescription

@@ -8,9 +8,16 @@ import pytest
 
 from aloft.blocks.general.constant import Constant
 from aloft.logs import RecordingError, read
-from aloft.logs.file.contents import DamagedError
 from aloft.logs.file.header import header_of
-from aloft.logs.file.messages import CLOSING, FILE_HEAD, HEAD, Content, _checked, table_of
+from aloft.logs.file.messages import (
+    CLOSING,
+    FILE_HEAD,
+    HEAD,
+    Content,
+    DamagedError,
+    _checked,
+    table_of,
+)
 from aloft.logs.file.repair import repair
 from aloft.logs.recording.writer import RecordingWriter
 from aloft.runtime.running.memory import BoundGraph, Snapshot
@@ -168,13 +175,13 @@ def test_any_prefix_is_useful(whole: Path, tmp_path: Path) -> None:
 
 
 def test_a_window_reads_only_what_it_needs(whole: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from aloft.logs.file import row_sources
+    from aloft.logs.file import reader
 
     run = read(whole)
     _ = run.ticks
     asked: list[int] = []
-    unpack = row_sources.unpack
-    monkeypatch.setattr(row_sources, "unpack", lambda data: asked.append(1) or unpack(data))
+    unpack = reader.unpack
+    monkeypatch.setattr(reader, "unpack", lambda data: asked.append(1) or unpack(data))
     ticks, rows = run.window(25, 35)
     assert ticks.tolist() == list(range(25, 35))
     assert rows.tobytes() == written_rows(rows.shape[1])[25:35].tobytes()

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from aloft.logs.file.row_codec import pack, unpack, unpack_bytes
-from aloft.logs.file.row_prediction import ordered, predict
+from aloft.logs.file.row_codec import ordered, pack, predict, unpack, unpack_bytes
 
 ODD = np.array([0.0, -0.0, np.nan, -np.nan, np.inf, -np.inf, 5e-324, -1.7e308, 1.0])
 
@@ -75,26 +74,6 @@ def test_the_dearer_of_two_like_columns_is_predicted() -> None:
     how = predict(ordered(np.stack([dear, cheap]).view(np.int64)))
     assert how.source.tolist() == [1, 1]
     assert not how.negative.any()
-
-
-def test_rows_of_format_3_are_read() -> None:
-    """As they were packed: each word combined with the one before by exclusive or, by bytes."""
-    from struct import pack as packed
-    from zlib import crc32
-
-    import pyarrow as pa
-
-    rows = rows_of(smooth(40), np.full(40, 1.5))[:, :13]
-    words = np.zeros((40, 16), np.uint8)
-    words[:, :13] = rows
-    changes = words.view(np.uint64).copy()
-    changes[1:] ^= words.view(np.uint64)[:-1]
-    planes = changes.view(np.uint8).reshape(40, -1, 8).transpose(1, 2, 0).tobytes()
-    head = packed("<4sIIqI", b"rows", 40, 13, 9, crc32(rows.tobytes()))
-    data = head + pa.Codec("zstd").compress(planes, asbytes=True)
-    assert unpack(data)[0] == unpack_bytes(data, 2, 4)[0] == 9
-    np.testing.assert_array_equal(unpack(data)[1], rows)
-    np.testing.assert_array_equal(unpack_bytes(data, 2, 12)[1], rows[:, 2:12])
 
 
 def test_damage_is_a_clear_error() -> None:

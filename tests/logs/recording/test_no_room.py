@@ -13,8 +13,8 @@ import pytest
 
 from aloft.logs import read
 from aloft.logs.exporting.export import export
-from aloft.logs.recording import remedy as remedies
-from aloft.logs.recording.remedy import remedy
+from aloft.logs.recording import place as remedies
+from aloft.logs.recording.place import remedy
 from aloft.logs.recording.ring import ALIGNMENT, CONTROL, fitting_capacity
 
 GRAPH = """\

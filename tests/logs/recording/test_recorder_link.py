@@ -13,9 +13,8 @@ from typing import Any
 import pytest
 
 from aloft.logs import read
-from aloft.logs.recording import recorder_link
-from aloft.logs.recording.recorder import Recorder
-from aloft.logs.recording.recorder_link import GIVE_UP_TIME, STALL_TIME, RecorderLink
+from aloft.logs.recording import recorder as recorder_module
+from aloft.logs.recording.recorder import GIVE_UP_TIME, STALL_TIME, Recorder, RecorderLink
 from aloft.runtime.language.stages import ClockSpec
 from aloft.runtime.running.executor import run
 
@@ -29,7 +28,7 @@ class SlowProcess:
         self.now = 0.0
         self.moved = 0
         clock = SimpleNamespace(monotonic=lambda: self.now, sleep=self.sleep)
-        monkeypatch.setattr(recorder_link, "time", clock)
+        monkeypatch.setattr(recorder_module, "time", clock)
         monkeypatch.setattr("aloft.logs.recording.recorder.time", clock)
         self.link: Any = object.__new__(RecorderLink)
         self.link.ring = SimpleNamespace(read_back=0)
@@ -114,7 +113,7 @@ def test_the_bytes_of_a_process_are_counted() -> None:
 def test_virtual_time_waits_for_a_recorder_that_is_stuck(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(recorder_link, "STALL_TIME", 0.2)
+    monkeypatch.setattr(recorder_module, "STALL_TIME", 0.2)
     told: list[str] = []
     recorder = Recorder(tmp_path / "a.rrd", ring_time=0.01, on_warning=told.append)
 
@@ -137,8 +136,8 @@ def test_virtual_time_waits_for_a_recorder_that_is_stuck(
 def test_a_recorder_that_is_stuck_for_very_long_is_given_up(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(recorder_link, "STALL_TIME", 0.1)
-    monkeypatch.setattr(recorder_link, "GIVE_UP_TIME", 0.3)
+    monkeypatch.setattr(recorder_module, "STALL_TIME", 0.1)
+    monkeypatch.setattr(recorder_module, "GIVE_UP_TIME", 0.3)
     recorder = Recorder(tmp_path / "a.rrd", ring_time=0.01)
     stop = At(1000, lambda: os.kill(process_of(recorder), signal.SIGSTOP))
     try:

@@ -11,8 +11,7 @@ from aloft.logs.file.format import Header, RecordedLayout
 from aloft.logs.file.header import header_of
 from aloft.logs.file.reader import read
 from aloft.logs.recording.writer import RecordingWriter
-from aloft.logs.replay.carried_files import restored
-from aloft.logs.replay.opened_run import OpenedRun
+from aloft.logs.replay.opened_run import OpenedRun, restored
 from aloft.logs.replay.replay import replay
 from aloft.robots.description import find_robot, read_description, robot_names
 from aloft.runtime.language.stages import CheckedGraph

@@ -14,8 +14,7 @@ import pytest
 from aloft.logs.file.header import machine, make_header
 from aloft.logs.recording.writer import RecordingWriter
 from aloft.logs.replay.opened_run import OpenedRun
-from aloft.logs.replay.replay import replay
-from aloft.logs.replay.replayable import Keyframes
+from aloft.logs.replay.replay import Keyframes, replay
 from aloft.runtime.language.errors import AloftError
 from aloft.runtime.loading import load
 from aloft.runtime.loading.checking.parameters import adjust

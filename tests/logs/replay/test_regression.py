@@ -9,11 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from aloft.logs.recording.finished_run import write_recording
+from aloft.logs.recording.writer import write_recording
 from aloft.logs.replay.opened_run import OpenedRun
 from aloft.logs.replay.regression import capture, write_test
-from aloft.logs.replay.replay import ReplayError
-from aloft.logs.replay.replayable import KeptRun, Keyframes
+from aloft.logs.replay.replay import KeptRun, Keyframes, ReplayError
 from aloft.runtime.loading import load
 from aloft.runtime.loading.checking.parameters import adjust
 from aloft.runtime.running.executor import Executor

@@ -11,8 +11,15 @@ from aloft.blocks.general.gain import Gain
 from aloft.blocks.general.sine_wave import SineWave
 from aloft.blocks.general.unit_delay import UnitDelay
 from aloft.blocks.general.vector import Vector
-from aloft.logs.replay.replay import ReplayError, default_inputs, replay
-from aloft.logs.replay.replayable import KeptRun, Keyframes, RowCursor, nearest_keyframe
+from aloft.logs.replay.replay import (
+    KeptRun,
+    Keyframes,
+    ReplayError,
+    RowCursor,
+    default_inputs,
+    nearest_keyframe,
+    replay,
+)
 from aloft.runtime.language.block import Block, Output, State
 from aloft.runtime.language.errors import BlockError
 from aloft.runtime.language.parameters import Parameters, parameter

@@ -7,10 +7,9 @@ import pytest
 
 from aloft.blocks.general.gain import Gain
 from aloft.blocks.general.sine_wave import SineWave
-from aloft.logs.file.contents import all_tables
-from aloft.logs.replay.replay import ReplayError, replay
+from aloft.logs.file.messages import all_tables
+from aloft.logs.replay.replay import KeptRun, Keyframes, ReplayError, replay
 from aloft.logs.replay.replay_recording import write_replay
-from aloft.logs.replay.replayable import KeptRun, Keyframes
 from aloft.runtime.language.stages import CheckedGraph
 from aloft.runtime.running.executor import Executor
 from aloft.runtime.testing import Use, checked_graph

@@ -13,9 +13,8 @@ from numpy.typing import NDArray
 
 from aloft import load
 from aloft.logs.file.reader import RecordedRun, read
-from aloft.logs.recording.comparison import write_comparison
+from aloft.logs.recording.drawn_run import write_comparison, write_view
 from aloft.logs.recording.recorder import Recorder
-from aloft.logs.recording.whole_view import write_view
 from aloft.logs.viewing.viewer import start_viewer
 
 from .browser import PROGRAM, Browser

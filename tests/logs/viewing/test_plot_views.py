@@ -10,8 +10,8 @@ import pytest
 from aloft import load
 from aloft.logs.file.format import Header, RecordedField
 from aloft.logs.file.header import header_of
+from aloft.logs.viewing.contacts import force_arrows
 from aloft.logs.viewing.plot_views import MOST_IN_TAB, Shown, block_tabs, legend, main_plots
-from aloft.logs.viewing.scene_contacts import force_arrows
 from aloft.logs.viewing.scene_ports import scene_ports
 from aloft.logs.viewing.signal_names import element_names, unit_of
 from aloft.logs.viewing.state_lanes import all_lanes

@@ -1,13 +1,30 @@
 """How robots of any kind are drawn."""
 
+import re
 import warnings
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from aloft.logs.viewing.robot_shapes import capsules, reach_of, shapes_of
-from aloft.logs.viewing.scene_contacts import force_scale
-from aloft.robots.description import Shape, find_robot
+from aloft import load
+from aloft.logs import read
+from aloft.logs.recording.recorder import Recorder
+from aloft.logs.viewing.contacts import force_scale
+from aloft.logs.viewing.robot_shapes import (
+    MOST_TRIANGLES,
+    Surface,
+    capsules,
+    drawn_link,
+    missing_meshes,
+    normals,
+    reach_of,
+    read_meshes,
+    shapes_of,
+)
+from aloft.robots.description import Look, Mesh, RobotDescription, Shape, find_robot
+
+from ...robots.example_robots import needs_robots
 
 BRUCE = find_robot("bruce")
 
@@ -39,3 +56,99 @@ def test_a_robot_is_measured_by_its_reach() -> None:
     weight = 9.81 * BRUCE.total_mass
     assert weight * force_scale(BRUCE) == pytest.approx(0.6 * reach_of(BRUCE), rel=0.03)
     assert np.isfinite(reach_of(BRUCE.changed(joints=(), links=BRUCE.links[:1])))
+
+
+TETRAHEDRON = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
+
+
+def with_look(folder: Path, *files: str) -> RobotDescription:
+    """BRUCE whose base is drawn as these files, with one ball beside them."""
+    meshes = tuple(
+        Mesh(file=str(folder / name), position=(0.0, 0.0, 0.5), scale=(0.1, 0.1, 0.2))
+        for name in files
+    )
+    ball = Shape(start=(0.0, 0.0, 0.0), end=(0.0, 0.0, 0.0004), radius=0.05)
+    return BRUCE.changed(looks={BRUCE.base: Look(meshes=meshes, shapes=(ball,))})
+
+
+def test_a_link_is_drawn_as_its_meshes(tmp_path: Path) -> None:
+    import rerun as rr
+
+    (tmp_path / "a.obj").write_text(TETRAHEDRON)
+    robot = with_look(tmp_path, "a.obj", "a.obj")
+    meshes = read_meshes(robot)
+    assert meshes.problems == [] and list(meshes.surfaces) == [robot.base]
+    surface = meshes.surfaces[robot.base]
+    assert surface.corners.shape == (8, 3) and surface.triangles.shape == (8, 3)
+    assert np.ptp(surface.corners, axis=0) == pytest.approx([0.1, 0.1, 0.2])
+    assert surface.corners[:, 2].min() == pytest.approx(0.5)
+    drawn = drawn_link(robot, robot.link(robot.base), meshes, 0x90A4AEFF)
+    assert [type(each) for each in drawn.values()] == [rr.Mesh3D, rr.Capsules3D]
+    assert list(drawn) == ["", "/beside"]
+    other = next(link for link in robot.links if link.name != robot.base)
+    assert isinstance(drawn_link(robot, other, meshes, 0x90A4AEFF)[""], rr.Capsules3D)
+
+
+def test_normals_point_out_of_a_surface() -> None:
+    corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [9, 9, 9]], dtype=float)
+    surface = Surface(corners, np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]))
+    found = normals(surface)
+    assert np.linalg.norm(found, axis=1) == pytest.approx(1.0)
+    middle = corners[:4].mean(axis=0)
+    assert ((corners[:4] - middle) * found[:4]).sum(axis=1).min() > 0.0
+
+
+@pytest.mark.parametrize(
+    ("content", "told"),
+    [
+        (None, r"link base is drawn as its collision shapes: there is no mesh .*a\.obj"),
+        ("v 1 2", r"link base is drawn as its .*: the mesh cannot be read \(.*a\.obj"),
+    ],
+)
+def test_what_is_missing_is_a_warning_and_the_shapes_are_drawn(
+    content: str | None, told: str, tmp_path: Path
+) -> None:
+    import rerun as rr
+
+    if content is not None:
+        (tmp_path / "a.obj").write_text(content)
+    robot = with_look(tmp_path, "a.obj")
+    meshes = read_meshes(robot)
+    assert meshes.surfaces == {}
+    (problem,) = meshes.problems
+    assert re.match(told.replace("base", robot.base), problem)
+    assert missing_meshes(robot) == ([problem] if content is None else [])
+    drawn = drawn_link(robot, robot.link(robot.base), meshes, 0x90A4AEFF)
+    assert [type(each) for each in drawn.values()] == [rr.Capsules3D]
+
+
+@needs_robots
+@pytest.mark.parametrize("name", ["g1", "go2", "talos"])
+def test_a_published_robot_takes_little_of_a_recording(name: str) -> None:
+    robot = find_robot(name)
+    meshes = read_meshes(robot)
+    assert meshes.problems == [] and len(meshes.surfaces) == len(robot.links)
+    assert sum(len(each.triangles) for each in meshes.surfaces.values()) <= MOST_TRIANGLES
+    bytes_ = sum(24 * len(s.corners) + 12 * len(s.triangles) for s in meshes.surfaces.values())
+    assert bytes_ < 600_000
+
+
+@needs_robots
+def test_a_recording_names_the_meshes_that_were_not_there(tmp_path: Path) -> None:
+    """The run goes on, says so at its end, and its recording has the robot as capsules."""
+    root = Path(__file__).parents[3]
+    shipped = (root / "robots" / "solo12" / "solo12.yaml").read_text()
+    looks = "looks: {base_link: {meshes: [{file: gone/base.stl}]}}\n"
+    (tmp_path / "solo.yaml").write_text(shipped + looks)
+    graphs = root / "graphs"
+    (tmp_path / "stand.yaml").write_text(
+        "robot: solo.yaml\n"
+        f"include: [{graphs}/robots/stand.yaml, {graphs}/controllers/solo12.yaml]\n"
+    )
+    graph = load(tmp_path / "stand.yaml", ["duration=0.02 s"])
+    recorder = Recorder(tmp_path / "solo.rrd")
+    graph.run(sinks=[recorder], log=False)
+    (warning,) = [text for text in recorder.warnings if "mesh" in text]
+    assert warning.endswith(f"there is no mesh {tmp_path / 'gone' / 'base.stl'}")
+    header = read(tmp_path / "solo.rrd").header
+    assert header.robot is not None and list(header.robot.looks) == ["base_link"]

@@ -2,19 +2,22 @@
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from aloft import load
 from aloft.logs.file.format import Header, RecordedField
 from aloft.logs.file.header import header_of
-from aloft.logs.viewing.block_times import times_table
+from aloft.logs.file.reader import read
+from aloft.logs.recording.writer import RecordingWriter
 from aloft.logs.viewing.blueprint import main_lanes
-from aloft.logs.viewing.limits import limits_of
-from aloft.logs.viewing.scene_contacts import cone_lines, convex_hull
+from aloft.logs.viewing.contacts import cone_lines, convex_hull
+from aloft.logs.viewing.plot_views import limits_of
 from aloft.logs.viewing.scene_ports import OTHERS, PUSH, ROLES, PoseSource, port_of, scene_ports
-from aloft.logs.viewing.state_lanes import lanes_of
+from aloft.logs.viewing.state_lanes import lanes_of, times_table
 from aloft.robots.description import find_robot
+from aloft.runtime.language.terrain import Ground, Terrain
 from aloft.runtime.running.memory import BoundGraph
 
 GRAPH = Path(__file__).parents[3] / "graphs" / "jump.yaml"
@@ -107,12 +110,7 @@ def test_a_ports_type_comes_before_its_fields() -> None:
     assert found(*old) == "a.push", "old recordings keep no types"
 
 
-def test_a_recording_made_before_signals_had_names_is_read() -> None:
-    data = {
-        "name": "a.b.c", "dtype": "float64", "start": 0, "shape": [3], "dimensions": ["n_feet"],
-        "unit": "m", "frame": None, "text": "", "values": {}, "constant": False,
-    }  # fmt: skip
-    assert RecordedField.from_json(data).signals == ()
+def test_a_recording_keeps_the_names_of_signals() -> None:
     header = header_of(BoundGraph(load(GRAPH).checked))
     again = Header.from_json(header.to_json())
     assert again.bus == header.bus
@@ -159,3 +157,60 @@ def test_the_times_are_a_table() -> None:
     text = times_table({"blocks": {"wbc": times}, "ticks": 3, "wall_time_s": 0.5})
     assert "| wbc | 3 | 1.0 | 2.0 | 3.0 | 4.0 | 1 |" in text
     assert "3 ticks in 0.50 s" in text
+
+
+GRAPHS = Path(__file__).parents[3] / "graphs"
+
+
+def boxes_of(path: Path) -> Any:
+    from rerun.chunk import RrdReader
+
+    chunks = RrdReader(path).stream().filter(content="/world/ground")
+    return [chunk.to_record_batch() for chunk in chunks]
+
+
+def written(tmp_path: Path, header: Header) -> Path:
+    path = tmp_path / "run.rrd"
+    RecordingWriter(path, header).close()
+    return path
+
+
+def test_a_step_is_drawn(tmp_path: Path) -> None:
+    header = header_of(BoundGraph(load(GRAPHS / "up_5cm.yaml").checked))
+    assert header.terrain is not None and header.terrain.blocks[0].most[2] == 0.05
+    path = written(tmp_path, header)
+    assert read(path).header.terrain == header.terrain
+    (batch,) = boxes_of(path)
+    centre = np.array(batch["Boxes3D:centers"].to_pylist()[0])
+    half = np.array(batch["Boxes3D:half_sizes"].to_pylist()[0])
+    block = header.terrain.blocks[0]
+    np.testing.assert_allclose(centre - half, [block.least], atol=1e-6)
+    np.testing.assert_allclose(centre + half, [block.most], atol=1e-6)
+
+
+def test_a_platform_has_a_floor_below_it(tmp_path: Path) -> None:
+    header = header_of(BoundGraph(load(GRAPHS / "jump.yaml").checked))
+    platform = Terrain(-0.35, (Ground((-0.5, -0.4, -0.35), (0.1, 0.4, 0.0)),))
+    (batch,) = boxes_of(written(tmp_path, replace(header, terrain=platform)))
+    assert len(batch["Boxes3D:centers"].to_pylist()[0]) == 2
+
+
+def test_level_ground_is_the_viewers_grid(tmp_path: Path) -> None:
+    header = header_of(BoundGraph(load(GRAPHS / "jump.yaml").checked))
+    assert header.terrain == Terrain()
+    assert boxes_of(written(tmp_path, header)) == []
+
+
+def test_plots_show_every_value(tmp_path: Path) -> None:
+    # a mean over neighbouring values halves the peak of a touchdown and draws force into the flight
+    from rerun.chunk import RrdReader
+
+    path = written(tmp_path, header_of(BoundGraph(load(GRAPHS / "jump.yaml").checked)))
+    policies = {}
+    for chunk in RrdReader(path).stream().filter(content="/**"):
+        batch = chunk.to_record_batch()
+        if "SeriesLines:aggregation_policy" in batch.schema.names:
+            (found,) = batch["SeriesLines:aggregation_policy"].to_pylist()
+            policies[str(chunk.entity_path)] = found
+    assert set(map(tuple, policies.values())) == {(1,)}  # AggregationPolicy.Off
+    assert {"/signals/robot/truth/com", "/plots/foot_force"} <= set(policies)

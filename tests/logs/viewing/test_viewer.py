@@ -11,7 +11,7 @@ import pytest
 
 from aloft import load
 from aloft.logs.file.reader import read
-from aloft.logs.recording.comparison import write_comparison
+from aloft.logs.recording.drawn_run import write_comparison
 from aloft.logs.recording.recorder import Recorder
 from aloft.logs.viewing.page_server import OUTSIDE, policy
 from aloft.logs.viewing.viewer import ViewerError, find_program, free_ports, start_viewer

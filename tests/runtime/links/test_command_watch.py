@@ -35,7 +35,7 @@ def watched(
 @dataclass
 class Box:
     link: Link
-    heard_at: int = 0
+    received_at: int = 0
 
 
 class Time:
@@ -86,7 +86,7 @@ def test_silence_counts_from_the_first_look_and_for_the_most_silent_link() -> No
         "link last@far -> onboard brings commands and was silent for 20.0 ms, at most 20 ms are "
         "allowed (links.watchdog)"
     )
-    box.heard_at = time.now
+    box.received_at = time.now
     assert watch.heard() == time.now and not watch.complaint()
 
 
@@ -130,7 +130,7 @@ class Repeating:
 def test_in_lockstep_messages_count_when_they_come() -> None:
     run = run_spread(replace(ring(ticks=20), links=LinkSettings(watchdog=60.0)))
     part = run.parts["onboard"]
-    assert part.watch.links and all(box.heard_at > 0 for box in part.inboxes)
+    assert part.watch.links and all(box.received_at > 0 for box in part.receivers)
     assert run.ticks == 20
 
 

@@ -5,11 +5,11 @@ from aloft.runtime.links.coordinator import PartClock
 
 def test_a_wish_alone_does_not_end_the_run() -> None:
     clock = PartClock(0.01)
-    assert (clock.stop_reason, clock.stopped_by, clock.wish) == (None, "", None)
+    assert (clock.stop_reason, clock.stopped_by, clock.stop_request) == (None, "", None)
     clock.stop_reason = "balanced"
     clock.stopped_by = "controller"
     assert (clock.stop_reason, clock.stopped_by) == (None, "")
-    assert clock.wish == ("balanced", "controller")
+    assert clock.stop_request == ("balanced", "controller")
     clock.agree("it fell", "score")
     assert (clock.stop_reason, clock.stopped_by) == ("it fell", "score")
 
@@ -19,7 +19,7 @@ def test_the_first_wish_is_kept_with_its_block() -> None:
     clock.stop_reason = "stopped by SIGINT"
     clock.stop_reason = "balanced"
     clock.stopped_by = "controller"
-    assert clock.wish == ("stopped by SIGINT", "")
+    assert clock.stop_request == ("stopped by SIGINT", "")
 
 
 def test_a_restored_graph_begins_anew() -> None:
@@ -28,4 +28,4 @@ def test_a_restored_graph_begins_anew() -> None:
     clock.agree("balanced", "")
     clock.stop_reason = None
     clock.stopped_by = ""
-    assert clock.wish is None and clock.stop_reason is None
+    assert clock.stop_request is None and clock.stop_reason is None

@@ -9,7 +9,7 @@ import pytest
 
 from aloft.runtime.language.errors import AloftError, ExitCode
 from aloft.runtime.language.stages import CheckedGraph, ClockSpec, LinkPolicy, LinkSettings
-from aloft.runtime.links.free_link import LatestInbox
+from aloft.runtime.links.free_link import LatestReceiver
 from aloft.runtime.links.part import BoundPart, part_clock, run_part
 from aloft.runtime.loading.checking.parameters import adjust
 from aloft.runtime.placement.placed import place
@@ -32,19 +32,19 @@ def free(
     return replace(graph, base_rate=100.0, clock=ClockSpec("paced"), links=links)
 
 
-def inbox_of(part: BoundPart) -> LatestInbox:
-    (inbox,) = part.inboxes
-    assert isinstance(inbox, LatestInbox)
-    return inbox
+def inbox_of(part: BoundPart) -> LatestReceiver:
+    (receiver,) = part.receivers
+    assert isinstance(receiver, LatestReceiver)
+    return receiver
 
 
 def test_values_go_round_and_nothing_is_lost() -> None:
     run = run_spread(free(ticks=150))  # long enough for a machine that is busy otherwise
     for machine, result in run.results.items():
         assert result.success, result.reason
-        inbox = inbox_of(run.parts[machine])
-        assert inbox.received > 30
-        assert (inbox.lost, inbox.surplus, inbox.damaged) == (0, 0, 0)
+        receiver = inbox_of(run.parts[machine])
+        assert receiver.received > 30
+        assert (receiver.lost, receiver.surplus, receiver.damaged) == (0, 0, 0)
     log = run.results["onboard"].log
     assert log is not None and log.layout is not None
     rows = log.rows()
@@ -129,8 +129,8 @@ def test_a_part_that_is_started_again_joins_without_the_others_starting_again() 
     threads = {name: in_a_thread(part, results, name) for name, part in parts.items()}
     far = inbox_of(parts["far"])
     assert wait_for(lambda: far.received > 20)
-    parts["near"].others._transport.close()  # as if the process were gone: it sends no more
-    assert wait_for(lambda: "near" in parts["far"].others._gone)
+    parts["near"].peers._transport.close()  # as if the process were gone: it sends no more
+    assert wait_for(lambda: "near" in parts["far"].peers._gone)
     time.sleep(0.2)
     before = far.received
     assert all(thread.is_alive() for thread in threads.values())
@@ -156,7 +156,7 @@ def test_a_part_with_actuators_does_not_join_by_itself() -> None:
     results: dict[str, RunResult] = {}
     threads = [in_a_thread(part, results, name) for name, part in parts.items()]
     assert wait_for(lambda: inbox_of(parts["far"]).received > 10)
-    parts["onboard"].others._transport.close()
+    parts["onboard"].peers._transport.close()
     parts["onboard"].clock.stop_reason = "its process is gone"
     threads[0].join(60.0)
     Counter.LOG.clear()
@@ -203,8 +203,8 @@ def test_parameters_change_where_their_block_runs() -> None:
 def test_the_clocks_of_the_others_are_estimated() -> None:
     run = run_spread(free(ticks=30))
     for part in run.parts.values():
-        for name in part.others.names:
-            clock = part.others.clock_of(name)
+        for name in part.peers.names:
+            clock = part.peers.clock_of(name)
             # all parts have one clock here
             assert clock.uncertainty >= 0 and abs(clock.offset) <= clock.uncertainty
 
@@ -216,7 +216,7 @@ def test_a_part_that_is_gone_does_not_end_the_others(policy: str) -> None:
     def prepare(parts: Mapping[str, BoundPart], hub: Hub) -> None:
         def kill() -> None:
             wait_for(lambda: parts["near"].clock.tick > 20)
-            parts["near"].others._transport.close()
+            parts["near"].peers._transport.close()
 
         threading.Thread(target=kill, daemon=True).start()
 

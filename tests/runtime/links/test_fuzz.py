@@ -8,7 +8,7 @@ from typing import Any
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from aloft.runtime.links.peers import Others
+from aloft.runtime.links.peers import PeerStates
 from aloft.runtime.placement.placed import place
 from aloft.runtime.running.executor import run
 from aloft.runtime.testing.spread import run_spread
@@ -35,17 +35,17 @@ BEACON = st.fixed_dictionaries(
 @given(st.binary(max_size=200) | BEACON.map(lambda state: json.dumps(state).encode()))
 def test_no_beacon_raises(data: bytes) -> None:
     placed = place(ring())
-    others = Others(placed, "onboard", Hub().transport(), lambda: None)
-    others._hear(data)
-    others._hear(data)
-    assert others.names == ("near", "far")
+    peers = PeerStates(placed, "onboard", Hub().transport(), lambda: None)
+    peers._on_beacon(data)
+    peers._on_beacon(data)
+    assert peers.names == ("near", "far")
 
 
 def test_beacons_as_deep_as_a_parser_goes() -> None:
-    others = Others(place(ring()), "onboard", Hub().transport(), lambda: None)
-    others._hear(b"[" * 100_000)
-    others._hear(b'{"machine":"far","run":"' + b"00" * 8 + b'","phase":1e999,"checked":[]}')
-    assert others.run_of("far") is None
+    peers = PeerStates(place(ring()), "onboard", Hub().transport(), lambda: None)
+    peers._on_beacon(b"[" * 100_000)
+    peers._on_beacon(b'{"machine":"far","run":"' + b"00" * 8 + b'","phase":1e999,"checked":[]}')
+    assert peers.run_of("far") is None
 
 
 class Storm:
@@ -77,10 +77,10 @@ class Storm:
 def test_a_run_in_a_storm_of_bytes_gives_the_bytes_of_one_process() -> None:
     graph = ring(ticks=40)
     storm = Storm()
-    spread = run_spread(graph, interfere=storm, patience=60.0)
+    spread = run_spread(graph, interfere=storm, timeout=60.0)
     for machine, result in spread.results.items():
         assert result.success, (machine, result.reason)
     assert storm.sent > 200
     assert spread.run_hash == run(graph).run_hash
-    damaged: Any = [box.damaged for part in spread.parts.values() for box in part.inboxes]
+    damaged: Any = [box.damaged for part in spread.parts.values() for box in part.receivers]
     assert sum(damaged) > 20

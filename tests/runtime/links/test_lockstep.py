@@ -113,7 +113,7 @@ def change(parts: Mapping[str, BoundPart], at: int, machine: str, value: float) 
             answers.append(str(error))
 
     thread = threading.Thread(target=submit, daemon=True)
-    block = part.blocks["~conductor"]
+    block = part.blocks["~coordinator"]
     before: Callable[[], None] = block.update  # type: ignore[attr-defined]
 
     def update() -> None:
@@ -235,11 +235,11 @@ def test_what_a_network_may_do_changes_no_byte(
 
 def test_damaged_and_doubled_messages_are_counted() -> None:
     spread_out = run_spread(ring(), interfere=AndDamagedCopies())
-    inbox = spread_out.parts["near"].inboxes[0]
-    assert inbox.received == 40 and inbox.damaged >= 4 * 40
+    receiver = spread_out.parts["near"].receivers[0]
+    assert receiver.received == 40 and receiver.damaged >= 4 * 40
     spread_out = run_spread(ring(), interfere=doubled)
-    inbox = spread_out.parts["near"].inboxes[0]
-    assert 79 <= inbox.received <= 80 and inbox.surplus >= 38
+    receiver = spread_out.parts["near"].receivers[0]
+    assert 79 <= receiver.received <= 80 and receiver.surplus >= 38
 
 
 class FromMessage:
@@ -270,7 +270,7 @@ def test_a_message_that_is_lost_for_good_ends_the_run_in_order(
 ) -> None:
     Counter.LOG.clear()
     interfere = FromMessage("data/near/far/first", 20, what)
-    spread_out = run_spread(ring(), interfere=interfere, patience=2.0)
+    spread_out = run_spread(ring(), interfere=interfere, timeout=2.0)
     reasons = [r.reason for r in spread_out.results.values()]
     # the robot waits for its command, and the machine that sends it for the message that is lost
     lost = r"link (first@near -> far|last@far -> onboard): the message of tick (\d+) has not come"
@@ -301,7 +301,7 @@ def test_a_machine_that_is_gone_ends_the_run_at_once() -> None:
 
     Counter.LOG.clear()
     began = time.monotonic()
-    spread_out = run_spread(ring(), prepare=prepare, patience=120.0)
+    spread_out = run_spread(ring(), prepare=prepare, timeout=120.0)
     assert time.monotonic() - began < 60.0
     for name in ("onboard", "far"):
         assert "machine 'near' is gone" in spread_out.results[name].reason

@@ -44,7 +44,7 @@ def test_exactly_the_fields_of_each_link_arrive(placed: PlacedGraph, layout: Lay
         writer, reader, here, there = ends(link, layout)
         message = reader.read(writer.write(tick=812, time=99))
         assert (message.sequence, message.tick, message.time) == (0, 812, 99)
-        reader.show(message.payload)
+        reader.write_outputs(message.payload)
         expected = np.zeros(layout.size, np.uint8)
         for field in link.fields:
             first, last = layout.byte_range(field.name)

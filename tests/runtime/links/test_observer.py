@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from aloft.runtime.language.stages import LinkPolicy, MachineSpec
-from aloft.runtime.links.observer import ROW_HEADER, Observer, Showing, read_row
+from aloft.runtime.links.observer import ROW_HEADER, Observer, StatusPublisher, read_row
 from aloft.runtime.links.part import BoundPart, run_part
 from aloft.runtime.placement.placed import PlacedGraph, place
 from aloft.runtime.running.run_result import RunResult
@@ -45,7 +45,7 @@ class Running:
 
     def _run(self, name: str) -> None:
         part = self.parts[name]
-        showing = Showing(name, part.transport, part.others, part.inboxes)
+        showing = StatusPublisher(name, part.transport, part.peers, part.receivers)
         self.results[name] = run_part(part, sinks=[showing])
 
     def end(self) -> None:
@@ -156,13 +156,13 @@ def test_a_transport_that_fails_hinders_nothing() -> None:
         is_open = True
         count = 0
 
-        def shower(self, key: str) -> Any:
+        def background_publisher(self, key: str) -> Any:
             self.count += 1
             raise OSError("no network")
 
     broken: Any = Broken()
     part = BoundPart(placed, "far", broken)
-    showing = Showing("far", broken, part.others, [])
+    showing = StatusPublisher("far", broken, part.peers, [])
     showing.open(part)
     for tick in range(10):
         showing.record(tick)

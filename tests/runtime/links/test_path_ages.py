@@ -14,7 +14,7 @@ from aloft.logs.recording.recorder import Recorder
 from aloft.runtime.graph import Graph
 from aloft.runtime.language.errors import ExitCode
 from aloft.runtime.language.stages import CheckedGraph, LinkPolicy
-from aloft.runtime.links.path_ages import NAME, judged, path_sinks, timeline_of
+from aloft.runtime.links.path_ages import NAME, check_path_ages, path_sinks, timeline_of
 from aloft.runtime.loading import load_text
 from aloft.runtime.placement.placed import place
 from aloft.runtime.running.executor import run
@@ -99,7 +99,7 @@ def test_parts_that_run_free_are_followed_through_their_links() -> None:
         view = partial(log.layout.view, log.rows())
         timelines[machine] = timeline_of(run_.placed, machine, result.time * 100.0, view)
         timelines[machine] = replace(timelines[machine], ticks=list(log.ticks))
-    found = judged(run_.placed.graph, timelines)
+    found = check_path_ages(run_.placed.graph, timelines)
     # once round through two other machines, and held for a tick
     assert "success" not in found, found
     assert 10.0 < float(found["age_p50_ms robot.y -> robot.u"]) < 60_000.0  # type: ignore[arg-type]

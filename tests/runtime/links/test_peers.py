@@ -13,11 +13,11 @@ def exchange(
     """One beacon each way; ``out`` and ``back`` are the times on the way. Returns the time after."""
     stamp = here.stamp(now)
     now += out
-    there.hear(stamp, now + ahead)
+    there.update(stamp, now + ahead)
     now += 3 * MS
     stamp = there.stamp(now + ahead)
     now += back
-    here.hear(stamp, now)
+    here.update(stamp, now)
     return now
 
 
@@ -51,5 +51,5 @@ def test_drift_is_followed() -> None:
 
 def test_a_restarted_clock_gives_no_estimate() -> None:
     here = ClockOffset()
-    here.hear([10, 1000, 5], 100)
+    here.update([10, 1000, 5], 100)
     assert here.uncertainty == -1

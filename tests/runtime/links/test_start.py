@@ -18,13 +18,13 @@ from aloft.runtime.transports.hub import Hub
 from .example_graphs import Counter, ring
 
 
-def run_parts(graphs: Mapping[str, CheckedGraph], patience: float = 60.0) -> dict[str, RunResult]:
+def run_parts(graphs: Mapping[str, CheckedGraph], timeout: float = 60.0) -> dict[str, RunResult]:
     """Run each machine with a graph of its own."""
     hub = Hub()
     results: dict[str, RunResult] = {}
 
     def run(machine: str) -> None:
-        part = BoundPart(place(graphs[machine]), machine, hub.transport(), connect_time=patience)
+        part = BoundPart(place(graphs[machine]), machine, hub.transport(), connect_timeout=timeout)
         results[machine] = run_part(part)
 
     threads = [threading.Thread(target=run, args=(machine,), daemon=True) for machine in graphs]
@@ -56,7 +56,7 @@ def test_parts_of_different_graphs_refuse_to_start() -> None:
 
 def test_a_part_that_does_not_come_is_named_with_its_endpoint() -> None:
     Counter.LOG.clear()
-    results = run_parts({"onboard": ring(), "near": ring()}, patience=2.0)
+    results = run_parts({"onboard": ring(), "near": ring()}, timeout=2.0)
     for result in results.values():
         assert "nothing was heard of far (tcp/127.0.0.1:7452) for 2 s" in result.reason
         assert "aloft run GRAPH --machine NAME" in result.reason
@@ -69,7 +69,7 @@ def test_a_link_that_carries_nothing_keeps_all_motors_off(key: str) -> None:
         return () if sent == key else (data,)
 
     Counter.LOG.clear()
-    results = run_spread(ring(), interfere=interfere, patience=2.0).results
+    results = run_spread(ring(), interfere=interfere, timeout=2.0).results
     assert all(result.exit_code is ExitCode.RUN_FAILED for result in results.values())
     assert all(result.ticks == 0 for result in results.values())
     assert "did not become linked in 2 s" in " ".join(r.reason for r in results.values())
@@ -109,9 +109,9 @@ def test_motors_are_enabled_last_and_damped_first() -> None:
 def test_the_graph_of_a_part() -> None:
     graph = part_graph(place(ring()), "near")
     # what is received is waited for right before it is read, and sent on at once
-    assert graph.order == ("robot", "first", "first~to~far", "~conductor")
+    assert graph.order == ("robot", "first", "first~to~far", "~coordinator")
     assert part_graph(place(ring()), "onboard").order == (
-        "robot", "robot~to~near", "last", "~conductor",
+        "robot", "robot~to~near", "last", "~coordinator",
     )  # fmt: skip
     kinds: dict[str, Any] = {spec.path: spec.block_type.__name__ for spec in graph.blocks}
-    assert kinds["robot"] == "ReceivedCounter" and kinds["first"] == "Failing"
+    assert kinds["robot"] == "LinkInputCounter" and kinds["first"] == "Failing"

@@ -95,7 +95,7 @@ def test_it_stands_still_and_is_gone(
     assert live._reader is not None
     last = live._reader.look()
     monkeypatch.setattr(live._reader, "look", lambda: last)
-    monkeypatch.setattr(live_run, "STILL", 0.05)
+    monkeypatch.setattr(live_run, "STALLED_AFTER", 0.05)
     found = wait_for(live, "still")
     assert "no tick has come for" in found["said"] and found["tick"] == last.tick  # type: ignore[union-attr]
     monkeypatch.setattr(live_run, "answers", lambda path: False)

@@ -142,7 +142,7 @@ def test_a_graph_that_has_ended(server: LiveServer, running: Running) -> None:
 pytestmark = pytest.mark.skipif(
     PROGRAM is None, reason="looks through a real browser; install Debian's chromium"
 )
-PATIENCE = 60.0
+REQUEST_TIMEOUT = 60.0
 
 
 class Page:
@@ -159,7 +159,7 @@ class Page:
 
     def wait(self, script: str, expected: Any = True) -> None:
         """Wait until an expression has that value."""
-        end = time.monotonic() + PATIENCE
+        end = time.monotonic() + REQUEST_TIMEOUT
         while (found := self.ask(script)) != expected:
             assert time.monotonic() < end, f"{script} is {found!r}, not {expected!r}"
             time.sleep(0.05)
@@ -264,7 +264,7 @@ def brightness(page: Page, script: str) -> float:
 
 
 def wait_until(holds: Any) -> None:
-    end = time.monotonic() + PATIENCE
+    end = time.monotonic() + REQUEST_TIMEOUT
     while not holds():
         assert time.monotonic() < end
         time.sleep(0.02)

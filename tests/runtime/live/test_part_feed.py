@@ -29,7 +29,7 @@ class Kept:
 
         self.farewells: list[Callable[[], None]] = []
 
-    def shower(self, key: str) -> Any:
+    def background_publisher(self, key: str) -> Any:
         self.keys.append(key)
         return self.messages.append
 
@@ -112,7 +112,7 @@ def test_bytes_that_nobody_meant(messages: tuple[BoundGraph, Kept]) -> None:
 
 def test_a_transport_that_fails_hinders_nothing(graph_file: Path) -> None:
     class Broken(Kept):
-        def shower(self, key: str) -> Any:
+        def background_publisher(self, key: str) -> Any:
             self.keys.append(key)
             raise OSError("no network")
 

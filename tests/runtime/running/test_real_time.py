@@ -13,7 +13,7 @@ from aloft.runtime.language.block import Block, Output
 from aloft.runtime.language.parameters import Parameters
 from aloft.runtime.running import real_time
 from aloft.runtime.running.executor import run
-from aloft.runtime.running.real_time import RealTime, RealTimeError
+from aloft.runtime.running.real_time import RealTimeError, RealTimeOptions
 from aloft.runtime.testing.graphs import Use, checked_graph
 
 
@@ -40,7 +40,7 @@ def test_the_processor_is_the_runs_own_only_while_it_ticks() -> None:
         def step(self) -> None:
             seen.append(os.sched_getaffinity(0))
 
-    run(checked_graph({"w": Use(Witness)}, ticks=1), real_time=RealTime(cpu=cpu))
+    run(checked_graph({"w": Use(Witness)}, ticks=1), real_time=RealTimeOptions(cpu=cpu))
     assert seen == [before, {cpu}]
     assert os.sched_getaffinity(0) == before
 
@@ -48,7 +48,7 @@ def test_the_processor_is_the_runs_own_only_while_it_ticks() -> None:
 def test_a_processor_that_there_is_not_is_refused() -> None:
     allowed = ", ".join(map(str, sorted(os.sched_getaffinity(0))))
     with pytest.raises(RealTimeError, match=f"--cpu 4096: .* use the processors {allowed}"):
-        RealTime(cpu=4096).check()
+        RealTimeOptions(cpu=4096).check()
 
 
 def test_threads_that_are_started_later_stay_ordinary(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -59,14 +59,14 @@ def test_threads_that_are_started_later_stay_ordinary(monkeypatch: pytest.Monkey
         lambda pid, policy, param: set_to.append((policy, param.sched_priority)),
     )
     ordinary = os.sched_getscheduler(0), os.sched_getparam(0).sched_priority
-    RealTime(priority=42).check()
+    RealTimeOptions(priority=42).check()
     assert set_to == [(os.SCHED_FIFO | os.SCHED_RESET_ON_FORK, 42), ordinary]
 
 
 @pytest.mark.parametrize("priority", [0, 100])
 def test_a_priority_that_there_is_not_is_refused(priority: int) -> None:
     with pytest.raises(RealTimeError, match=f"--priority {priority}: expected 1 to 99"):
-        RealTime(priority=priority).check()
+        RealTimeOptions(priority=priority).check()
 
 
 def test_what_the_system_refuses_is_told_before_anything_moves(
@@ -78,7 +78,7 @@ def test_what_the_system_refuses_is_told_before_anything_moves(
     monkeypatch.setattr(os, "sched_setscheduler", refuse)
     graph = checked_graph({"w": Use(Ticks)}, ticks=1)
     with pytest.raises(RealTimeError, match=r"--priority 50: .* `aloft doctor` says how"):
-        run(graph, real_time=RealTime(priority=50))
+        run(graph, real_time=RealTimeOptions(priority=50))
 
 
 def test_memory_that_cannot_be_locked_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -88,7 +88,7 @@ def test_memory_that_cannot_be_locked_is_told(monkeypatch: pytest.MonkeyPatch) -
 
     monkeypatch.setattr(real_time, "_libc", Refuses)
     with pytest.raises(RealTimeError, match="--lock-memory: the system does not allow it"):
-        RealTime(lock_memory=True).check()
+        RealTimeOptions(lock_memory=True).check()
 
 
 def test_memory_is_locked_within_and_unlocked_after(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -107,7 +107,7 @@ def test_memory_is_locked_within_and_unlocked_after(monkeypatch: pytest.MonkeyPa
 
     @contextmanager
     def within() -> Iterator[None]:
-        with RealTime(lock_memory=True).granted():
+        with RealTimeOptions(lock_memory=True).granted():
             calls.append("run")
             yield
 
@@ -115,5 +115,5 @@ def test_memory_is_locked_within_and_unlocked_after(monkeypatch: pytest.MonkeyPa
         pass
     assert calls == ["lock 3", "run", "unlock"]
     calls.clear()
-    RealTime(lock_memory=True).check()
+    RealTimeOptions(lock_memory=True).check()
     assert calls == ["lock 7", "unlock"]  # 4: what is only reserved stays so

@@ -7,7 +7,7 @@ import pytest
 
 from aloft.runtime.language.errors import AloftError
 from aloft.runtime.language.stages import CheckedGraph, LinkPolicy, LinkSettings
-from aloft.runtime.links.free_link import LatestInbox
+from aloft.runtime.links.free_link import LatestReceiver
 from aloft.runtime.links.part import BoundPart
 from aloft.runtime.testing.spread import VirtualRun, run_spread, run_virtual
 
@@ -39,9 +39,9 @@ def graph(ticks: int = 50, watchdog: float | None = None, late: str = "hold") ->
     return replace(made, links=LinkSettings("free", made.links.policy, {}, {}, watchdog))
 
 
-def inbox(run: VirtualRun, machine: str) -> LatestInbox:
-    (box,) = run.parts[machine].inboxes
-    assert isinstance(box, LatestInbox)
+def receiver(run: VirtualRun, machine: str) -> LatestReceiver:
+    (box,) = run.parts[machine].receivers
+    assert isinstance(box, LatestReceiver)
     return box
 
 
@@ -60,7 +60,7 @@ def test_a_message_is_as_old_as_delay_and_phase_make_it(
     phases = {"onboard": 0.0, "near": 0.0, "far": phase}
     run = run_virtual(graph(), lambda key, now: delay, phases)
     assert run.success and run.reason == "ran to its end"
-    ages = inbox(run, "far").about()
+    ages = receiver(run, "far").about()
     assert ages["age_p50_ms"] == pytest.approx(age) and ages["lost"] == 0
 
 
@@ -71,7 +71,7 @@ def test_the_same_run_gives_the_same_numbers() -> None:
     for _ in range(2):
         left = iter(delays)
         run = run_virtual(graph(), lambda key, now, left=left: next(left), {"near": 0.5})  # type: ignore[misc]
-        runs.append((counted(run.parts["onboard"]), inbox(run, "far").about()))
+        runs.append((counted(run.parts["onboard"]), receiver(run, "far").about()))
     assert runs[0] == runs[1]
     assert runs[0][1]["surplus"] > 0  # some overtook others
 
@@ -84,7 +84,7 @@ def test_lost_messages_are_counted() -> None:
         return None if len(sent) % 4 == 0 else 0
 
     run = run_virtual(graph(), travel, {"near": 0.2, "far": 0.4})
-    total = sum(inbox(run, name).lost for name in run.parts)
+    total = sum(receiver(run, name).lost for name in run.parts)
     assert 0.2 * len(sent) < total + 3 and total <= len(sent) // 4
 
 

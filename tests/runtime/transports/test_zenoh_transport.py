@@ -113,7 +113,7 @@ def test_congestion_express_and_priority_of_each_link_are_said(
             "congestion_control": block if wait else drop, "express": wait,
             "priority": zenoh.Priority.REAL_TIME, "reliability": zenoh.Reliability.RELIABLE,
         }  # fmt: skip
-        transport.shower("watch/a")
+        transport.background_publisher("watch/a")
         assert session.settings == {
             "congestion_control": drop, "express": False,
             "priority": zenoh.Priority.BACKGROUND, "reliability": zenoh.Reliability.BEST_EFFORT,

@@ -1,1 +1,0 @@
-"""What ``aloft plan`` shows, the grids that it plans, and rehearsals of plans."""

@@ -1,0 +1,264 @@
+"""Runs a graph once, or once for each of many seeds, and prints the result."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from contextlib import closing
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Protocol
+
+import typer
+
+from ...runtime.language.errors import ExitCode
+from ...runtime.running.memory import BoundGraph
+from ...runtime.running.run_result import RunResult
+from .output import (
+    number,
+    print_error,
+    print_json,
+    print_place,
+    print_warning,
+    say,
+    stopped_by_signals,
+    table,
+)
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from ...logs.viewing.viewer import Viewer
+    from ...runtime.language.stages import CheckedGraph
+    from ...runtime.running.real_time import RealTimeOptions
+    from ...runtime.running.sinks import Sink
+    from ...studies.batch.seeds import SeedRow
+
+
+class Runs(Protocol):
+    """What ``run_once`` runs: a graph, or one machine's part of it."""
+
+    @property
+    def checked(self) -> CheckedGraph:
+        """The graph that runs."""
+
+    def run(
+        self,
+        *,
+        sinks: Sequence[Sink],
+        log: bool,
+        plain: bool,
+        fuse: bool,
+        real_time: RealTimeOptions,
+    ) -> RunResult:
+        """Run it once."""
+
+    def about(self) -> Mapping[str, Any]:
+        """What the JSON object says beside the result of the run."""
+
+
+def run_once(
+    graph: Runs,
+    record: Path | None,
+    out: Console,
+    as_json: bool,
+    sinks: Sequence[Sink] = (),
+    viewer: Viewer | None = None,
+    *,
+    keep: int = 0,
+    split: float = 0.0,
+    said: Sequence[str] = (),
+    also: Mapping[str, Any] | None = None,
+    times: bool = True,
+    traceback: bool = False,
+    plain: bool = False,
+    fuse: bool = True,
+    real_time: RealTimeOptions | None = None,
+) -> ExitCode:
+    """Run the graph, record and show it, and print the result; ``said`` are warnings so far,
+    ``also`` is what else the JSON object has, and ``times`` says whether those of blocks are
+    printed."""
+    from ...logs.recording.recorder import Recorder
+    from ...runtime.running.freeze_guard import FreezeGuard
+    from ...runtime.running.real_time import NO_REAL_TIME
+    from .output import TickCounter, compiling_shown, progress_bar
+    from .viewing import how_to_view
+
+    name = graph.checked.name
+    recorder = None
+    if record is not None or viewer is not None:
+        live = viewer.source if viewer is not None else ""
+        recorder = Recorder(record, keep=keep, split=split, live=live, on_warning=print_warning)
+    with (
+        progress_bar(out, f"running {name}", graph.checked.ticks) as (progress, task),
+        compiling_shown(progress),
+    ):
+        counter = TickCounter(progress, task)
+        recorders = [recorder] if recorder is not None else []
+        last_words = LastWords(name, as_json)
+        with FreezeGuard(graph.checked, as_json=as_json) as guard:
+            result = graph.run(
+                sinks=[*recorders, counter, last_words, *sinks, guard], log=False, plain=plain,
+                fuse=fuse, real_time=real_time or NO_REAL_TIME,
+            )  # fmt: skip
+    recording = recorder.recording if recorder is not None else None
+    problem = recorder.problem if recorder is not None and record is not None else ""
+    code = code_with_recording(result.exit_code, problem)
+    print_result(out, name, result, times=times)
+    if recorder is not None and recording is not None:
+        missing = f" ({recorder.missing} ticks are not in it)" if recorder.missing else ""
+        say(out, f"recording: {recording}{missing}; to see it: {how_to_view(recording)}")
+        if recorder.files:
+            say(out, f"the recording is in {len(recorder.files)} files: "
+                f"{', '.join(file.name for file in recorder.files)}")  # fmt: skip
+        if recorder.before:
+            say(out, recorder.before)
+    for warning in (*result.cautions, *result.stop_problems):
+        print_warning(warning)
+    if as_json:
+        shown = str(recording) if recording else None
+        overrides = dict(graph.checked.overrides)
+        warnings = [*said, *result.warnings]
+        files = [str(file) for file in recorder.files] if recorder is not None else []
+        about = {**result.to_json(), "warnings": warnings, "recording": shown, "files": files}
+        about |= {"exit_code": int(code), "recording_problem": problem or None}
+        print_json(
+            {"graph": name, "overrides": overrides, **(also or {}), **about, **graph.about()}
+        )
+    else:
+        print_verdict(result)
+        if result.error is not None:
+            print_place(result.error, traceback=traceback)
+    if problem:
+        print_error(problem)
+    return code
+
+
+MOST_METRIC_COLUMNS = 5
+
+
+def run_many(
+    path: Path,
+    overrides: list[str],
+    seeds: list[int],
+    out: Console,
+    as_json: bool,
+    *,
+    plain: bool = False,
+    fuse: bool = True,
+) -> ExitCode:
+    """Run the graph once with each seed; print a row for each, and how many succeeded."""
+    from ...studies.batch.seeds import run_seeds
+    from .output import progress_bar
+
+    rows: list[SeedRow] = []
+    with (
+        stopped_by_signals() as received,
+        progress_bar(out, f"running {len(seeds)} seeds", len(seeds)) as (progress, task),
+        closing(run_seeds(path, overrides, seeds, plain=plain, fuse=fuse)) as results,
+    ):
+        for row in results:
+            rows.append(row)
+            progress.advance(task)
+    successes = sum(row.success for row in rows)
+    reason = f"{successes} of {len(rows)} seeds succeeded"
+    success = successes == len(seeds)
+    code = ExitCode.SUCCESS if success else ExitCode.NOT_SUCCESSFUL
+    if received:
+        success, code = False, ExitCode(128 + received[0])
+        reason = f"stopped by {received[0].name} after {len(rows)} of {len(seeds)} seeds"
+    print_rows(out, rows)
+    if as_json:
+        summary = {"n": len(rows), "successes": successes, "seeds": seeds}
+        outcome: dict[str, Any] = {"success": success, "reason": reason, "recording": None}
+        outcome |= {"overrides": overrides, "summary": summary}
+        print_json({**outcome, "rows": [vars(row) for row in rows]})
+    else:
+        typer.secho(reason, fg=typer.colors.GREEN if success else typer.colors.RED)
+    return code
+
+
+def print_rows(out: Console, rows: list[SeedRow]) -> None:
+    """Print one line for each seed, with the first few metrics that differ between seeds."""
+    values: dict[str, list[Any]] = {}
+    for row in rows:
+        for name, value in row.metrics.items():
+            values.setdefault(name, []).append(value)
+    differing = [name for name, found in values.items() if len(set(found)) > 1]
+    names = differing[:MOST_METRIC_COLUMNS]
+    out.print(
+        table(
+            "",
+            (">seed", "success", *(f">{name}" for name in names), "reason"),
+            [
+                (
+                    str(row.seed),
+                    "yes" if row.success else "no",
+                    *(number(row.metrics.get(name, "")) for name in names),
+                    row.reason,
+                )
+                for row in rows
+            ],
+        )
+    )
+
+
+def print_result(out: Console, name: str, result: RunResult, *, times: bool = True) -> None:
+    """Print the metrics and the times of a run."""
+    metrics = [(key, number(value)) for key, value in result.metrics.items()]
+    if metrics:
+        out.print(table(f"{name}: metrics", ("metric", ">value"), metrics))
+    rows = [
+        (path, str(t.calls), f"{t.p50_us:.1f}", f"{t.p99_us:.1f}", f"{t.max_us:.1f}")
+        for path, t in result.blocks.items()
+    ]
+    columns = ("block", ">runs", ">median [us]", ">99 % [us]", ">longest [us]")
+    if times:
+        out.print(table(f"{name}: time a run of each block takes", columns, rows))
+    speed = result.duration_s / result.wall_time_s if result.wall_time_s else 0.0
+    say(
+        out,
+        f"{result.ticks} ticks, {result.duration_s:.3f} s of the graph in "
+        f"{result.wall_time_s:.2f} s ({speed:.1f} x real time); run hash {result.run_hash}",
+    )
+    if result.overruns:
+        say(out, f"{result.overruns} overruns, {result.skipped_periods} periods skipped")
+
+
+def print_verdict(result: RunResult) -> None:
+    """Print whether the run succeeded and why, also with ``--quiet``."""
+    if result.success:
+        typer.secho(f"success: {result.reason}", fg=typer.colors.GREEN)
+    else:
+        typer.secho(f"no success: {result.reason}", fg=typer.colors.RED, err=True)
+
+
+def code_with_recording(code: ExitCode, problem: str) -> ExitCode:
+    """The exit code of a run whose own is ``code``, where ``problem`` says what of its recording is
+    missing: a run that failed by itself keeps its own."""
+    return ExitCode.NOT_RECORDED if problem and code is ExitCode.SUCCESS else code
+
+
+class LastWords:
+    """A sink that prints the JSON object of an abandoned run; it records nothing.
+
+    Args:
+        name: what the graph is called.
+        as_json: whether the object is printed; the reason goes to standard error in any case.
+    """
+
+    def __init__(self, name: str, as_json: bool) -> None:
+        self._name = name
+        self._as_json = as_json
+
+    def open(self, bound: BoundGraph) -> None:
+        """Nothing to prepare."""
+
+    def record(self, tick: int) -> None:
+        """Nothing to record."""
+
+    def close(self) -> None:
+        """Nothing to close."""
+
+    def abandoned(self, result: RunResult) -> None:
+        """Print the result."""
+        if self._as_json:
+            print_json({"graph": self._name, **result.to_json()})

@@ -1,0 +1,412 @@
+"""Runs the parts of a graph that is spread over machines, for ``aloft run --machine`` and ``--local``.
+
+``--machine NAME`` runs the part of one machine, over Zenoh, together with the others. ``--local`` starts such
+a process for each machine here, with endpoints on the loopback. One table, one exit code and one recording come
+out, as of a run in one process.
+"""
+
+from __future__ import annotations
+
+import json
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ...runtime.language.errors import AloftError, ExitCode, RunError
+from ...runtime.language.stages import CheckedGraph
+from ...runtime.links.observer import StatusPublisher
+from ...runtime.links.part import BoundPart, run_part
+from ...runtime.links.path_ages import NAME
+from ...runtime.live.part_feed import PartFeed
+from ...runtime.loading import load
+from ...runtime.placement.placed import PlacedGraph, place
+from ...runtime.running.memory import BoundGraph
+from ...runtime.running.real_time import NO_REAL_TIME, RealTimeOptions
+from ...runtime.running.run_result import RunResult, merge_metrics
+from ...runtime.running.sinks import Sink
+from ...runtime.running.timing import BlockTimes
+from ...runtime.transports.keys import check_endpoints, secured
+from ...runtime.transports.zenoh_transport import ZenohTransport
+from .output import (
+    number,
+    print_error,
+    print_json,
+    print_place,
+    print_warning,
+    say,
+    table,
+)
+from .run_graph import code_with_recording, print_result, print_verdict
+from .running_graphs import registered
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+
+GRACE = 15.0
+"""Seconds that the other parts have to end after one has ended."""
+
+
+@dataclass(frozen=True)
+class Wishes:
+    """What the command line asks for: settings, where the recording goes (by default where one of
+    the graph goes) and whether it is kept, the name for ``aloft params``, how to print,
+    whether nothing is compiled, the folder of keys, for links over TLS, and whether blocks of kernels
+    are fused."""
+
+    settings: Sequence[str]
+    record: Path | None
+    keep: bool
+    params: str
+    as_json: bool
+    traceback: bool
+    plain: bool
+    keys: Path | None = None
+    fuse: bool = True
+
+
+def run_local(path: Path, wishes: Wishes, out: Console) -> ExitCode:
+    """Run all parts of the graph in ``path``; print one result.
+
+    Raises:
+        LoadError: the graph is wrong.
+        PlacementError: it names no machines.
+        AloftError: a part said nothing when it ended.
+    """
+    from ...logs.recording.merged_run import merge_recordings, path_metrics, read_parts, run_hash_of
+    from ...logs.recording.place import cause_of, remedy
+    from .viewing import how_to_view
+
+    placed = place(load(path, wishes.settings))
+    graph = placed.graph
+    with tempfile.TemporaryDirectory(prefix="aloft-parts-") as folder:
+        files = {machine.name: Path(folder) / f"{machine.name}.rrd" for machine in placed.machines}
+        said = _run_processes(path, wishes, placed, files)
+        parts = read_parts(placed, files) if all(f.exists() for f in files.values()) else {}
+        run_hash, ticks = run_hash_of(placed, parts) if parts else ("", 0)
+        ages = path_metrics(placed, parts) if parts else {}
+        result = _whole_result(placed, said, ages, run_hash, ticks)
+        recording, problem = None, ""
+        if wishes.keep:
+            target = wishes.record or Path("recordings") / f"{graph.name}.rrd"
+            problem = "; ".join(
+                f"machine {name!r}: {part['recording_problem']}"
+                for name, part in said.items()
+                if part.get("recording_problem")
+            )
+            try:
+                if parts:
+                    recording = merge_recordings(
+                        target, placed, BoundGraph(graph), parts, result.to_json()
+                    )
+            except OSError as error:
+                why = error.strerror or error
+                problem = f"no whole recording: {target} cannot be written ({why})"
+                problem += f"; {remedy(cause_of(error), target)}"
+        code = code_with_recording(result.exit_code, problem)
+    print_result(out, graph.name, result)
+    _print_links(out, said)
+    if recording is not None:
+        say(out, f"recording: {recording}; to see it: {how_to_view(recording)}")
+    for text in (*result.cautions, *result.stop_problems, *result.warnings):
+        print_warning(text)
+    if wishes.as_json:
+        overrides = dict(graph.overrides)
+        about = {**result.to_json(), "recording": str(recording) if recording else None}
+        about |= {"exit_code": int(code), "recording_problem": problem or None}
+        print_json({"graph": graph.name, "overrides": overrides, **about, "machines": said})
+    else:
+        print_verdict(result)
+        if result.error is not None:
+            print_place(result.error, traceback=wishes.traceback)
+    if problem:
+        print_error(problem)
+    return code
+
+
+def _run_processes(
+    path: Path, wishes: Wishes, placed: PlacedGraph, files: Mapping[str, Path]
+) -> dict[str, dict[str, Any]]:
+    """What each part says at its end, by machine.
+
+    Raises:
+        AloftError: a part has said nothing.
+    """
+    endpoints = _free_endpoints(len(files), "tcp" if wishes.keys is None else "tls")
+    settings = [
+        f"machines.{name}={endpoint}" for name, endpoint in zip(files, endpoints, strict=True)
+    ]
+    settings = [*wishes.settings, *settings]
+    sets = [text for setting in settings for text in ("--set", setting)]
+    with ExitStack() as stack:
+        stack.enter_context(registered(path, settings))
+        running: dict[str, subprocess.Popen[str]] = {}
+        for number, (machine, file) in enumerate(files.items()):
+            # the first part answers for the run, which one in real time does by the graph's name
+            params = "none" if number else wishes.params
+            command = [
+                sys.executable, "-m", "aloft", "run", str(path), *sets, "--machine", machine,
+                "--record", str(file), "--params", params, "--json", "--quiet",
+                *(["--plain"] if wishes.plain else []), *([] if wishes.fuse else ["--no-fuse"]),
+                *(["--keys", str(wishes.keys)] if wishes.keys is not None else []),
+            ]  # fmt: skip
+            # in a group of its own, so that Ctrl-C reaches it once, from here
+            process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, process_group=0)
+            running[machine] = stack.enter_context(process)
+        received = _wait_for_all(running)
+        said = {}
+        for machine, process in running.items():
+            assert process.stdout is not None
+            lines = process.stdout.read().splitlines()
+            try:
+                said[machine] = json.loads(lines[-1])
+            except (IndexError, ValueError):
+                if received:  # it had not come as far as a run
+                    code, reason = ExitCode(128 + received[0]), f"stopped by {received[0].name}"
+                    said[machine] = {"exit_code": code, "reason": reason}
+                    continue
+                raise AloftError(
+                    f"the part on {machine!r} ended with code {process.returncode} and no result"
+                ) from None
+    return said
+
+
+def _wait_for_all(running: Mapping[str, subprocess.Popen[str]]) -> list[signal.Signals]:
+    """Wait until every process has ended; pass on SIGINT and SIGTERM, and end those that hang.
+
+    Returns the signals that were passed on.
+    """
+    received: list[signal.Signals] = []
+
+    def receive(number: int, _: object) -> None:
+        received.append(signal.Signals(number))
+        pass_on(number)
+
+    def pass_on(number: int) -> None:
+        for process in running.values():
+            if process.poll() is None:
+                process.send_signal(number)
+
+    before = {n: signal.signal(n, receive) for n in (signal.SIGINT, signal.SIGTERM)}
+    first_end = 0.0
+    asked = False
+    try:
+        while any(process.poll() is None for process in running.values()):
+            ended = any(process.poll() is not None for process in running.values())
+            first_end = first_end or (time.monotonic() if ended else 0.0)
+            late = time.monotonic() - first_end if first_end else 0.0
+            if late > 2 * GRACE:
+                for process in running.values():
+                    process.kill()
+            elif late > GRACE and not asked:
+                asked = True
+                pass_on(signal.SIGTERM)
+            time.sleep(0.02)
+    finally:
+        for process in running.values():
+            if process.poll() is None:
+                process.kill()
+        for number, handler in before.items():
+            signal.signal(number, handler)
+    return received
+
+
+def _free_endpoints(count: int, protocol: str) -> list[str]:
+    """Endpoints on the loopback that nobody uses at present."""
+    with ExitStack() as stack:
+        sockets = [stack.enter_context(socket.socket()) for _ in range(count)]
+        for made in sockets:
+            made.bind(("127.0.0.1", 0))
+        return [f"{protocol}/127.0.0.1:{made.getsockname()[1]}" for made in sockets]
+
+
+def _whole_result(
+    placed: PlacedGraph,
+    said: Mapping[str, Mapping[str, Any]],
+    ages: Mapping[str, Any],
+    run_hash: str,
+    ticks: int,
+) -> RunResult:
+    """The result of the whole run, from what each part said of its own, and from measured ages."""
+    graph = placed.graph
+    by_block = {
+        path: found
+        for spec in graph.blocks
+        for path, found in said[spec.machine].get("metrics_by_block", {}).items()
+        if path == spec.path
+    }
+    measured = (part.get("metrics_by_block", {}).get(NAME) for part in said.values())
+    by_block[NAME] = next((found for found in measured if found), ages)
+    metrics, unmet, praise = merge_metrics(by_block)
+    code, reason = _verdict(said, unmet, praise)
+    failed = next(_in_order_of_guilt(said), None)
+    error = None
+    if code is ExitCode.RUN_FAILED and failed is not None and said[failed].get("error"):
+        error = _error(said[failed]["error"])
+    return RunResult(
+        success=code is ExitCode.SUCCESS,
+        reason=reason,
+        exit_code=code,
+        ticks=ticks,
+        period=graph.base_period,
+        wall_time_s=max((part.get("wall_time_s", 0.0) for part in said.values()), default=0.0),
+        run_hash=run_hash,
+        metrics=metrics,
+        blocks=_times(graph, said),
+        overruns=sum(part.get("overruns", 0) for part in said.values()),
+        skipped_periods=sum(part.get("skipped_periods", 0) for part in said.values()),
+        error=error,
+        stop_problems=_collected(said, "stop_problems"),
+        cautions=_collected(said, "cautions"),
+        warnings=tuple(
+            f"{name}: {text}"
+            for name, part in said.items()
+            for text in part.get("warnings", ())
+            if text != part.get("recording_problem")
+        ),
+        graph=graph,
+    )
+
+
+def _in_order_of_guilt(said: Mapping[str, Mapping[str, Any]]) -> Any:
+    """The machines that failed: first those that failed by themselves, then those that were told."""
+    failed = [name for name, part in said.items() if part.get("exit_code", 3) == 3]
+    return iter(sorted(failed, key=lambda name: bool(said[name].get("heard"))))
+
+
+def _verdict(
+    said: Mapping[str, Mapping[str, Any]], unmet: str | None, praise: str | None
+) -> tuple[ExitCode, str]:
+    for name, part in said.items():
+        if "exit_code" not in part:  # it did not come as far as a run
+            return ExitCode.BAD_INPUT, f"machine {name!r}: {part.get('reason', 'no result')}"
+    for name in _in_order_of_guilt(said):
+        return ExitCode.RUN_FAILED, str(said[name]["reason"])
+    for part in said.values():
+        if part["exit_code"] >= ExitCode.INTERRUPTED:
+            return ExitCode(part["exit_code"]), str(part["reason"])
+    if unmet is not None:
+        return ExitCode.NOT_SUCCESSFUL, unmet
+    reasons = [str(part["reason"]) for part in said.values()]
+    return ExitCode.SUCCESS, praise or reasons[0]
+
+
+def _times(graph: CheckedGraph, said: Mapping[str, Mapping[str, Any]]) -> dict[str, BlockTimes]:
+    """The times of every block on its own machine."""
+    return {
+        path: BlockTimes(**found)
+        for path in graph.order
+        if (found := said[graph.block(path).machine].get("blocks", {}).get(path))
+    }
+
+
+def _collected(said: Mapping[str, Mapping[str, Any]], key: str) -> tuple[str, ...]:
+    return tuple(f"{name}: {text}" for name, part in said.items() for text in part.get(key, ()))
+
+
+def _error(data: Mapping[str, Any]) -> RunError:
+    error = RunError(data["message"], block=data["block"], tick=data["tick"])
+    error.where, error.traceback = data["where"], data["traceback"]
+    return error
+
+
+def _print_links(out: Console, said: Mapping[str, Mapping[str, Any]]) -> None:
+    """Print one row for each link."""
+    links = [link for part in said.values() for link in part.get("links", ())]
+    if any("age_p50_ms" in link for link in links):
+        columns: tuple[str, ...] = (
+            "link", ">messages", ">lost", ">damaged", ">late ticks", ">median age [ms]",
+            ">99 % [ms]", ">oldest [ms]", ">jitter [ms]",
+        )  # fmt: skip
+        keys: tuple[str, ...] = (
+            "name", "received", "lost", "damaged", "late_ticks", "age_p50_ms", "age_p99_ms",
+            "age_max_ms", "jitter_ms",
+        )  # fmt: skip
+    else:
+        columns = ("link", ">messages", ">damaged", ">twice or late")
+        keys = ("name", "received", "damaged", "surplus")
+    rows = [tuple(number(link[key]) for key in keys) for link in links]
+    if rows:
+        out.print(table("links", columns, rows))
+
+
+class Part:
+    """One machine's part, bound and ready to run once.
+
+    Args:
+        graph: the graph.
+        machine: the machine.
+        keys: the folder of ``aloft keys``, for links over TLS.
+
+    Raises:
+        PlacementError: the graph names no such machine.
+        AloftError: endpoints and keys do not fit together.
+        RunError: a block could not be set up.
+    """
+
+    def __init__(self, graph: CheckedGraph, machine: str, keys: Path | None = None) -> None:
+        placed = place(graph)
+        if keys is not None:
+            check_endpoints(placed)
+        elif any(spec.endpoint.startswith("tls/") for spec in placed.machines):
+            raise AloftError(
+                "links over TLS need certificates: `aloft keys GRAPH` makes them, and "
+                "--keys FOLDER takes them"
+            )
+        transport = ZenohTransport(
+            graph.name,
+            placed.machines,
+            wait=graph.links.mode == "lockstep",
+            secured=None if keys is None else secured(placed, keys, machine),
+        )
+        self.bound = BoundPart(placed, machine, transport)
+        self._result: RunResult | None = None
+
+    @property
+    def checked(self) -> CheckedGraph:
+        """The graph of this part."""
+        return self.bound.graph
+
+    def run(
+        self,
+        *,
+        sinks: Sequence[Sink],
+        log: bool,
+        plain: bool = False,
+        fuse: bool = True,
+        real_time: RealTimeOptions = NO_REAL_TIME,
+    ) -> RunResult:
+        """Run the part once."""
+        bound = self.bound
+        showing = StatusPublisher(bound.machine, bound.transport, bound.peers, bound.receivers)
+        feed = PartFeed(bound.machine, bound.transport)
+        self._result = run_part(
+            bound, sinks=[*sinks, showing, feed], log=log, plain=plain, fuse=fuse,
+            real_time=real_time,
+        )  # fmt: skip
+        return self._result
+
+    def about(self) -> Mapping[str, Any]:
+        """The machine, the metrics of each of its blocks, what its links have carried, and the others' clocks."""
+        error = self._result.error if self._result is not None else None
+        metrics = {path: dict(block.metrics()) for path, block in self.bound.blocks.items()}
+        metrics |= {sink.name: dict(sink.metrics()) for sink in self.bound.path_ages}
+        return {
+            "machine": self.bound.machine,
+            "heard": bool(getattr(error, "heard", False)),
+            "metrics_by_block": {path: found for path, found in metrics.items() if found},
+            "links": [receiver.about() for receiver in self.bound.receivers],
+            "clocks": {
+                name: {"offset_s": clock.offset * 1e-9, "uncertainty_s": clock.uncertainty * 1e-9}
+                for name in self.bound.peers.names
+                for clock in (self.bound.peers.clock_of(name),)
+            },
+        }

@@ -1,0 +1,257 @@
+"""The runs of a study: checked, made with a progress bar, shown as a table or JSON, and made again one by one."""
+
+from __future__ import annotations
+
+import signal
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Any
+
+from ...runtime.language.errors import AloftError, ExitCode
+from .output import number, print_error, print_json, print_warning, say, stopped_by_signals, table
+from .run_graph import code_with_recording
+from .viewing import draw, how_to_view, show
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from ...studies.execution import Run
+    from ...studies.expansion import Cell
+    from ...studies.journal import Journal, Outcome
+    from ...studies.study import Filter, Study
+    from ...studies.summary import Row
+    from ...studies.tuning import Draw
+
+
+def check_cells(found: Study, expanded: Sequence[Cell], screen: Console) -> list[Cell]:
+    """The cells, after each was checked as ``aloft check`` checks a graph."""
+    from ...studies.expansion import checked_cells
+    from ...studies.fingerprint import code_fingerprint
+    from .output import progress_bar
+
+    with progress_bar(screen, f"checking {len(expanded)} cells", len(expanded)) as (bar, task):
+        return checked_cells(expanded, found, code_fingerprint(), lambda: bar.advance(task))
+
+
+def make_all(
+    runs: Sequence[Run],
+    journal: Journal,
+    workers: int,
+    cluster: str,
+    screen: Console,
+    text: str,
+) -> list[Run] | signal.Signals:
+    """Make all runs that the journal lacks.
+
+    Returns:
+        All runs with their outcomes, or the signal that stopped the work.
+    """
+    from ...studies.execution import make_runs
+    from .output import progress_bar
+
+    successes = 0
+    keys = {run.key for run in runs}
+    known = len(keys & journal.outcomes.keys())
+    if known:
+        say(screen, f"{known} of {len(keys)} runs were made before")
+    with (
+        stopped_by_signals() as received,
+        progress_bar(screen, text, len(keys)) as (bar, task),
+    ):
+
+        def on_run(outcome: Outcome) -> None:
+            nonlocal successes
+            successes += outcome.success
+            bar.update(task, advance=1, description=f"{text}: {successes} succeeded")
+
+        return make_runs(runs, journal, workers=workers, cluster=cluster, on_run=on_run)
+    return received[0]
+
+
+def report_stop(
+    stopped: signal.Signals, runs: Sequence[Run], journal: Journal, screen: Console, as_json: bool
+) -> ExitCode:
+    """Print how many runs were made before the signal; the exit code says which signal it was."""
+    journal.read_back()
+    keys = {run.key for run in runs}
+    done, all_runs = len(keys & journal.outcomes.keys()), len(keys)
+    reason = f"stopped by {stopped.name} after {done} of {all_runs} runs, which are kept"
+    if as_json:
+        print_json({"success": False, "reason": reason, "done": done, "runs": all_runs})
+    else:
+        print_warning(f"{reason}; the same command continues from there")
+    return ExitCode(128 + stopped)
+
+
+MOST_ROWS = 60
+
+
+def study_json(
+    study: Study, rows: Sequence[Row], seeds: Sequence[int], folder: Path
+) -> dict[str, Any]:
+    """The results as one JSON object."""
+    from ...studies.fingerprint import code_fingerprint
+    from ...studies.study import FIRST_REPORT_SEED
+
+    n, successes = sum(row.n for row in rows), sum(row.successes for row in rows)
+    errors = sum(row.errors for row in rows)
+    goals = [row.met for row in rows if row.met is not None]
+    reason = f"{successes} of {n} runs succeeded"
+    if goals:
+        reason += f"; {sum(goals)} of {len(goals)} goals met"
+    if errors:
+        reason += f"; {errors} runs broke"
+    return {
+        "success": not errors and all(goals),
+        "reason": reason,
+        "study": study.name,
+        "n": n,
+        "successes": successes,
+        "errors": errors,
+        "seeds": list(seeds),
+        "tuning_seeds": [seed for seed in seeds if seed < FIRST_REPORT_SEED],
+        "code": code_fingerprint(),
+        "table": str(folder / "runs.parquet"),
+        "rows": [row.to_json() for row in rows],
+    }
+
+
+def print_rows(screen: Console, study: Study, rows: Sequence[Row], seeds: Sequence[int]) -> None:
+    """Print one line for each cell. Axes with a single value are left out."""
+    from ...studies.study import FIRST_REPORT_SEED
+
+    tuning = sum(seed < FIRST_REPORT_SEED for seed in seeds)
+    if tuning:
+        print_warning(
+            f"{tuning} of {len(seeds)} seeds are tuning seeds (below {FIRST_REPORT_SEED}): "
+            "no result to report"
+        )
+    axes = [name for name in study.axis_names if len(study.labels_of(name)) > 1] or ["task"]
+    cells = [
+        (
+            *(row.cell.labels[axis] for axis in axes),
+            f"{row.successes}/{row.n}",
+            f"{row.rate:.1%}",
+            f"{row.ci_low:.1%} to {row.ci_high:.1%}",
+            "" if row.goal is None else f"{row.goal:.0%}",
+            "" if row.met is None else number(row.met),
+            next(iter(row.reasons), ""),
+        )
+        for row in rows[:MOST_ROWS]
+    ]
+    columns = (
+        *axes,
+        ">succeed",
+        ">rate",
+        ">95 % interval",
+        ">goal",
+        "met",
+        "most frequent failure",
+    )
+    screen.print(table(study.title, columns, cells))
+    if len(rows) > MOST_ROWS:
+        screen.print(f"... and {len(rows) - MOST_ROWS} more cells, in the summary")
+
+
+def tuned_json(study: Study, best: Mapping[str, Draw], path: Path, broken: int) -> dict[str, Any]:
+    """The result of tuning as one JSON object."""
+    assert study.tuning is not None
+    return {
+        "success": True,
+        "reason": f"tuned {len(best)} arms",
+        "study": study.name,
+        "seeds": list(study.tuning.seeds),
+        "draws_per_arm": study.tuning.draws,
+        "errors": broken,
+        "file": str(path),
+        "arms": {
+            arm: {"draw": d.number, "successes": d.successes, "n": d.n, "set": dict(d.values)}
+            for arm, d in best.items()
+        },
+    }
+
+
+def print_tuned(screen: Console, study: Study, best: Mapping[str, Draw]) -> None:
+    """Print the best draw of every arm."""
+    from ...runtime.loading.reading.nodes import text_of
+
+    assert study.tuning is not None
+    cells = [
+        (
+            arm,
+            str(found.number),
+            f"{found.successes}/{found.n}",
+            ", ".join(f"{key} {text_of(value)}" for key, value in found.values.items())
+            or "as written",
+        )
+        for arm, found in best.items()
+    ]
+    title = f"best of {study.tuning.draws} draws for every arm"
+    screen.print(table(title, ("arm", ">draw", ">succeed", "parameters"), cells))
+
+
+def open_run(
+    found: Study,
+    part: Filter,
+    seeds: Sequence[int],
+    folder: Path,
+    number: int,
+    screen: Console,
+    as_json: bool,
+    *,
+    show: bool,
+) -> ExitCode:
+    """Record the run and, if that is wanted, show it.
+
+    Raises:
+        AloftError: the study has no finished runs, or none with that number.
+    """
+    from ...logs.recording.recorder import Recorder
+    from ...studies.execution import Run
+    from ...studies.expansion import cells as expand
+    from ...studies.journal import Journal
+    from ...studies.tuning import read_tuned
+    from ...studies.worst import chosen_run, file_name, labels_of, run_again, with_outcomes
+
+    chosen = [cell for cell in expand(found, read_tuned(found)) if part.takes(cell.labels)]
+    cells = check_cells(found, chosen, screen)
+    with Journal(folder / "runs.jsonl") as journal:
+        runs = with_outcomes([Run(c, seed) for c in cells for seed in seeds], journal.outcomes)
+    if not runs:
+        raise AloftError(
+            f"no run of {found.path} as it is now is in {folder}; run the study first: "
+            f"aloft study {found.path}"
+        )
+    run = chosen_run(runs, number)
+    assert run.outcome is not None
+    say(screen, f"run {number} of {len(runs)}: {labels_of(run)}")
+    path = folder / "worst" / file_name(run)
+    recorder = Recorder(path, on_warning=print_warning)
+    result = run_again(run, [recorder])
+    if result.run_hash != run.outcome.run_hash:
+        print_warning("the run gave other bytes than in the study; something has changed since")
+    kept = recorder.recording
+    if kept is None:
+        raise AloftError(recorder.problem)
+    if recorder.problem:
+        print_error(recorder.problem)
+    say(screen, f"{result.reason}; recording: {kept}; to see it: {how_to_view(kept)}")
+    if as_json:
+        print_json(
+            {"success": True, "reason": result.reason, "run": labels_of(run),
+             "run_succeeded": result.success, "run_hash": result.run_hash,
+             "same_bytes": result.run_hash == run.outcome.run_hash, "recording": str(kept),
+             "recording_problem": recorder.problem or None}
+        )  # fmt: skip
+    if show:
+        show_recording(kept)
+    return code_with_recording(ExitCode.SUCCESS, recorder.problem)
+
+
+def show_recording(path: Path) -> None:
+    """Show the recording in a window until that is closed."""
+    with TemporaryDirectory() as folder:
+        drawn = Path(folder) / path.name
+        draw(path, None, drawn)
+        show(drawn, web=False)

@@ -1,1 +1,0 @@
-"""How ``aloft study`` and ``aloft tune`` make runs and show them, and the paper's figures."""

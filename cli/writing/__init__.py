@@ -1,1 +1,0 @@
-"""What ``aloft new`` and ``aloft blocks`` write: files of a project, and the reference as a page."""

@@ -1,0 +1,66 @@
+"""The sensors that a robot's description mounts on its links, as far as they say how they are drawn."""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+
+from ...hal.sensors.sensor import MountedSensor, SensorError, mounted_sensors
+from ...robots.description import RobotDescription
+from .contacts import ARROW_RADIUS, force_arrows
+from .drawing import Moments, ScenePart
+from .scene_ports import Ports, ports_of
+
+
+def sensor_ports(robot: RobotDescription, ports: Ports) -> dict[str, MountedSensor]:
+    """The ports on which the robot publishes mounted sensors, ``block.sensor``, with their sensors.
+
+    Sensors of a user's own module that cannot be imported here are left out.
+    """
+    try:
+        sensors = mounted_sensors(robot)
+    except (SensorError, ImportError):
+        return {}
+    return {
+        port: sensor
+        for sensor in sensors
+        for port, fields in ports.items()
+        if port.rpartition(".")[2] == sensor.name
+        and sensor.signal.__name__ in next(iter(fields.values())).signals
+    }
+
+
+class SensorPart(ScenePart):
+    """``sensors/NAME``: an arrow for every mounted sensor that is drawn as one, where it is mounted."""
+
+    @cached_property
+    def _arrows(self) -> dict[str, MountedSensor]:
+        found = sensor_ports(self.robot, ports_of(self.header))
+        return {port: sensor for port, sensor in found.items() if sensor.drawn is not None}
+
+    def write_static(self) -> None:
+        """Write the colours."""
+        import rerun as rr
+
+        for sensor in self._arrows.values():
+            width = ARROW_RADIUS * self.scale
+            arrow = rr.Arrows3D.from_fields(colors=[self.colors.support], radii=[width])
+            self.log(f"sensors/{sensor.name}", arrow)
+
+    def write(self, moments: Moments) -> None:
+        """Write the vectors, in the world's frame."""
+        import rerun as rr
+
+        if not self._arrows:
+            return
+        poses = moments.poses(self.robot, self.ports.pose)
+        for port, sensor in self._arrows.items():
+            assert sensor.drawn is not None
+            position, rotation = poses.of(sensor.link)
+            vector = np.einsum("nij,nj->ni", rotation, moments[f"{port}.{sensor.drawn.field}"])
+            arrows = rr.Arrows3D.columns(
+                origins=position + rotation @ np.array(sensor.position),
+                vectors=force_arrows(self.robot, vector),
+            )
+            self.send(f"sensors/{sensor.name}", moments, arrows)

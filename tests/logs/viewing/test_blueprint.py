@@ -1,0 +1,79 @@
+"""A user's own layout: what it shows, and that every fault is told with its place."""
+
+from pathlib import Path
+
+import pytest
+
+from aloft import load
+from aloft.logs.file.format import Header
+from aloft.logs.file.header import header_of
+from aloft.logs.viewing.blueprint import (
+    LayoutError,
+    blueprint_with,
+    layout_beside,
+    read_layout,
+)
+from aloft.runtime.running.memory import BoundGraph
+
+GRAPH = Path(__file__).parents[3] / "graphs" / "jump.yaml"
+GOOD = """follow: false
+tabs:
+  - name: Balance
+    plots:
+      - robot.truth.com
+      - title: velocity
+        signals: [estimator.base.linear_velocity, robot.truth.base_linear_velocity]
+        range: [-1, 2]
+        legend: true
+"""
+
+
+@pytest.fixture(scope="module")
+def header() -> Header:
+    return header_of(BoundGraph(load(GRAPH).checked))
+
+
+def test_a_users_tabs_come_first(header: Header, tmp_path: Path) -> None:
+    path = tmp_path / "view.yaml"
+    path.write_text(GOOD)
+    layout = read_layout(path, header)
+    blueprint = blueprint_with(layout, header)
+    tabs = blueprint.root_container.contents[1].contents
+    assert [tab.name for tab in tabs[:2]] == ["Balance", "Main signals"]
+    assert [view.name for view in tabs[0].contents] == ["robot.truth.com [m]", "velocity [m/s]"]
+    blueprint.save("aloft", tmp_path / "layout.rbl")
+    assert (tmp_path / "layout.rbl").stat().st_size > 1000
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("tabs: [{name: A, plots: [robot.truth.con]}]", "1:26: tabs.0.plots.0: no signal"),
+        ("tabs:\n  - name: A\n", "2:5: tabs.0.plots: Field required"),
+        ("tab: []\n", "1:6: tab: Extra inputs are not permitted"),
+        ("follow: [\n", "this is no YAML"),
+        ("follow: true\nfollow: false\n", "2:1: key 'follow' stands twice"),
+        ("tabs: [{name: A, plots: [dynamics.terms.mass_matrix]}]", "too many elements"),
+        (
+            "tabs: [{name: A, plots: [{signals: [robot.truth.com, robot.joints.torque]}]}]",
+            "robot.truth.com [m] and robot.joints.torque [N m]",
+        ),
+    ],
+)
+def test_faults_have_their_place(header: Header, tmp_path: Path, text: str, told: str) -> None:
+    path = tmp_path / "view.yaml"
+    path.write_text(text)
+    with pytest.raises(LayoutError) as error:
+        read_layout(path, header)
+    assert told in str(error.value)
+    assert str(path) in str(error.value)
+
+
+def test_the_file_beside_the_graph_is_found(header: Header, tmp_path: Path) -> None:
+    from dataclasses import replace
+
+    there = replace(header, source=str(tmp_path / "graph.yaml"))
+    assert layout_beside(there) is None
+    (tmp_path / "view.yaml").write_text(GOOD)
+    assert layout_beside(there) == tmp_path / "view.yaml"
+    assert layout_beside(replace(header, source="")) is None
