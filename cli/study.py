@@ -15,10 +15,8 @@ from .shared.studies import (
     check_cells,
     make_all,
     print_rows,
-    print_tuned,
     report_stop,
     study_json,
-    tuned_json,
 )
 
 if TYPE_CHECKING:
@@ -40,9 +38,6 @@ def study(
         list[str] | None,
         typer.Option(help="Only part of the grid: axis=value, task=..., arm=... Repeatable."),
     ] = None,
-    tune: Annotated[
-        bool, typer.Option("--tune", help="Tune the arms instead, and write what was found.")
-    ] = False,
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="Check everything and count the runs; run nothing.")
     ] = False,
@@ -63,7 +58,7 @@ def study(
     """Run a study: every graph, arm and grid point with every seed, on all cores.
 
     Runs that were made before are not made again, so a study that was stopped or killed goes on
-    where it was. Exits with 0 when all goals are met, 1 when one is missed, 3 when a run broke.
+    where it was. 'aloft tune' searches the parameters of a study's arms. Exits with 0 when all goals are met, 1 when one is missed, 3 when a run broke.
 
     'aloft study paper' makes the runs of the paper's figures, draws them into docs (or --out), and
     writes the page about them there.
@@ -74,34 +69,27 @@ def study(
 
     screen = console(to_stderr=as_json)
     with errors_reported(as_json):
-        if number and (tune or dry_run or cluster):
+        if number and (dry_run or cluster):
             raise AloftError("--open takes --where, --seeds, --out, --no-show and --json")
         if no_show and not number:
             raise AloftError("--no-show would do nothing; add --open N")
         if file == Path(NAME) and not file.exists():
-            if where or tune or dry_run or cluster:
+            if where or dry_run or cluster:
                 raise AloftError(f"'aloft study {NAME}' takes --out, --seeds, --workers and --json")
             raise typer.Exit(draw_paper(out, seeds, workers, screen, as_json))
         found = read_study(file)
         chosen = parse_seeds(seeds) if seeds else list(found.seeds)
         folder = out or Path("results") / found.name
-        if tune:
-            if seeds or where or dry_run:
-                raise AloftError(
-                    "--seeds, --where and --dry-run are for runs; see the study's 'tune'"
-                )
-            code = tune_study(found, folder, workers, cluster, screen, as_json)
-        else:
-            part = part_of(found, where or [])
-            if number:
-                from .shared.studies import open_run
+        part = part_of(found, where or [])
+        if number:
+            from .shared.studies import open_run
 
-                raise typer.Exit(
-                    open_run(found, part, chosen, folder, number, screen, as_json, show=not no_show)
-                )
-            code = run_study(
-                found, part, chosen, folder, workers, cluster, screen, as_json, dry_run=dry_run
+            raise typer.Exit(
+                open_run(found, part, chosen, folder, number, screen, as_json, show=not no_show)
             )
+        code = run_study(
+            found, part, chosen, folder, workers, cluster, screen, as_json, dry_run=dry_run
+        )
     raise typer.Exit(code)
 
 
@@ -118,12 +106,11 @@ def run_study(
     dry_run: bool = False,
 ) -> ExitCode:
     """Make the study's runs; write and print the results."""
-    from ..studies.charts.plots import write_plots
+    from ..studies.charts import write_plots
     from ..studies.execution import Run
     from ..studies.expansion import cells as expand
     from ..studies.journal import Journal
-    from ..studies.summary import summarise
-    from ..studies.table import make_table, write_table
+    from ..studies.summary import make_table, summarise, write_table
     from ..studies.tuning import extreme_cells, read_tuned, tuned_path, tuning_cells
     from ..studies.worst import write_page
 
@@ -170,37 +157,6 @@ def run_study(
         return ExitCode.RUN_FAILED
     missed = any(row.met is False for row in rows)
     return ExitCode.NOT_SUCCESSFUL if missed else ExitCode.SUCCESS
-
-
-def tune_study(
-    found: Study, folder: Path, workers: int, cluster: str, screen: Console, as_json: bool
-) -> ExitCode:
-    """Search for every arm's best parameters; write and print them."""
-    from ..studies import tuning
-    from ..studies.journal import Journal
-
-    if found.tuning is None:
-        raise AloftError(f"{found.path} has no section 'tune'")
-    tried = tuning.tuning_cells(found)
-    if not tried:
-        raise AloftError(f"{found.path}: 'where' of 'tune' leaves nothing to run")
-    count = len(tried)
-    checked = check_cells(found, [*tried, *tuning.extreme_cells(found, tried)], screen)[:count]
-    planned = tuning.tuning_runs(found, checked)
-    runs = [run for _, _, run in planned]
-    with Journal(folder / "tuning.jsonl") as journal:
-        stopped = make_all(runs, journal, workers, cluster, screen, f"tuning {found.name}")
-        if isinstance(stopped, signal.Signals):
-            return report_stop(stopped, runs, journal, screen, as_json)
-    done = [(arm, draw, run) for (arm, draw, _), run in zip(planned, stopped, strict=True)]
-    best = tuning.best_draws(found, done)
-    path = tuning.write_tuned(found, best)
-    print_tuned(screen, found, best)
-    say(screen, f"tuned parameters: {path}")
-    broken = sum(bool(run.outcome and run.outcome.error) for run in stopped)
-    if as_json:
-        print_json(tuned_json(found, best, path, broken))
-    return ExitCode.SUCCESS
 
 
 def json_text(value: dict[str, Any]) -> str:

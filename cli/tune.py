@@ -29,11 +29,10 @@ def tune(
 ) -> None:
     """Search the best parameters of every arm of a study with Optuna (extra 'tune').
 
-    The study says what is searched: ranges, graphs, seeds and the number of draws. 'aloft study
-    FILE --tune' draws at random instead. A search that was stopped goes on where it was. What is
-    found goes into a file beside the study, from which 'aloft study FILE' takes it.
+    The study says what is searched: ranges, graphs, seeds and the number of draws. A search that
+    was stopped goes on where it was. What is found goes into a file beside the study, from which 'aloft study FILE' takes it.
     """
-    from ..studies import searching, tuning
+    from ..studies import tuning
     from ..studies.journal import Journal
     from ..studies.reading import read_study
 
@@ -63,10 +62,10 @@ def tune(
                 made.extend(done)
                 return done
 
-            best = searching.search(found, checked, make)
+            best = tuning.search(found, checked, make)
             if best is None:
                 raise typer.Exit(report_stop(stops[0], asked, journal, screen, as_json))
-        path = tuning.write_tuned(found, best, "tune")
+        path = tuning.write_tuned(found, best)
         print_tuned(screen, found, best)
         say(screen, f"tuned parameters: {path}")
         if as_json:

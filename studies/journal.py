@@ -1,13 +1,18 @@
 """Keeps finished runs in a file, one line each, so that they survive the death of the process.
 
 The file holds lines of JSON and is only appended to. An incomplete last line is not a run.
+
+The code, the data and the library versions that decide the outcome of a run, besides its graph.
 """
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 from dataclasses import asdict, dataclass, field
+from functools import cache
+from importlib import metadata
 from pathlib import Path
 from typing import IO, Any, Self
 
@@ -96,3 +101,25 @@ class Journal:
         file.seek(0, os.SEEK_END)
         if file.tell() > whole:
             file.truncate(whole)
+
+
+ROOT = Path(__file__).parent.parent
+FOLDERS = ("mathematics", "robots", "runtime", "blocks", "planner", "hal")
+SUFFIXES = (".py", ".yaml")
+LIBRARIES = ("numpy", "mujoco-core", "mujoco", "pin", "daqp", "qpsolvers")
+
+
+@cache
+def code_fingerprint() -> str:
+    """A hash of all code that may run in a graph, of the shipped plans, and of the versions of
+    what computes. Results that were made by other code are therefore not used."""
+    digest = hashlib.sha256()
+    files = [p for folder in FOLDERS for p in (ROOT / folder).rglob("*") if p.suffix in SUFFIXES]
+    for path in sorted([*files, *(ROOT / "graphs" / "plans").glob("*.npz")]):
+        digest.update(path.relative_to(ROOT).as_posix().encode() + b"\0" + path.read_bytes())
+    for name in LIBRARIES:
+        try:
+            digest.update(f"{name} {metadata.version(name)}\n".encode())
+        except metadata.PackageNotFoundError:
+            continue
+    return digest.hexdigest()[:24]

@@ -15,10 +15,9 @@ from ..runtime.loading.problems import Code, LoadError, Problems, nearest
 from ..runtime.loading.reading.document import read_file
 from ..runtime.loading.reading.nodes import Entry, ListNode, MapNode, Node, ScalarNode, plain
 from ..runtime.loading.reading.written import unknown_key, wrong_kind
-from .axes import read_axes, read_sets
-from .ranges import read_range
-from .sections import Labels, read_goals, read_plots, read_seeds, read_tuning
+from .sections import Labels, read_axes, read_goals, read_plots, read_seeds, read_sets, read_tuning
 from .study import Arm, Filter, Range, Study, Task
+from .tuning import read_range
 
 KEYS = (
     "graph", "graphs", "graphs_of", "include", "seeds", "title", "set", "arms", "grid", "goals",

@@ -12,22 +12,43 @@ from collections.abc import Callable, Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
 from ..blocks.jumping.plan_progress import speed_error
+from ..hal.simulated.simulated_robot import SimulatorParameters
 from ..mathematics.arrays import Array
 from ..mathematics.constants import GRAVITY
 from ..planner.library.rehearsed import ZERO, Deviation, Rehearsed, Vector
+from ..planner.library.shipped import shipped_folder
 from ..runtime.graph import load
 from ..runtime.language.errors import AloftError
 from ..runtime.loading.flattening.flat import FlatGraph
+from ..runtime.loading.reading.files import settings_of
 from ..runtime.loading.reading.nodes import text_of
 from ..runtime.running.run_result import RunResult
 from .batch.jobs import job_results
 from .batch.seeds import overrides_for
-from .trials import trial_settings
+
+
+def trial_settings(trial: str, option: str = "--trial") -> dict[str, Any]:
+    """What a trial sets. What only other trials set goes back to the simulator's defaults.
+
+    Raises:
+        AloftError: there is no such trial.
+    """
+    if not trial:
+        return {}
+    files = {file.stem: file for file in sorted((shipped_folder() / "trials").glob("*.yaml"))}
+    if trial not in files:
+        raise AloftError(f"{option} {trial}: there is {', '.join(files)}")
+    defaults = SimulatorParameters().model_dump(mode="json", round_trip=True)
+    found = {
+        key: defaults[key.partition(".")[2]] for file in files.values() for key in settings_of(file)
+    }
+    return found | settings_of(files[trial])
+
 
 Found = TypeVar("Found")
 

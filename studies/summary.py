@@ -5,12 +5,45 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
-from .confidence import wilson_interval
+from ..runtime.language.errors import AloftError
 from .execution import Run
 from .expansion import Cell
-from .study import Study
+from .study import FIRST_REPORT_SEED, Study
+
+if TYPE_CHECKING:
+    import pyarrow
+
+
+Z_95 = 1.959963984540054
+"""The standard normal's quantile that leaves 2.5 % above it."""
+
+
+def wilson_interval(successes: int, n: int, z: float = Z_95) -> tuple[float, float]:
+    """The score interval of E. B. Wilson (1927) for a probability of success.
+
+        centre = (p + z^2 / 2n) / (1 + z^2 / n)
+        half   = z / (1 + z^2 / n) sqrt(p (1 - p) / n + z^2 / 4n^2)
+
+    with p = successes / n. Unlike the interval around p it never leaves [0, 1], and it says
+    something also where all runs succeed: 40 of 40 give 0.912 to 1. Without runs it is (0, 1).
+
+    Raises:
+        ValueError: there are fewer than no successes, or more of them than runs.
+    """
+    if not 0 <= successes <= n:
+        raise ValueError(f"{successes} successes of {n} runs")
+    if n == 0:
+        return 0.0, 1.0
+    p = successes / n
+    scale = 1.0 + z * z / n
+    centre = (p + z * z / (2 * n)) / scale
+    half = z / scale * math.sqrt(p * (1.0 - p) / n + z * z / (4.0 * n * n))
+    low = 0.0 if successes == 0 else max(0.0, centre - half)
+    high = 1.0 if successes == n else min(1.0, centre + half)
+    return low, high
 
 
 @dataclass(frozen=True)
@@ -117,3 +150,63 @@ def quantile(ordered: Sequence[float], share: float) -> float:
     low = math.floor(place)
     high = min(low + 1, len(ordered) - 1)
     return ordered[low] + (place - low) * (ordered[high] - ordered[low])
+
+
+def make_table(runs: Sequence[Run]) -> pyarrow.Table:
+    """The table: ``task``, ``arm``, a column for every axis, ``seed``, ``tuning_seed`` (whether
+    it is one), ``success``, ``reason``, ``error``, ``run_hash``, every metric, ``wall_time_s``.
+
+    A metric that a run does not have is null. The same runs give the same table, except its last
+    column, no matter which processes made them and how often the study was interrupted.
+    """
+    import pyarrow
+
+    outcomes = [run.outcome for run in runs]
+    columns: dict[str, Any] = {
+        "task": pyarrow.array([run.cell.task for run in runs], pyarrow.string()),
+        "arm": pyarrow.array([run.cell.arm for run in runs], pyarrow.string()),
+    }
+    for name in dict.fromkeys(name for run in runs for name in run.cell.coordinates):
+        columns[name] = _array([run.cell.coordinates.get(name) for run in runs])
+    columns["seed"] = pyarrow.array([run.seed for run in runs], pyarrow.int64())
+    columns["tuning_seed"] = pyarrow.array(
+        [run.seed < FIRST_REPORT_SEED for run in runs], pyarrow.bool_()
+    )
+    columns["success"] = pyarrow.array([o.success if o else None for o in outcomes])
+    for name in ("reason", "error", "run_hash"):
+        values = [getattr(o, name) if o else None for o in outcomes]
+        columns[name] = pyarrow.array(values, pyarrow.string())
+    for name in sorted({name for o in outcomes if o for name in o.metrics}):
+        values = [o.metrics.get(name) if o else None for o in outcomes]
+        columns[name if name not in columns else f"metric.{name}"] = _array(values)
+    times = [o.wall_time_s if o else None for o in outcomes]
+    columns["wall_time_s"] = pyarrow.array(times, pyarrow.float64())
+    return pyarrow.table(columns)
+
+
+def _array(values: list[Any]) -> pyarrow.Array:
+    """The values as an array of one type: truth values, integers, numbers, or else texts."""
+    import pyarrow
+
+    there = [value for value in values if value is not None]
+    if all(isinstance(value, bool) for value in there) and there:
+        return pyarrow.array(values, pyarrow.bool_())
+    if any(isinstance(value, (str, bool)) for value in there):
+        texts = [None if value is None else str(value) for value in values]
+        return pyarrow.array(texts, pyarrow.string())
+    if all(isinstance(value, int) for value in there) and there:
+        return pyarrow.array(values, pyarrow.int64())
+    numbers = [None if value is None else float(value) for value in values]
+    return pyarrow.array(numbers, pyarrow.float64())
+
+
+def write_table(path: Path, table: pyarrow.Table) -> None:
+    """Write the table. After a failure there is no half-written file. Raises ``AloftError``."""
+    from pyarrow import parquet
+
+    partial = path.with_name(f".{path.name}.partial")
+    try:
+        parquet.write_table(table, partial, compression="zstd")
+        partial.replace(path)
+    except OSError as error:
+        raise AloftError(f"cannot write {path}: {error.strerror or error}") from error

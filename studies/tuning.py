@@ -1,11 +1,23 @@
-"""Random search for the gains of every arm, with the same effort for each.
+"""Search for the gains of every arm with Optuna, with the same effort for each.
+
+::
+
+    landing.w_k: [0, 0.5]                   # one number, uniform
+    landing.w_l: [[0, 0.1], [0, 0.1]]       # a vector, each number for itself
+    wbc.thrust.torso_weight: {from: 1.0e-3, to: 10, log: true}
+    landing.law: {choices: [paper, deviation]}
 
 Every arm gets the same number of draws, and every draw the same cells and seeds. Draw 0 is the arm
-as it is written, so tuning never ends below it; the others come from a generator that the study's
-``tune.seed``, the arm's name and the number of the draw decide, so that neither the order of the
-runs nor another arm changes them. The best draw is the one with the most successes. Among equals it
-is the one with the least mean of the metric ``least``, and then the first one. An arm without
-ranges is not changed.
+as it is written, so tuning never ends below it. Optuna's tree-structured Parzen estimator proposes
+the others, a few at a time for every arm, from the results of those before, so that all processors
+have work (Bergstra, Bardenet, Bengio and Kegl, Algorithms for Hyper-Parameter Optimization, NIPS
+2011). The best draw is the one with the most successes. Among equals it is the one with the least
+mean of the metric ``least``, and then the first one. An arm without ranges is not changed.
+
+The number of draws that are proposed at once is fixed, and the sampler is seeded by the study's
+``tune.seed`` and the arm's name: what is proposed depends neither on the number of processors nor on
+another arm. So a search that was stopped goes on where it was, because it proposes the same again
+and finds those runs in its journal.
 
 The result is a file beside the study's file, from which the study's runs take the parameters. It
 holds a hash of what was searched: a study that was changed since has to be tuned again.
@@ -15,22 +27,117 @@ from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
-
-import numpy as np
+from typing import TYPE_CHECKING, Any
 
 from ..runtime.language.errors import AloftError
 from ..runtime.language.stages import Position
-from ..runtime.loading.problems import LoadError, Problems
+from ..runtime.loading.problems import Code, LoadError, Problems
 from ..runtime.loading.reading.document import read_file
-from ..runtime.loading.reading.nodes import plain, text_of
+from ..runtime.loading.reading.nodes import (
+    Entry,
+    ListNode,
+    MapNode,
+    Node,
+    ScalarNode,
+    plain,
+    text_of,
+)
+from ..runtime.loading.reading.written import unknown_key
 from .execution import Run
 from .expansion import Cell, Tuned, cells
-from .ranges import corners, draw
-from .study import Arm, Study, Tuning
+from .quantities import in_unit, quantity, written
+from .study import Arm, Range, Study
+
+if TYPE_CHECKING:
+    from optuna import Study as OptunaStudy
+    from optuna import Trial
+
+
+EXPECTED = "[low, high], [[low, high], ...], {from:, to:, log: true} or {choices: [...]}"
+
+
+def read_range(entry: Entry, problems: Problems) -> Range | None:
+    """The range of one parameter; ``None`` if it is wrong, which is noted as a problem."""
+    node = entry.value
+    if isinstance(node, MapNode):
+        choices = node.get("choices")
+        legal = ("choices",) if choices else ("from", "to", "log")
+        for item in node:
+            if item.key not in legal:
+                unknown_key(item, ("from", "to", "log", "choices"), "of a range", problems)
+                return None
+        if choices is not None:
+            if isinstance(choices.value, ListNode) and choices.value.items:
+                return Range(entry.key, entry.key_where, choices=tuple(plain(choices.value)))
+            return _refuse(entry, node, problems)
+        low, high = node.get("from"), node.get("to")
+        log = node.get("log")
+        if low is None or high is None or (log and not isinstance(plain(log.value), bool)):
+            return _refuse(entry, node, problems)
+        scalar = not isinstance(low.value, ListNode)
+        lows = [plain(low.value)] if scalar else plain(low.value)
+        highs = [plain(high.value)] if scalar else plain(high.value)
+        return _bounds(entry, lows, highs, scalar, bool(log and plain(log.value)), problems)
+    if not isinstance(node, ListNode) or len(node.items) < 1:
+        return _refuse(entry, node, problems)
+    if all(isinstance(item, ListNode) and len(item.items) == 2 for item in node.items):
+        pairs = plain(node)
+        return _bounds(entry, [p[0] for p in pairs], [p[1] for p in pairs], False, False, problems)
+    if len(node.items) == 2 and all(isinstance(item, ScalarNode) for item in node.items):
+        low_value, high_value = plain(node)
+        return _bounds(entry, [low_value], [high_value], True, False, problems)
+    return _refuse(entry, node, problems)
+
+
+def _bounds(
+    entry: Entry, lows: Any, highs: Any, scalar: bool, log: bool, problems: Problems
+) -> Range | None:
+    if not isinstance(highs, list) or len(lows) != len(highs) or not lows:
+        return _refuse(entry, entry.value, problems)
+    unit = next((found[1] for v in (*lows, *highs) if (found := quantity(v)) and found[1]), "")
+    bounds = []
+    for low_value, high_value in zip(lows, highs, strict=True):
+        low, high = in_unit(low_value, unit), in_unit(high_value, unit)
+        if low is None or high is None or not low <= high or (log and low <= 0):
+            return _refuse(entry, entry.value, problems, log)
+        bounds.append((low, high))
+    return Range(entry.key, entry.key_where, tuple(bounds), scalar, unit, log)
+
+
+def _refuse(entry: Entry, node: Node, problems: Problems, log: bool = False) -> Range | None:
+    low = "numbers above zero, low before high" if log else "low before high"
+    problems.add(
+        Code.BAD_VALUE,
+        f"{text_of(plain(node))} is no range for {entry.key}",
+        node.where,
+        at=entry.key,
+        expected=f"{EXPECTED}, {low}",
+    )
+    return None
+
+
+def value_at(found: Range, shares: Sequence[float]) -> Any:
+    """The value at a share, from 0 to 1, of each of its numbers' ranges."""
+    values = []
+    for (low, high), share in zip(found.bounds, shares, strict=True):
+        if found.log:
+            number = math.exp(math.log(low) + share * (math.log(high) - math.log(low)))
+        else:
+            number = low + share * (high - low)
+        # four digits: what was found can be read, copied and said
+        values.append(written(min(max(float(f"{number:.4g}"), low), high), found.unit))
+    return values[0] if found.scalar else values
+
+
+def corners(found: Range) -> tuple[Any, ...]:
+    """The values at the ends of the range, with which every graph is checked before tuning."""
+    if found.choices:
+        return found.choices
+    ends = [[written(pair[end], found.unit) for pair in found.bounds] for end in (0, 1)]
+    return tuple(end[0] if found.scalar else end for end in ends)
 
 
 @dataclass(frozen=True)
@@ -43,16 +150,6 @@ class Draw:
     successes: int = 0
     least: float = math.nan
     """The mean of the metric that should be least; NaN where no run has it, or none is named."""
-
-
-def draws(arm: Arm, tuning: Tuning) -> list[Draw]:
-    """The draws of an arm; one only, as it is written, where nothing may be tuned."""
-    found = [Draw(0, {})]
-    name = int.from_bytes(hashlib.sha256(arm.name.encode()).digest()[:8], "big")
-    for number in range(1, tuning.draws if arm.ranges else 1):
-        generator = np.random.default_rng([tuning.seed, name, number])
-        found.append(Draw(number, {each.key: draw(each, generator) for each in arm.ranges}))
-    return found
 
 
 def tuning_cells(study: Study) -> list[Cell]:
@@ -74,17 +171,6 @@ def extreme_cells(study: Study, chosen: Sequence[Cell]) -> list[Cell]:
     return found
 
 
-def tuning_runs(study: Study, chosen: Sequence[Cell]) -> list[tuple[str, int, Run]]:
-    """Every run of every draw, as (arm, draw, run); the cells must have been checked."""
-    assert study.tuning is not None
-    found = []
-    for arm in study.arms:
-        mine = [cell for cell in chosen if cell.arm == arm.name]
-        for each in draws(arm, study.tuning):
-            found += [(arm.name, each.number, run) for run in draw_runs(study, arm, each, mine)]
-    return found
-
-
 def draw_runs(study: Study, arm: Arm, each: Draw, mine: Sequence[Cell]) -> list[Run]:
     """The runs of one draw on the checked cells of its arm."""
     assert study.tuning is not None
@@ -97,25 +183,6 @@ def draw_runs(study: Study, arm: Arm, each: Draw, mine: Sequence[Cell]) -> list[
             tried = replace(tried, key=hashlib.sha256(text.encode()).hexdigest()[:24])
         found += [Run(tried, seed) for seed in study.tuning.seeds]
     return found
-
-
-def best_draws(study: Study, done: Sequence[tuple[str, int, Run]]) -> dict[str, Draw]:
-    """The best draw of every arm."""
-    assert study.tuning is not None
-    best = {}
-    for arm in study.arms:
-        by_draw: dict[int, list[Run]] = {}
-        for name, number, run in done:
-            if name == arm.name:
-                by_draw.setdefault(number, []).append(run)
-        tried = [
-            scored(each, by_draw[each.number], study.tuning.least)
-            for each in draws(arm, study.tuning)
-            if each.number in by_draw
-        ]
-        if tried:
-            best[arm.name] = min(tried, key=order)
-    return best
 
 
 def order(found: Draw) -> tuple[float, float, int]:
@@ -153,14 +220,12 @@ def definition(study: Study) -> str:
     return hashlib.sha256(text_of(searched).encode()).hexdigest()[:16]
 
 
-def write_tuned(study: Study, best: Mapping[str, Draw], found_by: str = "study --tune") -> Path:
-    """Write the best parameters of every arm, and by which command. Raises ``AloftError``."""
+def write_tuned(study: Study, best: Mapping[str, Draw]) -> Path:
+    """Write the best parameters of every arm. Raises ``AloftError``."""
     assert study.tuning is not None
     tuning = study.tuning
-    verb, _, option = found_by.partition(" ")
-    option = f" {option}" if option else ""
     lines = [
-        f"# What `aloft {verb} {study.path.name}{option}` found; its runs take it from here.",
+        f"# What `aloft tune {study.path.name}` found; its runs take it from here.",
         f"definition: {text_of(definition(study))}",
         f"seeds: {text_of(list(tuning.seeds))}",
         f"draws_per_arm: {tuning.draws}",
@@ -189,7 +254,7 @@ def read_tuned(study: Study) -> Tuned:
     if study.tuning is None:
         return {}
     path = tuned_path(study)
-    fix = f"aloft study {study.path} --tune"
+    fix = f"aloft tune {study.path}"
     if not path.is_file():
         raise AloftError(f"{study.path} has not been tuned: there is no {path}; run {fix}")
     problems = Problems()
@@ -206,3 +271,75 @@ def read_tuned(study: Study) -> Tuned:
         return {arm.name: dict(data["arms"][arm.name]["set"]) for arm in study.arms}
     except (KeyError, TypeError) as error:
         raise AloftError(f"{path} does not have all arms; run {fix}") from error
+
+
+AT_ONCE = 8
+"""Draws of an arm that are proposed before the first of their results is known."""
+Make = Callable[[Sequence[Run]], "list[Run] | None"]
+"""Makes runs; nothing comes back where it was stopped."""
+
+
+def search(study: Study, chosen: Sequence[Cell], make: Make) -> dict[str, Draw] | None:
+    """The best draw of every arm; ``None`` where ``make`` was stopped.
+
+    Args:
+        study: the study, with a section ``tune``.
+        chosen: its cells for tuning, checked.
+        make: makes the runs of some draws of all arms.
+
+    Raises:
+        AloftError: Optuna is not installed.
+    """
+    assert study.tuning is not None
+    tuning = study.tuning
+    arms = {arm.name: arm for arm in study.arms if any(c.arm == arm.name for c in chosen)}
+    own_cells = {name: [cell for cell in chosen if cell.arm == name] for name in arms}
+    samplers = {name: _optuna_study(tuning.seed, arm) for name, arm in arms.items() if arm.ranges}
+    best: dict[str, Draw] = {}
+    for first in (0, *range(1, tuning.draws, AT_ONCE)):
+        asked: list[tuple[str, Draw, Trial | None]] = []
+        for name, arm in arms.items():
+            if first == 0:
+                asked.append((name, Draw(0, {}), None))  # as it is written
+            elif arm.ranges:
+                for number in range(first, min(first + AT_ONCE, tuning.draws)):
+                    trial = samplers[name].ask()
+                    values = {each.key: _proposed(each, trial) for each in arm.ranges}
+                    asked.append((name, Draw(number, values), trial))
+        planned = [draw_runs(study, arms[name], each, own_cells[name]) for name, each, _ in asked]
+        done = make([run for runs in planned for run in runs])
+        if done is None:
+            return None
+        at = 0
+        for (name, each, trial), runs in zip(asked, planned, strict=True):
+            found = scored(each, done[at : at + len(runs)], tuning.least)
+            at += len(runs)
+            if trial is not None:
+                samplers[name].tell(trial, value_to_minimise(found, len(runs)))
+            if name not in best or order(found) < order(best[name]):
+                best[name] = found
+    return best
+
+
+def value_to_minimise(found: Draw, runs: int) -> float:
+    """One number that orders draws as ``order`` does: failures first, then the metric, in (0, 1)."""
+    share = 1.0 if math.isnan(found.least) else 0.5 + math.atan(found.least) / math.pi
+    return runs - found.successes + share
+
+
+def _proposed(each: Range, trial: Trial) -> Any:
+    if each.choices:
+        return each.choices[trial.suggest_categorical(each.key, list(range(len(each.choices))))]
+    shares = [trial.suggest_float(f"{each.key} {i}", 0.0, 1.0) for i in range(len(each.bounds))]
+    return value_at(each, shares)
+
+
+def _optuna_study(seed: int, arm: Arm) -> OptunaStudy:
+    try:
+        import optuna
+    except ImportError:
+        raise AloftError("aloft tune needs Optuna: pip install 'aloft[tune]'") from None
+    optuna.logging.set_verbosity(optuna.logging.ERROR)
+    name = int.from_bytes(hashlib.sha256(f"{seed} {arm.name}".encode()).digest()[:4], "big")
+    sampler = optuna.samplers.TPESampler(seed=name, constant_liar=True)
+    return optuna.create_study(sampler=sampler)

@@ -235,7 +235,7 @@ UNUSED = {
     "aloft.hal.simulated.base.report_fixed": (BASE,),
     "aloft.hal.simulated.base.report_planar": (POSE[0], POSE[3], BASE),
     "aloft.hal.simulated.base.read_pitch_rate": (POSE[0], np.zeros(3)),
-    "aloft.hal.simulated.plant.push_point": (
+    "aloft.hal.simulated.plant.apply_push": (
         np.array([3.0, -2.0, 1.0]), np.array(1),
         plant.PushPoints(
             np.array([2, 0]), np.array([1, 1]), DRAW((3, 3)), DRAW((2, 3)), np.zeros((2, 6)),

@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 
 import aloft
-from aloft.mathematics.kernel import kernel, kernels
+from aloft.mathematics.kernel import expand, kernel, kernels
 
 from .kernel_samples import UNUSED
 
@@ -37,6 +37,7 @@ NOT_HOT = {
     "blocks.estimation.mass_estimator._scratch": "memory, when a block is set up",
     "mathematics.linear_algebra.inverse": "before a run, when tables are made",
     "mathematics.linear_algebra.product": "before a run, when tables are made",
+    "mathematics.compiling.expressions.cross": "stands for loops, which kernels get before they run",
     "mathematics.compiling.chain_code.rows_of": "a view, when calls are bound",
     "mathematics.compiling.library_call._caller": "makes machine code, when calls are bound",
     "mathematics.compiling.compile_calls._tell": "says how far compiling is, before a run",
@@ -143,6 +144,7 @@ def compiler():
     def build(function):
         name = known[id(function)]
         if name not in compiled:
+            expand(function)
             scope = dict(function.__globals__)
             for used in function.__code__.co_names:
                 if id(scope.get(used)) in known:

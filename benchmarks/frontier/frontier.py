@@ -28,8 +28,7 @@ from ...planner.library.shipped import shipped_folder
 from ...robots.description import find_robot
 from ...studies.batch.jobs import job_results
 from ...studies.expansion import load_cell
-from ...studies.fingerprint import code_fingerprint
-from ...studies.journal import Journal, Outcome
+from ...studies.journal import Journal, Outcome, code_fingerprint
 from ..rows import Row
 from .chart import frontier_chart
 from .directions import DIRECTIONS, Direction

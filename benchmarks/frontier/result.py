@@ -7,8 +7,8 @@ from collections import Counter
 from collections.abc import Iterable
 from typing import Any
 
-from ...studies.confidence import wilson_interval
 from ...studies.journal import Outcome
+from ...studies.summary import wilson_interval
 from ..rows import Row
 from .jobs import required
 from .search import Tries

@@ -26,10 +26,9 @@ from ...planner.task.errors import PlanError, TaskError
 from ...planner.task.task import JumpTask
 from ...robots.description import RobotDescription, find_robot
 from ...studies.batch.jobs import job_results
-from ...studies.confidence import wilson_interval
 from ...studies.expansion import load_cell
-from ...studies.fingerprint import code_fingerprint
-from ...studies.journal import Journal, Outcome
+from ...studies.journal import Journal, Outcome, code_fingerprint
+from ...studies.summary import wilson_interval
 from ..rows import Row
 from .random_tasks import SEED, random_tasks, why_not
 

@@ -42,12 +42,10 @@ def draw_paper(
     from ...studies.batch.seeds import parse_seeds
     from ...studies.execution import Run
     from ...studies.expansion import cells as expand
-    from ...studies.figures.page import page
-    from ...studies.figures.paper import draw
+    from ...studies.figures.paper import draw, page
     from ...studies.journal import Journal
     from ...studies.reading import read_study
-    from ...studies.summary import summarise
-    from ...studies.table import make_table, write_table
+    from ...studies.summary import make_table, summarise, write_table
     from .studies import check_cells, make_all, report_stop
 
     found = read_study(study)

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 def check_cells(found: Study, expanded: Sequence[Cell], screen: Console) -> list[Cell]:
     """The cells, after each was checked as ``aloft check`` checks a graph."""
     from ...studies.expansion import checked_cells
-    from ...studies.fingerprint import code_fingerprint
+    from ...studies.journal import code_fingerprint
     from .output import progress_bar
 
     with progress_bar(screen, f"checking {len(expanded)} cells", len(expanded)) as (bar, task):
@@ -91,7 +91,7 @@ def study_json(
     study: Study, rows: Sequence[Row], seeds: Sequence[int], folder: Path
 ) -> dict[str, Any]:
     """The results as one JSON object."""
-    from ...studies.fingerprint import code_fingerprint
+    from ...studies.journal import code_fingerprint
     from ...studies.study import FIRST_REPORT_SEED
 
     n, successes = sum(row.n for row in rows), sum(row.successes for row in rows)

@@ -11,8 +11,8 @@ import pytest
 from PIL import Image
 
 from aloft.cli.shared import paper
-from aloft.studies.figures import offscreen
-from aloft.studies.figures.page import page
+from aloft.studies.figures import strip
+from aloft.studies.figures.paper import page
 from aloft.studies.reading import read_study
 
 CallJson = Callable[..., dict[str, Any]]
@@ -46,14 +46,14 @@ def drawn(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, Any
     study.write_text(text + "set: {duration: 40 ms}\n")
     screen = console(quiet=True)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(offscreen, "_context", unavailable)
+        patch.setattr(strip, "_context", unavailable)
         code = paper.draw_paper(folder / "out", "", 1, screen, False, study)
     assert code == 0
     return folder / "out", json.loads((folder / "out" / "paper.json").read_text())
 
 
 def unavailable(width: int, height: int) -> Any:
-    raise offscreen.NoRendererError(f"no OpenGL without a screen (none here); {offscreen.REMEDY}")
+    raise strip.NoRendererError(f"no OpenGL without a screen (none here); {strip.REMEDY}")
 
 
 def test_curves_are_drawn_and_frames_left_out_where_nothing_renders(
@@ -87,7 +87,7 @@ def test_what_the_command_does_not_take_is_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, call_json: CallJson
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    result = call_json("study", "paper", "--tune", code=2)
+    result = call_json("study", "paper", "--dry-run", code=2)
     assert result["reason"] == "'aloft study paper' takes --out, --seeds, --workers and --json"
 
 

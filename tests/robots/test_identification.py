@@ -13,11 +13,16 @@ import pytest
 from aloft.mathematics.arrays import Array
 from aloft.robots.description import find_robot
 from aloft.robots.identification import (
+    BLOCK,
+    CLUSTER,
     COM,
     MARGIN,
+    SOFT_SPEED,
     IdentificationError,
     Motion,
     _Assembly,
+    _clustered,
+    _solve,
     identify_delay,
     identify_rigid_body,
 )
@@ -130,6 +135,84 @@ def test_an_offset_of_the_torso_and_more_mass_are_what_the_columns_say() -> None
     )
     more, _ = _Assembly(ROBOT.changed(links=heavier), np.zeros(N, dtype=np.bool_))._tick(motion, 1)
     np.testing.assert_allclose(more[:, 0], 1.1 * rows[:, 0], rtol=1e-9, atol=1e-9)
+
+
+def test_equations_that_agree_are_solved_exactly() -> None:
+    rng = np.random.default_rng(3)
+    rows, unknown = rng.normal(size=(7, 4, 3)), rng.normal(size=3)
+    np.testing.assert_allclose(_solve(rows, rows @ unknown), unknown, atol=1e-12)
+
+
+def test_the_error_of_a_mean_is_that_of_its_clusters() -> None:
+    """One unknown, the mean of n numbers: var = sum of (sums of errors by cluster)^2 / n^2, c / (c - 1)."""
+    count = 6 * CLUSTER
+    error = np.random.default_rng(4).normal(size=(count, 1))
+    where = 500 + BLOCK * np.arange(count)
+    sums = error.reshape(6, CLUSTER).sum(axis=1)
+    found = _clustered(np.ones((count, 1, 1)), error, where)
+    assert found.shape == (1, 1)
+    assert found[0, 0] == pytest.approx((sums**2).sum() / count**2 * 6 / 5)
+    # twice the rows: half of the unknown
+    half = _clustered(np.full((count, 1, 1), 2.0), error, where)
+    assert half[0, 0] == pytest.approx(found[0, 0] / 4.0)
+
+
+def moving(ticks: int, mass: float, offset: Array, coulomb: float) -> Motion:
+    """A robot in the air whose joints swing, with the torques and forces that its dynamics need."""
+    import pinocchio as pin
+
+    links = tuple(
+        link.model_copy(update={
+            "mass": mass * link.mass, "inertia": tuple(mass * i for i in link.inertia),
+            "com": tuple(np.array(link.com) + (offset if link.name == ROBOT.base else 0.0)),
+        })
+        for link in ROBOT.links
+    )  # fmt: skip
+    model = build_pinocchio_model(ROBOT.changed(links=links)).model
+    model.armature = np.zeros(model.nv)
+    model.gravity.linear = np.zeros(3)
+    data = model.createData()
+    time = 0.002 * np.arange(ticks)
+    phase = np.linspace(0.0, 5.0, N)
+    rate = 6.0 + np.arange(N)
+    swing = np.cos(np.outer(time, rate) + phase)
+    position = ROBOT.standing_position + 0.2 * swing
+    velocity = -0.2 * rate * np.sin(np.outer(time, rate) + phase)
+    turning = 0.5 * np.sin(np.outer(time, [3.0, 4.0, 5.0]))
+    force, torque = np.zeros((ticks, 3)), np.zeros((ticks, N))
+    for k in range(1, ticks):
+        q, v, a = np.zeros(7 + N), np.zeros(6 + N), np.zeros(6 + N)
+        q[6], q[7:] = 1.0, 0.5 * (position[k - 1] + position[k])
+        v[3:6], v[6:] = 0.5 * (turning[k - 1] + turning[k]), 0.5 * (velocity[k - 1] + velocity[k])
+        a[3:6], a[6:] = (
+            (turning[k] - turning[k - 1]) / 0.002,
+            (velocity[k] - velocity[k - 1]) / 0.002,
+        )
+        # free flight: the base accelerates such that no force is needed on it
+        nothing = pin.rnea(model, data, q, v, a)[:3]
+        unit = np.array([pin.rnea(model, data, q, v, a + np.eye(6 + N)[i])[:3] - nothing
+                         for i in range(3)]).T  # fmt: skip
+        a[:3] = np.linalg.solve(unit, -nothing)
+        force[k] = a[:3]
+        torque[k] = pin.rnea(model, data, q, v, a)[6:] + ROBOT.rotor_matrix @ a[6:]
+        torque[k] += coulomb * np.tanh(v[6:] / SOFT_SPEED) + 0.1 * v[6:]
+    closed = np.zeros((ticks, 4), dtype=np.bool_)
+    up = np.tile([0.0, 0.0, 1.0], (ticks, 1))
+    return Motion(0.002, position, velocity, torque, turning, force, up, closed)
+
+
+def test_friction_that_was_put_in_is_found_again() -> None:
+    """Without a contact only the torques tell; the moments about the base are left to nobody."""
+    motion = moving(700, 1.0, np.zeros(3), 0.3)
+    assembly = _Assembly(ROBOT, np.ones(N, dtype=np.bool_))
+    rows, right, where = assembly.blocks(motion, np.arange(1, 700))
+    assert len(rows) == len(where) == 699 // BLOCK and where[0] == 1
+    joints = rows[:, 6:, :]
+    found = _solve(joints, right[:, 6:])
+    np.testing.assert_allclose(found[4 : 4 + N], 0.3, atol=1e-6)
+    np.testing.assert_allclose(found[4 + N :], 0.1, atol=1e-6)
+    assert found[0] == pytest.approx(1.0, abs=1e-6)
+    np.testing.assert_allclose(found[COM], 0.0, atol=1e-6)
 
 
 PERIOD = 0.002

@@ -10,7 +10,7 @@ from aloft.studies.execution import Run, make_runs
 from aloft.studies.expansion import cells, checked_cells
 from aloft.studies.journal import Journal
 from aloft.studies.reading import read_study
-from aloft.studies.table import make_table, write_table
+from aloft.studies.summary import make_table, write_table
 
 from ..local_cluster import local_cluster
 

@@ -1,9 +1,10 @@
 """Tuning: equal effort, determinism, the best draw, the file, and what it is good for."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -15,14 +16,18 @@ from aloft.studies.journal import Outcome
 from aloft.studies.reading import read_study
 from aloft.studies.study import Study
 from aloft.studies.tuning import (
-    best_draws,
-    draws,
+    AT_ONCE,
+    Draw,
     extreme_cells,
+    order,
     read_tuned,
+    search,
     tuning_cells,
-    tuning_runs,
+    value_to_minimise,
     write_tuned,
 )
+
+pytest.importorskip("optuna")
 
 Read = Callable[[str], Study]
 TEXT = """
@@ -41,41 +46,31 @@ tune:
 """
 
 
-def done(found: Study, judge: Callable[[Run], Outcome]) -> list[tuple[str, int, Run]]:
+def made_by(
+    found: Study, judge: Callable[[Run], Outcome]
+) -> tuple[dict[str, Draw], list[tuple[str, Run]]]:
+    """The best draws and, by arm, all runs that were made."""
     checked = [replace(cell, key=str(n)) for n, cell in enumerate(tuning_cells(found))]
-    runs = tuning_runs(found, checked)
-    return [(arm, draw, replace(run, outcome=judge(run))) for arm, draw, run in runs]
+    runs: list[tuple[str, Run]] = []
+
+    def make(asked: Sequence[Run]) -> list[Run]:
+        runs.extend((run.cell.arm, run) for run in asked)
+        return [replace(run, outcome=judge(run)) for run in asked]
+
+    best = search(found, checked, make)
+    assert best is not None
+    return best, runs
 
 
 def test_every_arm_gets_the_same_draws_cells_and_seeds(study: Read) -> None:
     found = study(TEXT)
-    runs = done(found, lambda run: Outcome(True, ""))
+    _, runs = made_by(found, lambda run: Outcome(True, ""))
     for arm, count in (("fixed", 1), ("one", 20), ("two", 20)):
-        mine = [(draw, run) for name, draw, run in runs if name == arm]
+        mine = [run for name, run in runs if name == arm]
         assert len(mine) == count * 2 * 2
-        tried = {(d, r.cell.labels["stop"], r.seed) for d, r in mine}
-        assert tried == {(d, s, n) for d in range(count) for s in ("10", "30") for n in (5, 6)}
-        assert all("double.goal" in run.cell.overrides for _, run in mine)
-    keys = {run.key for _, _, run in runs}
-    assert len(keys) == len(runs)
-
-
-def test_draws_are_decided_by_seed_arm_and_number_alone(study: Read) -> None:
-    found = study(TEXT)
-    assert found.tuning is not None
-    one, two = found.arms[1], found.arms[2]
-    first = [draw.values for draw in draws(one, found.tuning)]
-    assert first[0] == {} and len({str(values) for values in first}) == 20
-    more = draws(one, replace(found.tuning, draws=30))
-    assert [draw.values for draw in more[:20]] == first
-    assert [d.values for d in draws(one, replace(found.tuning, seed=1))[1:]] != first[1:]
-    assert [d.values for d in draws(replace(one, name="other"), found.tuning)[1:]] != first[1:]
-    assert all(0 <= values["counter.goal"] <= 10 for values in first[1:])
-    goals = [draw.values["double.goal"] for draw in draws(two, found.tuning)[1:]]
-    numbers = [float(goal.removesuffix(" cm")) for goal in goals]
-    assert all(1 <= number <= 100 for number in numbers)
-    assert sum(number < 10 for number in numbers) in range(5, 15)  # half of them, in the logarithm
-    assert {draw.values["counter.goal"] for draw in draws(two, found.tuning)[1:]} == {1, 2}
+        tried = {(run.cell.labels["stop"], run.seed) for run in mine}
+        assert tried == {(stop, seed) for stop in ("10", "30") for seed in (5, 6)}
+        assert all("double.goal" in run.cell.overrides for run in mine)
 
 
 def test_the_best_succeeds_most_then_has_the_least_metric_then_is_the_first(study: Read) -> None:
@@ -87,21 +82,27 @@ def test_the_best_succeeds_most_then_has_the_least_metric_then_is_the_first(stud
             return Outcome(goal > 4, "", metrics={"metric_m": goal})
         return Outcome(True, "", metrics={"metric_m": math.nan if goal == 1 else 3.0})
 
-    runs = done(found, judge)
-    best = best_draws(found, runs)
-    tried = [draw.values["counter.goal"] for draw in draws(found.arms[1], found.tuning)[1:]]  # type: ignore[arg-type]
+    best, runs = made_by(found, judge)
+    tried = [run.cell.overrides["counter.goal"] for arm, run in runs if arm == "one"]
     assert best["one"].values["counter.goal"] == min(goal for goal in tried if goal > 4)
     assert (best["one"].successes, best["one"].n) == (4, 4)
     assert best["fixed"].number == 0 and best["fixed"].values == {}
-    again = best_draws(found, list(reversed(runs)))
-    assert {arm: d.number for arm, d in again.items()} == {a: d.number for a, d in best.items()}
+
+
+def test_values_lie_in_their_ranges(study: Read) -> None:
+    _, runs = made_by(study(TEXT), lambda run: Outcome(True, ""))
+    tried = [run.cell.overrides for arm, run in runs if arm == "two"][4:]
+    numbers = [float(values["double.goal"].removesuffix(" cm")) for values in tried]
+    assert all(1 <= number <= 100 for number in numbers)
+    assert {values["counter.goal"] for values in tried} == {1, 2}
+    assert all(0 <= run.cell.overrides["counter.goal"] <= 10 for arm, run in runs if arm == "one")
 
 
 def test_the_file_is_read_back_and_belongs_to_what_was_tuned(study: Read) -> None:
     found = study(TEXT)
-    with pytest.raises(AloftError, match=r"no study.tuned.yaml; run aloft study study.yaml --tune"):
+    with pytest.raises(AloftError, match=r"no study.tuned.yaml; run aloft tune study.yaml"):
         read_tuned(found)
-    best = best_draws(found, done(found, lambda run: Outcome(run.cell.arm != "one", "")))
+    best, _ = made_by(found, lambda run: Outcome(run.cell.arm != "one", ""))
     best["two"] = replace(best["two"], values={"double.goal": "3 cm", "counter.goal": [1, 2.5]})
     assert write_tuned(found, best) == Path("study.tuned.yaml")
     tuned = read_tuned(found)
@@ -126,3 +127,72 @@ def test_a_filter_may_leave_out_arms_that_are_not_tuned(study: Read) -> None:
     found = study(TEXT.replace("where: {", "where: {arm: two, "))
     assert {cell.arm for cell in tuning_cells(found)} == {"two"}
     assert read_study(found.path).tuning == found.tuning
+
+
+SEARCHING_TEXT = """
+arms:
+  fixed: {set: {counter.goal: 1}, tune: {}}
+  one: {tune: {counter.goal: [0, 100], double.goal: {from: 1 cm, to: 1 m, log: true}}}
+  two: {tune: {counter.goal: {choices: [10, 20, 30]}}}
+tune: {seeds: 5:7, draws: 30, least: metric}
+"""
+
+
+def judged(run: Run) -> Outcome:
+    """The metric is least at a goal of 42 and at 10 cm; seed 6 fails far from it."""
+    goal = float(run.cell.overrides.get("counter.goal", 0))
+    other = float(str(run.cell.overrides.get("double.goal", "100 cm")).removesuffix(" cm"))
+    metric = abs(goal - 42.0) + abs(other - 10.0)
+    return Outcome(run.seed == 5 or metric < 60.0, "", metrics={"metric": metric})
+
+
+def searched(study: Study, most: int = 10**9) -> tuple[dict[str, Draw] | None, list[Any]]:
+    made: list[Any] = []
+
+    def make(runs: Sequence[Run]) -> list[Run] | None:
+        if len(made) + len(runs) > most:
+            return None
+        made.extend((run.key, dict(run.cell.overrides)) for run in runs)
+        return [replace(run, outcome=judged(run)) for run in runs]
+
+    cells = [replace(cell, key=str(n)) for n, cell in enumerate(tuning_cells(study))]
+    return search(study, cells, make), made
+
+
+def test_every_arm_gets_the_same_effort_and_a_better_set_is_found(study: Read) -> None:
+    found = study(SEARCHING_TEXT)
+    best, made = searched(found)
+    assert best is not None
+    assert len(made) == 2 * (1 + 30 + 30)
+    assert best["fixed"].values == {} and best["fixed"].number == 0
+    one = best["one"]
+    assert one.successes == 2 and one.least < 25.0
+    assert best["two"].values == {"counter.goal": 30}
+    # draw 0 is the arm as it is written, so tuning never ends below it
+    assert made[0][1] == {"counter.goal": 1}
+
+
+def test_the_same_is_proposed_again_and_after_a_stop(study: Read) -> None:
+    found = study(SEARCHING_TEXT)
+    best, made = searched(found)
+    assert searched(found) == (best, made)
+    stopped, part = searched(found, most=2 * (1 + 2 + 2 * AT_ONCE))
+    assert stopped is None and made[: len(part)] == part and len(part) > 2 * AT_ONCE
+    assert found.tuning is not None
+    assert searched(replace(found, tuning=replace(found.tuning, seed=1)))[1] != made
+
+
+def test_the_value_orders_draws_as_they_are_ranked() -> None:
+    draws = [
+        Draw(0, {}, 4, 3, 5.0), Draw(1, {}, 4, 4, 1e9), Draw(2, {}, 4, 4, -7.0), Draw(3, {}, 4, 0),
+        Draw(4, {}, 4, 3, 4.5),
+    ]  # fmt: skip
+    assert sorted(draws, key=order) == sorted(draws, key=lambda d: value_to_minimise(d, 4))
+
+
+def test_optuna_is_asked_for(study: Read, monkeypatch: pytest.MonkeyPatch) -> None:
+    import sys
+
+    monkeypatch.setitem(sys.modules, "optuna", None)
+    with pytest.raises(AloftError, match=r"aloft tune needs Optuna: pip install 'aloft\[tune\]'"):
+        searched(study(SEARCHING_TEXT))

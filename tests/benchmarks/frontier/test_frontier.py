@@ -10,7 +10,7 @@ from aloft.benchmarks.frontier import frontier as module
 from aloft.benchmarks.frontier.directions import DIRECTIONS, Direction
 from aloft.benchmarks.frontier.frontier import frontier
 from aloft.benchmarks.frontier.jobs import PlanJob, RunJob, enough
-from aloft.studies.batch.job import JobResult, attempt
+from aloft.studies.batch.jobs import JobResult, attempt
 from aloft.studies.journal import Outcome
 
 UP, BACK = DIRECTIONS[0], DIRECTIONS[2]

@@ -12,7 +12,7 @@ from aloft.studies.journal import Outcome
 
 
 def in_this_process(function, jobs):  # type: ignore[no-untyped-def]
-    from aloft.studies.batch.job import JobResult, attempt
+    from aloft.studies.batch.jobs import JobResult, attempt
 
     for index, job in enumerate(jobs):
         yield JobResult(index, *attempt(function, job))

@@ -7,11 +7,23 @@ import math
 import numpy as np
 import pytest
 
+from aloft.blocks.control.followed_plan import (
+    BEFORE,
+    Flown,
+    Following,
+    PlannedJoints,
+    Soles,
+    keeps_acceleration,
+    planned_pitch,
+    turned_too_far,
+)
 from aloft.blocks.control.leg_inverse_kinematics import LegInverseKinematics
 from aloft.blocks.signals import Phase
+from aloft.mathematics.rotations import multiply, to_matrix
 from aloft.robots.description import find_robot
 from aloft.runtime.testing import BlockBench
 
+from ...turns import quaternion_of
 from .test_leg_inverse_kinematics import feet_of
 
 ROBOT = find_robot("bruce")
@@ -95,3 +107,59 @@ def test_the_lead_reads_no_acceleration_of_the_landing():
             )  # fmt: skip
             bench.step()
         assert bench.get("target").velocity == pytest.approx(2.0 + 0.01 * expected)
+
+
+def plan_of(**values):
+    """The planned joints, with the values named."""
+    plan = PlannedJoints(
+        np.zeros((), dtype=np.int64), *(np.zeros(()) for _ in range(3)), np.array([0.0, 0, 0, 1]),
+        *(np.zeros(10) for _ in range(3)),
+    )  # fmt: skip
+    for name, value in values.items():
+        getattr(plan, name)[...] = value
+    return plan
+
+
+@pytest.mark.parametrize("pitch", [-3.0, -1.0, 0.0, 0.7, 2.5])
+@pytest.mark.parametrize("other", [(0.0, 0.0), (0.3, 0.0), (0.0, -0.4), (-0.2, 0.5)])
+def test_the_planned_pitch_is_the_turn_about_y_before_roll_and_yaw(pitch, other):
+    roll, yaw = other
+    found = planned_pitch(plan_of(orientation=quaternion_of([0.0, pitch, 0.0])))
+    assert found == pytest.approx(pitch, abs=1e-12)
+    rolled = multiplied(quaternion_of([0.0, pitch, 0.0]), quaternion_of([roll, 0.0, 0.0]))
+    turned = multiplied(rolled, quaternion_of([0.0, 0.0, yaw]))
+    matrix = np.empty((3, 3))
+    to_matrix(turned, matrix)
+    # the x axis, seen in the plane of x and z
+    expected = math.atan2(-matrix[2, 0], matrix[0, 0])
+    assert planned_pitch(plan_of(orientation=turned)) == pytest.approx(expected, abs=1e-12)
+
+
+def multiplied(first, second):
+    out = np.empty(4)
+    multiply(first, second, out)
+    return out
+
+
+@pytest.mark.parametrize("pitch", [-2.9, -0.5, 0.0, 1.0, 3.0])
+@pytest.mark.parametrize("more", [-0.3, 0.0, 0.2])
+def test_how_far_the_base_has_turned_beyond_the_plan(pitch, more):
+    c, s = math.cos(pitch + more), math.sin(pitch + more)
+    level = np.array([[[c, 0.0, -s], [0.0, 1.0, 0.0], [s, 0.0, c]]])
+    soles = Soles(level, np.zeros(1, int), np.ones(1), np.full(1, -9.0), np.full(1, 9.0))
+    assert turned_too_far(0, soles, pitch) == pytest.approx(more, abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("touchdown", "known", "late", "keeps"),
+    [
+        (1.0, True, 0.01, True), (1.0, False, 0.01, False), (1.0, True, 0.0, False),
+        (1.0 + 0.9 * BEFORE, True, 0.01, True), (1.0 + 1.1 * BEFORE, True, 0.01, False),
+        (1.0 - 0.9 * BEFORE, True, 0.01, True), (1.0 - 1.1 * BEFORE, True, 0.01, False),
+    ],
+)  # fmt: skip
+def test_accelerations_near_the_touchdown_are_those_of_before(touchdown, known, late, keeps):
+    following = Following(np.zeros(1), np.zeros(1), np.full(1, late))
+    flown = Flown(np.array(known), np.zeros(()), *(np.zeros(10) for _ in range(3)))
+    plan = plan_of(time=1.0, touchdown_time=touchdown)
+    assert keeps_acceleration(following, plan, flown) == keeps

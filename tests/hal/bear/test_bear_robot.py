@@ -16,12 +16,15 @@ import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 import yaml
 
 import aloft
+from aloft.blocks.signals import DrivePhase
+from aloft.hal.bear.bear_robot import BearRobot
 from aloft.hal.bear.bus import open_port
 from aloft.hal.bear.configuration import Hardware
 from aloft.hal.bear.protocol import Instruction, frame_bytes
@@ -222,3 +225,138 @@ def test_the_kernel_of_the_goals_is_compiled_with_the_graph() -> None:
     graph = aloft.load(Path(aloft.__file__).parent / "graphs" / "jump_robot.yaml")
     calls = BoundGraph(graph.checked).kernel_calls
     assert "aloft.hal.drive_control.make_goals" in [call.name for call in calls]
+
+
+def block(**values: Any) -> SimpleNamespace:
+    """What the methods of the block read: periods of 1 ms and ticks of 4 ms, nothing else."""
+    params = SimpleNamespace(time="real", graph_timeout=0.04, command_age=0.02)
+    bus = SimpleNamespace(period=0.001)
+    found = SimpleNamespace(
+        params=params, period=0.004, _hardware=SimpleNamespace(bus=bus), _next_tick=0, _thread=None,
+        _queue=None, _watchdog=None, _switch=SimpleNamespace(held=lambda: True), driver=None,
+        context=SimpleNamespace(clock=SimpleNamespace(command_limit=0.0)),
+    )  # fmt: skip
+    for name, value in values.items():
+        setattr(found, name, value)
+    return found
+
+
+def test_ticks_begin_with_every_fourth_cycle_and_those_that_are_over_are_missed() -> None:
+    waited: list[tuple[int, float]] = []
+
+    def wait_for(cycle: int, seconds: float) -> bool:
+        waited.append((cycle, seconds))
+        return True
+
+    robot = block(_thread=SimpleNamespace(done=0, wait_for=wait_for))
+    missed = []
+    for done in (0, 4, 9, 21, 23, 24):
+        robot._thread.done = done
+        missed.append(BearRobot.wait(robot))  # type: ignore[arg-type]
+    assert missed == [0, 0, 0, 1, 0, 0]
+    assert [cycle for cycle, _ in waited] == [4, 8, 12, 20, 24, 28]
+    assert all(seconds > 0.0 for _, seconds in waited)
+    assert BearRobot.wait(block()) == 0  # type: ignore[arg-type]
+
+
+def test_a_motor_thread_that_makes_no_cycle_is_a_fault() -> None:
+    faults: list[str] = []
+    loop = SimpleNamespace(fail=faults.append)
+    stopped: list[bool] = []
+    robot = block(
+        _thread=SimpleNamespace(done=0, wait_for=lambda cycle, seconds: False),
+        _driver=SimpleNamespace(loop=loop), stop_after_fault=lambda: stopped.append(True),
+    )  # fmt: skip
+    assert BearRobot.wait(robot) == 0  # type: ignore[arg-type]
+    assert faults == ["the motor thread made no cycle for 1 s"] and stopped == [True]
+
+
+def test_why_the_motor_thread_must_not_go_on() -> None:
+    def reason(robot: SimpleNamespace) -> str:
+        return BearRobot._stop_reason(robot)  # type: ignore[arg-type]
+
+    assert reason(block()) == ""
+    let_go = SimpleNamespace(held=lambda: False)
+    assert reason(block(_switch=let_go)) == "the dead man's switch was let go"
+    for tripped in (True, False):
+        robot = block(_watchdog=SimpleNamespace(tripped=tripped))
+        assert reason(robot).endswith("the graph hung for 40 ms") == tripped
+    robot = block(_watchdog=SimpleNamespace(tripped=True))
+    robot.context.clock.command_limit = 0.015
+    assert reason(robot).endswith("or no commands came over the links for 15 ms")
+
+
+@pytest.mark.parametrize("phase", [DrivePhase.OFF, DrivePhase.DRIVING])
+def test_damping_waits_for_two_cycles_and_leaves_drives_that_are_off(phase: DrivePhase) -> None:
+    waited: list[int] = []
+    thread = SimpleNamespace(done=7, wait_for=lambda cycle, seconds: waited.append(cycle))
+    damped: list[int] = []
+    loop = SimpleNamespace(link_lost=False, phase=phase)
+    driver = SimpleNamespace(loop=loop, damp=damped.append)
+    BearRobot.damp(block(driver=driver, _thread=thread))  # type: ignore[arg-type]
+    assert waited == [9] and damped == []
+    assert loop.phase is (DrivePhase.OFF if phase is DrivePhase.OFF else DrivePhase.DAMPED)
+    BearRobot.damp(block(driver=driver))  # type: ignore[arg-type]
+    BearRobot.damp(block(driver=driver, _queue=SimpleNamespace(cycles=4)))  # type: ignore[arg-type]
+    assert damped == [1, 4]
+    loop.link_lost = True
+    BearRobot.damp(block(driver=driver, _thread=thread))  # type: ignore[arg-type]
+    BearRobot.damp(block())  # type: ignore[arg-type]
+    assert waited == [9] and damped == [1, 4]
+
+
+def test_the_time_of_a_twin_is_that_of_its_exchanges() -> None:
+    robot = block(_driver=SimpleNamespace(loop=SimpleNamespace(cycles=250)))
+    robot.params.time = "virtual"
+    assert BearRobot.now(robot) == pytest.approx(0.25)  # type: ignore[arg-type]
+    robot.params.time, robot._opened_at = "real", time.monotonic() - 3.0
+    assert BearRobot.now(robot) == pytest.approx(3.0, abs=1.0)  # type: ignore[arg-type]
+
+
+def test_periods_of_the_soft_start_follow_one_another() -> None:
+    robot = block(_cycle=time.monotonic())
+    start = robot._cycle
+    for k in range(1, 6):
+        assert BearRobot._next_cycle(robot)  # type: ignore[arg-type]
+        assert time.monotonic() >= start + 0.001 * k
+    robot._cycle = time.monotonic() - 10.0  # far too late: it goes on from now
+    before = time.monotonic()
+    BearRobot._next_cycle(robot)  # type: ignore[arg-type]
+    assert before - 1e-6 <= robot._cycle <= time.monotonic()
+    robot._switch = SimpleNamespace(held=lambda: False)
+    assert not BearRobot._next_cycle(robot)  # type: ignore[arg-type]
+    robot.params.time = "virtual"
+    assert BearRobot._next_cycle(robot)  # type: ignore[arg-type]
+
+
+def test_commands_go_to_the_thread_or_to_the_next_exchanges() -> None:
+    followed: list[object] = []
+    thread = SimpleNamespace(follow=lambda *given: followed.append(given))
+    watchdog = SimpleNamespace(beat=lambda last: followed.append(last))
+    queue = SimpleNamespace(
+        give=lambda given: followed.append(given), advance=lambda: followed.append("on")
+    )
+    common = {"command": "c", "stop_after_fault": lambda: None}
+    robot = block(_thread=thread, _watchdog=watchdog, **common)
+    robot.context.clock.commands_heard = lambda: 17
+    BearRobot.write(robot)  # type: ignore[arg-type]
+    BearRobot.advance(robot)  # type: ignore[arg-type]
+    assert followed == [17, ("c", 17)]
+    followed.clear()
+    robot = block(_queue=queue, **common)
+    robot.context.clock.commands_heard = lambda: 0
+    BearRobot.write(robot)  # type: ignore[arg-type]
+    BearRobot.advance(robot)  # type: ignore[arg-type]
+    assert followed == ["c", "on"]
+
+
+@pytest.mark.parametrize(
+    ("period", "fits"),
+    [(0.001, True), (0.004, True), (0.0025, False), (0.0005, False), (0.04, True)],
+)
+def test_the_control_period_is_a_whole_number_of_the_buss(period: float, fits: bool) -> None:
+    params = BearRobot.Params(**BearRobot.example_parameters())
+    context = SimpleNamespace(robot=ROBOT, period=period, folder=Path("/"), graph_folder=Path("/"))
+    found = list(BearRobot.requires_of_graph(params, context))  # type: ignore[arg-type]
+    assert (found == []) == fits
+    assert fits or "does not divide the control period" in str(found[0])

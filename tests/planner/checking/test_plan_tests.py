@@ -268,3 +268,14 @@ def test_a_knot_moved_aside_slips_by_as_much(by_hand: JumpPlan, amount: float) -
     before = found(by_hand)["foot_slip"].value
     slip = found(change_of_sole(by_hand)(amount))["foot_slip"].value
     assert slip == pytest.approx(abs(amount), abs=before + 1e-4)
+
+
+def test_the_landing_may_have_another_effort() -> None:
+    plan = shipped("down_35cm")
+    robot = plan.task.equipped(ROBOT)
+    evidence = Evidence(plan, robot, replay(plan, robot))
+    time = evidence.replay.samples.time
+    assert plan.task.landing_effort != plan.task.effort
+    before, behind = time < plan.touchdown_time - 1e-6, time > plan.touchdown_time + 1e-6
+    assert set(evidence.effort[before, 0]) == {plan.task.effort}
+    assert plan.task.landing_effort in evidence.effort[behind, 0]

@@ -1,12 +1,14 @@
 """The validity check: what a plan by hand passes, and that every test can fail by itself."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from aloft.blocks.signals import Phase
+from aloft.planner.checking import validity
+from aloft.planner.checking.evidence import Found
 from aloft.planner.checking.validity import (
     InvalidPlanError,
     ValidityReport,
@@ -193,3 +195,16 @@ def test_a_landing_may_have_more_of_the_motors_than_the_rest() -> None:
         float(where.split(" at ")[1].split()[0]) for where in failed.values() if " at " in where
     ]
     assert min(times) >= plan.touchdown_time - 1e-3  # said in milliseconds
+
+
+def test_a_test_passes_up_to_its_limit(by_hand: JumpPlan, monkeypatch: pytest.MonkeyPatch) -> None:
+    def bounds(evidence: object) -> Iterator[Found]:
+        for name, value in (("at", 2.0), ("above", 2.0 + 1e-9), ("below", -5.0), ("none", np.nan)):
+            yield Found(name, value, 2.0, "m", "a length")
+
+    monkeypatch.setattr(validity, "PLAN_TESTS", (bounds,))
+    found = check_plan(by_hand, ROBOT)
+    assert {test.name: test.passed for test in found.tests} == {
+        "at": True, "above": False, "below": True, "none": False,
+    }  # fmt: skip
+    assert [test.name for test in found.failed] == ["above", "none"] and not found.valid

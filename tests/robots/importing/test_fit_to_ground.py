@@ -6,7 +6,14 @@ import numpy as np
 import pytest
 
 from aloft.robots.description import RobotDescription, find_robot
-from aloft.robots.importing.fit_to_ground import find_standing_pose
+from aloft.robots.importing.fit_to_ground import (
+    CLEARANCE,
+    _above,
+    find_standing_pose,
+    fit_to_ground,
+)
+from aloft.robots.kinematics import link_poses_in_base, standing_heights
+from aloft.robots.robot_description import Shape
 
 from ..example_robots import needs_robots
 from ..limbed_robots import humanoid, quadruped
@@ -57,3 +64,47 @@ def test_a_robot_without_feet_and_an_unknown_joint() -> None:
         find_standing_pose(robot.changed(feet=(), contacts=()))
     with pytest.raises(ValueError, match="bruce has no joint knee"):
         find_standing_pose(robot, {"knee": 1.0})
+
+
+def test_a_pose_is_found_only_where_none_is_given() -> None:
+    robot = find_robot("bruce")
+    same, notes = fit_to_ground(robot, True, {})
+    assert same.standing == robot.standing
+    assert [note.split(" reach ")[0] for note in notes] == ["shapes of right_foot, left_foot"]
+    fitted, (found, *others) = fit_to_ground(robot, False, {})
+    assert found == "standing is not given: the pose was found" and len(others) == 1
+    assert fitted.standing == find_standing_pose(robot).angles != robot.standing
+    assert fit_to_ground(robot.changed(feet=(), contacts=()), False, {})[1] == []
+
+
+def test_shapes_end_above_the_ground_and_what_lies_below_is_gone() -> None:
+    upright = np.eye(3)
+    shape = Shape(start=(0.0, 0.0, 0.0), end=(0.0, 0.0, -1.0), radius=0.1)
+    assert _above(shape, upright, -1.2) is shape
+    shortened = _above(shape, upright, -0.6)
+    assert shortened is not None and shortened.start == (0.0, 0.0, 0.0)
+    # the lower ball now rests at the height: its centre is a radius above it
+    assert shortened.end[2] - 0.1 == pytest.approx(-0.6, abs=1e-3) and shortened.radius == 0.1
+    assert _above(shape, upright, 0.0) is None and _above(shape, upright, 5.0) is None
+    # upside down it is the other end that is cut
+    over = np.diag([1.0, -1.0, -1.0])
+    turned = _above(shape, over, 0.3)
+    assert turned is not None and turned.end == (0.0, 0.0, -1.0)
+    assert -turned.start[2] - 0.1 == pytest.approx(0.3, abs=1e-3)
+
+
+def test_a_low_shape_of_a_robot_is_cut_in_its_standing_pose() -> None:
+    robot = find_robot("bruce")
+    calf = next(link for link in robot.links if link.name == "left_calf")
+    long = Shape(start=(0.0, 0.0, 0.0), end=(0.0, 0.0, -0.6), radius=0.02)
+    links = tuple(
+        link.model_copy(update={"shapes": (*link.shapes, long)}) if link is calf else link
+        for link in robot.links
+    )
+    fitted, notes = fit_to_ground(robot.changed(links=links), True, {})
+    assert len(notes) == 1 and "left_calf" in notes[0] and "right_calf" not in notes[0]
+    (cut,) = fitted.link("left_calf").shapes[len(calf.shapes) :]
+    rotation, position = link_poses_in_base(robot, robot.standing_position)["left_calf"]
+    low = min((position + rotation @ np.array(end))[2] for end in (cut.start, cut.end)) - 0.02
+    ground = float(np.min(standing_heights(robot)))
+    assert ground + CLEARANCE - 1e-4 <= low <= ground + CLEARANCE + 2e-3

@@ -84,3 +84,11 @@ def test_the_headline_counts(tmp_path: Path) -> None:
 def test_what_has_no_fault_can_be_read() -> None:
     assert find_faults(hopper()) == ()
     assert RobotDescription.model_validate(hopper()).name == "hopper"
+
+
+@pytest.mark.parametrize(
+    ("data", "found"), [(None, "nothing"), ([1, 2], "a list"), ("bruce", "a str"), (3.5, "a float")]
+)
+def test_what_is_no_mapping_describes_no_robot(data: object, found: str) -> None:
+    (fault,) = find_faults(data)
+    assert fault.message == "this describes no robot" and fault.found == found

@@ -29,3 +29,10 @@ def test_a_restored_graph_begins_anew() -> None:
     clock.stop_reason = None
     clock.stopped_by = ""
     assert clock.stop_request is None and clock.stop_reason is None
+
+
+def test_commands_were_heard_when_their_links_say_so() -> None:
+    clock = PartClock(0.01)
+    assert clock.commands_heard() == 0
+    clock.heard = lambda: 17
+    assert clock.commands_heard() == 17

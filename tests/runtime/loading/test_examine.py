@@ -51,6 +51,13 @@ def test_clock() -> None:
     assert graph_of(CONSTANT, head).clock == ClockSpec("paced", "stop", 3)
 
 
+@pytest.mark.parametrize("value", ["0", "-1", "true", "1.5", "three", "[1]"])
+def test_overruns_in_a_row_are_a_whole_number_from_one(value: str) -> None:
+    (problem,) = problems_of(CONSTANT, f"rate: 1\nclock: {{stop_after: {value}}}")
+    assert problem.startswith("bad-value: clock.stop_after cannot be")
+    assert graph_of(CONSTANT, "rate: 1\nclock: {stop_after: 1}").clock.stop_after == 1
+
+
 @pytest.mark.parametrize(
     ("rate", "offset", "period"), [("100", 0, 1), ("50 Hz", 1, 2), ("33.3333333333 Hz", 2, 3)]
 )
@@ -70,6 +77,33 @@ def test_dimensions_of_robot_graph_and_block() -> None:
     assert graph.robot is not None and graph.robot.name == "bruce"
     sizes = graph.block("one").dimensions
     assert (sizes["n"], sizes["m"], sizes["n_joints"]) == (3, 5, 10)
+
+
+SIZED = """\
+from aloft import Block, Field, Output, Signal
+
+
+class Sized(Signal):
+    value = Field("m")
+
+
+class Source(Block):
+    y = Output(Sized)
+
+    def step(self):
+        self.y.value[:] = 1.0
+"""
+
+
+def test_the_fix_for_a_missing_dimension_is_a_key_of_the_graph(tmp_path: Path) -> None:
+    (tmp_path / "sized.py").write_text(SIZED)
+    path = tmp_path / "graph.yaml"
+    path.write_text("rate: 1\nblocks:\n  one: {use: sized:Source}\n")
+    (problem,) = check(path).problems
+    assert problem.message == "one (sized:Source) needs the dimension 'm', which nothing gives"
+    assert problem.fix == "for the whole graph, beside 'blocks': dimensions: {m: 3}"
+    path.write_text(f"{problem.fix.partition(': ')[2]}\n{path.read_text()}")
+    assert load(path).block("one").dimensions["m"] == 3
 
 
 def test_a_robot_from_a_file_beside_the_graph(tmp_path: Path) -> None:

@@ -1,16 +1,20 @@
-"""Jobs on a Dask cluster: a real scheduler and real worker processes, on the loopback only."""
+"""Jobs on a Dask cluster: a real scheduler and real worker processes, on the loopback only.
 
+An event loop in a thread runs what it is given, and says when it cannot start.
+"""
+
+import asyncio
 import math
 import os
 import signal
 import sys
+import threading
 from collections.abc import Iterator
 
 import pytest
 
 from aloft.runtime.language.errors import AloftError
-from aloft.studies.batch.job import JobResult
-from aloft.studies.batch.jobs import run_jobs
+from aloft.studies.batch.jobs import JobResult, run_jobs, running_loop
 
 from ...local_cluster import local_cluster
 
@@ -52,7 +56,7 @@ def test_a_job_that_kills_its_workers_is_given_up_and_the_others_are_done(cluste
 
 @pytest.mark.parametrize("address", ["tcp://127.0.0.1:1", "nonsense://x", "127.0.0.1"])
 def test_no_scheduler_is_one_clear_error(address: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    from aloft.studies.batch import cluster as module
+    from aloft.studies.batch import jobs as module
 
     monkeypatch.setattr(module, "WAIT", 0.5)
     with pytest.raises(AloftError, match=f"there is no Dask scheduler at '{address}'"):
@@ -63,3 +67,24 @@ def test_without_dask_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> Non
     monkeypatch.setitem(sys.modules, "distributed", None)
     with pytest.raises(AloftError, match=r"pip install 'aloft\[cluster\]'"):
         results(math.sqrt, [1.0], "tcp://127.0.0.1:1")
+
+
+pytest.importorskip("distributed")
+
+
+async def _thread_name() -> str:
+    await asyncio.sleep(0)
+    return threading.current_thread().name
+
+
+def test_it_runs_in_a_thread_of_its_own_and_is_made_once() -> None:
+    loop = running_loop()
+    found = asyncio.run_coroutine_threadsafe(_thread_name(), loop.asyncio_loop)
+    assert found.result(60) == "event loop"
+    assert running_loop() is loop
+
+
+def test_a_thread_that_does_not_come_to_run_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(threading.Thread, "start", lambda thread: None)
+    with pytest.raises(AloftError, match=r"did not run within 0.01 s: the machine is overloaded"):
+        running_loop(0.01)

@@ -16,8 +16,7 @@ import pytest
 
 from aloft.runtime.language.errors import AloftError
 from aloft.runtime.language.units import parse_unit
-from aloft.studies.batch.job import JobResult, attempt
-from aloft.studies.batch.jobs import job_results, processors, run_jobs
+from aloft.studies.batch.jobs import JobResult, attempt, job_results, processors, run_jobs
 
 
 def results(function: Any, jobs: Any, workers: int = 2) -> dict[int, JobResult]:

@@ -15,7 +15,7 @@ from aloft.planner.task.read_task import read_task
 from aloft.planner.task.task import JumpTask, TaskError, make_task
 from aloft.robots.description import RobotDescription, find_robot
 from aloft.studies.batch import plan_grid as grid
-from aloft.studies.batch.job import JobResult, attempt
+from aloft.studies.batch.jobs import JobResult, attempt
 from aloft.studies.batch.plan_grid import fill, read_grid, robot_of
 
 ROBOT = find_robot("bruce")

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from aloft.studies.figures.jump_curves import jump_numbers
-from aloft.studies.figures.push_curves import push_numbers
+from aloft.studies.figures.curves import jump_numbers, push_numbers
 from aloft.studies.figures.trace import Trace, pitch_and_roll
 from aloft.studies.journal import Outcome
 

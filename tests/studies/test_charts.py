@@ -8,7 +8,7 @@ from xml.etree import ElementTree
 import pytest
 
 from aloft.runtime.language.errors import AloftError
-from aloft.studies.charts.plots import draw_plot, group, reach
+from aloft.studies.charts import draw_plot, group, reach
 from aloft.studies.execution import Run
 from aloft.studies.expansion import cells
 from aloft.studies.journal import Outcome

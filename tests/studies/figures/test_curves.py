@@ -3,7 +3,7 @@
 import numpy as np
 
 from aloft.plotting import DPI, Line, Panel
-from aloft.studies.figures.canvas import COLUMN_WIDTH, Column, draw_columns
+from aloft.studies.figures.curves import COLUMN_WIDTH, Column, draw_columns
 
 X = np.linspace(0.0, 1.0, 101)
 
