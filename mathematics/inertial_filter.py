@@ -203,21 +203,21 @@ def stand_on(
     anchors, anchored = points.anchors, points.anchored
     total = 0.0
     for i in range(weights.shape[0]):
-        total += float(weights[i])
+        total += weights[i]
     share = 1.0 / max(total, 1.0)
     for k in range(3):
         still, back = 0.0, 0.0
         for i in range(weights.shape[0]):
             if not active[i]:
                 continue
-            weight = float(weights[i])
-            place = position[k] + float(points.places[i, k])
+            weight = weights[i]
+            place = position[k] + points.places[i, k]
             if anchored[i]:
-                anchors[i, k] += (1.0 - weight) * (place - float(anchors[i, k]))
+                anchors[i, k] += (1.0 - weight) * (place - anchors[i, k])
             else:
                 anchors[i, k] = place
-            still -= weight * (velocity[k] + float(points.rates[i, k]))
-            back += weight * (float(anchors[i, k]) - place)
+            still -= weight * (velocity[k] + points.rates[i, k])
+            back += weight * (anchors[i, k] - place)
         velocity[k] += velocity_gain * share * still
         position[k] += position_gain * share * back
     for i in range(weights.shape[0]):

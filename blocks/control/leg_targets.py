@@ -47,7 +47,7 @@ def end_targets(
 ) -> None:
     """Take the plan's joints instead where it flies, or has just landed, and is followed; remember what
     was ``found``."""
-    if follows and int(plan.phase[()]) == _FLIGHT:
+    if follows and plan.phase[()] == _FLIGHT:
         follow_plan(following, soles, plan, flown, target)
     elif follows:
         go_on(following, plan, flown, target)

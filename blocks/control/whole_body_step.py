@@ -84,4 +84,4 @@ def keep_solution(
         return
     memory.failed[()] = 0
     command.solved[()] = True
-    command.failures[()] = int(memory.failures[()])
+    command.failures[()] = memory.failures[()]

@@ -26,13 +26,13 @@ def filter_tick(estimator: Estimator) -> None:
     fastest = predict(estimator)
     if fastest < estimator.settings.still_rate[0]:
         for axis in range(3):
-            learning.filling_sum[axis] += float(sample.gyro[axis])
+            learning.filling_sum[axis] += sample.gyro[axis]
         learn_bias(learning, estimator.fixed.block, estimate.gyro_bias, 10.0)
     else:
         forget_samples(learning)
     if is_unaccelerated(sample.force) and count_standing(points.active) > 0:
         right_up(
-            estimate.orientation, sample.force, float(estimator.settings.tilt_gain[0]),
+            estimate.orientation, sample.force, estimator.settings.tilt_gain[0],
             estimator.scratch.spare,
         )  # fmt: skip
     place_points(estimator)

@@ -90,8 +90,8 @@ def angular_rows(
     for i in range(3):
         for k in range(matrix.shape[1]):
             rows.jacobian[i, k] = matrix[3 + i, k]
-        wanted = -float(gains.damping[i]) * float(measured.value[i])
+        wanted = -gains.damping[i] * measured.value[i]
         if gains.track:
-            wanted += float(target.rate[i]) + float(gains.damping[i]) * float(target.value[i])
-        rows.desired[i] = wanted - float(measured.rate[i])
+            wanted += target.rate[i] + gains.damping[i] * target.value[i]
+        rows.desired[i] = wanted - measured.rate[i]
         rows.weights[i] = gains.weight[i]

@@ -210,7 +210,7 @@ def contact_rows(
     ground, loaded = 0.0, 0
     for i in range(count):
         if stance[i]:
-            ground += float(points.position[i, 2])
+            ground += points.position[i, 2]
             loaded += 1
     ground = ground / loaded if loaded else 0.0
     for i in range(count):
@@ -218,7 +218,7 @@ def contact_rows(
             row = 3 * i + k
             for j in range(rows.jacobian.shape[1]):
                 rows.jacobian[row, j] = points.jacobian[i, k, j]
-            speed, drift = float(points.velocity[i, k]), float(points.drift[i, k])
+            speed, drift = points.velocity[i, k], points.drift[i, k]
             if stance[i]:
                 rows.weights[row] = stance_weight
                 rows.desired[row] = -stance_damping * speed - drift
@@ -226,7 +226,7 @@ def contact_rows(
                 rows.weights[row] = swing_weight
                 wanted = -swing_damping * speed
                 if k == 2:
-                    wanted += swing_stiffness * (ground - float(points.position[i, 2]))
+                    wanted += swing_stiffness * (ground - points.position[i, 2])
                 rows.desired[row] = wanted - drift
 
 
@@ -239,7 +239,7 @@ def step_rows(points: Points, steps: Steps, weight: float, rows: TaskRows) -> No
         for k in range(3):
             row = 3 * i + k
             rows.weights[row] = weight
-            rows.desired[row] = float(steps.acceleration[i, k]) - float(points.drift[i, k])
+            rows.desired[row] = steps.acceleration[i, k] - points.drift[i, k]
 
 
 @kernel
@@ -259,13 +259,13 @@ def follow_plan(
     """
     first = velocity.shape[0] - position.shape[0]
     for foot in range(ankles.place.shape[0]):
-        place = int(ankles.place[foot])
+        place = ankles.place[foot]
         if place >= 0:
             joint = place - first
             ankles.acceleration[foot] = (
-                float(planned.acceleration[joint])
-                + stiffness * (float(planned.position[joint]) - position[joint])
-                + damping * (float(planned.velocity[joint]) - velocity[place])
+                planned.acceleration[joint]
+                + stiffness * (planned.position[joint] - position[joint])
+                + damping * (planned.velocity[joint] - velocity[place])
             )
 
 
@@ -295,18 +295,16 @@ def lifting_rows(
     for i in range(stance.shape[0]):
         if stance[i]:
             continue
-        row, wanted, ankle = 3 * i, 0.0, int(ankles.place[foot[i]])
+        row, wanted, ankle = 3 * i, 0.0, ankles.place[foot[i]]
         if ankle < 0:
-            rows.desired[row + 2] = -damping * float(points.velocity[i, 2]) - float(
-                points.drift[i, 2]
-            )
+            rows.desired[row + 2] = -damping * points.velocity[i, 2] - points.drift[i, 2]
             continue
         rows.jacobian[row, :] = 0.0
         for k in range(3):
             across = foot_rotation[foot[i], k, 1]
-            wanted -= across * (damping * float(points.velocity[i, k]) + float(points.drift[i, k]))
+            wanted -= across * (damping * points.velocity[i, k] + points.drift[i, k])
             for j in range(rows.jacobian.shape[1]):
-                rows.jacobian[row, j] += across * float(points.jacobian[i, k, j])
+                rows.jacobian[row, j] += across * points.jacobian[i, k, j]
         rows.desired[row] = wanted
         rows.jacobian[row + 1, :] = 0.0
         rows.jacobian[row + 1, ankle] = 1.0

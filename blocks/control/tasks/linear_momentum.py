@@ -111,9 +111,9 @@ def linear_rows(
         for k in range(matrix.shape[1]):
             rows.jacobian[i, k] = matrix[i, k] / mass
         rows.desired[i] = (
-            float(target.acceleration[i])
-            + float(gains.stiffness[i]) * (float(target.position[i]) - float(measured.position[i]))
-            + float(gains.damping[i]) * (float(target.velocity[i]) - float(measured.velocity[i]))
-            - float(measured.acceleration[i]) / mass
+            target.acceleration[i]
+            + gains.stiffness[i] * (target.position[i] - measured.position[i])
+            + gains.damping[i] * (target.velocity[i] - measured.velocity[i])
+            - measured.acceleration[i] / mass
         )
         rows.weights[i] = gains.weight[i]

@@ -170,8 +170,8 @@ def posture_rows(
         joint = joints[row]
         rows.jacobian[row, first + joint] = 1.0
         rows.desired[row] = (
-            float(reference.acceleration[row])
-            + gains.stiffness * (float(reference.position[row]) - position[joint])
-            + gains.damping * (float(reference.velocity[row]) - velocity[first + joint])
+            reference.acceleration[row]
+            + gains.stiffness * (reference.position[row] - position[joint])
+            + gains.damping * (reference.velocity[row] - velocity[first + joint])
         )
         rows.weights[row] = gains.weight[row]

@@ -112,7 +112,7 @@ def torso_rows(
     logarithm(quaternion, error)
     for i in range(3):
         rows.jacobian[i, 3 + i] = 1.0
-        rows.desired[i] = float(gains.stiffness[i]) * error[i] + float(gains.damping[i]) * (
-            float(target.angular_velocity[i]) - float(measured.angular_velocity[i])
+        rows.desired[i] = gains.stiffness[i] * error[i] + gains.damping[i] * (
+            target.angular_velocity[i] - measured.angular_velocity[i]
         )
         rows.weights[i] = gains.weight[i]
