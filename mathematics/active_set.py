@@ -91,8 +91,7 @@ def solve_program(n: int, m: int, program: Program, memory: ActiveSetMemory, x: 
         for k in range(n):
             square += program.matrix[i, k] * program.matrix[i, k]
         memory.size[i] = math.sqrt(square)
-    for i in range(memory.is_active.shape[0]):
-        memory.is_active[i] = False
+    memory.is_active[:] = False
     return int(fulfil(n, m, 0, program, memory, x)[0])
 
 

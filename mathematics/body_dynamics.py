@@ -314,10 +314,7 @@ def weigh_bodies(tree: BodyTree, motion: BodyMotion, composite: Inertias) -> Non
     for joint in range(n_joints - 1, -1, -1):
         carrier, carried = tree.parent[joint], joint + 1
         composite.mass[carrier] = composite.mass[carrier] + composite.mass[carried]
-        for k in range(3):
-            composite.moment[carrier, k] = (
-                composite.moment[carrier, k] + composite.moment[carried, k]
-            )
+        composite.moment[carrier, :] = composite.moment[carrier] + composite.moment[carried]
         for k in range(6):
             composite.inertia[carrier, k] = (
                 composite.inertia[carrier, k] + composite.inertia[carried, k]
@@ -471,8 +468,7 @@ def equations_of_motion(
             the joints', (6 + n_joints,).
     """
     weigh_bodies(tree, motion, composite)
-    for k in range(3):
-        terms.com[k] = composite.moment[0, k] / composite.mass[0]
+    terms.com[:] = composite.moment[0] / composite.mass[0]
     write_matrices(tree, motion, composite, rotors, scale, terms)
     write_forces(motion, composite, scale, terms)
     write_momentum(velocity, scale, composite.mass[0], terms)

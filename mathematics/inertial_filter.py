@@ -41,8 +41,7 @@ def propagate(
         middle, acceleration: scratch, (4,) and (3,); ``acceleration`` holds the acceleration
             [m/s^2, world] afterwards.
     """
-    for i in range(3):
-        last_rate[i] = 0.5 * (last_rate[i] + rate[i])
+    last_rate[:] = 0.5 * (last_rate + rate)
     integrate(orientation, last_rate, 0.5 * period, middle)
     integrate(orientation, last_rate, period, orientation)
     rotate(middle, specific_force, acceleration)

@@ -234,9 +234,7 @@ def map_flight(
     multiply_matrices(rotation, out.inverse, out.drift)
     for i in range(jacobian.shape[0]):
         for j in range(3):
-            for k in range(3):
-                lever = momentum[j, 3 + k] / mass
-                out.lever[j, k] = jacobian[i, j, 3 + k] - lever
+            out.lever[j, :] = jacobian[i, j, 3:6] - momentum[j, 3:6] / mass
         rows = out.jacobian[3 * i : 3 * i + 3]
         multiply_matrices(out.lever, out.inverse, out.carried[3 * i : 3 * i + 3])
         multiply_matrices(out.lever, out.reaction, rows)
@@ -251,8 +249,7 @@ def map_flight(
     solve_rows(out.normal, out.answers)
     multiply_matrices(out.answers, out.jacobian.T, out.turn)
     for i in range(2):
-        for k in range(out.turn.shape[1]):
-            out.turn[i, k] = -out.turn[i, k]
+        out.turn[i, :] = -out.turn[i]
 
 
 @kernel

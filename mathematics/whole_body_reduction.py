@@ -343,18 +343,15 @@ def recover_acceleration(
 ) -> None:
     """The acceleration (n,) for ``size`` elements of force and ``extra`` elements of e."""
     response, lever, free = reduction.response, reduction.lever, reduction.free
-    for i in range(out.shape[0]):
-        out[i] = reduction.rest[i]
+    out[:] = reduction.rest
     for k in range(6):
         value = 0.0
         for i in range(size):
             value += lever[k, i] * unknowns[i]
-        for i in range(out.shape[0]):
-            out[i] = out[i] + value * response[k, i]
+        out[:] = out + value * response[k]
     for k in range(extra):
         value = unknowns[size + k]
-        for i in range(out.shape[0]):
-            out[i] = out[i] + value * free[k, i]
+        out[:] = out + value * free[k]
 
 
 @kernel

@@ -198,8 +198,7 @@ def write_forces(
         solution.code[0] = code
         return
     for point in range(solution.force.shape[0]):
-        for axis in range(3):
-            solution.force[point, axis] = 0.0
+        solution.force[point, :] = 0.0
     for j in range(count):
         for axis in range(3):
             solution.force[active[j], axis] = unknowns[3 * j + axis]

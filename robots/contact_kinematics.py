@@ -100,9 +100,8 @@ class Measured(NamedTuple):
 def see_contacts(rigid: Rigid, contacts: Contacts, measured: Measured, seen: Seen) -> None:
     """The contact points as seen from the base, which is held in place but turns."""
     tree, motion, down, arm = rigid.tree, rigid.motion, rigid.scratch[0], rigid.scratch[1]
-    for k in range(3):
-        motion.velocity[0, 3 + k] = measured.angular_velocity[k]
-        down[k] = 0.0
+    motion.velocity[0, 3:6] = measured.angular_velocity
+    down[:] = 0.0
     place_bodies(tree, measured.position, motion)
     move_bodies(tree, measured.velocity, motion)
     down[2] = -1.0
@@ -111,11 +110,9 @@ def see_contacts(rigid: Rigid, contacts: Contacts, measured: Measured, seen: See
         body = contacts.body[contacts.foot[i]]
         point = seen.points[i]
         place_of(motion, body, contacts.centre[i], point)
-        for k in range(3):
-            point[k] = point[k] + contacts.radius[i] * down[k]
+        point[:] = point + contacts.radius[i] * down
         velocity_at(motion, body, point, seen.rates[i])
-    for k in range(3):
-        seen.forward[k] = 0.0
+    seen.forward[:] = 0.0
     for foot in range(contacts.body.shape[0]):
         body, ball = contacts.body[foot], contacts.ball[foot]
         place_of(motion, body, contacts.sole[foot], seen.soles[foot])
@@ -161,8 +158,7 @@ def see_com_velocity(rigid: Rigid, out: Vector3) -> None:
         place_of(motion, body, tree.com[body], place)
         velocity_at(motion, body, place, velocity)
         total += mass
-        for k in range(3):
-            out[k] = out[k] + mass * velocity[k]
+        out[:] = out + mass * velocity
     out[:] = out / total
 
 

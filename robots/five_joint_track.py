@@ -139,8 +139,7 @@ def watch_line(
         period: between two ticks [s].
         known: whether ``direction`` (3,) is that of the last tick, of shape (); it is updated.
     """
-    for i in range(3):
-        scratch.line[i] = rotation[i, 0]
+    scratch.line[:] = rotation[:, 0]
     if pitched:
         pitched_line(rotation, pitch[()], scratch.line)
     line_rate(scratch.line, direction, period, bool(known[()]), scratch.rate)
@@ -182,8 +181,7 @@ def follow_foot(
         angles,
     )
     target.reachable[number] = inside
-    for i in range(3):
-        velocity[i] = min(max(foot.velocity[i], -_FASTEST), _FASTEST)
+    velocity[:] = min(max(foot.velocity, -_FASTEST), _FASTEST)
     if settings.slides[0] and not inside:
         slid, slid_share = slide(
             leg.hip, leg.plane, leg.signs, leg.limits, foot.position, foot.rotation, softness, yaw,

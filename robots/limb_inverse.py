@@ -376,24 +376,19 @@ def watch_foot(
     """
     rotation, twist = scratch.rotation, scratch.twist
     for i in range(3):
-        for k in range(3):
-            rotation[i, k] = foot.rotation[i, k]
+        rotation[i, :] = foot.rotation[i]
     if pitched:
         pitched_line(rotation, pitch[()], scratch.line)
-        for i in range(3):
-            rotation[i, 0] = scratch.line[i]
+        rotation[:, 0] = scratch.line
     # A ball's centre is its radius above the ground, whichever way the leg comes.
-    for k in range(3):
-        above = foot.rotation[k, 2] * limb.radius
-        scratch.place[k] = above + foot.position[k]
+    scratch.place[:] = foot.rotation[:, 2] * limb.radius + foot.position
     aim(scratch.place, rotation, scratch.target)
     for k in range(3, 6):
         twist[k] = 0.0
     if known[()]:
         turning(limb.tip, last, scratch.target, period, _JUMP, twist[3:])
     for i in range(4):
-        for k in range(3):
-            last[i, k] = scratch.target[i, k]
+        last[i, :] = scratch.target[i]
 
 
 @kernel

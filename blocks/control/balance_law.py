@@ -213,10 +213,9 @@ def follow(
     turn_about_vertical(plan.angular_momentum_rate, turn, out.angular_momentum_rate)
     mass = present.mass_matrix[0, 0]
     heavier = (mass if mass != 0.0 else stand.mass) / stand.mass
-    for k in range(3):
-        out.angular_momentum[k] = out.angular_momentum[k] * heavier
-        out.angular_momentum_rate[k] = out.angular_momentum_rate[k] * heavier
-        out.angular_velocity[k] = plan.angular_velocity[k]
+    out.angular_momentum[:] = out.angular_momentum * heavier
+    out.angular_momentum_rate[:] = out.angular_momentum_rate * heavier
+    out.angular_velocity[:] = plan.angular_velocity
     set_heading(turn, scratch.turn)
     multiply(scratch.turn, plan.orientation, out.orientation)
 
@@ -257,9 +256,7 @@ def correct_lift_off(
     add_quadratic_growth(vector, share, duration, out.angular_momentum, out.angular_momentum_rate)
     turn_about_vertical(gains.corrections[0], turn, vector)
     add_quadratic_growth(vector, share, duration, out.com_velocity, out.com_acceleration)
-    for k in range(3):
-        way = duration * share * share * share / 3.0
-        out.com[k] = out.com[k] + vector[k] * way
+    out.com[:] = out.com + vector * (duration * share * share * share / 3.0)
 
 
 @kernel

@@ -187,8 +187,7 @@ def weigh_torso(weighing: Weighing, tree: BodyTree) -> float:
     offset, mass = weighing.offset, weighing.mass[()]
     np.divide(weighing.com_offset, LEAST_OFFSET, offset)
     np.rint(offset, offset)
-    for k in range(3):
-        tree.com[0, k] = weighing.described[k] + offset[k] * LEAST_OFFSET
+    tree.com[0, :] = weighing.described + offset * LEAST_OFFSET
     if mass > 0.0:
         return round(mass / weighing.nominal / LEAST_SCALE) * LEAST_SCALE
     return 1.0
@@ -288,8 +287,7 @@ def write_contacts(tree: BodyTree, scratch: Scratch, feet: Feet, terms: FootTerm
                 feet.centre[point], feet.radius[point], motion.rotation[body],
                 feet.point[point],
             )  # fmt: skip
-            for k in range(3):
-                feet.sole[foot, k] = feet.point[point, k]
+            feet.sole[foot, :] = feet.point[point]
         place_of(motion, body, feet.point[point], place)
         velocity_at(motion, body, place, terms.contact_velocity[point])
         acceleration_at(motion, body, place, terms.contact_drift[point])
@@ -297,8 +295,7 @@ def write_contacts(tree: BodyTree, scratch: Scratch, feet: Feet, terms: FootTerm
             place_of(motion, body, feet.centre[point], centre)
             rolling_drift(motion, body, centre, place, terms.contact_drift[point])
         write_jacobian(tree, motion, body, place, terms.contact_jacobian[point])
-        for k in range(3):
-            terms.contact_position[point, k] = terms.base_position[k] + place[k]
+        terms.contact_position[point, :] = terms.base_position + place
 
 
 @kernel
@@ -328,5 +325,4 @@ def evaluate(
             for column in range(3):
                 turn = motion.rotation[body, row, column]
                 foot_terms.foot_rotation[foot, row, column] = turn
-    for k in range(3):
-        terms.com[k] = terms.com[k] + state.position[k]
+    terms.com[:] = terms.com + state.position

@@ -78,8 +78,7 @@ def follow_plan(
     ahead = following.plan_lead[0] * share_of_lead(plan)
     pitch = planned_pitch(plan)
     if not keeps_acceleration(following, plan, flown):
-        for joint in range(flown.acceleration.shape[0]):
-            flown.acceleration[joint] = plan.joint_acceleration[joint]
+        flown.acceleration[:] = plan.joint_acceleration
     for joint in range(plan.joint_position.shape[0]):
         speed = plan.joint_velocity[joint]
         change = flown.acceleration[joint] * ahead

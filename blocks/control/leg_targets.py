@@ -51,6 +51,5 @@ def end_targets(
         follow_plan(following, soles, plan, flown, target)
     elif follows:
         go_on(following, plan, flown, target)
-    for joint in range(found.shape[0]):
-        found[joint] = target.position[joint]
+    found[:] = target.position
     known[()] = True

@@ -77,8 +77,7 @@ def keep_solution(
         command.torque[:] = 0.0
         memory.torque[:] = 0.0
     elif code[0] == SOLVED:
-        for i in range(memory.torque.shape[0]):
-            memory.torque[i] = command.torque[i]
+        memory.torque[:] = command.torque
     else:
         unsolved[0] = 1
         return

@@ -189,8 +189,7 @@ def start(estimator: Estimator) -> None:
         turn(estimate.orientation, error[0], error[1], error[2])
     for foot in range(seen.soles.shape[0]):
         rotate(estimate.orientation, seen.soles[foot], spare)
-        for axis in range(2):
-            estimate.position[axis] -= spare[axis] / seen.soles.shape[0]
+        estimate.position[:2] -= spare[:2] / seen.soles.shape[0]
     for point in range(seen.points.shape[0]):
         rotate(estimate.orientation, seen.points[point], spare)
         estimate.position[2] -= spare[2] / seen.points.shape[0]
@@ -213,11 +212,9 @@ def predict(estimator: Estimator) -> float:
     started = bool(estimate.started[()])
     if started:
         fastest = watch_motion(estimator)
-    for axis in range(3):
-        sample.force[axis] -= estimate.accelerometer_bias[axis]
-        scratch.last_rate[axis] = estimate.angular_velocity[axis]
-        rate = sample.gyro[axis] - estimate.gyro_bias[axis]
-        estimate.angular_velocity[axis] = rate
+    sample.force[:] -= estimate.accelerometer_bias
+    scratch.last_rate[:] = estimate.angular_velocity
+    estimate.angular_velocity[:] = sample.gyro - estimate.gyro_bias
     if started:
         propagate(
             estimate.orientation, estimate.position, estimate.velocity, scratch.last_rate,
@@ -251,8 +248,7 @@ def is_unaccelerated(force: Array1D) -> bool:
 def forget_samples(learning: Learning) -> None:
     """Begin a new block of samples, since the robot moves."""
     learning.filled[()] = learning.held[()] = 0
-    for axis in range(3):
-        learning.filling_sum[axis] = 0.0
+    learning.filling_sum[:] = 0.0
 
 
 @kernel
@@ -271,12 +267,9 @@ def learn_bias(learning: Learning, block: int, bias: Vector3, prior: float) -> N
     if learning.held[()] > 0:
         samples = min(learning.samples[()] + filled, 1000)
         learning.samples[()] = samples
-        for i in range(3):
-            excess = learning.held_sum[i] - filled * bias[i]
-            bias[i] += excess / (samples + prior)
-    for axis in range(3):
-        learning.held_sum[axis] = learning.filling_sum[axis]
-        learning.filling_sum[axis] = 0.0
+        bias[:] += (learning.held_sum - filled * bias) / (samples + prior)
+    learning.held_sum[:] = learning.filling_sum
+    learning.filling_sum[:] = 0.0
     learning.held[()], learning.filled[()] = filled, 0
 
 
@@ -324,9 +317,7 @@ def use_contacts(estimator: Estimator, trusted: float, support: float) -> None:
     )  # fmt: skip
     if estimator.fixed.ballistic:
         fall_freely(estimator)
-    for axis in range(3):
-        base.position[axis] = estimate.position[axis]
-        base.linear_velocity[axis] = estimate.velocity[axis]
-        base.angular_velocity[axis] = estimate.angular_velocity[axis]
-    for k in range(4):
-        base.orientation[k] = estimate.orientation[k]
+    base.position[:] = estimate.position
+    base.linear_velocity[:] = estimate.velocity
+    base.angular_velocity[:] = estimate.angular_velocity
+    base.orientation[:] = estimate.orientation

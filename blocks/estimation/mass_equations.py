@@ -143,8 +143,7 @@ def follow_mass(
     """One tick: filter velocity and torque, correct the estimate where it is due, publish it."""
     joints, ticks = memory.torque.shape[0], memory.ticks[()]
     if ticks == 0:
-        for i in range(memory.velocity.shape[0]):
-            memory.velocity[i] = measured.velocity[i]
+        memory.velocity[:] = measured.velocity
         for i in range(joints):
             memory.torque[i] = measured.torque[i]
     if measured.phase[()] > _SQUAT:
@@ -215,8 +214,7 @@ def form_rows(
         settings.friction_left, scratch.known, scratch.unknown,
     )  # fmt: skip
     multiply_vector(measured.mass_matrix, scratch.acceleration, force)
-    for i in range(force.shape[0]):
-        force[i] = force[i] + measured.nonlinear[i]
+    force[:] = force + measured.nonlinear
     for j in range(joints):
         left = memory.torque[j] - scratch.known[j]
         scratch.joint[j] = left - force[6 + j]

@@ -75,10 +75,8 @@ def align_with_ground(estimator: Estimator, trust: Trust) -> None:
     error[2] = wrap(error[2] + trust.heading[()])
     limit(error, 0.05, error)
     rotate_back(estimate.orientation, error, spare)
-    for axis in range(3):
-        drift = spare[axis] * (drift_gain / estimator.fixed.period)
-        estimate.gyro_bias[axis] -= drift
-        error[axis] *= angle_gain
+    estimate.gyro_bias[:] -= spare * (drift_gain / estimator.fixed.period)
+    error[:] *= angle_gain
     turn(estimate.orientation, error[0], error[1], error[2])
 
 
@@ -93,9 +91,7 @@ def learn_accelerometer_bias(estimator: Estimator, still: bool) -> None:
     up[0] = up[1] = 0.0
     up[2] = GRAVITY
     rotate_back(estimate.orientation, up, weight)
-    for axis in range(3):
-        total = learning.filling_sum[axis] + estimator.sample.force[axis]
-        learning.filling_sum[axis] = total + bias[axis] - weight[axis]
+    learning.filling_sum[:] = learning.filling_sum + estimator.sample.force + bias - weight
     learn_bias(learning, estimator.fixed.block, bias, 3.0)
 
 

@@ -128,8 +128,7 @@ def remember_command(sent: Sent, acceleration: Array2D, loaded: Flags1D) -> None
     loaded[0] = False
     for point in range(sent.stance.shape[0]):
         loaded[0] = loaded[0] or bool(sent.stance[point])
-    for k in range(acceleration.shape[1]):
-        acceleration[0, k] = sent.acceleration[k]
+    acceleration[0, :] = sent.acceleration
 
 
 @kernel
@@ -211,8 +210,7 @@ def predict_state(
     exponential(way[3:6], turn)
     multiply(measured.orientation, turn, predicted.orientation)
     rotate(predicted.orientation, speed[0:3], predicted.linear_velocity)
-    for k in range(3):
-        predicted.position[k] = measured.position[k] + spare[k]
+    predicted.position[:] = measured.position + spare
     for joint in range(predicted.joint_position.shape[0]):
         rate = measured.joint_velocity[joint]
         predicted.joint_velocity[joint] = rate + speed[6 + joint]

@@ -145,8 +145,7 @@ def take_steps(
     for i in range(before.stance.shape[0]):
         out.stance[i] = before.stance[i]
         out.stepping[i] = False
-        for k in range(3):
-            out.step_acceleration[i, k] = 0.0
+        out.step_acceleration[i, :] = 0.0
     lands = phase in (_LANDING, _RECOVER)
     goes_on = lift_off_time[()] > time[()]
     if not lands or goes_on or feet.side.shape[0] < 2:

@@ -274,8 +274,7 @@ def follow_phases(
     for i in range(active.shape[0]):
         out.stance[i] = memory.stance[i]
         out.stepping[i] = False  # steps are for CaptureStep to take
-        for k in range(3):
-            out.step_acceleration[i, k] = 0.0
+        out.step_acceleration[i, :] = 0.0
 
 
 @kernel

@@ -216,17 +216,13 @@ def aim_feet(
                 hasten(memory.swing[foot], lead * share, lead * rate / reach, place, speed)
             place[2] = place[2] + lift
             speed[2] = speed[2] + lift_rate
-            for k in range(3):
-                memory.goal[foot, k] = terms.com[k] + targets.landing[foot, k]
+            memory.goal[foot, :] = terms.com + targets.landing[foot]
         elif landing:
-            for k in range(2):
-                place[k] = memory.goal[foot, k] - terms.com[k]
+            place[:2] = memory.goal[foot, :2] - terms.com[:2]
             place[2] = lowest - terms.com[2]
-            for k in range(3):
-                speed[k] = -terms.com_velocity[k]
+            speed[:] = -terms.com_velocity
         else:
-            for k in range(3):
-                place[k] = memory.planned[foot, k]
+            place[:] = memory.planned[foot]
         convert_to_body(foot, plan.foot_yaw[foot], terms, targets, scratch)
 
 
@@ -251,9 +247,7 @@ def remember_landing(plan: Plan, flying: bool, memory: Memory) -> None:
     fall = plan.touchdown_time[()] - plan.time[()]
     if flying and fall < 0.0:
         return
-    for k in range(3):
-        place = plan.com_velocity[k] * fall + plan.com[k]
-        memory.wished[k] = place + memory.origin[k]
+    memory.wished[:] = plan.com_velocity * fall + plan.com + memory.origin
 
 
 @kernel
@@ -265,10 +259,8 @@ def remember_plan(plan: Plan, terms: Terms, law: Law, memory: Memory) -> None:
     for k in range(3):
         memory.linear[k] = plan.com_velocity[k] * mass
         memory.angular[k] = plan.angular_momentum[k] * (mass / law.mass)
-        for foot in range(memory.planned.shape[0]):
-            memory.planned[foot, k] = plan.foot_position[foot, k] - plan.com[k]
-    for k in range(4):
-        memory.orientation[k] = plan.orientation[k]
+        memory.planned[:, k] = plan.foot_position[:, k] - plan.com[k]
+    memory.orientation[:] = plan.orientation
 
 
 @kernel
@@ -286,12 +278,9 @@ def feed_back(terms: Terms, law: Law, memory: Memory, scratch: Scratch) -> None:
 def lift_off(terms: Terms, memory: Memory) -> None:
     """Begin a flight: note how far the feet are from their plan."""
     memory.due[()] = 0.0
-    for k in range(4):
-        memory.shift[k] = 0.0
+    memory.shift[:] = 0.0
     for foot in range(memory.offset.shape[0]):
-        for k in range(3):
-            place = terms.foot_position[foot, k] - terms.com[k]
-            memory.offset[foot, k] = place - memory.planned[foot, k]
+        memory.offset[foot, :] = terms.foot_position[foot] - terms.com - memory.planned[foot]
 
 
 @kernel
@@ -311,9 +300,7 @@ def predict(
     if left > 0.0:
         memory.due[()] = elapsed + left
     left = memory.due[()] - elapsed
-    for k in range(3):
-        place = terms.com_velocity[k] * left + terms.com[k]
-        scratch.miss[k] = place - memory.wished[k]
+    scratch.miss[:] = terms.com_velocity * left + terms.com - memory.wished
     speed = max(GRAVITY * left - terms.com_velocity[2], _SLOWEST)
     later = fall_time(speed, memory.shift[3])
     if left + later >= LAST:
@@ -368,8 +355,7 @@ def turn_frame(
     conjugate(planned, turn)
     multiply(turn, scratch.quaternion, turn)
     logarithm(turn, vector)
-    for k in range(3):
-        vector[k] = vector[k] * alpha[k]
+    vector[:] = vector * alpha
     exponential(vector, turn)
     multiply(planned, turn, turn)
     to_matrix(turn, scratch.rotation)

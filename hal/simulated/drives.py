@@ -103,10 +103,11 @@ def joint_feedback_torque(
 ) -> None:
     """Write feedforward plus joint feedback [N m] to ``out`` (paper, V, first equation):
     ``tau_ff + Kp (q_d - q) + Kd (qd_d - qd)``."""
-    for k in range(out.shape[0]):
-        spring = (position_target[k] - position[k]) * stiffness[k]
-        damper = (velocity_target[k] - velocity[k]) * damping[k]
-        out[k] = (spring + feedforward[k]) + damper
+    out[:] = (
+        (position_target - position) * stiffness
+        + feedforward
+        + (velocity_target - velocity) * damping
+    )
 
 
 @kernel

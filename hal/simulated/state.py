@@ -122,8 +122,7 @@ def clear(
     for point in range(record.load.shape[0]):
         for axis in range(4):
             record.load[point, axis] = 0.0
-    for axis in range(3):
-        record.accelerometer[axis] = 0.0
+    record.accelerometer[:] = 0.0
     for k in range(saturated.shape[0]):
         saturated[k] = 0
         record.joint_torque[k] = record.violation[k] = record.overload[k] = 0.0
@@ -209,8 +208,7 @@ def record_step(
         allowed += sensors.load[point, 0]
         for axis in range(4):
             record.load[point, axis] += sensors.load[point, axis]
-    for axis in range(3):
-        record.accelerometer[axis] += sensors.accelerometer[axis]
+    record.accelerometer[:] += sensors.accelerometer
     if sensors.contacts[0] > allowed:
         record.forbidden[()] = record.forbidden[()] + 1
     for joint in range(lower.shape[0]):

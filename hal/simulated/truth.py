@@ -127,10 +127,9 @@ def report_contacts(instant: TrueState, peaks: TickExtremes, report: TruthFields
 @kernel
 def report_truth(instant: TrueState, peaks: TickExtremes, report: TruthFields) -> None:
     """Write the truth about a tick that has been simulated."""
-    for axis in range(3):
-        report.com[axis] = instant.com[axis]
-        report.com_velocity[axis] = instant.com_velocity[axis]
-        report.angular_momentum[axis] = instant.angular_momentum[axis]
+    report.com[:] = instant.com
+    report.com_velocity[:] = instant.com_velocity
+    report.angular_momentum[:] = instant.angular_momentum
     report_contacts(instant, peaks, report)
     count, at_limit = report.joint_position.shape[0], 0
     for k in range(count):

@@ -216,8 +216,7 @@ def contact_rows(
     for i in range(count):
         for k in range(3):
             row = 3 * i + k
-            for j in range(rows.jacobian.shape[1]):
-                rows.jacobian[row, j] = points.jacobian[i, k, j]
+            rows.jacobian[row, :] = points.jacobian[i, k]
             speed, drift = points.velocity[i, k], points.drift[i, k]
             if stance[i]:
                 rows.weights[row] = stance_weight
@@ -303,8 +302,7 @@ def lifting_rows(
         for k in range(3):
             across = foot_rotation[foot[i], k, 1]
             wanted -= across * (damping * points.velocity[i, k] + points.drift[i, k])
-            for j in range(rows.jacobian.shape[1]):
-                rows.jacobian[row, j] += across * points.jacobian[i, k, j]
+            rows.jacobian[row, :] += across * points.jacobian[i, k]
         rows.desired[row] = wanted
         rows.jacobian[row + 1, :] = 0.0
         rows.jacobian[row + 1, ankle] = 1.0

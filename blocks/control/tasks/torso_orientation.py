@@ -105,8 +105,7 @@ def torso_rows(
         error, quaternion: scratch (3,) and (4,).
     """
     for i in range(3):
-        for k in range(rows.jacobian.shape[1]):
-            rows.jacobian[i, k] = 0.0
+        rows.jacobian[i, :] = 0.0
     conjugate(measured.orientation, quaternion)
     multiply(quaternion, target.orientation, quaternion)
     logarithm(quaternion, error)
