@@ -6,7 +6,7 @@ import sys
 from collections.abc import Mapping
 from enum import IntEnum
 from functools import cache
-from typing import Any, ForwardRef, NamedTuple
+from typing import Any, NamedTuple
 
 from ..arrays import Rank
 from .kernel_registry import arguments_of
@@ -46,8 +46,7 @@ NUMBER = NumberKind()
 
 def kind_of_annotation(annotation: Any, scope: Mapping[str, Any]) -> Kind:
     """What an annotation, or the text of one, says; ``scope`` has the names in it."""
-    if isinstance(annotation, ForwardRef):  # what a named tuple makes of a text
-        annotation = annotation.__forward_arg__
+    annotation = getattr(annotation, "__forward_arg__", annotation)  # the text in a named tuple
     if isinstance(annotation, str):
         try:
             annotation = eval(annotation, dict(scope))
