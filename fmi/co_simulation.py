@@ -40,7 +40,11 @@ class CoSimulation(UnitBlock):
 
     @classmethod
     def fitted(
-        cls, params: Parameters, folder: Path, robot: RobotDescription | None = None
+        cls,
+        params: Parameters,
+        folder: Path,
+        robot: RobotDescription | None = None,
+        graph_folder: Path | None = None,
     ) -> type[Block]:
         """The class with the ports of the FMU."""
         assert isinstance(params, FmuParameters)

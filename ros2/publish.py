@@ -57,7 +57,11 @@ class Publish(Ros2Block):
 
     @classmethod
     def fitted(
-        cls, params: Parameters, folder: Path, robot: RobotDescription | None = None
+        cls,
+        params: Parameters,
+        folder: Path,
+        robot: RobotDescription | None = None,
+        graph_folder: Path | None = None,
     ) -> type[Block]:
         """The class whose input has the fields of the message type."""
         assert isinstance(params, PublishParameters)

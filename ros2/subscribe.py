@@ -63,7 +63,11 @@ class Subscribe(Ros2Block):
 
     @classmethod
     def fitted(
-        cls, params: Parameters, folder: Path, robot: RobotDescription | None = None
+        cls,
+        params: Parameters,
+        folder: Path,
+        robot: RobotDescription | None = None,
+        graph_folder: Path | None = None,
     ) -> type[Block]:
         """The class whose output has the fields of the message type."""
         assert isinstance(params, SubscribeParameters)

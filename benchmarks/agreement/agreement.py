@@ -11,9 +11,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ...blocks.control.round_program import rows_without_pyramids
 from ...blocks.control.whole_body_controller import WholeBodyController
-from ...blocks.control.whole_body_program import WholeBodyProgram
+from ...blocks.control.whole_body_program import WholeBodyProgram, rows_without_pyramids
 from ...mathematics.active_set import INFEASIBLE
 from ...mathematics.arrays import Array, Flags, Indices
 from ...mathematics.compiling.compile_calls import compile_calls

@@ -12,8 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ...blocks.control.round_program import rows_without_pyramids
-from ...blocks.control.whole_body_program import WholeBodyProgram
+from ...blocks.control.whole_body_program import WholeBodyProgram, rows_without_pyramids
 from ...mathematics.arrays import Array, Flags, Indices
 
 Long = NDArray[np.longdouble]

@@ -29,8 +29,8 @@ from typing import Any
 
 import numpy as np
 
-from ...blocks.control.tasks.choose import PHASE_KINDS
 from ...blocks.control.tasks.posture import chosen_joints
+from ...blocks.control.tasks.task import PHASE_KINDS
 from ...blocks.control.whole_body_controller import WholeBodyController
 from ...blocks.signals import Phase
 from ...mathematics.arrays import Array
@@ -153,7 +153,7 @@ class TsidProgram:
         self._body(known, gains)
         for chosen in block._chosen:
             if chosen.kind.__name__ == "Posture":
-                self._posture(known, chosen.gains(kind, gains))
+                self._posture(known, chosen.params(kind, gains))
         known.joints("regularise", np.ones(self.torque.shape[0]), p.acceleration_weight, 0.0, 0.0)
         if self._exact:
             self._regularise_base(known, p.acceleration_weight)
@@ -216,8 +216,8 @@ class TsidProgram:
 
         known.show.append(show)
         foot = int(self._block.robot.foot_of_contact()[point])
-        for task_of in self._block._tasks:
-            ankles = getattr(task_of, "_ankles", None)
+        for task_of in self._block._tasks["thrust"]:
+            ankles = getattr(task_of, "ankles", None)
             if across and ankles is not None and ankles.place[foot] >= 0:
                 mask = np.zeros(self.torque.shape[0])
                 mask[int(ankles.place[foot]) - 6] = 1.0

@@ -43,7 +43,7 @@ class TsidCheck:
     def __init__(self, tsid: ModuleType, own: RecordedController) -> None:
         block, dynamics = own.bound.blocks["wbc"], own.bound.blocks["dynamics"]
         assert isinstance(block, WholeBodyController) and isinstance(dynamics, Dynamics)
-        assert any(type(task) is ContactPoints for task in block._tasks)
+        assert any(type(task) is ContactPoints for task in block._tasks["stand"])
         self._tsid, self._block, self._dynamics = tsid, block, dynamics
         n, contacts = len(block.command.acceleration), len(block.command.force)
         self._mass = np.zeros((n, n))
