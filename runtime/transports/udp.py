@@ -249,8 +249,8 @@ class UdpTransport(NetworkTransport):
             self._thread.join(1.0)
         if self._socket is not None:
             goodbye = self._datagram(Kind.LEAVE)
-            for peer in self._peers.values():
-                self._send(goodbye, peer.address)
+            for address in self._everybody():
+                self._send(goodbye, address)
             self._socket.close()
         self._socket = self._thread = None
 

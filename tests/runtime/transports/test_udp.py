@@ -141,7 +141,7 @@ def test_without_acknowledgements_what_is_lost_stays_lost() -> None:
 
 def test_a_machine_that_leaves_is_lost_at_once(pair: Pair) -> None:
     first, second, lost = pair
-    assert wait_for(lambda: bool(first._peers)) and lost == []
+    assert wait_for(lambda: first._peers and second._peers) and lost == []
     second.close()
     assert wait_for(lambda: lost == ["b"], LEASE / 2)
     assert first.is_open and not second.is_open
@@ -150,7 +150,7 @@ def test_a_machine_that_leaves_is_lost_at_once(pair: Pair) -> None:
 def test_a_machine_that_is_silent_is_lost_after_a_while() -> None:
     first, second, lost = pair_of(Lossy)
     try:
-        assert wait_for(lambda: bool(first._peers))
+        assert wait_for(lambda: first._peers and second._peers)
         assert isinstance(second, Lossy)
         second.loss = 1.0
         assert wait_for(lambda: lost == ["b"], 3 * LEASE)
