@@ -25,7 +25,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .arrays import Array, Indices
+from .arrays import Array1D, Array2D, Indices1D
 from .kernel import kernel
 from .linear_algebra import factorise, solve_rows_transposed, solve_transposed, solve_upper
 from .whole_body_qp import Bounds, RigidBodyTerms, TaskRows
@@ -41,19 +41,19 @@ class Reduction(NamedTuple):
     function of f and e.
     """
 
-    factor: Array
-    base: Array
-    wanted: Array
-    shape: Array
-    lever: Array
-    pull: Array
-    response: Array
-    rest: Array
-    price: Array
-    free: Array
-    mirrors: Array
-    torque_map: Array
-    torque_rest: Array
+    factor: Array2D
+    base: Array2D
+    wanted: Array1D
+    shape: Array2D
+    lever: Array2D
+    pull: Array1D
+    response: Array2D
+    rest: Array1D
+    price: Array1D
+    free: Array2D
+    mirrors: Array2D
+    torque_map: Array2D
+    torque_rest: Array1D
 
 
 def reduction_memory(n: int, m: int) -> Reduction:
@@ -69,7 +69,7 @@ def reduction_memory(n: int, m: int) -> Reduction:
 def eliminate(
     tasks: TaskRows,
     terms: RigidBodyTerms,
-    active: Indices,
+    active: Indices1D,
     count: int,
     acceleration_weight: float,
     reduction: Reduction,
@@ -87,16 +87,16 @@ def eliminate(
             factor[i, k] = 0.0
         factor[i, i] = acceleration_weight
     for row in range(tasks.jacobian.shape[0]):
-        weight = float(tasks.weights[row])
+        weight = tasks.weights[row]
         if weight == 0.0:
             continue
-        desired = float(tasks.desired[row])
+        desired = tasks.desired[row]
         for i in range(n):
-            value = weight * float(tasks.jacobian[row, i])
+            value = weight * tasks.jacobian[row, i]
             if value != 0.0:
-                wanted[i] = float(wanted[i]) + value * desired
+                wanted[i] = wanted[i] + value * desired
                 for k in range(i, n):
-                    factor[i, k] = float(factor[i, k]) + value * float(tasks.jacobian[row, k])
+                    factor[i, k] = factor[i, k] + value * tasks.jacobian[row, k]
     if not factorise(factor, 0.0):
         return False
     solve_transposed(factor, wanted)
@@ -109,11 +109,11 @@ def eliminate(
         for j in range(k, 6):
             total = 0.0
             for i in range(n):
-                total += float(base[k, i]) * float(base[j, i])
+                total += base[k, i] * base[j, i]
             shape[k, j] = total
-        total = float(terms.nonlinear[k])
+        total = terms.nonlinear[k]
         for i in range(n):
-            total += float(base[k, i]) * float(wanted[i])
+            total += base[k, i] * wanted[i]
         pull[k] = total
         for j in range(count):
             for axis in range(3):
@@ -133,9 +133,9 @@ def eliminate(
         rest[i] = wanted[i]
     solve_upper(factor, rest)
     for k in range(6):
-        value = float(pull[k])
+        value = pull[k]
         for i in range(n):
-            rest[i] = float(rest[i]) - value * float(response[k, i])
+            rest[i] = rest[i] - value * response[k, i]
     return True
 
 
@@ -145,8 +145,8 @@ def force_program(
     size: int,
     extra: int,
     force_weight: float,
-    hessian: Array,
-    gradient: Array,
+    hessian: Array2D,
+    gradient: Array1D,
 ) -> None:
     """The cost in the first ``size`` elements of force and the first ``extra`` elements of e."""
     lever, pull = reduction.lever, reduction.pull
@@ -157,22 +157,22 @@ def force_program(
         hessian[i, i] = force_weight if i < size else 1.0
     for k in range(6):
         for i in range(size):
-            value = float(lever[k, i])
-            gradient[i] = float(gradient[i]) - value * float(pull[k])
+            value = lever[k, i]
+            gradient[i] = gradient[i] - value * pull[k]
             for j in range(size):
-                hessian[i, j] = float(hessian[i, j]) + value * float(lever[k, j])
+                hessian[i, j] = hessian[i, j] + value * lever[k, j]
 
 
 @kernel
 def force_gradient(
     reduction: Reduction,
     terms: RigidBodyTerms,
-    active: Indices,
+    active: Indices1D,
     count: int,
     extra: int,
     force_weight: float,
-    unknowns: Array,
-    out: Array,
+    unknowns: Array1D,
+    out: Array1D,
 ) -> None:
     """The gradient of the cost: w_f f + B'R^-1 (K f - k), then e; (3 count + extra,).
 
@@ -181,17 +181,17 @@ def force_gradient(
     """
     size, price = 3 * count, reduction.price
     for k in range(6):
-        total = -float(reduction.pull[k])
+        total = -reduction.pull[k]
         for i in range(size):
-            total += float(reduction.lever[k, i]) * float(unknowns[i])
+            total += reduction.lever[k, i] * unknowns[i]
         price[k] = total
     solve_upper(reduction.shape, price)
     for j in range(count):
         for axis in range(3):
             i = 3 * j + axis
-            total = force_weight * float(unknowns[i])
+            total = force_weight * unknowns[i]
             for k in range(6):
-                total += float(terms.jacobian[active[j], axis, k]) * float(price[k])
+                total += terms.jacobian[active[j], axis, k] * price[k]
             out[i] = total
     for k in range(size, size + extra):
         out[k] = unknowns[k]
@@ -204,8 +204,8 @@ def friction_rows(
     friction: float,
     least: float,
     most: float,
-    matrix: Array,
-    bound: Array,
+    matrix: Array2D,
+    bound: Array1D,
 ) -> int:
     """Six rows for each point: |f_x| <= mu f_z, |f_y| <= mu f_z, least <= f_z <= most.
 
@@ -237,15 +237,15 @@ def free_motions(reduction: Reduction) -> None:
     for k in range(6):
         square = 0.0
         for i in range(k, n):
-            square += float(mirrors[k, i]) * float(mirrors[k, i])
-        head = float(mirrors[k, k])
+            square += mirrors[k, i] * mirrors[k, i]
+        head = mirrors[k, k]
         mirrors[k, k] = head + math.copysign(math.sqrt(square), head)
-        square += float(mirrors[k, k]) * float(mirrors[k, k]) - head * head
+        square += mirrors[k, k] * mirrors[k, k] - head * head
         scale = math.sqrt(2.0 / square) if square > 0.0 else 0.0
         for i in range(k):
             mirrors[k, i] = 0.0
         for i in range(k, n):
-            mirrors[k, i] = float(mirrors[k, i]) * scale
+            mirrors[k, i] = mirrors[k, i] * scale
         for other in range(k + 1, 6):
             reflect(mirrors[k], mirrors[other])
     for j in range(n - 6):
@@ -258,26 +258,25 @@ def free_motions(reduction: Reduction) -> None:
 
 
 @kernel
-def reflect(mirror: Array, vector: Array) -> None:
+def reflect(mirror: Array1D, vector: Array1D) -> None:
     """Replace x by x - v (v'x), a reflection where v has the length sqrt(2)."""
     total = 0.0
     for i in range(vector.shape[0]):
-        total += float(mirror[i]) * float(vector[i])
-    for i in range(vector.shape[0]):
-        vector[i] = float(vector[i]) - total * float(mirror[i])
+        total += mirror[i] * vector[i]
+    vector[:] = vector - total * mirror
 
 
 @kernel
 def torque_rows(
     reduction: Reduction,
     terms: RigidBodyTerms,
-    active: Indices,
+    active: Indices1D,
     count: int,
-    transmission: Array,
+    transmission: Array2D,
     bounds: Bounds,
     first: int,
-    matrix: Array,
-    bound: Array,
+    matrix: Array2D,
+    bound: Array1D,
 ) -> int:
     """Two rows in [f; e] for each limited torque, from row ``first`` on; returns the number in all.
 
@@ -288,9 +287,9 @@ def torque_rows(
     torque_map, torque_rest = reduction.torque_map, reduction.torque_rest
     joints, n, size = torque_rest.shape[0], reduction.rest.shape[0], 3 * count
     for j in range(joints):
-        rest = float(terms.nonlinear[6 + j])
+        rest = terms.nonlinear[6 + j]
         for i in range(n):
-            rest += float(terms.mass_matrix[6 + j, i]) * float(reduction.rest[i])
+            rest += terms.mass_matrix[6 + j, i] * reduction.rest[i]
         torque_rest[j] = rest
         for point in range(count):
             for axis in range(3):
@@ -298,13 +297,13 @@ def torque_rows(
         for k in range(6):
             total = 0.0
             for i in range(n):
-                total += float(terms.mass_matrix[6 + j, i]) * float(response[k, i])
+                total += terms.mass_matrix[6 + j, i] * response[k, i]
             for i in range(size):
-                torque_map[j, i] = float(torque_map[j, i]) + total * float(lever[k, i])
+                torque_map[j, i] = torque_map[j, i] + total * lever[k, i]
         for k in range(joints):
             total = 0.0
             for i in range(n):
-                total += float(terms.mass_matrix[6 + j, i]) * float(free[k, i])
+                total += terms.mass_matrix[6 + j, i] * free[k, i]
             torque_map[j, size + k] = total
     for motor in range(joints):
         high, low = first + motor, first + joints + motor
@@ -312,60 +311,57 @@ def torque_rows(
             matrix[high, i] = 0.0
         rest = 0.0
         for j in range(joints):
-            share = float(transmission[motor, j])
+            share = transmission[motor, j]
             if share != 0.0:
-                rest += share * float(torque_rest[j])
+                rest += share * torque_rest[j]
                 for i in range(size + joints):
-                    matrix[high, i] = float(matrix[high, i]) + share * float(torque_map[j, i])
+                    matrix[high, i] = matrix[high, i] + share * torque_map[j, i]
         for i in range(size + joints):
-            matrix[low, i] = -float(matrix[high, i])
-        bound[high] = float(bounds.upper[motor]) - rest
-        bound[low] = rest - float(bounds.lower[motor])
+            matrix[low, i] = -matrix[high, i]
+        bound[high] = bounds.upper[motor] - rest
+        bound[low] = rest - bounds.lower[motor]
     return int(first + 2 * joints)
 
 
 @kernel
-def within_limits(torque: Array, transmission: Array, bounds: Bounds) -> bool:
+def within_limits(torque: Array1D, transmission: Array2D, bounds: Bounds) -> bool:
     """Whether torques (n_joints,) [N m] keep their limits, up to 1e-10 N m."""
     for motor in range(torque.shape[0]):
         total = 0.0
         for j in range(torque.shape[0]):
-            total += float(transmission[motor, j]) * float(torque[j])
-        if total > float(bounds.upper[motor]) + 1e-10:
+            total += transmission[motor, j] * torque[j]
+        if total > bounds.upper[motor] + 1e-10:
             return False
-        if total < float(bounds.lower[motor]) - 1e-10:
+        if total < bounds.lower[motor] - 1e-10:
             return False
     return True
 
 
 @kernel
 def recover_acceleration(
-    reduction: Reduction, size: int, extra: int, unknowns: Array, out: Array
+    reduction: Reduction, size: int, extra: int, unknowns: Array1D, out: Array1D
 ) -> None:
     """The acceleration (n,) for ``size`` elements of force and ``extra`` elements of e."""
     response, lever, free = reduction.response, reduction.lever, reduction.free
-    for i in range(out.shape[0]):
-        out[i] = reduction.rest[i]
+    out[:] = reduction.rest
     for k in range(6):
         value = 0.0
         for i in range(size):
-            value += float(lever[k, i]) * float(unknowns[i])
-        for i in range(out.shape[0]):
-            out[i] = float(out[i]) + value * float(response[k, i])
+            value += lever[k, i] * unknowns[i]
+        out[:] = out + value * response[k]
     for k in range(extra):
-        value = float(unknowns[size + k])
-        for i in range(out.shape[0]):
-            out[i] = float(out[i]) + value * float(free[k, i])
+        value = unknowns[size + k]
+        out[:] = out + value * free[k]
 
 
 @kernel
 def recover_torque(
     terms: RigidBodyTerms,
-    active: Indices,
+    active: Indices1D,
     count: int,
-    acceleration: Array,
-    force: Array,
-    torque: Array,
+    acceleration: Array1D,
+    force: Array1D,
+    torque: Array1D,
 ) -> None:
     """The joint torques M_j a + h_j - J_j' f (paper, opt_torque), (n_joints,) [N m].
 
@@ -373,12 +369,10 @@ def recover_torque(
         force: of the first ``count`` points of ``active``, three elements each.
     """
     for j in range(torque.shape[0]):
-        total = float(terms.nonlinear[6 + j])
+        total = terms.nonlinear[6 + j]
         for i in range(acceleration.shape[0]):
-            total += float(terms.mass_matrix[6 + j, i]) * float(acceleration[i])
+            total += terms.mass_matrix[6 + j, i] * acceleration[i]
         for point in range(count):
             for axis in range(3):
-                total -= float(terms.jacobian[active[point], axis, 6 + j]) * float(
-                    force[3 * point + axis]
-                )
+                total -= terms.jacobian[active[point], axis, 6 + j] * force[3 * point + axis]
         torque[j] = total

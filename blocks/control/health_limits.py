@@ -6,7 +6,13 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
-from ...mathematics.arrays import Array, Counts, Flags
+from ...mathematics.arrays import (
+    Array0D,
+    Array1D,
+    Flags0D,
+    Indices0D,
+    Indices1D,
+)
 from ...mathematics.kernel import kernel
 from ...runtime.language.parameters import Parameters, parameter
 from ..signals import RobotHealth
@@ -73,26 +79,26 @@ class Limits(NamedTuple):
 class Drives(NamedTuple):
     """What the drives report, and for how many ticks in a row it was beyond a limit."""
 
-    condition: Counts
-    age: Array
-    voltage: Array
-    temperature: Array
-    current: Array
-    low: Counts
-    hot: Counts
-    strong: Counts
+    condition: Indices1D
+    age: Array1D
+    voltage: Array1D
+    temperature: Array1D
+    current: Array1D
+    low: Indices1D
+    hot: Indices1D
+    strong: Indices1D
 
 
 class Sensors(NamedTuple):
     """What is reported of the sensors, and what is kept of it from tick to tick."""
 
-    imu_age: Array
-    stamp: Array
-    joints_valid: Flags
-    imu_valid: Flags
-    contacts_valid: Flags
-    invalid: Counts
-    stamps: Array
+    imu_age: Array0D
+    stamp: Array0D
+    joints_valid: Flags0D
+    imu_valid: Flags0D
+    contacts_valid: Flags0D
+    invalid: Indices1D
+    stamps: Array1D
 
 
 class Health(NamedTuple):
@@ -102,8 +108,8 @@ class Health(NamedTuple):
     drives: Drives
     sensors: Sensors
     limits: Limits
-    state: Counts
-    verdict: Counts
+    state: Indices0D
+    verdict: Indices1D
 
 
 class HealthTimers(Protocol):
@@ -206,7 +212,7 @@ def health_text(fault: Fault, who: str, value: float, params: HealthParameters) 
 
 
 @kernel
-def judge_health(drives: Drives, sensors: Sensors, limits: Limits, verdict: Counts) -> None:
+def judge_health(drives: Drives, sensors: Sensors, limits: Limits, verdict: Indices1D) -> None:
     """Write the gravest fault, and the drive that has it, to ``verdict``, (2,); all counts are updated.
     A voltage of zero is one that is not measured."""
     fault, place = 0, 0
@@ -223,16 +229,16 @@ def judge_health(drives: Drives, sensors: Sensors, limits: Limits, verdict: Coun
 @kernel
 def judge_drive(drives: Drives, limits: Limits, k: int) -> int:
     """The gravest fault of drive ``k``; its counts are updated."""
-    condition, voltage = int(drives.condition[k]), float(drives.voltage[k])
+    condition, voltage = drives.condition[k], drives.voltage[k]
     low = 0.0 < voltage < limits.lowest_voltage
-    hot = not float(drives.temperature[k]) <= limits.highest_temperature
-    strong = not abs(float(drives.current[k])) <= limits.largest_current
-    drives.low[k] = int(drives.low[k]) + 1 if low else 0
-    drives.hot[k] = int(drives.hot[k]) + 1 if hot else 0
-    drives.strong[k] = int(drives.strong[k]) + 1 if strong else 0
+    hot = not drives.temperature[k] <= limits.highest_temperature
+    strong = not abs(drives.current[k]) <= limits.largest_current
+    drives.low[k] = drives.low[k] + 1 if low else 0
+    drives.hot[k] = drives.hot[k] + 1 if hot else 0
+    drives.strong[k] = drives.strong[k] + 1 if strong else 0
     if condition & _CRITICAL != 0 or condition & _ANSWERED == 0:
         return _DRIVE
-    if not float(drives.age[k]) <= limits.answer_age:
+    if not drives.age[k] <= limits.answer_age:
         return _SILENT_DRIVE
     if drives.low[k] > limits.hold:
         return _VOLTAGE
@@ -246,18 +252,18 @@ def judge_drive(drives: Drives, limits: Limits, k: int) -> int:
 @kernel
 def judge_sensors(sensors: Sensors, limits: Limits) -> int:
     """The gravest fault of what is measured; all counts are updated."""
-    invalid, stamps, stamp = sensors.invalid, sensors.stamps, float(sensors.stamp[()])
-    invalid[0] = 0 if sensors.joints_valid[()] else int(invalid[0]) + 1
-    invalid[1] = 0 if sensors.imu_valid[()] else int(invalid[1]) + 1
-    invalid[2] = 0 if sensors.contacts_valid[()] else int(invalid[2]) + 1
-    same = stamp >= 0.0 and stamp == float(stamps[0])
-    stamps[1] = float(stamps[1]) + 1.0 if same else 0.0
+    invalid, stamps, stamp = sensors.invalid, sensors.stamps, sensors.stamp[()]
+    invalid[0] = 0 if sensors.joints_valid[()] else invalid[0] + 1
+    invalid[1] = 0 if sensors.imu_valid[()] else invalid[1] + 1
+    invalid[2] = 0 if sensors.contacts_valid[()] else invalid[2] + 1
+    same = stamp >= 0.0 and stamp == stamps[0]
+    stamps[1] = stamps[1] + 1.0 if same else 0.0
     stamps[0] = stamp
-    if not float(sensors.imu_age[()]) <= limits.imu_age:
+    if not sensors.imu_age[()] <= limits.imu_age:
         return _SILENT_IMU
     for k in range(3):
         if invalid[k] > limits.invalid_hold:
             return _INVALID_JOINTS + k
-    if float(stamps[1]) > limits.stamp_hold:
+    if stamps[1] > limits.stamp_hold:
         return _STALE_HEALTH
     return 0

@@ -5,7 +5,14 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from ...mathematics.arrays import Array, Counts, Flags
+from ...mathematics.arrays import (
+    Array1D,
+    Flags0D,
+    Flags1D,
+    Indices0D,
+    Vector3,
+    Vector4,
+)
 from ...mathematics.constants import GRAVITY
 from ...mathematics.inertial_filter import (
     StandingPoints,
@@ -34,38 +41,38 @@ class Sample(NamedTuple):
     ``gyro``, ``force`` and ``joint_rates`` are what the filter uses, ``force`` without its bias.
     """
 
-    angular_velocity: Array
-    specific_force: Array
-    joint_velocity: Array
-    gyro: Array
-    force: Array
-    joint_rates: Array
+    angular_velocity: Vector3
+    specific_force: Vector3
+    joint_velocity: Array1D
+    gyro: Vector3
+    force: Vector3
+    joint_rates: Array1D
 
 
 class Filter(NamedTuple):
     """The fields of ``BaseEstimate``."""
 
-    position: Array
-    orientation: Array
-    velocity: Array
-    angular_velocity: Array
-    gyro_bias: Array
-    accelerometer_bias: Array
-    mean_rate: Array
-    mean_joint_rate: Array
-    ballistic_velocity: Array
-    flight_ticks: Counts
-    started: Flags
+    position: Vector3
+    orientation: Vector4
+    velocity: Vector3
+    angular_velocity: Vector3
+    gyro_bias: Vector3
+    accelerometer_bias: Vector3
+    mean_rate: Vector3
+    mean_joint_rate: Array1D
+    ballistic_velocity: Vector3
+    flight_ticks: Indices0D
+    started: Flags0D
 
 
 class Learning(NamedTuple):
     """The fields of ``BiasSamples``."""
 
-    samples: Counts
-    filled: Counts
-    held: Counts
-    filling_sum: Array
-    held_sum: Array
+    samples: Indices0D
+    filled: Indices0D
+    held: Indices0D
+    filling_sum: Vector3
+    held_sum: Vector3
 
 
 class Legs(NamedTuple):
@@ -81,10 +88,10 @@ class Legs(NamedTuple):
 class Settings(NamedTuple):
     """Parameters that may change during a run, each (1,)."""
 
-    velocity_gain: Array
-    position_gain: Array
-    tilt_gain: Array
-    still_rate: Array
+    velocity_gain: Array1D
+    position_gain: Array1D
+    tilt_gain: Array1D
+    still_rate: Array1D
 
 
 class Fixed(NamedTuple):
@@ -101,20 +108,20 @@ class Fixed(NamedTuple):
 class Scratch(NamedTuple):
     """Memory of a tick: the angular velocity of the tick before, and vectors."""
 
-    last_rate: Array
-    error: Array
-    spare: Array
-    middle: Array
-    acceleration: Array
+    last_rate: Vector3
+    error: Vector3
+    spare: Vector3
+    middle: Array1D
+    acceleration: Array1D
 
 
 class Base(NamedTuple):
     """The fields of ``BaseState``."""
 
-    position: Array
-    orientation: Array
-    linear_velocity: Array
-    angular_velocity: Array
+    position: Vector3
+    orientation: Vector4
+    linear_velocity: Vector3
+    angular_velocity: Vector3
 
 
 class Estimator(NamedTuple):
@@ -131,14 +138,13 @@ class Estimator(NamedTuple):
 
 
 @kernel
-def limit(values: Array, largest: float, out: Array) -> None:
+def limit(values: Array1D, largest: float, out: Array1D) -> None:
     """Values within plus and minus ``largest``; what is not a number stays so."""
-    for k in range(out.shape[0]):
-        out[k] = max(min(float(values[k]), largest), -largest)
+    out[:] = max(min(values, largest), -largest)
 
 
 @kernel
-def count_standing(active: Flags) -> int:
+def count_standing(active: Flags1D) -> int:
     """The number of points in contact."""
     standing = 0
     for point in range(active.shape[0]):
@@ -155,13 +161,13 @@ def watch_motion(estimator: Estimator) -> float:
     estimate, sample = estimator.filter, estimator.sample
     share, fastest = estimator.fixed.watch_share, 0.0
     for i in range(3):
-        mean = float(estimate.mean_rate[i])
-        mean += share * (float(sample.gyro[i]) - mean)
+        mean = estimate.mean_rate[i]
+        mean += share * (sample.gyro[i] - mean)
         estimate.mean_rate[i] = mean
         fastest = max(fastest, abs(mean))
     for i in range(sample.joint_rates.shape[0]):
-        mean = float(estimate.mean_joint_rate[i])
-        mean += share * (float(sample.joint_rates[i]) - mean)
+        mean = estimate.mean_joint_rate[i]
+        mean += share * (sample.joint_rates[i] - mean)
         estimate.mean_joint_rate[i] = mean
         fastest = max(fastest, abs(mean))
     active = estimator.legs.points.active
@@ -180,14 +186,13 @@ def start(estimator: Estimator) -> None:
         limit(error, 0.2, error)
         if not estimator.fixed.starts_level:
             error[0] = error[1] = 0.0
-        turn(estimate.orientation, float(error[0]), float(error[1]), float(error[2]))
+        turn(estimate.orientation, error[0], error[1], error[2])
     for foot in range(seen.soles.shape[0]):
         rotate(estimate.orientation, seen.soles[foot], spare)
-        for axis in range(2):
-            estimate.position[axis] -= float(spare[axis]) / seen.soles.shape[0]
+        estimate.position[:2] -= spare[:2] / seen.soles.shape[0]
     for point in range(seen.points.shape[0]):
         rotate(estimate.orientation, seen.points[point], spare)
-        estimate.position[2] -= float(spare[2]) / seen.points.shape[0]
+        estimate.position[2] -= spare[2] / seen.points.shape[0]
     for joint in range(estimate.mean_joint_rate.shape[0]):
         estimate.mean_joint_rate[joint] = 1.0  # it counts as moving until it is seen at rest
     estimate.started[()] = True
@@ -207,11 +212,9 @@ def predict(estimator: Estimator) -> float:
     started = bool(estimate.started[()])
     if started:
         fastest = watch_motion(estimator)
-    for axis in range(3):
-        sample.force[axis] -= float(estimate.accelerometer_bias[axis])
-        scratch.last_rate[axis] = estimate.angular_velocity[axis]
-        rate = float(sample.gyro[axis]) - float(estimate.gyro_bias[axis])
-        estimate.angular_velocity[axis] = rate
+    sample.force[:] -= estimate.accelerometer_bias
+    scratch.last_rate[:] = estimate.angular_velocity
+    estimate.angular_velocity[:] = sample.gyro - estimate.gyro_bias
     if started:
         propagate(
             estimate.orientation, estimate.position, estimate.velocity, scratch.last_rate,
@@ -235,9 +238,9 @@ def place_points(estimator: Estimator) -> None:
 
 
 @kernel
-def is_unaccelerated(force: Array) -> bool:
+def is_unaccelerated(force: Array1D) -> bool:
     """Whether the accelerometer reads about 1 g, so that it shows the vertical."""
-    x, y, z = float(force[0]), float(force[1]), float(force[2])
+    x, y, z = force[0], force[1], force[2]
     return abs(math.sqrt(x * x + y * y + z * z) - GRAVITY) <= 0.1 * GRAVITY
 
 
@@ -245,12 +248,11 @@ def is_unaccelerated(force: Array) -> bool:
 def forget_samples(learning: Learning) -> None:
     """Begin a new block of samples, since the robot moves."""
     learning.filled[()] = learning.held[()] = 0
-    for axis in range(3):
-        learning.filling_sum[axis] = 0.0
+    learning.filling_sum[:] = 0.0
 
 
 @kernel
-def learn_bias(learning: Learning, block: int, bias: Array, prior: float) -> None:
+def learn_bias(learning: Learning, block: int, bias: Vector3, prior: float) -> None:
     """Count a sample that has been added to ``filling_sum``, and update the bias (3,).
 
     A full block of samples counts only once the block after it is full too, so that samples
@@ -258,19 +260,16 @@ def learn_bias(learning: Learning, block: int, bias: Array, prior: float) -> Non
     zero with the weight of ``prior`` samples: the usual ratio of the variances of noise and
     bias.
     """
-    filled = int(learning.filled[()]) + 1
+    filled = learning.filled[()] + 1
     learning.filled[()] = filled
     if filled < block:
         return
     if learning.held[()] > 0:
-        samples = min(int(learning.samples[()]) + filled, 1000)
+        samples = min(learning.samples[()] + filled, 1000)
         learning.samples[()] = samples
-        for i in range(3):
-            excess = float(learning.held_sum[i]) - filled * float(bias[i])
-            bias[i] += excess / (samples + prior)
-    for axis in range(3):
-        learning.held_sum[axis] = learning.filling_sum[axis]
-        learning.filling_sum[axis] = 0.0
+        bias[:] += (learning.held_sum - filled * bias) / (samples + prior)
+    learning.held_sum[:] = learning.filling_sum
+    learning.filling_sum[:] = 0.0
     learning.held[()], learning.filled[()] = filled, 0
 
 
@@ -278,24 +277,24 @@ def learn_bias(learning: Learning, block: int, bias: Array, prior: float) -> Non
 def fall_freely(estimator: Estimator) -> None:
     """In flight, let the centre of mass fall freely and the base follow from the joints."""
     estimate, scratch, period = estimator.filter, estimator.scratch, estimator.fixed.period
-    ticks, fall, change = int(estimate.flight_ticks[()]), scratch.spare, scratch.acceleration
+    ticks, fall, change = estimate.flight_ticks[()], scratch.spare, scratch.acceleration
     if ticks == 0:
         return
     average = max(round(0.02 / period), 1)
     rotate(estimate.orientation, estimator.legs.seen.com_velocity, fall)
     largest = 0.0
     for axis in range(3):
-        fall[axis] += float(estimate.velocity[axis])
+        fall[axis] += estimate.velocity[axis]
         if axis == 2:
             fall[axis] += GRAVITY * period * ticks
-        change[axis] = float(fall[axis]) - float(estimate.ballistic_velocity[axis])
-        largest = max(largest, abs(float(change[axis])))
+        change[axis] = fall[axis] - estimate.ballistic_velocity[axis]
+        largest = max(largest, abs(change[axis]))
     if ticks <= average:
         for axis in range(3):
-            estimate.ballistic_velocity[axis] += float(change[axis]) / ticks
+            estimate.ballistic_velocity[axis] += change[axis] / ticks
     elif largest < _IMPACT:
         for axis in range(3):
-            estimate.velocity[axis] -= float(change[axis])
+            estimate.velocity[axis] -= change[axis]
     else:
         estimate.flight_ticks[()] = 0  # an impact: keep the velocity by the IMU
 
@@ -311,16 +310,14 @@ def use_contacts(estimator: Estimator, trusted: float, support: float) -> None:
     estimate, settings, base = estimator.filter, estimator.settings, estimator.base
     points = estimator.legs.points
     airborne = trusted * support < 0.25 or count_standing(points.active) == 0
-    estimate.flight_ticks[()] = int(estimate.flight_ticks[()]) + 1 if airborne else 0
+    estimate.flight_ticks[()] = estimate.flight_ticks[()] + 1 if airborne else 0
     stand_on(
-        points, support * float(settings.velocity_gain[0]),
-        support * float(settings.position_gain[0]), estimate.position, estimate.velocity,
+        points, support * settings.velocity_gain[0],
+        support * settings.position_gain[0], estimate.position, estimate.velocity,
     )  # fmt: skip
     if estimator.fixed.ballistic:
         fall_freely(estimator)
-    for axis in range(3):
-        base.position[axis] = estimate.position[axis]
-        base.linear_velocity[axis] = estimate.velocity[axis]
-        base.angular_velocity[axis] = estimate.angular_velocity[axis]
-    for k in range(4):
-        base.orientation[k] = estimate.orientation[k]
+    base.position[:] = estimate.position
+    base.linear_velocity[:] = estimate.velocity
+    base.angular_velocity[:] = estimate.angular_velocity
+    base.orientation[:] = estimate.orientation

@@ -8,7 +8,16 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ...mathematics.arrays import Array, Flags, Indices
+from ...mathematics.arrays import (
+    Array0D,
+    Array1D,
+    Flags1D,
+    Indices0D,
+    Indices1D,
+    Indices2D,
+    Rows3,
+    Vector3,
+)
 from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.constants import GRAVITY
 from ...mathematics.kernel import kernel
@@ -168,33 +177,33 @@ class JumpPhase(KernelBlock):
 class Planned(NamedTuple):
     """The fields of ``JumpReference`` that the phases follow."""
 
-    time: Array
-    phase: Indices
-    lift_off_time: Array
-    touchdown_time: Array
-    com: Array
-    com_velocity: Array
-    contact: Flags
+    time: Array0D
+    phase: Indices0D
+    lift_off_time: Array0D
+    touchdown_time: Array0D
+    com: Vector3
+    com_velocity: Vector3
+    contact: Flags1D
 
 
 class Present(NamedTuple):
     """The fields of ``DynamicsTerms`` that tell the time to touchdown, and the points."""
 
-    com: Array
-    com_velocity: Array
-    contact_position: Array
+    com: Vector3
+    com_velocity: Vector3
+    contact_position: Rows3
 
 
 class Memory(NamedTuple):
     """The fields of ``PhaseMemory``."""
 
-    phase: Indices
-    began: Array
-    touchdown: Array
-    lift_off_time: Array
-    touchdown_time: Array
-    unloaded: Array
-    stance: Flags
+    phase: Indices0D
+    began: Array0D
+    touchdown: Array0D
+    lift_off_time: Array0D
+    touchdown_time: Array0D
+    unloaded: Array1D
+    stance: Flags1D
 
 
 class Table(NamedTuple):
@@ -204,49 +213,49 @@ class Table(NamedTuple):
     may be above the lowest [m].
     """
 
-    transitions: Indices
-    limits: Array
-    stance_limits: Array
-    times: Array
-    holds: Flags
+    transitions: Indices2D
+    limits: Array1D
+    stance_limits: Array1D
+    times: Array1D
+    holds: Flags1D
 
 
 @kernel
 def follow_phases(
     period: float,
     planned: Planned,
-    active: Flags,
-    ahead: Array,
+    active: Flags1D,
+    ahead: Array0D,
     present: Present,
-    foot_of_point: Indices,
+    foot_of_point: Indices1D,
     table: Table,
     memory: Memory,
     out: PhaseFields,
 ) -> None:
     """One tick of ``JumpPhase``; ``active`` are the points with contact, (n_contacts,)."""
-    now, before, times = float(planned.time[()]), int(memory.phase[()]), table.times
+    now, before, times = planned.time[()], memory.phase[()], table.times
     shortest = count_unloaded(active, period, memory.unloaded)
     if before < Phase.FLIGHT:
-        memory.lift_off_time[()] = float(planned.lift_off_time[()])
-        memory.touchdown_time[()] = float(planned.touchdown_time[()])
-    lift_off = float(memory.lift_off_time[()])
-    touchdown = float(memory.touchdown_time[()])
-    another = float(planned.lift_off_time[()]) > touchdown
+        memory.lift_off_time[()] = planned.lift_off_time[()]
+        memory.touchdown_time[()] = planned.touchdown_time[()]
+    lift_off = memory.lift_off_time[()]
+    touchdown = memory.touchdown_time[()]
+    another = planned.lift_off_time[()] > touchdown
     remaining = 0.0
     if before <= Phase.FLIGHT:
         remaining = time_to_height(
-            float(present.com[2]), float(present.com_velocity[2]),
+            present.com[2], present.com_velocity[2],
             planned_touchdown_height(
-                float(planned.com[2]), float(planned.com_velocity[2]),
+                planned.com[2], planned.com_velocity[2],
                 touchdown - max(now, lift_off),
             ),
         )  # fmt: skip
-    times[NOW], times[IN_PHASE] = now, now - float(memory.began[()])
+    times[NOW], times[IN_PHASE] = now, now - memory.began[()]
     times[LIFT_OFF], times[TOUCHDOWN] = lift_off, touchdown
     if before == Phase.LANDING:  # it may have begun without a contact, after a long flight
-        shortest = min(shortest, float(times[IN_PHASE]))
-    times[REMAINING], times[UNLOADED], times[AHEAD] = remaining, shortest, float(ahead[()])
-    find_conditions(times, table.limits, int(planned.phase[()]), another, table.holds)
+        shortest = min(shortest, times[IN_PHASE])
+    times[REMAINING], times[UNLOADED], times[AHEAD] = remaining, shortest, ahead[()]
+    find_conditions(times, table.limits, planned.phase[()], another, table.holds)
     phase = next_phase(table.transitions, before, table.holds)
     if phase != before:
         memory.phase[()] = phase
@@ -254,19 +263,18 @@ def follow_phases(
         if phase == Phase.LANDING:
             memory.touchdown[()] = now
     choose_stance(
-        phase, planned.contact, memory.unloaded, float(table.stance_limits[0]),
-        present.contact_position, foot_of_point, float(table.stance_limits[1]), memory.stance,
+        phase, planned.contact, memory.unloaded, table.stance_limits[0],
+        present.contact_position, foot_of_point, table.stance_limits[1], memory.stance,
     )  # fmt: skip
     out.phase[()] = phase
-    out.time_in_phase[()] = now - float(memory.began[()])
+    out.time_in_phase[()] = now - memory.began[()]
     out.time_to_touchdown[()] = remaining if phase == Phase.FLIGHT else 0.0
-    landed = float(memory.touchdown[()])
+    landed = memory.touchdown[()]
     out.time_since_touchdown[()] = now - landed if landed >= 0.0 else 0.0
     for i in range(active.shape[0]):
         out.stance[i] = memory.stance[i]
         out.stepping[i] = False  # steps are for CaptureStep to take
-        for k in range(3):
-            out.step_acceleration[i, k] = 0.0
+        out.step_acceleration[i, :] = 0.0
 
 
 @kernel

@@ -9,7 +9,7 @@ from __future__ import annotations
 from math import degrees, pi, sqrt
 from typing import NamedTuple
 
-from ...mathematics.arrays import Array, Counts
+from ...mathematics.arrays import Array, Array0D, Array1D, Array2D, Counts, Indices0D
 from ...mathematics.kernel import kernel
 from ...runtime.language.signals import Field, Signal
 from .jump_criteria import JumpCriteria, mean_turn
@@ -41,56 +41,56 @@ class JumpSeries(Signal):
 class Jump(NamedTuple):
     """The fields of ``JumpRecord`` that are followed in a jump, and where the feet point now."""
 
-    direction: Array
-    unloaded_time: Array
-    unloaded_speed: Array
-    unloaded_momentum: Array
-    lift_off_time: Array
-    lift_off_speed: Array
-    lift_off_momentum: Array
-    touchdown_time: Array
-    touchdown_speed: Array
-    vertical_speed: Array
-    squat_height: Array
-    apex_height: Array
-    start_foot: Array
-    start_direction: Array
-    ground_low: Array
-    ground_high: Array
+    direction: Array2D
+    unloaded_time: Array0D
+    unloaded_speed: Array0D
+    unloaded_momentum: Array1D
+    lift_off_time: Array0D
+    lift_off_speed: Array0D
+    lift_off_momentum: Array1D
+    touchdown_time: Array0D
+    touchdown_speed: Array0D
+    vertical_speed: Array0D
+    squat_height: Array0D
+    apex_height: Array0D
+    start_foot: Array2D
+    start_direction: Array2D
+    ground_low: Array0D
+    ground_high: Array0D
 
 
 class Planned(NamedTuple):
     """The fields of ``JumpRecord`` whose names begin with ``planned_``."""
 
-    flight: Array
-    speed: Array
-    speed_time: Array
-    standing: Array
-    apex: Array
-    start: Array
-    foot: Array
-    yaw_start: Array
-    yaw: Array
+    flight: Array0D
+    speed: Array0D
+    speed_time: Array0D
+    standing: Array0D
+    apex: Array0D
+    start: Array2D
+    foot: Array2D
+    yaw_start: Array0D
+    yaw: Array0D
 
 
 class Series(NamedTuple):
     """The fields of ``JumpSeries``."""
 
-    made: Counts
-    landed_time: Array
-    planned_lift_off: Array
-    flight_share: Array
-    flight_jump: Counts
-    speed_error: Array
-    speed_jump: Counts
-    rise_error: Array
-    rise_jump: Counts
-    place_error: Array
-    place_now: Array
-    place_jump: Counts
-    turn_error: Array
-    turn_now: Array
-    turn_jump: Counts
+    made: Indices0D
+    landed_time: Array0D
+    planned_lift_off: Array0D
+    flight_share: Array0D
+    flight_jump: Indices0D
+    speed_error: Array0D
+    speed_jump: Indices0D
+    rise_error: Array0D
+    rise_jump: Indices0D
+    place_error: Array0D
+    place_now: Array0D
+    place_jump: Indices0D
+    turn_error: Array0D
+    turn_now: Array0D
+    turn_jump: Indices0D
 
 
 @kernel
@@ -111,22 +111,22 @@ def note_landing(
         standing: the height of the com at the start [m].
         compared: whether there is a reference to compare the jump with.
     """
-    made = int(series.made[()]) + 1
+    made = series.made[()] + 1
     series.made[()] = made
-    series.landed_time[()] = float(jump.touchdown_time[()])
+    series.landed_time[()] = jump.touchdown_time[()]
     if made == 1:
         series.flight_share[()] = 1e9
     if compared:
-        flight = float(jump.touchdown_time[()]) - float(jump.lift_off_time[()])
-        share = flight / max(float(planned.flight[()]), 1e-9)
+        flight = jump.touchdown_time[()] - jump.lift_off_time[()]
+        share = flight / max(planned.flight[()], 1e-9)
         if share < series.flight_share[()]:
             series.flight_share[()] = share
             series.flight_jump[()] = made
-        speed = float(planned.speed[()])
-        error = abs(float(jump.lift_off_speed[()]) - speed) / max(abs(speed), 1e-9)
+        speed = planned.speed[()]
+        error = abs(jump.lift_off_speed[()] - speed) / max(abs(speed), 1e-9)
         keep_worst(series.speed_error, series.speed_jump, error, made)
-        rise = float(planned.apex[()]) - float(planned.standing[()])
-        error = abs(float(jump.apex_height[()]) - standing - rise) / max(rise, 1e-9)
+        rise = planned.apex[()] - planned.standing[()]
+        error = abs(jump.apex_height[()] - standing - rise) / max(rise, 1e-9)
         keep_worst(series.rise_error, series.rise_jump, error, made)
     jump.lift_off_time[()] = jump.touchdown_time[()] = jump.unloaded_time[()] = NEVER
 
@@ -136,12 +136,12 @@ def note_place(foot: Array, jump: Jump, planned: Planned, series: Series) -> Non
     """Between two jumps: note how far the feet, (n_feet, 2), are from their planned position."""
     x, y, feet = 0.0, 0.0, foot.shape[0]
     for k in range(feet):
-        moved = float(foot[k, 0]) - float(jump.start_foot[k, 0])
-        x += (moved - (float(planned.foot[k, 0]) - float(planned.start[k, 0]))) / feet
-        moved = float(foot[k, 1]) - float(jump.start_foot[k, 1])
-        y += (moved - (float(planned.foot[k, 1]) - float(planned.start[k, 1]))) / feet
+        moved = float(foot[k, 0]) - jump.start_foot[k, 0]
+        x += (moved - (planned.foot[k, 0] - planned.start[k, 0])) / feet
+        moved = float(foot[k, 1]) - jump.start_foot[k, 1]
+        y += (moved - (planned.foot[k, 1] - planned.start[k, 1])) / feet
     series.place_now[()] = sqrt(x * x + y * y)
-    turn = float(planned.yaw[()]) - float(planned.yaw_start[()])
+    turn = planned.yaw[()] - planned.yaw_start[()]
     error = abs(mean_turn(jump.start_direction, jump.direction) - turn)
     # Half a turn to the left is the same as half a turn to the right.
     series.turn_now[()] = abs(error - 2.0 * pi) if error > pi else error
@@ -150,9 +150,9 @@ def note_place(foot: Array, jump: Jump, planned: Planned, series: Series) -> Non
 @kernel
 def keep_place(series: Series) -> None:
     """When the next jump lifts off: keep the last landing's error if it is the largest."""
-    made = int(series.made[()])
-    keep_worst(series.place_error, series.place_jump, float(series.place_now[()]), made)
-    keep_worst(series.turn_error, series.turn_jump, float(series.turn_now[()]), made)
+    made = series.made[()]
+    keep_worst(series.place_error, series.place_jump, series.place_now[()], made)
+    keep_worst(series.turn_error, series.turn_jump, series.turn_now[()], made)
 
 
 def series_failure(series: JumpSeries, limits: JumpCriteria, made: int) -> str | None:

@@ -46,6 +46,7 @@ NUMBER = NumberKind()
 
 def kind_of_annotation(annotation: Any, scope: Mapping[str, Any]) -> Kind:
     """What an annotation, or the text of one, says; ``scope`` has the names in it."""
+    annotation = getattr(annotation, "__forward_arg__", annotation)  # the text in a named tuple
     if isinstance(annotation, str):
         try:
             annotation = eval(annotation, dict(scope))
@@ -57,7 +58,7 @@ def kind_of_annotation(annotation: Any, scope: Mapping[str, Any]) -> Kind:
         return RecordKind(annotation.__name__, annotation.kernel_kinds())
     for mark in getattr(annotation, "__metadata__", ()):
         if isinstance(mark, Rank):
-            return ArrayKind((None,) * mark.dimensions, mark.element)
+            return ArrayKind(mark.sizes or (None,) * mark.dimensions, mark.element)
     if (
         isinstance(annotation, type)
         and issubclass(annotation, tuple)
