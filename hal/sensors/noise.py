@@ -118,11 +118,11 @@ class FieldErrors:
 
 
 class DelayLine(NamedTuple):
-    """Past samples of ``n`` numbers: a ring ``samples`` (slots, n), of which slot ``count % slots`` is
-    written next (``count`` (1,)), and how many samples each number is late, ``delay`` (n,)."""
+    """Past samples of ``n`` numbers: a ring ``samples`` (slots, n), of which slot ``taken % slots`` is
+    written next (``taken`` (1,)), and how many samples each number is late, ``delay`` (n,)."""
 
     samples: Array
-    count: Counts
+    taken: Counts
     delay: Counts
 
 
@@ -130,9 +130,9 @@ class DelayLine(NamedTuple):
 def delay_sample(sample: Array, line: DelayLine, reading: Array) -> None:
     """Put a ``sample`` (n,) into the line, and write the ``reading`` (n,) that is late; before the
     first samples there was what the first one says."""
-    slots, count = line.samples.shape[0], int(line.count[0])
+    slots, count = line.samples.shape[0], int(line.taken[0])
     for k in range(sample.shape[0]):
         line.samples[count % slots, k] = sample[k]
         late = min(int(line.delay[k]), count)
         reading[k] = line.samples[(count - late) % slots, k]
-    line.count[0] = count + 1
+    line.taken[0] = count + 1
