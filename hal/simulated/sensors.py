@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...blocks.signals import ImuReading, JointState
-from ...mathematics.arrays import Array, Counts, Flags
+from ...mathematics.arrays import Array, Array1D, Counts, Flags, Flags1D, Indices1D, Vector3
 from ...mathematics.compiling.call_sequence import Call
 from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.kernel import kernel
@@ -29,8 +29,8 @@ if TYPE_CHECKING:
 
 
 @kernel
-def accumulate(now: Array, averaged: Flags, total: Array, steps: Counts) -> None:
-    """Add the true values of a physics step, (n,), where they are ``averaged``; else keep them."""
+def accumulate(now: Array1D, averaged: Flags1D, total: Array1D, steps: Indices1D) -> None:
+    """Add the true values of a physics step where they are ``averaged``; else keep them."""
     for k in range(now.shape[0]):
         if averaged[k] and steps[0] > 0:
             total[k] += now[k]
@@ -40,26 +40,25 @@ def accumulate(now: Array, averaged: Flags, total: Array, steps: Counts) -> None
 
 
 @kernel
-def take_sample(averaged: Flags, total: Array, steps: Counts, true: Array) -> None:
-    """Write the true values (n,) of a sample, and begin the next one."""
+def take_sample(averaged: Flags1D, total: Array1D, steps: Indices1D, true: Array1D) -> None:
+    """Write the true values of a sample, and begin the next one."""
     for k in range(true.shape[0]):
-        true[k] = float(total[k]) / max(1, int(steps[0])) if averaged[k] else float(total[k])
-        total[k] = true[k]
+        true[k] = total[k] / max(1, steps[0]) if averaged[k] else total[k]
+    total[:] = true
     steps[0] = 0
 
 
 @kernel
-def copy_numbers(numbers: Array, out: Array) -> None:
-    """Copy numbers, (n,)."""
-    for k in range(out.shape[0]):
-        out[k] = numbers[k]
+def copy_numbers(numbers: Array1D, out: Array1D) -> None:
+    """Copy numbers."""
+    out[:] = numbers
 
 
 @kernel
-def read_nothing(first: Array, second: Array) -> None:
-    """Zeros, (3,), for an IMU that the robot does not have."""
-    for axis in range(3):
-        first[axis] = second[axis] = 0.0
+def read_nothing(rate: Vector3, force: Vector3) -> None:
+    """Zeros, for an IMU that the robot does not have."""
+    rate[:] = 0.0
+    force[:] = 0.0
 
 
 class SimulatedSensor:
