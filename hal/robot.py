@@ -101,7 +101,11 @@ class Robot(Block, ABC):
 
     @classmethod
     def fitted(
-        cls, params: Parameters, folder: Path, robot: RobotDescription | None = None
+        cls,
+        params: Parameters,
+        folder: Path,
+        robot: RobotDescription | None = None,
+        graph_folder: Path | None = None,
     ) -> type[Block]:
         """The class with an output for every sensor that the robot's description mounts."""
         sensors = mounted_sensors(robot, folder)

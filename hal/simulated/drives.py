@@ -92,10 +92,11 @@ def joint_feedback_torque(
 ) -> None:
     """Write feedforward plus joint feedback [N m] to ``out`` (paper, V, first equation):
     ``tau_ff + Kp (q_d - q) + Kd (qd_d - qd)``."""
-    for k in range(out.shape[0]):
-        spring = (position_target[k] - position[k]) * stiffness[k]
-        damper = (velocity_target[k] - velocity[k]) * damping[k]
-        out[k] = (spring + feedforward[k]) + damper
+    out[:] = (
+        (position_target - position) * stiffness
+        + feedforward
+        + (velocity_target - velocity) * damping
+    )
 
 
 @kernel
@@ -138,15 +139,15 @@ def drive_motors(
         scratch.requested, scratch.torque,
     )  # fmt: skip
     for k in range(torque.shape[0]):
-        produced, speed = float(scratch.torque[k]), float(scratch.speed[k])
+        produced, speed = scratch.torque[k], scratch.speed[k]
         if produced != scratch.requested[k]:
             record.saturated[k] += 1
         update_maximum(record.torque_high, k, produced)
         update_minimum(record.torque_low, k, produced)
         update_maximum(record.speed_high, k, speed)
         update_minimum(record.speed_low, k, speed)
-        update_maximum(record.overload, k, produced - float(scratch.upper[k]))
-        update_maximum(record.overload, k, float(scratch.lower[k]) - produced)
+        update_maximum(record.overload, k, produced - scratch.upper[k])
+        update_maximum(record.overload, k, scratch.lower[k] - produced)
         record.joint_torque[k] += torque[k]
 
 
@@ -182,7 +183,7 @@ def follow_commands(commands: CommandRing, released: Array1D, joints: Joints) ->
     Args:
         released: the damping in the damping mode [N m s/rad], (n_joints,).
     """
-    active, pending = int(commands.active[()]), int(commands.pending[()])
+    active, pending = commands.active[()], commands.pending[()]
     joints.arrived[0] = False
     while pending > 0:
         following = (active + 1) % commands.due.shape[0]
@@ -192,7 +193,7 @@ def follow_commands(commands: CommandRing, released: Array1D, joints: Joints) ->
         joints.arrived[0] = True
     commands.active[()] = active
     commands.pending[()] = pending
-    mode = int(commands.mode[active])
+    mode = commands.mode[active]
     if mode == _ACTIVE:
         joint_feedback_torque(
             commands.targets.torque[active], commands.targets.stiffness[active],
@@ -201,7 +202,7 @@ def follow_commands(commands: CommandRing, released: Array1D, joints: Joints) ->
         )  # fmt: skip
         return
     for k in range(joints.torque.shape[0]):
-        joints.torque[k] = float(joints.velocity[k]) * -released[k]
+        joints.torque[k] = joints.velocity[k] * -released[k]
         if mode != _DAMPING:
             joints.torque[k] = 0.0
 
@@ -232,8 +233,8 @@ def drive_loops(
 ) -> None:
     """As ``drive_joints``, but once a command has arrived each drive closes the loop of its motor."""
     follow_commands(commands, released, joints)
-    active = int(commands.active[()])
-    if int(commands.mode[active]) == _ACTIVE:
+    active = commands.active[()]
+    if commands.mode[active] == _ACTIVE:
         close_loops(
             loops, commands.targets, active, bool(joints.arrived[0]), joints.position,
             joints.velocity, joints.torque,
@@ -263,15 +264,15 @@ def send_command(
 
     ``step`` and ``last_due``, the arrival of the command sent last, have no dimension.
     """
-    delay = float(latency.minimum[0])
+    delay = latency.minimum[0]
     if latency.jitter != 0.0:
-        delay += latency.jitter * float(latency.draw[0])
+        delay += latency.jitter * latency.draw[0]
     due = step[()] + math.ceil(delay / latency.timestep - 1e-9)
     due = max(due, last_due[()])
-    pending = int(commands.pending[()])
-    slot = (int(commands.active[()]) + 1 + pending) % commands.due.shape[0]
+    pending = commands.pending[()]
+    slot = (commands.active[()] + 1 + pending) % commands.due.shape[0]
     targets = commands.targets
-    commands.mode[slot] = int(command.mode[()])
+    commands.mode[slot] = command.mode[()]
     for k in range(command.torque.shape[0]):
         targets.torque[slot, k] = command.torque[k]
         targets.position[slot, k] = command.position[k]

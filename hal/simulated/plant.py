@@ -98,10 +98,10 @@ def apply_push(force: Array1D, point: Indices0D, points: PushPoints) -> None:
     if number < 0 or number >= points.sites.shape[0]:
         points.missing[0] = True
         return
-    site, body = int(points.sites[number]), int(points.bodies[number])
-    x = float(points.places[site, 0]) - float(points.centres[body, 0])
-    y = float(points.places[site, 1]) - float(points.centres[body, 1])
-    z = float(points.places[site, 2]) - float(points.centres[body, 2])
+    site, body = points.sites[number], points.bodies[number]
+    x = points.places[site, 0] - points.centres[body, 0]
+    y = points.places[site, 1] - points.centres[body, 1]
+    z = points.places[site, 2] - points.centres[body, 2]
     wrench = points.wrenches
     wrench[body, 0], wrench[body, 1], wrench[body, 2] = fx, fy, fz
     wrench[body, 3], wrench[body, 4] = y * fz - z * fy, z * fx - x * fz

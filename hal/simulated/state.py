@@ -94,8 +94,7 @@ def clear(record: TickRecord) -> None:
     for point in range(record.load.shape[0]):
         for axis in range(4):
             record.load[point, axis] = 0.0
-    for axis in range(3):
-        record.accelerometer[axis] = 0.0
+    record.accelerometer[:] = 0.0
     for k in range(record.saturated.shape[0]):
         record.saturated[k] = 0
         record.joint_torque[k] = record.violation[k] = record.overload[k] = 0.0
@@ -175,17 +174,16 @@ def record_step(
         int(step[()]), sensors.load, ground_force, bounce_steps, record.closed, record.bounce_end
     )
     step[()] = step[()] + 1
-    record.steps[()] = int(record.steps[()]) + 1
+    record.steps[()] = record.steps[()] + 1
     allowed = 0.0
     for point in range(sensors.load.shape[0]):
-        allowed += float(sensors.load[point, 0])
+        allowed += sensors.load[point, 0]
         for axis in range(4):
             record.load[point, axis] += sensors.load[point, axis]
-    for axis in range(3):
-        record.accelerometer[axis] += sensors.accelerometer[axis]
+    record.accelerometer[:] += sensors.accelerometer
     if sensors.contacts[0] > allowed:
-        record.forbidden[()] = int(record.forbidden[()]) + 1
+        record.forbidden[()] = record.forbidden[()] + 1
     for joint in range(lower.shape[0]):
-        angle = float(sensors.position[joint])
+        angle = sensors.position[joint]
         update_maximum(record.violation, joint, lower[joint] - angle)
         update_maximum(record.violation, joint, angle - upper[joint])

@@ -72,16 +72,16 @@ def largest(values: Array1D) -> float:
 @kernel
 def report_contacts(instant: TrueState, peaks: TickRecord, report: RobotTruth) -> None:
     """The contact points: where they are, the ground under them, and the mean force on each."""
-    steps = int(peaks.steps[()])
+    steps = peaks.steps[()]
     for point in range(instant.below.shape[0]):
-        place = int(instant.contacts[point])
-        x, y = float(instant.places[place, 0]), float(instant.places[place, 1])
+        place = instant.contacts[point]
+        x, y = instant.places[place, 0], instant.places[place, 1]
         report.contact_position[point, 0], report.contact_position[point, 1] = x, y
         report.contact_position[point, 2] = instant.places[place, 2] - instant.below[point]
         report.ground_height[point] = height_of_ground(instant.floor, instant.boxes, x, y)
         touched = False
         for axis in range(3):
-            force = float(peaks.load[point, 1 + axis]) / -steps
+            force = peaks.load[point, 1 + axis] / -steps
             report.contact_force[point, axis] = force
             touched = touched or force != 0.0
         report.contact_touched[point] = touched
@@ -90,24 +90,23 @@ def report_contacts(instant: TrueState, peaks: TickRecord, report: RobotTruth) -
 @kernel
 def report_truth(instant: TrueState, peaks: TickRecord, report: RobotTruth) -> None:
     """Write the truth about a tick that has been simulated."""
-    for axis in range(3):
-        report.com[axis] = instant.com[axis]
-        report.com_velocity[axis] = instant.com_velocity[axis]
-        report.angular_momentum[axis] = instant.angular_momentum[axis]
+    report.com[:] = instant.com
+    report.com_velocity[:] = instant.com_velocity
+    report.angular_momentum[:] = instant.angular_momentum
     report_contacts(instant, peaks, report)
     count, at_limit = report.joint_position.shape[0], 0
     for k in range(count):
         report.joint_position[k] = instant.joint_position[k]
         report.joint_velocity[k] = instant.joint_velocity[k]
-        at_limit += int(peaks.saturated[k])
-        high, low = float(peaks.torque_high[k]), float(peaks.torque_low[k])
+        at_limit += peaks.saturated[k]
+        high, low = peaks.torque_high[k], peaks.torque_low[k]
         report.motor_torque[k] = low if -low > high else high
-        high, low = float(peaks.speed_high[k]), float(peaks.speed_low[k])
+        high, low = peaks.speed_high[k], peaks.speed_low[k]
         report.motor_speed[k] = low if -low > high else high
-    report.forbidden_contacts[()] = int(peaks.forbidden[()])
+    report.forbidden_contacts[()] = peaks.forbidden[()]
     report.joint_limit_violation[()] = largest(peaks.violation)
     report.motor_overload[()] = largest(peaks.overload)
-    report.saturated_share[()] = at_limit / (int(peaks.steps[()]) * max(1, count))
+    report.saturated_share[()] = at_limit / (peaks.steps[()] * max(1, count))
 
 
 class TruthReport:

@@ -82,7 +82,9 @@ def _draft(flat: FlatBlock, graph: FlatGraph, settings: Settings, problems: Prob
     if draft.params is None:
         return draft
     try:
-        draft.block_type = draft.block_type.fitted(draft.params, flat.folder, settings.robot)
+        draft.block_type = draft.block_type.fitted(
+            draft.params, flat.folder, settings.robot, graph.folder
+        )
     except BlockError as error:
         problems.add(Code.MISFIT, f"{flat.path}: {error}", flat.where, at=flat.path)
         draft.block_type = None
