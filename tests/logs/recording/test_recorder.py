@@ -24,7 +24,7 @@ from aloft.runtime.running.executor import run
 from aloft.runtime.running.memory import BoundGraph
 from aloft.runtime.running.run_result import RunResult
 from aloft.runtime.testing.allocations import count_array_allocations
-from aloft.runtime.testing.graphs import Use, checked_graph
+from aloft.runtime.testing.graphs import BlockUse, checked_graph
 
 
 class Numbers(Signal):
@@ -69,7 +69,7 @@ class At:
 
 
 def graph(ticks: int) -> CheckedGraph:
-    return checked_graph({"walk": Use(Walk)}, ticks=ticks)
+    return checked_graph({"walk": BlockUse(Walk)}, ticks=ticks)
 
 
 def process_of(recorder: Recorder) -> int:
@@ -270,7 +270,7 @@ def test_overruns_and_faults_are_noted(tmp_path: Path) -> None:
                 raise ValueError("the spring broke")
 
     recorder = Recorder(tmp_path / "a.rrd")
-    slow = checked_graph({"walk": Use(Slow)}, ticks=100)
+    slow = checked_graph({"walk": BlockUse(Slow)}, ticks=100)
     result = run(slow, sinks=[recorder], clock=ClockSpec("paced"))
     assert not result.success
     recorded = read(tmp_path / "a.rrd")
