@@ -87,16 +87,16 @@ def eliminate(
             factor[i, k] = 0.0
         factor[i, i] = acceleration_weight
     for row in range(tasks.jacobian.shape[0]):
-        weight = float(tasks.weights[row])
+        weight = tasks.weights[row]
         if weight == 0.0:
             continue
-        desired = float(tasks.desired[row])
+        desired = tasks.desired[row]
         for i in range(n):
-            value = weight * float(tasks.jacobian[row, i])
+            value = weight * tasks.jacobian[row, i]
             if value != 0.0:
-                wanted[i] = float(wanted[i]) + value * desired
+                wanted[i] = wanted[i] + value * desired
                 for k in range(i, n):
-                    factor[i, k] = float(factor[i, k]) + value * float(tasks.jacobian[row, k])
+                    factor[i, k] = factor[i, k] + value * tasks.jacobian[row, k]
     if not factorise(factor, 0.0):
         return False
     solve_transposed(factor, wanted)
@@ -109,11 +109,11 @@ def eliminate(
         for j in range(k, 6):
             total = 0.0
             for i in range(n):
-                total += float(base[k, i]) * float(base[j, i])
+                total += base[k, i] * base[j, i]
             shape[k, j] = total
-        total = float(terms.nonlinear[k])
+        total = terms.nonlinear[k]
         for i in range(n):
-            total += float(base[k, i]) * float(wanted[i])
+            total += base[k, i] * wanted[i]
         pull[k] = total
         for j in range(count):
             for axis in range(3):
@@ -133,9 +133,9 @@ def eliminate(
         rest[i] = wanted[i]
     solve_upper(factor, rest)
     for k in range(6):
-        value = float(pull[k])
+        value = pull[k]
         for i in range(n):
-            rest[i] = float(rest[i]) - value * float(response[k, i])
+            rest[i] = rest[i] - value * response[k, i]
     return True
 
 
@@ -157,10 +157,10 @@ def force_program(
         hessian[i, i] = force_weight if i < size else 1.0
     for k in range(6):
         for i in range(size):
-            value = float(lever[k, i])
-            gradient[i] = gradient[i] - value * float(pull[k])
+            value = lever[k, i]
+            gradient[i] = gradient[i] - value * pull[k]
             for j in range(size):
-                hessian[i, j] = hessian[i, j] + value * float(lever[k, j])
+                hessian[i, j] = hessian[i, j] + value * lever[k, j]
 
 
 @kernel
@@ -181,9 +181,9 @@ def force_gradient(
     """
     size, price = 3 * count, reduction.price
     for k in range(6):
-        total = -float(reduction.pull[k])
+        total = -reduction.pull[k]
         for i in range(size):
-            total += float(reduction.lever[k, i]) * unknowns[i]
+            total += reduction.lever[k, i] * unknowns[i]
         price[k] = total
     solve_upper(reduction.shape, price)
     for j in range(count):
@@ -191,7 +191,7 @@ def force_gradient(
             i = 3 * j + axis
             total = force_weight * unknowns[i]
             for k in range(6):
-                total += float(terms.jacobian[active[j], axis, k]) * float(price[k])
+                total += terms.jacobian[active[j], axis, k] * price[k]
             out[i] = total
     for k in range(size, size + extra):
         out[k] = unknowns[k]
@@ -237,15 +237,15 @@ def free_motions(reduction: Reduction) -> None:
     for k in range(6):
         square = 0.0
         for i in range(k, n):
-            square += float(mirrors[k, i]) * float(mirrors[k, i])
-        head = float(mirrors[k, k])
+            square += mirrors[k, i] * mirrors[k, i]
+        head = mirrors[k, k]
         mirrors[k, k] = head + math.copysign(math.sqrt(square), head)
-        square += float(mirrors[k, k]) * float(mirrors[k, k]) - head * head
+        square += mirrors[k, k] * mirrors[k, k] - head * head
         scale = math.sqrt(2.0 / square) if square > 0.0 else 0.0
         for i in range(k):
             mirrors[k, i] = 0.0
         for i in range(k, n):
-            mirrors[k, i] = float(mirrors[k, i]) * scale
+            mirrors[k, i] = mirrors[k, i] * scale
         for other in range(k + 1, 6):
             reflect(mirrors[k], mirrors[other])
     for j in range(n - 6):
@@ -287,9 +287,9 @@ def torque_rows(
     torque_map, torque_rest = reduction.torque_map, reduction.torque_rest
     joints, n, size = torque_rest.shape[0], reduction.rest.shape[0], 3 * count
     for j in range(joints):
-        rest = float(terms.nonlinear[6 + j])
+        rest = terms.nonlinear[6 + j]
         for i in range(n):
-            rest += float(terms.mass_matrix[6 + j, i]) * float(reduction.rest[i])
+            rest += terms.mass_matrix[6 + j, i] * reduction.rest[i]
         torque_rest[j] = rest
         for point in range(count):
             for axis in range(3):
@@ -297,13 +297,13 @@ def torque_rows(
         for k in range(6):
             total = 0.0
             for i in range(n):
-                total += float(terms.mass_matrix[6 + j, i]) * float(response[k, i])
+                total += terms.mass_matrix[6 + j, i] * response[k, i]
             for i in range(size):
-                torque_map[j, i] = float(torque_map[j, i]) + total * float(lever[k, i])
+                torque_map[j, i] = torque_map[j, i] + total * lever[k, i]
         for k in range(joints):
             total = 0.0
             for i in range(n):
-                total += float(terms.mass_matrix[6 + j, i]) * float(free[k, i])
+                total += terms.mass_matrix[6 + j, i] * free[k, i]
             torque_map[j, size + k] = total
     for motor in range(joints):
         high, low = first + motor, first + joints + motor
@@ -313,13 +313,13 @@ def torque_rows(
         for j in range(joints):
             share = transmission[motor, j]
             if share != 0.0:
-                rest += share * float(torque_rest[j])
+                rest += share * torque_rest[j]
                 for i in range(size + joints):
-                    matrix[high, i] = matrix[high, i] + share * float(torque_map[j, i])
+                    matrix[high, i] = matrix[high, i] + share * torque_map[j, i]
         for i in range(size + joints):
             matrix[low, i] = -matrix[high, i]
-        bound[high] = float(bounds.upper[motor]) - rest
-        bound[low] = rest - float(bounds.lower[motor])
+        bound[high] = bounds.upper[motor] - rest
+        bound[low] = rest - bounds.lower[motor]
     return int(first + 2 * joints)
 
 
@@ -330,9 +330,9 @@ def within_limits(torque: Array1D, transmission: Array2D, bounds: Bounds) -> boo
         total = 0.0
         for j in range(torque.shape[0]):
             total += transmission[motor, j] * torque[j]
-        if total > float(bounds.upper[motor]) + 1e-10:
+        if total > bounds.upper[motor] + 1e-10:
             return False
-        if total < float(bounds.lower[motor]) - 1e-10:
+        if total < bounds.lower[motor] - 1e-10:
             return False
     return True
 
@@ -343,18 +343,15 @@ def recover_acceleration(
 ) -> None:
     """The acceleration (n,) for ``size`` elements of force and ``extra`` elements of e."""
     response, lever, free = reduction.response, reduction.lever, reduction.free
-    for i in range(out.shape[0]):
-        out[i] = reduction.rest[i]
+    out[:] = reduction.rest
     for k in range(6):
         value = 0.0
         for i in range(size):
-            value += float(lever[k, i]) * unknowns[i]
-        for i in range(out.shape[0]):
-            out[i] = out[i] + value * float(response[k, i])
+            value += lever[k, i] * unknowns[i]
+        out[:] = out + value * response[k]
     for k in range(extra):
         value = unknowns[size + k]
-        for i in range(out.shape[0]):
-            out[i] = out[i] + value * float(free[k, i])
+        out[:] = out + value * free[k]
 
 
 @kernel
@@ -372,10 +369,10 @@ def recover_torque(
         force: of the first ``count`` points of ``active``, three elements each.
     """
     for j in range(torque.shape[0]):
-        total = float(terms.nonlinear[6 + j])
+        total = terms.nonlinear[6 + j]
         for i in range(acceleration.shape[0]):
-            total += float(terms.mass_matrix[6 + j, i]) * acceleration[i]
+            total += terms.mass_matrix[6 + j, i] * acceleration[i]
         for point in range(count):
             for axis in range(3):
-                total -= float(terms.jacobian[active[point], axis, 6 + j]) * force[3 * point + axis]
+                total -= terms.jacobian[active[point], axis, 6 + j] * force[3 * point + axis]
         torque[j] = total

@@ -14,8 +14,7 @@ from ..robots.description import RobotDescription
 from ..runtime.language.block import Block, Input, Metric
 from ..runtime.language.parameters import Parameters, parameter
 from ..runtime.language.signals import Signal
-from .names import attachment
-from .node import Endpoint, Node, join, leave
+from .node import Endpoint, Node, attachment, join, leave
 from .parameters import Ros2Block, Ros2Parameters, message_type, place, quality
 
 SLOTS = 32

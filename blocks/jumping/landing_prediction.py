@@ -251,7 +251,7 @@ def choose_shift_of_feet(
     cost = gains.cost
     map_flight(
         terms.centroidal_matrix, terms.contact_jacobian, terms.base_rotation, soles.mass,
-        float(gains.damping[0]), scratch.flight,
+        gains.damping[0], scratch.flight,
     )  # fmt: skip
     find_ways(terms, foot_yaw, planned, soles, scratch)
     from_matrix(terms.base_rotation, scratch.quaternion)
@@ -262,14 +262,14 @@ def choose_shift_of_feet(
         scratch.flight, scratch.vector, angular, scratch.way, left, 1.0 / speed, soles.side,
         scratch.tilt, scratch.turn,
     )  # fmt: skip
-    cost.bounds[0] = max(float(gains.lowest[0]), -float(gains.early[0]) * duration * speed)
-    cost.bounds[1] = max(float(gains.highest[0]) - speed * speed * float(gains.stroke[0]), 0.0)
-    ahead = float(gains.per_linear[0]) * linear[0]
-    cost.goal[0] = ahead + float(gains.per_angular[0]) * angular[1]
-    aside = float(gains.per_linear[1]) * linear[1]
-    cost.goal[1] = aside - float(gains.per_angular[1]) * angular[0]
-    cost.goal[2] = float(gains.clearance[0]) * abs(linear[1])
-    pull_to_place(cost.goal, miss, float(gains.place_gain[0]), float(gains.place_range[0]))
+    cost.bounds[0] = max(gains.lowest[0], -gains.early[0] * duration * speed)
+    cost.bounds[1] = max(gains.highest[0] - speed * speed * gains.stroke[0], 0.0)
+    ahead = gains.per_linear[0] * linear[0]
+    cost.goal[0] = ahead + gains.per_angular[0] * angular[1]
+    aside = gains.per_linear[1] * linear[1]
+    cost.goal[1] = aside - gains.per_angular[1] * angular[0]
+    cost.goal[2] = gains.clearance[0] * abs(linear[1])
+    pull_to_place(cost.goal, miss, gains.place_gain[0], gains.place_range[0])
     choose_shift(scratch.tilt, scratch.turn, cost, scratch.matrix, shift)
 
 
@@ -279,9 +279,9 @@ def find_ways(
 ) -> None:
     """How far every contact point is from its planned place, with flat soles."""
     for point in range(soles.foot_of_point.shape[0]):
-        foot = int(soles.foot_of_point[point])
+        foot = soles.foot_of_point[point]
         heading_matrix(foot_yaw[foot], scratch.heading)
         multiply_vector(scratch.heading, soles.offset[point], scratch.vector)
         for k in range(3):
-            place = float(scratch.vector[k]) + planned[foot, k] + float(terms.com[k])
-            scratch.way[3 * point + k] = place - float(terms.contact_position[point, k])
+            place = scratch.vector[k] + planned[foot, k] + terms.com[k]
+            scratch.way[3 * point + k] = place - terms.contact_position[point, k]

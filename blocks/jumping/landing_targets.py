@@ -173,28 +173,28 @@ def aim_feet(
     scratch: Scratch,
 ) -> None:
     """One tick of ``LandingHeuristic``."""
-    phase = int(now.phase[()])
+    phase = now.phase[()]
     flying, landing = phase == _FLIGHT, phase == _LANDING
     if not memory.started[()]:
         find_origin(plan, terms, memory)
     remember_landing(plan, flying, memory)
-    overdue = flying and int(plan.phase[()]) > _FLIGHT
+    overdue = flying and plan.phase[()] > _FLIGHT
     if not overdue:
         remember_plan(plan, terms, law, memory)
     feed_back(terms, law, memory, scratch)
     if flying and not memory.flying[()]:
         lift_off(terms, memory)
     memory.flying[()] = flying
-    elapsed, left = float(now.time_in_phase[()]), float(now.time_to_touchdown[()])
+    elapsed, left = now.time_in_phase[()], now.time_to_touchdown[()]
     if law.predicts and flying:
         left = predict(plan, terms, elapsed, left, prediction, memory, scratch)
-    reach = float(settings.reach_share[0]) * max(elapsed + left, law.period)
+    reach = settings.reach_share[0] * max(elapsed + left, law.period)
     share, rate, _ = minimum_jerk(elapsed / reach)
-    drawn_in = float(settings.retraction[0])
+    drawn_in = settings.retraction[0]
     if plan.toes_first[()]:
         drawn_in = 0.0  # the plan itself draws the feet in
-    lift, lift_rate = retraction(left, drawn_in, float(settings.retraction_time[0]))
-    lowest, lead = lowest_height(terms.foot_position), float(settings.lead_time[0])
+    lift, lift_rate = retraction(left, drawn_in, settings.retraction_time[0])
+    lowest, lead = lowest_height(terms.foot_position), settings.lead_time[0]
     turn_frame(plan, terms, settings, overdue, memory, scratch)
     if law.turned:
         turn_places(law.stance, yaw(memory.orientation), scratch.centre)
@@ -202,7 +202,7 @@ def aim_feet(
         place, speed = scratch.place[foot], scratch.speed
         choose_place(foot, law, settings, memory, targets.landing[foot], scratch)
         for k in range(3):
-            speed[k] = float(plan.foot_velocity[foot, k]) - float(plan.com_velocity[k])
+            speed[k] = plan.foot_velocity[foot, k] - plan.com_velocity[k]
             if overdue:
                 speed[k] = 0.0
             else:
@@ -214,20 +214,16 @@ def aim_feet(
             )  # fmt: skip
             if law.predicts:
                 hasten(memory.swing[foot], lead * share, lead * rate / reach, place, speed)
-            place[2] = float(place[2]) + lift
-            speed[2] = float(speed[2]) + lift_rate
-            for k in range(3):
-                memory.goal[foot, k] = float(terms.com[k]) + float(targets.landing[foot, k])
+            place[2] = place[2] + lift
+            speed[2] = speed[2] + lift_rate
+            memory.goal[foot, :] = terms.com + targets.landing[foot]
         elif landing:
-            for k in range(2):
-                place[k] = float(memory.goal[foot, k]) - float(terms.com[k])
-            place[2] = lowest - float(terms.com[2])
-            for k in range(3):
-                speed[k] = -float(terms.com_velocity[k])
+            place[:2] = memory.goal[foot, :2] - terms.com[:2]
+            place[2] = lowest - terms.com[2]
+            speed[:] = -terms.com_velocity
         else:
-            for k in range(3):
-                place[k] = memory.planned[foot, k]
-        convert_to_body(foot, float(plan.foot_yaw[foot]), terms, targets, scratch)
+            place[:] = memory.planned[foot]
+        convert_to_body(foot, plan.foot_yaw[foot], terms, targets, scratch)
 
 
 @kernel
@@ -236,8 +232,8 @@ def find_origin(plan: Plan, terms: Terms, memory: Memory) -> None:
     n = memory.offset.shape[0]
     for k in range(3):
         for foot in range(n):
-            off = float(terms.foot_position[foot, k]) - float(plan.foot_position[foot, k])
-            memory.origin[k] = float(memory.origin[k]) + off / n
+            off = terms.foot_position[foot, k] - plan.foot_position[foot, k]
+            memory.origin[k] = memory.origin[k] + off / n
     memory.started[()] = True
 
 
@@ -246,29 +242,25 @@ def remember_landing(plan: Plan, flying: bool, memory: Memory) -> None:
     """Keep where the centre of mass should touch down, before the plan names the next jump."""
     if not flying:
         memory.lift_off_time[()] = plan.lift_off_time[()]
-    elif float(plan.lift_off_time[()]) != float(memory.lift_off_time[()]):
+    elif plan.lift_off_time[()] != memory.lift_off_time[()]:
         return
-    fall = float(plan.touchdown_time[()]) - float(plan.time[()])
+    fall = plan.touchdown_time[()] - plan.time[()]
     if flying and fall < 0.0:
         return
-    for k in range(3):
-        place = float(plan.com_velocity[k]) * fall + float(plan.com[k])
-        memory.wished[k] = place + float(memory.origin[k])
+    memory.wished[:] = plan.com_velocity * fall + plan.com + memory.origin
 
 
 @kernel
 def remember_plan(plan: Plan, terms: Terms, law: Law, memory: Memory) -> None:
     """Keep the plan of this instant."""
-    mass = float(terms.mass_matrix[0, 0])
+    mass = terms.mass_matrix[0, 0]
     if mass == 0.0:
         mass = law.mass
     for k in range(3):
-        memory.linear[k] = float(plan.com_velocity[k]) * mass
-        memory.angular[k] = float(plan.angular_momentum[k]) * (mass / law.mass)
-        for foot in range(memory.planned.shape[0]):
-            memory.planned[foot, k] = float(plan.foot_position[foot, k]) - float(plan.com[k])
-    for k in range(4):
-        memory.orientation[k] = plan.orientation[k]
+        memory.linear[k] = plan.com_velocity[k] * mass
+        memory.angular[k] = plan.angular_momentum[k] * (mass / law.mass)
+        memory.planned[:, k] = plan.foot_position[:, k] - plan.com[k]
+    memory.orientation[:] = plan.orientation
 
 
 @kernel
@@ -278,20 +270,17 @@ def feed_back(terms: Terms, law: Law, memory: Memory, scratch: Scratch) -> None:
         scratch.linear[k] = terms.linear_momentum[k]
         scratch.angular[k] = terms.angular_momentum[k]
         if law.deviates:
-            scratch.linear[k] = float(scratch.linear[k]) - float(memory.linear[k])
-            scratch.angular[k] = float(scratch.angular[k]) - float(memory.angular[k])
+            scratch.linear[k] = scratch.linear[k] - memory.linear[k]
+            scratch.angular[k] = scratch.angular[k] - memory.angular[k]
 
 
 @kernel
 def lift_off(terms: Terms, memory: Memory) -> None:
     """Begin a flight: note how far the feet are from their plan."""
     memory.due[()] = 0.0
-    for k in range(4):
-        memory.shift[k] = 0.0
+    memory.shift[:] = 0.0
     for foot in range(memory.offset.shape[0]):
-        for k in range(3):
-            place = float(terms.foot_position[foot, k]) - float(terms.com[k])
-            memory.offset[foot, k] = place - float(memory.planned[foot, k])
+        memory.offset[foot, :] = terms.foot_position[foot] - terms.com - memory.planned[foot]
 
 
 @kernel
@@ -310,19 +299,17 @@ def predict(
     """
     if left > 0.0:
         memory.due[()] = elapsed + left
-    left = float(memory.due[()]) - elapsed
-    for k in range(3):
-        place = float(terms.com_velocity[k]) * left + float(terms.com[k])
-        scratch.miss[k] = place - float(memory.wished[k])
-    speed = max(GRAVITY * left - float(terms.com_velocity[2]), _SLOWEST)
-    later = fall_time(speed, float(memory.shift[3]))
+    left = memory.due[()] - elapsed
+    scratch.miss[:] = terms.com_velocity * left + terms.com - memory.wished
+    speed = max(GRAVITY * left - terms.com_velocity[2], _SLOWEST)
+    later = fall_time(speed, memory.shift[3])
     if left + later >= LAST:
         choose_shift_of_feet(
             terms, plan.foot_yaw, memory.planned, memory.orientation, scratch.linear,
-            scratch.angular, scratch.miss, left, float(memory.due[()]), speed, prediction,
+            scratch.angular, scratch.miss, left, memory.due[()], speed, prediction,
             memory.shift,
         )  # fmt: skip
-        later = fall_time(speed, float(memory.shift[3]))
+        later = fall_time(speed, memory.shift[3])
     return max(left + later, 0.0)
 
 
@@ -341,17 +328,17 @@ def choose_place(
     foot: int, law: Law, settings: Settings, memory: Memory, place: Array1D, scratch: Scratch
 ) -> None:
     """The landing ``place`` (3,) of a foot from the centre of mass, by the law."""
-    planned, side = memory.planned[foot], float(law.side[foot])
+    planned, side = memory.planned[foot], law.side[foot]
     if law.predicts:
         shift = memory.shift
-        place[0] = float(planned[0]) + float(shift[0])
-        place[1] = float(planned[1]) + (float(shift[1]) + side * float(shift[2]))
-        place[2] = float(planned[2]) + float(shift[3])
+        place[0] = planned[0] + shift[0]
+        place[1] = planned[1] + (shift[1] + side * shift[2])
+        place[2] = planned[2] + shift[3]
         keep_within(settings.p_max, scratch.centre[foot], place)
         return
     landing_place(
         planned, side, scratch.linear, scratch.angular, settings.w_l, settings.w_k,
-        float(settings.w_c[0]), settings.p_max, scratch.centre[foot], place,
+        settings.w_c[0], settings.p_max, scratch.centre[foot], place,
     )  # fmt: skip
 
 
@@ -368,18 +355,17 @@ def turn_frame(
     conjugate(planned, turn)
     multiply(turn, scratch.quaternion, turn)
     logarithm(turn, vector)
-    for k in range(3):
-        vector[k] = float(vector[k]) * float(alpha[k])
+    vector[:] = vector * alpha
     exponential(vector, turn)
     multiply(planned, turn, turn)
     to_matrix(turn, scratch.rotation)
     for k in range(3):
-        share = float(alpha[k])
-        scratch.rate[k] = float(terms.velocity[3 + k]) * share
+        share = alpha[k]
+        scratch.rate[k] = terms.velocity[3 + k] * share
         if not overdue:
-            kept = float(plan.angular_velocity[k]) * (1.0 - share)
-            scratch.rate[k] = float(scratch.rate[k]) + kept
-        vector[k] = float(terms.com[k]) - float(terms.base_position[k])
+            kept = plan.angular_velocity[k] * (1.0 - share)
+            scratch.rate[k] = scratch.rate[k] + kept
+        vector[k] = terms.com[k] - terms.base_position[k]
     multiply_vector(terms.base_rotation.T, vector, scratch.com_body)
 
 
@@ -392,16 +378,16 @@ def convert_to_body(
     vector, spare, com = scratch.vector, scratch.spare, scratch.com_body
     multiply_vector(turn, scratch.place[foot], vector)
     for k in range(3):
-        targets.position[foot, k] = float(com[k]) + float(vector[k])
+        targets.position[foot, k] = com[k] + vector[k]
     multiply_vector(turn, scratch.speed, velocity)
     cross(scratch.rate, vector, spare)
     for k in range(3):
-        velocity[k] = float(velocity[k]) - float(spare[k])
+        velocity[k] = velocity[k] - spare[k]
     multiply_vector(terms.base_rotation.T, terms.com_velocity, spare)
     for k in range(3):
-        velocity[k] = float(velocity[k]) + float(spare[k]) - float(terms.velocity[k])
+        velocity[k] = velocity[k] + spare[k] - terms.velocity[k]
     cross(terms.velocity[3:6], com, spare)
     for k in range(3):
-        velocity[k] = float(velocity[k]) - float(spare[k])
+        velocity[k] = velocity[k] - spare[k]
     heading_matrix(heading, scratch.heading)
     multiply_matrices(turn, scratch.heading, targets.rotation[foot])

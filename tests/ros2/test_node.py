@@ -2,7 +2,7 @@
 
 import pytest
 
-from aloft.ros2.names import (
+from aloft.ros2.node import (
     ATTACHMENT,
     NodeName,
     Quality,

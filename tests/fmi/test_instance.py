@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from aloft.fmi.exporting.write import export
-from aloft.fmi.library import release_at_exit
+from aloft.fmi.instance import release_at_exit
 
 pytest.importorskip("fmpy")
 pytest.importorskip("pythonfmu3")

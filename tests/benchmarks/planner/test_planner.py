@@ -7,8 +7,8 @@ from typing import Any
 
 import pytest
 
+from aloft.benchmarks.planner.planner import INSTALL, SNOPT, SNOPT_GOAL, solver_rows
 from aloft.benchmarks.planner.snopt import SnoptProgram
-from aloft.benchmarks.planner.solvers import INSTALL, SNOPT, SNOPT_GOAL, solver_rows
 from aloft.planner.problem.guess import ballistic_guess
 from aloft.planner.solving.solve import make_problem
 from aloft.planner.solving.solver import solve

@@ -3,10 +3,16 @@
 import numpy as np
 import pytest
 
-from aloft.benchmarks.agreement.agreement import CLARABEL, CONES, DAQP, OWN, Found, Methods
-from aloft.benchmarks.agreement.reference import Proposal, proved_minimum
-from aloft.benchmarks.agreement.states import (
+from aloft.benchmarks.agreement import (
+    CLARABEL,
+    CONES,
+    DAQP,
+    OWN,
+    Found,
+    Methods,
+    Proposal,
     State,
+    proved_minimum,
     random_states,
     recorded_states,
     show_state,

@@ -5,9 +5,16 @@ import json
 import numpy as np
 import pytest
 
-from aloft.benchmarks.scheduler.filter_chain import COUNT, hand_loop
-from aloft.benchmarks.scheduler.peers import PEERS, peer_chains
-from aloft.benchmarks.scheduler.scheduler import BARE, CHECKED, HAND, scheduler
+from aloft.benchmarks.scheduler import (
+    BARE,
+    CHECKED,
+    COUNT,
+    HAND,
+    PEERS,
+    hand_loop,
+    peer_chains,
+    scheduler,
+)
 
 
 def test_rows_are_complete_and_no_array_is_allocated() -> None:
@@ -35,6 +42,6 @@ def test_a_peer_that_computes_something_else_is_no_peer(monkeypatch: pytest.Monk
     def wrong() -> object:
         return (lambda ticks: None), (lambda: [np.ones(12)] * COUNT)
 
-    monkeypatch.setattr("aloft.benchmarks.scheduler.peers.PEERS", {"wrong": wrong})
+    monkeypatch.setattr("aloft.benchmarks.scheduler.PEERS", {"wrong": wrong})
     with pytest.raises(AssertionError, match="wrong: block 0 differs"):
         peer_chains([np.zeros(12)] * COUNT, 1)

@@ -1,38 +1,254 @@
 """Whether the methods for the whole-body program agree: on states of recorded jumps, and on random ones.
 
-Every program is solved by the own method with pyramids and with round cones, by DAQP and by Clarabel, and their
-torques are compared with a minimum that is proved (``agreement_reference``).
+Every program is solved by the own method with pyramids and with round cones, by DAQP and by Clarabel,
+and their torques are compared with a minimum that is proved: its conditions of optimality hold in
+extended precision. A solver only proposes which constraints are active. Newton's method solves the
+conditions of optimality for these, with residuals in extended precision; then all conditions are
+checked. A convex program has one minimum where they hold, so it does not matter who has proposed it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from ...blocks.control.whole_body_controller import WholeBodyController
-from ...blocks.control.whole_body_program import WholeBodyProgram, rows_without_pyramids
-from ...mathematics.active_set import INFEASIBLE
-from ...mathematics.arrays import Array, Flags, Indices
-from ...mathematics.compiling.compile_calls import compile_calls
-from ...mathematics.compiling.kernel_call import KernelCall
-from ...mathematics.quadratic_program import SOLVED as CLARABEL_SOLVED
-from ...mathematics.quadratic_program import ConeProgramSolver
-from ...mathematics.whole_body_cones import cone_solution_memory, solve_whole_body_cones
-from ...mathematics.whole_body_qp import joint_torque
-from ...mathematics.whole_body_solution import SOLVED, Solution
-from ..rows import Row
-from .reference import APEX, EDGE, INSIDE, Proposal, proved_minimum
-from .states import (
-    JUMPS,
-    SEED,
-    STANCES,
-    State,
-    random_states,
-    recorded_states,
-    show_state,
-)
+from ..blocks.control.whole_body_controller import WholeBodyController
+from ..blocks.control.whole_body_program import WholeBodyProgram, rows_without_pyramids
+from ..mathematics.active_set import INFEASIBLE
+from ..mathematics.arrays import Array, Flags, Indices
+from ..mathematics.compiling.compile_calls import compile_calls
+from ..mathematics.compiling.kernel_call import KernelCall
+from ..mathematics.quadratic_program import SOLVED as CLARABEL_SOLVED
+from ..mathematics.quadratic_program import ConeProgramSolver
+from ..mathematics.whole_body_cones import cone_solution_memory, solve_whole_body_cones
+from ..mathematics.whole_body_qp import RigidBodyTerms, TaskRows, joint_torque
+from ..mathematics.whole_body_solution import SOLVED, Solution
+from ..runtime.graph import load
+from ..runtime.loading.reading.files import FOLDER
+from ..runtime.running.executor import Executor
+from ..runtime.running.memory import BoundGraph
+from .rows import Row
+
+Long = NDArray[np.longdouble]
+
+NEWTON_STEPS = 12
+FEASIBLE = 1e-8
+"""By how much a constraint may be violated [N, N m], and a multiplier be negative, times ``size``."""
+INSIDE, EDGE, APEX = 0, 1, 2
+"""Where in its cone a force is."""
+
+
+class Proposal(NamedTuple):
+    """What may hold at the minimum: a solution x, the active inequalities, and where in its cone each
+    force is. Without ``places`` friction is among the inequalities."""
+
+    x: Array
+    active: Flags
+    places: Indices
+
+
+def proved_minimum(program: WholeBodyProgram, proposal: Proposal, friction: float) -> Array | None:
+    """The minimiser, or ``None`` if the proposal is not right.
+
+    Args:
+        friction: of the round cones, if the proposal has any.
+    """
+    (p, q), (a, b), (g, h) = program.cost, program.equality, program.inequality
+    places, n = proposal.places, len(q)
+    if len(places):
+        kept = rows_without_pyramids(len(places), len(h))
+        g, h = g[kept], h[kept]
+    first = n - 3 * len(places)
+    held = [first + 3 * j + k for j in np.flatnonzero(places == APEX) for k in range(3)]
+    edges = [first + 3 * int(j) for j in np.flatnonzero(places == EDGE)]
+    lines = np.vstack((a, g[proposal.active], np.eye(n)[held])).astype(np.longdouble)
+    right = np.hstack((b, h[proposal.active], np.zeros(len(held)))).astype(np.longdouble)
+    m, k = len(lines), len(edges)
+    hessian, gradient = p.astype(np.longdouble), q.astype(np.longdouble)
+    x, y, v = (
+        proposal.x.astype(np.longdouble),
+        np.zeros(m, np.longdouble),
+        np.zeros(k, np.longdouble),
+    )
+    for step in range(NEWTON_STEPS):
+        normals, bends = _normals(x, edges, friction, v)
+        matrix = np.zeros((n + m + k, n + m + k))
+        matrix[:n, :n] = p + bends
+        sides = np.vstack((lines.astype(np.float64), normals.astype(np.float64)))
+        matrix[:n, n:], matrix[n:, :n] = sides.T, sides
+        outside = np.array(
+            [np.hypot(x[i], x[i + 1]) - np.longdouble(friction) * x[i + 2] for i in edges],
+            np.longdouble,
+        )
+        residual = np.hstack(
+            (hessian @ x + gradient + lines.T @ y + normals.T @ v, lines @ x - right, outside)
+        )
+        try:
+            change = np.linalg.solve(matrix, residual.astype(np.float64))
+        except np.linalg.LinAlgError:
+            return None
+        if not np.isfinite(change).all():
+            return None
+        x, y, v = x - change[:n], y - change[n : n + m], v - change[n + m :]
+        if step > 2 and np.abs(change[:n]).max() < 1e-13 * (1.0 + float(np.abs(x).max())):
+            break
+    size = 1.0 + float(np.abs(q).max())
+    prices = y[len(b) : len(b) + int(proposal.active.sum())].astype(np.float64)
+    answer = x.astype(np.float64)
+    normals, _ = _normals(x, edges, friction, v)
+    slope = hessian @ x + gradient + lines.T @ y + normals.T @ v
+    fine = (
+        float(np.abs(slope).max()) < 1e-9 * size
+        and float((g @ answer - h).max(initial=-1.0)) < FEASIBLE
+        and float(prices.min(initial=0.0)) > -FEASIBLE * size
+        and float(v.min(initial=0.0)) > -FEASIBLE * size
+        and all(
+            np.hypot(*answer[i : i + 2]) - friction * answer[i + 2] < FEASIBLE
+            for i in range(first, n, 3)
+            if len(places)
+        )
+    )
+    pushes = y[m - len(held) :].astype(np.float64).reshape(-1, 3)
+    fine = fine and all(friction * np.hypot(s[0], s[1]) + s[2] < FEASIBLE * size for s in pushes)
+    return answer if fine else None
+
+
+def _normals(x: Long, edges: list[int], friction: float, multipliers: Long) -> tuple[Long, Array]:
+    """The gradients of |f_t| - mu f_z of the forces at their cones' edges, and their curvature."""
+    normals, bends = np.zeros((len(edges), len(x)), np.longdouble), np.zeros((len(x), len(x)))
+    for row, i in enumerate(edges):
+        size = np.hypot(x[i], x[i + 1])
+        u = x[i : i + 2] / size if size > 0.0 else np.zeros(2, np.longdouble)
+        normals[row, i : i + 2], normals[row, i + 2] = u, -friction
+        across = np.array([-u[1], u[0]], np.float64)
+        share = float(multipliers[row] / size) if size > 0.0 else 0.0
+        bends[i : i + 2, i : i + 2] = share * np.outer(across, across)
+    return normals, bends
+
+
+GRAPH = FOLDER / "jump.yaml"
+SEED = 7001
+"""The seed of the recorded jumps; the next ones follow it."""
+JUMPS: dict[str, dict[str, Any]] = {
+    "as shipped": {},
+    "slipping": {"robot.friction": 0.35, "wbc.friction": 0.1},
+    "torque-limited": {"wbc.torque_margin": 0.35},
+    "turning": {"plan.task": "tasks/twist_30deg.yaml"},
+    "aside": {"plan.task": "tasks/side_10cm.yaml"},
+}
+"""The jumps whose states are used, and what differs from ``graphs/jump.yaml``."""
+STANCES = (None, (True, True, False, False), (False, False, False, True))
+"""Points in stance that each state is solved with: the recorded ones, one foot, and one point."""
+
+
+class State(NamedTuple):
+    """What a controller had in a tick, and what may differ from its parameters.
+
+    ``peak`` (n_joints,) are the motors' peak torques [N m], ``friction``, ``force_min`` and ``force_max`` [N] the
+    limits of the forces.
+    """
+
+    rows: TaskRows
+    model: RigidBodyTerms
+    stance: Flags
+    velocity: Array
+    peak: Array
+    friction: float
+    force_min: float
+    force_max: float
+
+
+def recorded_states(
+    overrides: dict[str, Any], duration: float | None = None, every: int = 1
+) -> tuple[WholeBodyController, list[State]]:
+    """The controller of a jump that is over, and its states in ticks with a point in stance.
+
+    Raises:
+        RunError: the jump failed.
+    """
+    graph = load(GRAPH, overrides).checked
+    bound = BoundGraph(graph)
+    (block,) = (b for b in bound.blocks.values() if isinstance(b, WholeBodyController))
+    found: list[State] = []
+    step: Callable[[], None] = block.step
+
+    def watched() -> None:
+        step()
+        if block.phase.stance.any() and bound.clock.tick % every == 0:
+            found.append(present_state(block))
+
+    block.step = watched  # type: ignore[method-assign]  # a recorder in its place
+    ticks = None if duration is None else round(duration * graph.base_rate)
+    Executor(bound, log=False, fuse=False).run(ticks).raise_if_failed()
+    return block, found
+
+
+def present_state(block: WholeBodyController) -> State:
+    """The state that a controller has now."""
+    w = block._weights
+    return State(
+        TaskRows(*(array.copy() for array in block._rows)),
+        RigidBodyTerms(*(array.copy() for array in block._model)),
+        block.phase.stance.copy(),
+        block.joints.velocity.copy(),
+        block._motors.curves.peak.copy(),
+        float(w.friction[0]),
+        float(w.force_min[0]),
+        float(w.force_max[0]),
+    )
+
+
+def show_state(block: WholeBodyController, state: State) -> None:
+    """Write a state into the memory of a controller whose graph does not run."""
+    pairs: list[tuple[Array, Any]] = [
+        *zip(block._rows, state.rows, strict=True),
+        *zip(block._model, state.model, strict=True),
+        (block.phase.stance, state.stance),
+        (block.joints.velocity, state.velocity),
+        (block._motors.curves.peak, state.peak),
+        (block._weights.friction, state.friction),
+        (block._weights.force_min, state.force_min),
+        (block._weights.force_max, state.force_max),
+    ]
+    for array, values in pairs:
+        array.setflags(write=True)  # inputs are read-only for the block itself
+        array[...] = values
+
+
+def random_states(states: list[State], count: int, seed: int) -> Iterator[State]:
+    """So many programs made from recorded ones: other points in stance, tasks that ask for up to ten
+    times as much with other weights, other speeds, friction and limits.
+
+    One in fifty has no solution: its forces must be larger than they may be. Otherwise there is always one,
+    because tasks are no constraints.
+    """
+    random = np.random.default_rng(seed)
+    for _ in range(count):
+        state = states[int(random.integers(len(states)))]
+        stance = random.random(len(state.stance)) < 0.6
+        stance[random.integers(len(stance))] = True
+        rows = TaskRows(*(array.copy() for array in state.rows))
+        size = 10.0 ** random.uniform(-1.0, 1.0)
+        rows.desired[:] += (
+            size * np.abs(rows.desired).mean() * random.standard_normal(len(rows.desired))
+        )
+        rows.weights[:] *= 10.0 ** random.uniform(-1.0, 1.0, len(rows.weights))
+        least = float(random.choice([0.0, 0.0, 0.0, 1.0, 10.0, 60.0]))
+        yield State(
+            rows,
+            state.model,
+            stance,
+            state.velocity + random.normal(0.0, 3.0, len(state.velocity)),
+            state.peak * random.uniform(0.15, 1.0),
+            random.uniform(0.1, 1.0),
+            least,
+            least + (float(random.uniform(20.0, 400.0)) if random.random() > 0.02 else -1.0),
+        )
+
 
 OWN, DAQP, CONES, CLARABEL = (
     "own method",
