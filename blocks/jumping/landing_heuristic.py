@@ -169,39 +169,10 @@ class LandingHeuristic(Block):
     measured momenta minus the planned ones: the planned footholds already fit the planned momentum,
     so feeding back the whole momentum of a forward jump would count it twice.
 
-    With ``law: predicted`` the landing place is chosen anew in every tick, from the momenta that
-    were not planned, by what it does to the torso. Feet that keep their place in the world turn a
-    torso that tilts even further; drawn up they turn BRUCE's forward, by 5 to 8 deg per cm
-    (``mathematics/landing_law``). All feet are shifted ahead, to the left, apart and upwards
-    by the s that costs least::
-
-        (s_x - g_x)^2 + (s_y - g_y)^2 + (apart_cost (s_a - g_a))^2 + (height_cost s_z)^2
-            + sum over roll and pitch of (tilt_cost h (tilt - free))^2
-
-    where tilt is the deviation from the planned orientation at touchdown, linear in s, of which up
-    to ``free_tilt`` costs nothing. Drawn up legs touch down later, by s_z over the speed of the
-    fall, and the base turns until then. s_z is within ``height_range`` h, but drawn up legs must
-    keep the stroke in which ``stop_acceleration`` g stops the fall, and stretched legs touch down early
-    by at most the share ``early`` of the flight. The goal g is the capture point of the linear
-    inverted pendulum of the standing height h, w^2 = g / h, times the gains::
-
-        g_x = capture l^x / (m w) + capture_turn k^y w / (m g),
-        g_y = capture l^y / (m w) - capture_turn k^x w / (m g),    g_a = clearance |l^y| / (m w)
-
-    These gains have no unit, so they are the same for robots of any size. p_max applies as above.
-    They are less than 1, aside even more, because two feet that stand apart hold a capture point that
-    is off their middle, and a long way with drawn up legs is at the end of the hips' reach.
-
-    A robot that lifts off with a slightly wrong velocity lands beside its place, and feet that go to
-    the capture point land even further off. Let e be by how much unshifted feet would miss their
-    planned place in the world, by the measured motion, and d = g + e the way from that place to the
-    capture point, both horizontal. Then g is replaced by
-
-        g - place_gain / (1 + (|d| / (place_range h))^4) d
-
-    so a small miss, within which standing feet keep the balance, is partly made good; after a push
-    the feet go to the capture point. Touchdown comes some milliseconds before its prediction, and in
-    a long jump the feet still swing then. So they are ahead of their planned way by ``lead_time``.
+    With ``law: predicted`` the landing place is chosen anew in every tick: all feet are shifted ahead,
+    to the left, apart and upwards by what costs least, counting the distance from the capture point,
+    the change of the legs' length, and the tilt of the torso at touchdown that the momenta lead to.
+    ``docs/landing.md`` has this law in full. p_max applies as above.
 
     The foot moves there from its position at lift-off, along x and y with minimum jerk over
     ``reach_share`` of the predicted flight. Its height follows the plan (paper, V), and near
