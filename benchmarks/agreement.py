@@ -16,9 +16,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..blocks.control.round_program import rows_without_pyramids
 from ..blocks.control.whole_body_controller import WholeBodyController
-from ..blocks.control.whole_body_program import WholeBodyProgram
+from ..blocks.control.whole_body_program import WholeBodyProgram, rows_without_pyramids
 from ..mathematics.active_set import INFEASIBLE
 from ..mathematics.arrays import Array, Flags, Indices
 from ..mathematics.compiling.compile_calls import compile_calls

@@ -30,7 +30,6 @@ from typing import Any
 import numpy as np
 
 from ...blocks.control.dynamics import LEAST_OFFSET, LEAST_SCALE, Dynamics
-from ...blocks.control.tasks.choose import PHASE_KINDS
 from ...blocks.control.tasks.contact_points import ContactPoints
 from ...blocks.control.tasks.posture import chosen_joints
 from ...blocks.control.tasks.task import PHASE_KINDS
@@ -409,7 +408,7 @@ class TsidCheck:
     def __init__(self, tsid: ModuleType, own: RecordedController) -> None:
         block, dynamics = own.bound.blocks["wbc"], own.bound.blocks["dynamics"]
         assert isinstance(block, WholeBodyController) and isinstance(dynamics, Dynamics)
-        assert any(type(task) is ContactPoints for task in block._tasks)
+        assert any(type(task) is ContactPoints for task in block._tasks["stand"])
         self._tsid, self._block, self._dynamics = tsid, block, dynamics
         n, contacts = len(block.command.acceleration), len(block.command.force)
         self._mass = np.zeros((n, n))
