@@ -18,7 +18,7 @@ _ITEM_EXAMPLE = "block.port, block.port.field[2], or a number"
 
 
 @dataclass(frozen=True)
-class Link:
+class WrittenWire:
     """One end of a wire as it is written; ``instance`` is set for a sub-graph's own input.
 
     ``source`` is the absolute ``block.port``, or the input's name where ``instance`` is set. A wire
@@ -34,11 +34,11 @@ class Link:
     constant: MapNode | None = None
     selection: Selection = WHOLE
     literal: Node | None = None
-    parts: tuple[LinkPart, ...] = ()
+    parts: tuple[WrittenWirePart, ...] = ()
 
 
 @dataclass(frozen=True)
-class LinkPart:
+class WrittenWirePart:
     """What one field of an input is made of: one source, or a list of several one behind another.
 
     ``field`` is empty for the only field of the input.
@@ -46,13 +46,13 @@ class LinkPart:
 
     field: str
     where: Position
-    items: tuple[Link, ...]
+    items: tuple[WrittenWire, ...]
     is_list: bool = False
 
 
-def read_link(
+def read_wire(
     node: Node, prefix: str, instance: str | None, at: str, problems: Problems
-) -> Link | None:
+) -> WrittenWire | None:
     """The link that an input's value writes; ``None`` after a problem.
 
     Block paths get ``prefix`` in front; ``inputs.name`` is an input of the sub-graph ``instance``.
@@ -112,7 +112,7 @@ def _read_fields(
     instance: str | None,
     at: str,
     problems: Problems,
-) -> Link | None:
+) -> WrittenWire | None:
     parts = []
     for key, entry in keys.items():
         value = entry.value
@@ -123,17 +123,17 @@ def _read_fields(
         if part is None:
             return None
         parts.append(replace(part, where=entry.key_where))
-    return Link(node.where, parts=tuple(parts))
+    return WrittenWire(node.where, parts=tuple(parts))
 
 
 def _read_expression(
     node: ScalarNode | ListNode, prefix: str, instance: str | None, at: str, problems: Problems
-) -> Link | None:
+) -> WrittenWire | None:
     """A source, a number, or a list of these."""
     if isinstance(node, ScalarNode) and not is_number(node):
         return _read_source(node, prefix, instance, at, problems)
     part = _read_part("", node, prefix, instance, at, problems)
-    return Link(node.where, parts=(part,)) if part is not None else None
+    return WrittenWire(node.where, parts=(part,)) if part is not None else None
 
 
 def _read_part(
@@ -143,25 +143,25 @@ def _read_part(
     instance: str | None,
     at: str,
     problems: Problems,
-) -> LinkPart | None:
+) -> WrittenWirePart | None:
     if _all_numbers(node):
-        return LinkPart(field, node.where, (Link(node.where, literal=node),))
+        return WrittenWirePart(field, node.where, (WrittenWire(node.where, literal=node),))
     if isinstance(node, ScalarNode):
         link = _read_source(node, prefix, instance, at, problems)
-        return LinkPart(field, node.where, (link,)) if link is not None else None
+        return WrittenWirePart(field, node.where, (link,)) if link is not None else None
     items = []
     for item in node.items:
         if not isinstance(item, ScalarNode):
             wrong_kind(item, f"an item of the list for {at}", _ITEM_EXAMPLE, problems, at=at)
             return None
         if is_number(item):
-            items.append(Link(item.where, literal=item))
+            items.append(WrittenWire(item.where, literal=item))
             continue
         link = _read_source(item, prefix, instance, at, problems)
         if link is None:
             return None
         items.append(link)
-    return LinkPart(field, node.where, tuple(items), is_list=True)
+    return WrittenWirePart(field, node.where, tuple(items), is_list=True)
 
 
 def is_number(node: ScalarNode) -> bool:
@@ -179,7 +179,7 @@ def _all_numbers(node: Node) -> bool:
 
 def _read_source(
     node: ScalarNode, prefix: str, instance: str | None, at: str, problems: Problems
-) -> Link | None:
+) -> WrittenWire | None:
     text = node.value
     found = read_selection(text) if isinstance(text, str) else None
     if found is None:
@@ -196,7 +196,7 @@ def _read_source(
     block, _, port = text.rpartition(".")
     if block == "inputs":
         if instance is not None:
-            return Link(node.where, port, instance, selection=selection)
+            return WrittenWire(node.where, port, instance, selection=selection)
         problems.add(
             Code.UNKNOWN_SOURCE,
             f"{text!r} stands for an input of a sub-graph, and this file is not one",
@@ -206,12 +206,12 @@ def _read_source(
             found=text,
         )
         return None
-    return Link(node.where, prefix + text, selection=selection)
+    return WrittenWire(node.where, prefix + text, selection=selection)
 
 
 def _read_constant(
     node: MapNode, keys: Mapping[str, Entry], at: str, problems: Problems
-) -> Link | None:
+) -> WrittenWire | None:
     value = keys["value"].value
     for other in [key for key in keys if key != "value" and key in WIRE_KEYS]:
         problems.add(
@@ -224,7 +224,7 @@ def _read_constant(
     if not isinstance(value, MapNode):
         wrong_kind(value, "'value'", "fields and numbers: {value: {field: 0.0}}", problems, at=at)
         return None
-    return Link(node.where, constant=value)
+    return WrittenWire(node.where, constant=value)
 
 
 def _read_delay(entry: Entry | None, at: str, problems: Problems) -> int:

@@ -20,24 +20,24 @@ from ..flattening.flat import FlatBlock, FlatGraph
 from ..flattening.machines import on_machines, read_machines
 from ..flattening.rates import check_hyperperiod, read_offset, read_period
 from ..problems import Code, Problems, nearest
-from .block_check import Draft, check_defaults, check_emit, check_fit, check_sizes, lacks_robot
-from .carry import carried_fields, carry, unchecked_wires
-from .compose import put_together
+from .block_check import BlockDraft, check_defaults, check_emit, check_fit, check_sizes, lacks_robot
+from .composite_wires import resolve_composite_wires
+from .infer_units import infer_quantities, inferred_quantities, unchecked_wires
 from .inserted import insert_constant, insert_delay, read_values
 from .link_settings import check_paths, check_watchdog, read_link_settings
+from .parameter_references import resolve_references
 from .parameters import check_parameters
 from .settings import Settings, read_settings
-from .told import resolve_told
 from .wire_check import WireCheck
 
 LONGEST_RING = 8
 """Names at each end of a ring that are printed; what is between is counted."""
 
 
-def examine(graph: FlatGraph, problems: Problems) -> CheckedGraph | None:
+def check_graph(graph: FlatGraph, problems: Problems) -> CheckedGraph | None:
     """Check the whole graph. Returns ``None`` if there is any problem, also one noted before."""
     settings = read_settings(graph, problems)
-    graph = resolve_told(graph, settings, problems)
+    graph = resolve_references(graph, settings, problems)
     if graph.empty:
         where = Position(graph.file, 1, 1)
         problems.add(Code.MISSING_KEY, "the graph has no blocks", where, fix="blocks: ...")
@@ -45,10 +45,10 @@ def examine(graph: FlatGraph, problems: Problems) -> CheckedGraph | None:
     if settings.base_rate is not None and graph.rate is not None:
         periods = (draft.period_ticks for draft in drafts.values())
         check_hyperperiod(periods, graph.rate.key_where, problems)
-    drafts = put_together(graph, drafts, settings.robot, problems)
+    drafts = resolve_composite_wires(graph, drafts, settings.robot, problems)
     wires = WireCheck(graph, drafts, problems)
     values: dict[str, Any] = {}
-    carry(drafts, problems)
+    infer_quantities(drafts, problems)
     check_sizes(graph, drafts, problems)
     for draft in drafts.values():
         wires.check(draft)
@@ -68,8 +68,8 @@ def examine(graph: FlatGraph, problems: Problems) -> CheckedGraph | None:
     return None if len(problems) else checked
 
 
-def _draft(flat: FlatBlock, graph: FlatGraph, settings: Settings, problems: Problems) -> Draft:
-    draft = Draft(flat)
+def _draft(flat: FlatBlock, graph: FlatGraph, settings: Settings, problems: Problems) -> BlockDraft:
+    draft = BlockDraft(flat)
     if settings.base_rate is not None:
         draft.period_ticks = read_period(flat, settings.base_rate, problems)
         draft.offset_ticks = read_offset(flat, draft.period_ticks, problems)
@@ -155,7 +155,7 @@ def _places_of_modules(flat: FlatBlock, graph: FlatGraph) -> str:
     return f"{file} in {shown}, or a module that Python finds"
 
 
-def _check_dimensions(draft: Draft, settings: Settings, problems: Problems) -> bool:
+def _check_dimensions(draft: BlockDraft, settings: Settings, problems: Problems) -> bool:
     """Whether every named dimension of the block's ports is known and at least 1.
 
     A dimension of the robot may be zero: one without feet has empty arrays for its contacts.
@@ -201,14 +201,14 @@ def _check_dimensions(draft: Draft, settings: Settings, problems: Problems) -> b
 
 
 def _read_values(
-    draft: Draft, drafts: Mapping[str, Draft], values: dict[str, Any], problems: Problems
+    draft: BlockDraft, drafts: Mapping[str, BlockDraft], values: dict[str, Any], problems: Problems
 ) -> None:
     """Check and keep the initial values of delays, and constants, by ``block.input``."""
     for name, wire in draft.flat.wires.items():
         at = f"{draft.flat.path}.{name}"
         port = draft.inputs.get(name)
         signal: type[Signal] | None = None
-        owner: Draft | None = draft
+        owner: BlockDraft | None = draft
         node = wire.constant
         if wire.constant is not None and port is not None:
             signal = port.signal
@@ -222,7 +222,7 @@ def _read_values(
             values[at] = read_values(node, signal, owner, at, problems)
 
 
-def _machines(drafts: Mapping[str, Draft]) -> list[ScheduleBlock]:
+def _machines(drafts: Mapping[str, BlockDraft]) -> list[ScheduleBlock]:
     """The blocks as the schedule needs them; wires whose ends do not exist are left out."""
     outputs = {f"{path}.{name}" for path, draft in drafts.items() for name in draft.outputs}
     return [
@@ -240,7 +240,7 @@ def _machines(drafts: Mapping[str, Draft]) -> list[ScheduleBlock]:
     ]
 
 
-def _report_loops(drafts: Mapping[str, Draft], problems: Problems) -> None:
+def _report_loops(drafts: Mapping[str, BlockDraft], problems: Problems) -> None:
     for loop in find_loops(_machines(drafts)):
         # The last wire leads back to the first block of the ring: usually that is the feedback.
         ports = [port for port in loop.ports if not drafts[port.rpartition(".")[0]].stands_for]
@@ -278,7 +278,7 @@ def _assemble(
     graph: FlatGraph,
     settings: Settings,
     base_rate: float,
-    drafts: Mapping[str, Draft],
+    drafts: Mapping[str, BlockDraft],
     values: Mapping[str, Any],
 ) -> CheckedGraph:
     specs: list[BlockSpec] = []
@@ -314,7 +314,7 @@ def _assemble(
                 draft.offset_ticks,
                 flat.where,
                 flat.folder,
-                quantities=carried_fields(draft, drafts),
+                quantities=inferred_quantities(draft, drafts),
             )
         )
     order = order_blocks(

@@ -17,26 +17,26 @@ from ....robots.description import RobotDescription
 from ...language.parameters import Parameters
 from ...language.quantities import quantity_of
 from ...language.signals import Field, Signal
-from ..flattening.flat import FlatBlock, FlatGraph, FlatWire, Item, Part
+from ..flattening.flat import FlatBlock, FlatGraph, FlatWire, WireElement, WirePart
 from ..problems import Code, Problems, listing, nearest
 from ..reading.nodes import Entry, MapNode, text_of
 from ..reading.selection import Selection, runs, select
-from .block_check import Draft
-from .inserted import Piece, gather_block_type, part_signal, read_values
+from .block_check import BlockDraft
+from .inserted import GatherPiece, gather_block_type, part_signal, read_values
 from .wire_check import WireCheck
 
 JOINTS = "n_joints"
 """The dimension whose elements have the names of the robot's joints."""
 
 
-def put_together(
+def resolve_composite_wires(
     graph: FlatGraph,
-    drafts: Mapping[str, Draft],
+    drafts: Mapping[str, BlockDraft],
     robot: RobotDescription | None,
     problems: Problems,
-) -> dict[str, Draft]:
+) -> dict[str, BlockDraft]:
     """The drafts with an inserted block in front of every input that is put together."""
-    found: dict[str, Draft] = {}
+    found: dict[str, BlockDraft] = {}
     check = WireCheck(graph, drafts, problems)
     names = tuple(joint.name for joint in robot.joints) if robot is not None else ()
     for path, draft in drafts.items():
@@ -48,11 +48,11 @@ def put_together(
                 continue
             composer = _Composer(draft, name, wire, drafts, check, names, problems)
             made = composer.compose()
-            if isinstance(made, Draft):
+            if isinstance(made, BlockDraft):
                 found[made.flat.path] = made
                 source = f"{made.flat.path}.y"
                 delay = (wire.delay, wire.initial)
-                wires[name] = FlatWire(source, wire.where, *delay, shown=composer.said)
+                wires[name] = FlatWire(source, wire.where, *delay, shown=composer.wire_text)
             elif isinstance(made, FlatWire):
                 wires[name] = made
             else:
@@ -66,10 +66,10 @@ def put_together(
 
 @dataclass
 class _Composer:
-    reader: Draft
+    reader: BlockDraft
     name: str
     wire: FlatWire
-    drafts: Mapping[str, Draft]
+    drafts: Mapping[str, BlockDraft]
     check: WireCheck
     joints: tuple[str, ...]
     problems: Problems
@@ -79,11 +79,11 @@ class _Composer:
         self.signal: type[Signal] = self.reader.inputs[self.name].signal
         self.inputs: dict[str, type[Signal]] = {}
         self.wires: dict[str, FlatWire] = {}
-        self.pieces: list[Piece] = []
+        self.pieces: list[GatherPiece] = []
         self.fields: dict[str, tuple[tuple[int, ...], str]] = {}
-        self.said = said(replace(self.wire, delay=0, truth=False).plain())
+        self.wire_text = wire_text(replace(self.wire, delay=0, truth=False).plain())
 
-    def compose(self) -> Draft | FlatWire | None:
+    def compose(self) -> BlockDraft | FlatWire | None:
         """The inserted block, or a constant, or ``None`` after a problem."""
         parts = self._by_field()
         if parts is None:
@@ -100,10 +100,10 @@ class _Composer:
             return None
         return self._draft()
 
-    def _by_field(self) -> dict[str, Part] | None:
+    def _by_field(self) -> dict[str, WirePart] | None:
         """The parts by the reader's fields."""
         fields = self.signal.fields
-        found: dict[str, Part] = {}
+        found: dict[str, WirePart] = {}
         for part in self.wire.parts:
             name = part.field
             if not name:
@@ -142,7 +142,7 @@ class _Composer:
             return None
         return found
 
-    def _constant(self, parts: Mapping[str, Part]) -> FlatWire | None:
+    def _constant(self, parts: Mapping[str, WirePart]) -> FlatWire | None:
         """The wire of numbers alone."""
         if self.wire.delay:
             self._report(
@@ -155,18 +155,18 @@ class _Composer:
         )
         return FlatWire("", self.wire.where, constant=MapNode(entries, self.wire.where))
 
-    def _part(self, name: str, part: Part) -> None:
+    def _part(self, name: str, part: WirePart) -> None:
         """Add the pieces of one of the reader's fields."""
         field = self.signal.fields[name]
         shape: tuple[int, ...] = ()
         start = 0
-        types: dict[str, Item] = {}
+        types: dict[str, WireElement] = {}
         for item in part.items:
             if item.literal is not None:
                 values = self._numbers(name, field, item)
                 if values is None:
                     return
-                self.pieces.append(Piece(name, numbers=values, start=start))
+                self.pieces.append(GatherPiece(name, numbers=values, start=start))
                 shape, count = (len(values),), len(values)
             else:
                 taken = self._source(item)
@@ -175,13 +175,13 @@ class _Composer:
                 port, source, places = taken
                 types.setdefault(source.dtype_name, item)
                 copies = tuple((a, start + b, n) for a, b, n in runs(places))
-                self.pieces.append(Piece(name, port, source.name, copies))
+                self.pieces.append(GatherPiece(name, port, source.name, copies))
                 shape, count = places.shape, int(places.size)
             start += count
         if len(types) > 1:
             (first, a), (second, b) = list(types.items())[:2]
             self._report(
-                f"{said(a.plain())} is {first} and {said(b.plain())} is {second}",
+                f"{wire_text(a.plain())} is {first} and {wire_text(b.plain())} is {second}",
                 part.where,
                 expected=field.dtype_name,
                 found=listing(types),
@@ -192,7 +192,7 @@ class _Composer:
             shape = wanted if wanted == () and start == 1 else (start,)
         self.fields[name] = (shape, next(iter(types), field.dtype_name))
 
-    def _numbers(self, name: str, field: Field, item: Item) -> tuple[float, ...] | None:
+    def _numbers(self, name: str, field: Field, item: WireElement) -> tuple[float, ...] | None:
         """Numbers between sources, as those of a constant."""
         assert item.literal is not None
         alone = type("One", (Signal,), {name: _of_one(field)})
@@ -204,10 +204,10 @@ class _Composer:
             return None
         return tuple(np.atleast_1d(np.asarray(values[name], np.float64)).tolist())
 
-    def _source(self, item: Item) -> tuple[str, Field, NDArray[np.int64]] | None:
+    def _source(self, item: WireElement) -> tuple[str, Field, NDArray[np.int64]] | None:
         """The inserted block's input for a source, the field, and the places selected in it."""
         assert item.wire is not None
-        wire = replace(item.wire, where=item.where, shown=said(item.plain()))
+        wire = replace(item.wire, where=item.where, shown=wire_text(item.plain()))
         ends = self.check.source(self.at, wire, self.reader, None)
         if ends is None:
             return None
@@ -228,7 +228,7 @@ class _Composer:
             places = select(Selection("", item.selection.indices), shape, names)
         except ValueError as error:
             self._report(
-                f"{said(item.plain())}: {error}",
+                f"{wire_text(item.plain())}: {error}",
                 item.where,
                 other=wire.source,
                 other_where=draft.flat.where,
@@ -241,7 +241,7 @@ class _Composer:
         return port, field, places
 
     def _unknown_field(
-        self, item: Item, name: str, fields: Mapping[str, Field], draft: Draft
+        self, item: WireElement, name: str, fields: Mapping[str, Field], draft: BlockDraft
     ) -> None:
         assert item.wire is not None
         source = item.wire.source
@@ -255,12 +255,12 @@ class _Composer:
             other=source,
             other_where=draft.flat.where,
             expected=listing(f"{source}.{each}" for each in fields),
-            found=said(item.plain()),
+            found=wire_text(item.plain()),
             nearest=tuple(f"{source}.{each}" for each in similar),
             fix=f"{self.name}: {source}.{similar[0]}{indices}" if similar else "",
         )
 
-    def _draft(self) -> Draft | None:
+    def _draft(self) -> BlockDraft | None:
         """The inserted block: in the ticks of its reader, or of its sources where it is delayed."""
         reader = self.reader
         clock = (reader.period_ticks, reader.offset_ticks)
@@ -297,10 +297,10 @@ class _Composer:
                 name: q if q is not None and q.unit is not None else None
                 for name, q in wanted.items()
             },
-            said=self.said,
+            wire_text=self.wire_text,
             reads_truth=reader.inputs[self.name].reads_truth,
         )
-        draft = Draft(flat, block_type, Parameters(), {}, complete=True, stands_for=self.at)
+        draft = BlockDraft(flat, block_type, Parameters(), {}, complete=True, stands_for=self.at)
         draft.period_ticks, draft.offset_ticks = clock
         return draft
 
@@ -308,7 +308,7 @@ class _Composer:
         self.problems.add(Code.SELECTION, message, where, **{"at": self.at, **details})  # type: ignore[arg-type]  # texts
 
 
-def said(plain: object) -> str:
+def wire_text(plain: object) -> str:
     """What a graph says, in one line; the text of one source without the quotes of YAML."""
     return plain if isinstance(plain, str) else text_of(plain)
 

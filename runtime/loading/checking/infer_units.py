@@ -9,11 +9,11 @@ from ...language.block import Block
 from ...language.quantities import UNCHECKED, Given, Quantity, quantity_of
 from ...language.unit_algebra import over
 from ..problems import Code, Problems
-from .block_check import Draft
+from .block_check import BlockDraft
 from .inserted import own_unit
 
 
-def carry(drafts: Mapping[str, Draft], problems: Problems) -> None:
+def infer_quantities(drafts: Mapping[str, BlockDraft], problems: Problems) -> None:
     """Fill in the quantities of all drafts, and report inputs that do not go together.
 
     A block is asked when all its wired inputs are known. Where blocks wait for each other in a
@@ -21,15 +21,15 @@ def carry(drafts: Mapping[str, Draft], problems: Problems) -> None:
     is missing is taken for a plain number. Every block is asked again at the end, so that a ring
     whose quantities contradict each other is found.
     """
-    carrier = _Carrier(drafts)
-    carrier.run()
+    inference = _QuantityInference(drafts)
+    inference.run()
     for draft in drafts.values():
         if draft.block_type is not None and draft.params is not None:
-            _check(draft, carrier.given(draft), problems)
+            _check(draft, inference.given(draft), problems)
 
 
-class _Carrier:
-    def __init__(self, drafts: Mapping[str, Draft]) -> None:
+class _QuantityInference:
+    def __init__(self, drafts: Mapping[str, BlockDraft]) -> None:
         self.drafts = drafts
         self.readers: dict[str, list[str]] = {}
         for path, draft in drafts.items():
@@ -41,14 +41,14 @@ class _Carrier:
                     if declared is not None:
                         draft.quantities[f"{name}.{field_name}"] = declared
         self.waiting = {path: None for path, draft in drafts.items() if self._missing(draft)}
-        self.vain: dict[str, None] = {}
+        self.unanswered: dict[str, None] = {}
         """Blocks that had no answer to what has arrived so far."""
 
     def run(self) -> None:
         """Ask all blocks until every output is known."""
         self._settle(self.waiting)
         while self.waiting:
-            asked = (path for path in self.waiting if path not in self.vain)
+            asked = (path for path in self.waiting if path not in self.unanswered)
             changed = next((path for path in asked if self._ask(path)), None)
             if changed is None:
                 changed = next(iter(self.waiting))
@@ -74,7 +74,7 @@ class _Carrier:
     def _ask(self, path: str) -> bool:
         """Whether the block could say any further quantity."""
         draft = self.drafts[path]
-        answers = answers_of(draft, self.given(draft)) or {}
+        answers = inferred_outputs(draft, self.given(draft)) or {}
         found = False
         for name in list(self._missing(draft)):
             if answers.get(name) is not None:
@@ -83,22 +83,22 @@ class _Carrier:
         if found:
             self._tell_readers(path)
         else:
-            self.vain[path] = None
+            self.unanswered[path] = None
         return found
 
     def _tell_readers(self, path: str) -> None:
         """Something new arrives at the blocks that read this one: they may be asked again."""
         for reader in self.readers.get(path, ()):
-            self.vain.pop(reader, None)
+            self.unanswered.pop(reader, None)
 
-    def _missing(self, draft: Draft) -> Iterator[str]:
+    def _missing(self, draft: BlockDraft) -> Iterator[str]:
         """The output fields that are not known yet."""
         for name, output in draft.outputs.items():
             for field_name in output.signal.fields:
                 if f"{name}.{field_name}" not in draft.quantities:
                     yield f"{name}.{field_name}"
 
-    def _complete(self, draft: Draft) -> bool:
+    def _complete(self, draft: BlockDraft) -> bool:
         """Whether the quantities of all wired inputs are known."""
         for name, wire in draft.flat.wires.items():
             port = draft.inputs.get(name)
@@ -107,23 +107,26 @@ class _Carrier:
                 continue
             fields = source.outputs[wire.source_port].signal.fields
             for field_name in port.signal.fields:
-                if field_name in fields and arriving(self.drafts, draft, name, field_name) is None:
+                if (
+                    field_name in fields
+                    and quantity_at_input(self.drafts, draft, name, field_name) is None
+                ):
                     return False
         return True
 
-    def given(self, draft: Draft) -> Given:
+    def given(self, draft: BlockDraft) -> Given:
         """The quantities at a block's inputs."""
         found = {}
         for name, port in draft.inputs.items():
             for field_name in port.signal.fields:
-                quantity = arriving(self.drafts, draft, name, field_name)
+                quantity = quantity_at_input(self.drafts, draft, name, field_name)
                 if quantity is not None:
                     found[f"{name}.{field_name}"] = quantity
         return Given(found)
 
 
-def arriving(
-    drafts: Mapping[str, Draft], draft: Draft, name: str, field_name: str
+def quantity_at_input(
+    drafts: Mapping[str, BlockDraft], draft: BlockDraft, name: str, field_name: str
 ) -> Quantity | None:
     """What arrives at an input's field; ``None`` where nothing is wired, or it is not known yet."""
     wire = draft.flat.wires.get(name)
@@ -135,7 +138,7 @@ def arriving(
     return source.quantities.get(f"{wire.source_port}.{field_name}") if source else None
 
 
-def constant_quantity(draft: Draft, name: str, field_name: str) -> Quantity:
+def constant_quantity(draft: BlockDraft, name: str, field_name: str) -> Quantity:
     """The quantity of a constant: that of the input's field; a plain number if it takes any."""
     field = draft.inputs[name].signal.fields[field_name]
     declared = quantity_of(field)
@@ -146,7 +149,7 @@ def constant_quantity(draft: Draft, name: str, field_name: str) -> Quantity:
     return Quantity(own_unit(entry.value))
 
 
-def carried_fields(draft: Draft, drafts: Mapping[str, Draft]) -> dict[str, Quantity]:
+def inferred_quantities(draft: BlockDraft, drafts: Mapping[str, BlockDraft]) -> dict[str, Quantity]:
     """What a block's carried fields are in this graph, by ``port.field``."""
     found = {}
     for name, output in draft.outputs.items():
@@ -155,20 +158,20 @@ def carried_fields(draft: Draft, drafts: Mapping[str, Draft]) -> dict[str, Quant
                 found[f"{name}.{field_name}"] = draft.quantity(name, field_name)
     for name, port in draft.inputs.items():
         for field_name, field in port.signal.fields.items():
-            arrives = arriving(drafts, draft, name, field_name) if field.carried else None
+            arrives = quantity_at_input(drafts, draft, name, field_name) if field.carried else None
             if arrives is not None:
                 found[f"{name}.{field_name}"] = arrives
     return found
 
 
-def unchecked_wires(drafts: Mapping[str, Draft]) -> Iterator[str]:
+def unchecked_wires(drafts: Mapping[str, BlockDraft]) -> Iterator[str]:
     """A text for every wire whose reader has a unit and whose source does not say its own."""
     for path, draft in drafts.items():
         for name, wire in draft.flat.wires.items():
             if wire.constant is not None or name not in draft.inputs or draft.stands_for:
                 continue
             for field_name, field in draft.inputs[name].signal.fields.items():
-                arrives = arriving(drafts, draft, name, field_name)
+                arrives = quantity_at_input(drafts, draft, name, field_name)
                 if field.unit is not None and arrives is not None and arrives.unit is None:
                     yield (
                         f"{wire.shown or wire.source} does not say its unit, and {path}.{name} reads "
@@ -176,7 +179,7 @@ def unchecked_wires(drafts: Mapping[str, Draft]) -> Iterator[str]:
                     )
 
 
-def answers_of(draft: Draft, given: Given) -> dict[str, Quantity | None] | None:
+def inferred_outputs(draft: BlockDraft, given: Given) -> dict[str, Quantity | None] | None:
     """What the block says about its carried outputs, by ``port.field``; ``None`` if it fails."""
     block_type = draft.block_type
     carried = [
@@ -187,39 +190,39 @@ def answers_of(draft: Draft, given: Given) -> dict[str, Quantity | None] | None:
     ]
     if block_type is None or draft.params is None:
         return {f"{name}.{field_name}": UNCHECKED for name, field_name in carried}
-    said = {}
+    answers_by_name = {}
     silent = block_type.carried.__func__ is Block.carried.__func__  # type: ignore[attr-defined]  # a class method
     if not silent:
         try:
-            said = dict(block_type.carried(draft.params, given))
+            answers_by_name = dict(block_type.carried(draft.params, given))
         except Exception:  # noqa: BLE001  wrong parameters, which are reported; or a user's mistake
             silent = True
     return {
         f"{name}.{field_name}": UNCHECKED
         if silent
-        else said.get(f"{name}.{field_name}", said.get(name))
+        else answers_by_name.get(f"{name}.{field_name}", answers_by_name.get(name))
         for name, field_name in carried
     }
 
 
-def _check(draft: Draft, given: Given, problems: Problems) -> None:
+def _check(draft: BlockDraft, given: Given, problems: Problems) -> None:
     """Report where a block's inputs disagree, or an output contradicts what a ring said before."""
     flat = draft.flat
-    answers = answers_of(draft, given) or {}
+    answers = inferred_outputs(draft, given) or {}
     for item in given.disagreements:
         name = item.port.partition(".")[0]
         wire = flat.wires.get(name)
         other = item.other.partition(".")[0]
         reason = item.reason or f"{other} and {name} must be the same quantity"
         differ = item.expected is None or _units_differ(item.expected, item.found)
-        said = f"{flat.path}.{name}"
+        reader = f"{flat.path}.{name}"
         if draft.stands_for and wire is not None:
-            said = wire.shown
+            reader = wire.shown
         problems.add(
             Code.UNIT if differ else Code.FRAME,
-            f"{said} is in {_named(item.found)}: {reason}",
+            f"{reader} is in {_named(item.found)}: {reason}",
             wire.where if wire else flat.where,
-            at=draft.stands_for or said,
+            at=draft.stands_for or reader,
             other=f"{flat.path}.{other}" if other else "",
             other_where=flat.wires[other].where if other in flat.wires else None,
             expected=_named(item.expected) if item.expected else "",

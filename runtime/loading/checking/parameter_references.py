@@ -23,7 +23,7 @@ from .settings import Settings
 KEY = "from"
 
 
-def resolve_told(graph: FlatGraph, settings: Settings, problems: Problems) -> FlatGraph:
+def resolve_references(graph: FlatGraph, settings: Settings, problems: Problems) -> FlatGraph:
     """The graph with every reference to what another block tells replaced by the value.
 
     A reference that leads nowhere is reported. One to a block with problems of its own is left
@@ -31,7 +31,7 @@ def resolve_told(graph: FlatGraph, settings: Settings, problems: Problems) -> Fl
     """
     if not any(True for block in graph.blocks for _ in _references(block)):
         return graph
-    return _Telling(graph, settings, problems).resolved()
+    return _ReferenceResolver(graph, settings, problems).resolved()
 
 
 def _references(block: FlatBlock) -> Iterator[tuple[Entry, ScalarNode]]:
@@ -44,21 +44,21 @@ def _references(block: FlatBlock) -> Iterator[tuple[Entry, ScalarNode]]:
                 yield entry, source
 
 
-class _Telling:
+class _ReferenceResolver:
     """One graph, whose blocks are asked for what they tell, each of them once."""
 
     def __init__(self, graph: FlatGraph, settings: Settings, problems: Problems) -> None:
         self.graph, self.settings, self.problems = graph, settings, problems
         self.blocks = {block.path: block for block in graph.blocks}
         self.done: dict[str, FlatBlock] = {}
-        self.told: dict[str, Mapping[str, tuple[Any, str]] | None] = {}
+        self.exported: dict[str, Mapping[str, tuple[Any, str]] | None] = {}
 
     def resolved(self) -> FlatGraph:
         blocks = tuple(self.block(block.path, ()) for block in self.graph.blocks)
         return replace(self.graph, blocks=blocks)
 
-    def block(self, path: str, asking: tuple[str, ...]) -> FlatBlock:
-        """A block without references; ``asking`` are the blocks that wait for it."""
+    def block(self, path: str, waiting_blocks: tuple[str, ...]) -> FlatBlock:
+        """A block without references; ``waiting_blocks`` are the blocks that wait for it."""
         if path in self.done:
             return self.done[path]
         block = self.blocks[path]
@@ -66,7 +66,7 @@ class _Telling:
         kept = {entry.key: entry for entry in block.parameters}
         for entry, source in _references(block):
             del kept[entry.key]
-            node = self.value(block, block_type, entry, source, (*asking, path))
+            node = self.value(block, block_type, entry, source, (*waiting_blocks, path))
             if node is not None:
                 kept[entry.key] = replace(entry, value=node)
         entries = tuple(kept[entry.key] for entry in block.parameters if entry.key in kept)
@@ -75,7 +75,7 @@ class _Telling:
 
     def value(
         self, reader: FlatBlock, block_type: type[Block] | None, entry: Entry,
-        source: ScalarNode, asking: tuple[str, ...],
+        source: ScalarNode, waiting_blocks: tuple[str, ...],
     ) -> Node | None:  # fmt: skip
         """What stands in place of a reference; ``None`` where that is not known."""
         at = f"{reader.path}.{entry.key}"
@@ -85,8 +85,8 @@ class _Telling:
         if not path:
             self._report_unknown(source, at, f"there is no block {name!r}", name, self.blocks)
             return None
-        if path in asking:
-            ring = [*asking[asking.index(path) :], path]
+        if path in waiting_blocks:
+            ring = [*waiting_blocks[waiting_blocks.index(path) :], path]
             self.problems.add(
                 Code.LOOP,
                 f"the parameters of {' -> '.join(ring)} follow from each other",
@@ -95,14 +95,16 @@ class _Telling:
                 fix="give one of them a value of its own",
             )
             return None
-        told = self.tells(path, asking)
-        if told is None:
+        exported = self.tells(path, waiting_blocks)
+        if exported is None:
             return None
-        if what not in told:
+        if what not in exported:
             use = self.blocks[path].use
-            self._report_unknown(source, at, f"{path} ({use}) tells no {what!r}", what, told, path)
+            self._report_unknown(
+                source, at, f"{path} ({use}) tells no {what!r}", what, exported, path
+            )
             return None
-        value, unit = told[what]
+        value, unit = exported[what]
         if isinstance(value, Misfit):
             self.problems.add(
                 Code.MISFIT,
@@ -132,11 +134,13 @@ class _Telling:
             return None
         return from_plain(value, source.where)
 
-    def tells(self, path: str, asking: tuple[str, ...]) -> Mapping[str, tuple[Any, str]] | None:
+    def tells(
+        self, path: str, waiting_blocks: tuple[str, ...]
+    ) -> Mapping[str, tuple[Any, str]] | None:
         """What a block tells and its parameters, with units; ``None`` if it has a problem."""
-        if path not in self.told:
-            self.told[path] = self._ask(self.block(path, asking))
-        return self.told[path]
+        if path not in self.exported:
+            self.exported[path] = self._ask(self.block(path, waiting_blocks))
+        return self.exported[path]
 
     def _ask(self, block: FlatBlock) -> Mapping[str, tuple[Any, str]] | None:
         block_type = self.type_of(block)
@@ -155,7 +159,7 @@ class _Telling:
             graph=self.graph.plain(),
         )
         try:
-            told = block_type.tells(params, context)
+            exported = block_type.tells(params, context)
         except Exception as error:  # noqa: BLE001  the block's own code must not hide others
             if not find_misfits(block_type, params, context):
                 self.problems.add(
@@ -166,7 +170,7 @@ class _Telling:
                     at=block.path,
                 )
             return None
-        return {**_own(params), **{name: (value, "") for name, value in told.items()}}
+        return {**_own_values(params), **{name: (value, "") for name, value in exported.items()}}
 
     def type_of(self, block: FlatBlock) -> type[Block] | None:
         """The class of a block; ``None`` if it has none, which is reported elsewhere."""
@@ -199,7 +203,7 @@ class _Telling:
         )
 
 
-def _own(params: Parameters) -> dict[str, tuple[Any, str]]:
+def _own_values(params: Parameters) -> dict[str, tuple[Any, str]]:
     """The parameters of a block as plain data, with their units."""
     data = params.model_dump(mode="json", round_trip=True)
     return {k: (data[k], unit_of(info)) for k, info in type(params).model_fields.items()}
