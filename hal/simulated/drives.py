@@ -27,6 +27,7 @@ from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.kernel import kernel
 from ...mathematics.linear_algebra import multiply_vector
 from ...robots.description import RobotDescription
+from ...runtime.language.steps import as_record
 from ..drive_control import Targets
 from .motor_feedback import MotorFeedback, MotorLoops, close_loops
 from .state import DriveState, TickRecord, update_maximum, update_minimum
@@ -47,18 +48,6 @@ class Motors(NamedTuple):
     peak: Array1D
     slope: Array1D
     no_load: Array1D
-
-
-class MotorRecord(NamedTuple):
-    """Sums and extremes of the motors over some physics steps, each (n,): see ``TickRecord``."""
-
-    saturated: Indices1D
-    torque_high: Array1D
-    torque_low: Array1D
-    speed_high: Array1D
-    speed_low: Array1D
-    overload: Array1D
-    joint_torque: Array1D
 
 
 class MotorScratch(NamedTuple):
@@ -137,7 +126,7 @@ def clip_joint_torque(
 
 @kernel
 def drive_motors(
-    velocity: Array1D, torque: Array1D, motors: Motors, scratch: MotorScratch, record: MotorRecord
+    velocity: Array1D, torque: Array1D, motors: Motors, scratch: MotorScratch, record: TickRecord
 ) -> None:
     """Limit the joint ``torque`` [N m] at the joint ``velocity`` [rad/s] in place, and record how near
     the motors come to their limits. Of what is not a number the record says so too."""
@@ -225,7 +214,7 @@ def drive_joints(
     joints: Joints,
     motors: Motors,
     scratch: MotorScratch,
-    record: MotorRecord,
+    record: TickRecord,
 ) -> None:
     """The joint torques of a physics step: what the commands ask for, as far as the motors can."""
     follow_commands(commands, released, joints)
@@ -240,7 +229,7 @@ def drive_loops(
     joints: Joints,
     motors: Motors,
     scratch: MotorScratch,
-    record: MotorRecord,
+    record: TickRecord,
 ) -> None:
     """As ``drive_joints``, but once a command has arrived each drive closes the loop of its motor."""
     follow_commands(commands, released, joints)
@@ -251,17 +240,6 @@ def drive_loops(
             joints.velocity, joints.torque,
         )  # fmt: skip
     drive_motors(joints.velocity, joints.torque, motors, scratch, record)
-
-
-class CommandFields(NamedTuple):
-    """The fields of ``JointCommand``."""
-
-    mode: Indices0D
-    torque: Array1D
-    position: Array1D
-    velocity: Array1D
-    stiffness: Array1D
-    damping: Array1D
 
 
 class CommandLatency(NamedTuple):
@@ -276,7 +254,7 @@ class CommandLatency(NamedTuple):
 
 @kernel
 def send_command(
-    command: CommandFields,
+    command: JointCommand,
     step: Indices0D,
     latency: CommandLatency,
     commands: CommandRing,
@@ -322,7 +300,7 @@ class MotorLimits:
         )
         n = len(robot.joints)
         self.scratch = MotorScratch(*(np.zeros(n) for _ in MotorScratch._fields))
-        self.record = MotorRecord(*(getattr(record, name) for name in MotorRecord._fields))
+        self.record = as_record(record)
         self.motor_torque = self.scratch.torque
         """The motors' torques of the last step [N m], (n_joints,)."""
 
@@ -402,5 +380,6 @@ class Drives:
     def sending(self, command: JointCommand, step: Counts, latency: CommandLatency) -> KernelCall:
         """Sends a command in the physics step ``step``, a count without a dimension. It arrives as
         late as its ``latency`` is long, but not before earlier commands."""
-        fields = CommandFields(*(getattr(command, name) for name in CommandFields._fields))
-        return KernelCall(send_command, fields, step, latency, self._commands, self._state.last_due)
+        return KernelCall(
+            send_command, as_record(command), step, latency, self._commands, self._state.last_due
+        )

@@ -272,10 +272,10 @@ def _kernel_argument(block: Block, function: FunctionType, name: str, used: froz
     return as_record(value, used) if isinstance(value, Signal) else value
 
 
-def as_record(signal: Signal, used: frozenset[str]) -> Any:
-    """The named tuple of those fields of a signal that kernels name."""
+def as_record(signal: Signal, used: frozenset[str] | None = None) -> Any:
+    """The named tuple of those fields of a signal that kernels name; by default of all."""
     views = signal.views()
-    names = tuple(name for name in views if name in used) or tuple(views)[:1]
+    names = tuple(name for name in views if used is None or name in used) or tuple(views)[:1]
     return record_type(type(signal).__name__, names)(*(views[name] for name in names))
 
 

@@ -1,16 +1,29 @@
-"""The tactile switches in a robot's contact points: each closes above a force, and bounces."""
+"""The sensors that a robot has without mounting any: encoders in its joints, switches in its contact points."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from ...blocks.signals import ContactSwitches
+from ...blocks.signals import ContactSwitches, JointState
 from ...mathematics.arrays import Array, Array1D, Counts, Flags, Flags1D, Indices0D, Indices1D
 from ...mathematics.compiling.call_sequence import Call
 from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.kernel import kernel
 from ..random_streams import uniform_call
-from .sensor import Sensor
+from .sensor import RosMessage, Sensor
+
+
+class JointSensors(Sensor):
+    """Encoders and current sensors in all drives of a robot. Who simulates the drives knows the true
+    values, and their bus carries the readings, so there is nothing to mount."""
+
+    kind = "joints"
+    signal = JointState
+    averaged = ("torque",)
+    ros2 = RosMessage(
+        "sensor_msgs/msg/JointState",
+        {"position": "position", "velocity": "velocity", "torque": "effort"},
+    )
 
 
 @kernel
