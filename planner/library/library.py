@@ -6,7 +6,6 @@ import json
 import os
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +13,6 @@ import numpy as np
 
 from ...robots.description import RobotDescription
 from ..task.errors import PlanError
-from ..task.multipliers import multipliers_path, read_multipliers, write_multipliers
 from ..task.plan import JumpPlan, PlanFileError, read_plan, task_of_header, write_plan
 from ..task.task import JumpTask, TaskError
 from .shipped import shipped_folder
@@ -203,8 +201,7 @@ class PlanLibrary:
             except PlanFileError:
                 continue
             if plan.valid and plan.task.hash(self.robot) in name:
-                beside = multipliers_path(Path(name).parent, plan.task.hash(self.robot))
-                return replace(plan, multipliers=read_multipliers(beside))
+                return plan
         return None
 
     def farthest(self, task: JumpTask, parameter: str, modest: float) -> JumpPlan | None:
@@ -262,8 +259,6 @@ class PlanLibrary:
         ]
         for path in others:
             path.unlink(missing_ok=True)
-            beside = multipliers_path(self.folder, path.stem.rpartition("-")[2])
-            beside.unlink(missing_ok=True)
         return others
 
     def add(self, plan: JumpPlan) -> Path:
@@ -273,11 +268,6 @@ class PlanLibrary:
         for other in self.folder.glob(f"*-{plan.task.hash(self.robot)}.npz"):
             if other != path:
                 other.unlink(missing_ok=True)
-        beside = multipliers_path(self.folder, plan.task.hash(self.robot))
-        if plan.multipliers is None:
-            beside.unlink(missing_ok=True)
-        else:
-            write_multipliers(beside, plan.multipliers)
         return path
 
     def plan(

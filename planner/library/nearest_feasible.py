@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 from ...robots.description import RobotDescription
 from ..checking.binding import what_binds
@@ -310,8 +310,6 @@ class _Search:
         self._solves += 1
         task = self._task.model_copy(update=dict(values))
         make = _quick(self._solve, start is not None)
-        if start is not None:  # over a stride this long its multipliers lead the solver astray
-            start = replace(start, multipliers=None)
         try:
             return solve_and_check(task, self._robot, start, make, refine=False)
         except (PlanError, InvalidPlanError, TaskError):

@@ -33,15 +33,13 @@ from .outcome import failure, versions
 from .paper_plan import solve_paper
 from .refinement import asks_for_finer, finer_knots, with_knots
 from .rigid_body_plan import solve_rigid_body
-from .solver import LIMIT, NEAR, Solution, solve, structure_of
+from .solver import LIMIT, NEAR, Solution, solve
 from .whole_robot import for_all_joints, for_moving_joints
 
 QUICK = 60
 """Iterations of a quick solve."""
 QUICK_NEAR = 40
 """Iterations of a quick solve from a plan with all coordinates; those that come to an end take 20 to 30."""
-KNOWN_LIMIT = 25
-"""Iterations from a plan and its multipliers; those that come to an end take 3 to 15."""
 LAST = 60
 """Iterations of IPOPT for one jump with all coordinates, where each takes 60 to 90 ms; all plans that it has
 found there took fewer."""
@@ -104,11 +102,9 @@ def solve_full(task: JumpTask, robot: RobotDescription, options: SolveOptions) -
         near, most = pack(problem, warm_start, guess), LIMIT
         if options.quick:
             most = QUICK_NEAR if problem.coordinates.name == "full" else QUICK
-        solution = _from_multipliers(problem, near, warm_start)
-        if solution is None or not solution.solved:
-            solution = solve(
-                problem, near, warm=True, barrier=_barrier(problem), solver="fatrop", limit=most
-            )
+        solution = solve(
+            problem, near, warm=True, barrier=_barrier(problem), solver="fatrop", limit=most
+        )
         if options.quick and not solution.solved and problem.coordinates.name == "full":
             # The jump straight ahead is farther than the plan, and takes as long again.
             raise failure(task, solution)
@@ -147,9 +143,8 @@ def solve_full(task: JumpTask, robot: RobotDescription, options: SolveOptions) -
         "compiled": not problem.assembly.interpreted,
     }
     return JumpPlan(
-        task=task, statistics=statistics, versions=versions(), multipliers=solution.multipliers,
-        **unpack(problem, solution.values),
-    )  # fmt: skip
+        task=task, statistics=statistics, versions=versions(), **unpack(problem, solution.values)
+    )
 
 
 FORMULATIONS: Mapping[str, Formulation] = {
@@ -258,15 +253,6 @@ def straight_ahead(task: JumpTask) -> JumpTask:
     ahead = {"distance_y": 0.0, "twist": 0.0}
     jumps = task.jumps and tuple(hop.model_copy(update=ahead) for hop in task.jumps)
     return task.model_copy(update={**ahead, "jumps": jumps})
-
-
-def _from_multipliers(problem: Problem, near: Array, plan: JumpPlan) -> Solution | None:
-    """A solution from a plan's variables and multipliers; ``None`` where these are not known, or mean
-    something else."""
-    known = plan.multipliers
-    if known is None or known.structure != structure_of(problem):
-        return None
-    return solve(problem, near, solver="fatrop", limit=KNOWN_LIMIT, multipliers=known)
 
 
 def _barrier(problem: Problem) -> float:

@@ -27,12 +27,8 @@ import numpy as np
 
 from ...mathematics.arrays import Array
 from .bounded import bounded, count, cpu_time
-from .given_multipliers import give, take, use_given_multipliers
 
 Answer = tuple[Array, dict[str, Any]]
-
-MULTIPLIERS = "multipliers"
-"""The name, among a solver's arguments and answers, of what is no argument of CasADi's."""
 
 KEPT = 12
 """Solvers that the process keeps; a further one is sent again when it is needed again."""
@@ -53,21 +49,11 @@ def has_one_thread() -> bool:
 
 
 def call_solver(function: Any, arguments: Mapping[str, Array]) -> Answer:
-    """Call a solver of CasADi. Returns the variables, and what it says of its success.
-
-    fatrop's ``arguments`` have ``multipliers`` besides, see ``given_multipliers``, an empty array for
-    none, and what comes back then has those with which it ended.
-    """
-    own = {name: value for name, value in arguments.items() if name != MULTIPLIERS}
-    given = arguments.get(MULTIPLIERS)
-    if given is not None:
-        give(given)
+    """Call a solver of CasADi. Returns the variables, and what it says of its success."""
     with quiet():
-        result = function(**own)
+        result = function(**arguments)
     stats = function.stats()
     found = {key: stats.get(key) for key in ("success", "iter_count", "unified_return_status")}
-    if given is not None:
-        found[MULTIPLIERS] = take()
     return np.array(result["x"]).ravel(), found
 
 
@@ -173,7 +159,6 @@ def serve() -> None:
     """What the process does: answers calls until its input ends."""
     import casadi as ca
 
-    use_given_multipliers()
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # meant for the one that asks
     requests: IO[bytes] = os.fdopen(os.dup(0), "rb")
     answers: IO[bytes] = os.fdopen(os.dup(1), "wb")

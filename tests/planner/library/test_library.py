@@ -11,7 +11,6 @@ import pytest
 from aloft.planner.checking.validity import InvalidPlanError
 from aloft.planner.library.library import SHIPPED, PlanLibrary, kept_name, task_distance
 from aloft.planner.task.errors import PlanError
-from aloft.planner.task.multipliers import Multipliers
 from aloft.planner.task.plan import JumpPlan, PlanFileError, write_plan
 from aloft.planner.task.read_task import read_task
 from aloft.planner.task.task import JumpTask, make_task
@@ -69,31 +68,6 @@ def test_what_is_not_there_is_solved_from_the_nearest_and_kept(
     assert kept and solver.started_from == ["in_situ"], "a name decides nothing"
     assert again.task == near()
     assert [path.name for path in tmp_path.iterdir()] == [kept_name(near(), ROBOT)]
-
-
-def test_multipliers_lie_beside_their_plan(tmp_path: Path, good: JumpPlan) -> None:
-    known = Multipliers(np.array([0.5, -2.0]), "a structure")
-    library = PlanLibrary(ROBOT, tmp_path, ())
-    library.plan(near(), Planner(replace(good, multipliers=known)))
-    (beside,) = (tmp_path / "multipliers").iterdir()
-    assert beside.name == f"{near().hash(ROBOT)}.npz"
-    found = library.nearest(near(rise=0.1504))
-    assert found is not None and found[0].multipliers is not None
-    assert found[0].multipliers.structure == "a structure"
-    np.testing.assert_array_equal(found[0].multipliers.values, [0.5, -2.0])
-    beside.write_bytes(b"PK not whole")
-    found = library.nearest(near(rise=0.1504))
-    assert found is not None and found[0].multipliers is None, "a plan is as good without them"
-    library.prune([IN_SITU])
-    assert not beside.exists()
-
-
-def test_multipliers_of_the_plan_before_do_not_stay(tmp_path: Path, good: JumpPlan) -> None:
-    library = PlanLibrary(ROBOT, tmp_path, ())
-    known = Multipliers(np.ones(3), "a structure")
-    library.plan(near(), Planner(replace(good, multipliers=known)))
-    library.plan(near(), Planner(good), anew=True)
-    assert list((tmp_path / "multipliers").iterdir()) == []
 
 
 def test_a_replaced_file_is_read_again(tmp_path: Path, good: JumpPlan) -> None:
